@@ -14,7 +14,7 @@ from symgen.version import VERSION
 project = "symgen"
 release = VERSION
 copyright = "the symgen authors"
-extensions = ["myst_parser", "mathml", "robot_pages"]
+extensions = ["myst_parser", "mathml", "robot_pages", "llms"]
 exclude_patterns = ["_build", "examples"]
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3

@@ -15,6 +15,7 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import BeforeValidator, TypeAdapter
 
 from runtime.core import study as chapter
@@ -233,7 +234,29 @@ def suggested(study: Study, model: GeneratedModel) -> tuple[Study, list[str]]:
                     record[key] = value
             study = study_from_mapping(mapping)
         else:
-            return study, sentences
+            break
+    missing = study.signals.admits_missing
+    turns = [_starts_anew(one, model, missing) for one in study.record]
+    if any(turns):
+        sentences.append("positions start anew at full turns; suggested: record: {unwrap: true}")
+        pairs = zip(study.record, turns, strict=True)
+        study = replace(study, record=tuple(replace(r, unwrap=r.unwrap or t) for r, t in pairs))
+    return study, sentences
+
+
+def _starts_anew(settings: RecordSettings, model: GeneratedModel, missing: bool) -> bool:
+    """Whether the largest steps between samples shrink to a fifth where angles are continued."""
+    jumps, moves = (
+        np.max(
+            [
+                np.abs(np.diff(r.q, axis=0)).max(axis=0)
+                for r in read_records((s,), model, missing=missing)
+            ],
+            axis=0,
+        )
+        for s in (settings, replace(settings, unwrap=True))
+    )
+    return bool(np.any(jumps > 5 * moves))
 
 
 def draft(study: Study, model: GeneratedModel) -> str:

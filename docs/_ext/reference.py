@@ -287,7 +287,8 @@ def robot(name: str) -> str:
             f"{docstrings.text(description.title or name)}. Actuated joints: "
             f"{len(description.joints)}; frames: {len(description.frames)}; "
             f"{len(regrouping)} base parameters of {len(description.parameters)}.", "",
-            f'<p><a href="../robots/{name}.html">{name}: skeleton, frames, formulas</a></p>', "",
+            f'<p><a href="../robots/{name}.html"><img src="../robots/{name}.svg" alt="skeleton of {name}">'
+            f"<br>{name}: frames, formulas, the skeleton to turn</a></p>", "",
             f"```text\n{formulas}\n```" if formulas else "", "",
             docstrings.text(" ".join((description.source or "").split())), "",
         ]

@@ -330,6 +330,11 @@ class Advice(Result, Part):
             )
         return text + ")."
 
+    def brief(self) -> str:
+        """The answer, then the steps by encoder, and those asked for."""
+        steps = [f"{table.caption}\n{table.to_text()}" for table in self.tables()[:-1]]
+        return "\n\n".join([self.verdict, *steps, *self.asked_lines()])
+
     def to_table(self) -> str:
         """Steps by encoder, then by parameter, then what was assumed."""
         tables = [table.to_text() for table in self.tables()]

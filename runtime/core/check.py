@@ -8,8 +8,8 @@ open       not asked, or only the user can tell: does not count
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import wraps
 from typing import Any, Literal, NamedTuple, ParamSpec
 
@@ -36,6 +36,9 @@ class Check:
         What to do where the answer is not good.
     ahead : bool
         Whether its finding is printed ahead of the values, most of which mean nothing then.
+    change : mapping of str to value
+        The remedy as a change of the study, where it is one: {"record.units.q": "deg"}. What stands
+        under record.scale are factors on the scale that is there, one a joint.
     """
 
     question: str
@@ -44,6 +47,7 @@ class Check:
     limit: str = ""
     remedy: str = ""
     ahead: bool = False
+    change: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def sentence(self) -> str:
@@ -59,6 +63,7 @@ class Answer(NamedTuple):
     finding: str
     remedy: str | None = None
     limit: str | None = None
+    change: Mapping[str, Any] = {}
 
 
 @dataclass(frozen=True)
@@ -80,7 +85,8 @@ class Question:
                 return None
             limit = self.limit if answer.limit is None else answer.limit
             remedy = self.remedy if answer.remedy is None else answer.remedy
-            return Check(self.question, answer.state, answer.finding, limit, remedy, self.ahead)
+            state, finding, change = answer.state, answer.finding, answer.change
+            return Check(self.question, state, finding, limit, remedy, self.ahead, change)
 
         return check
 

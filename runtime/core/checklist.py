@@ -77,7 +77,7 @@ class Checklist(Result):
         if self.worst is not None:
             return f"{self.worst.remedy}."
         asked = [c.remedy for c in self.checks if c.state == "open" and c.remedy][:1]
-        use = "use the parameters printed first together, with their corrected deviations"
+        use = "use these parameters together, with their intervals"
         return "; for what was not judged, ".join([use, *asked]) + "."
 
     def _repr_html_(self) -> str:

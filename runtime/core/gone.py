@@ -1,14 +1,20 @@
-"""Settings that earlier versions read, each with the sentence that names what to use instead."""
+"""Settings that earlier versions read, or that belong elsewhere, each with the sentence that names what to use instead."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
+RATIO = (
+    "gear ratios belong into the robot file, drives: {ratio: [100, 80]}; record.side: motor says that "
+    "the columns are those of motors"
+)
 WENT: Mapping[str, str] = {
     "estimate.options.prior: entropic": "the distance entropic went; set euclidean, or none",
     "estimate.method: tls": "total least squares went; set wls, and ask `symgen cestac --advise` what the encoder does to the estimate",
     "estimate.method: cloe": "output error of the closed loop went; set didim, which reads the same records of the same loop",
+    "record.ratio": RATIO,
+    "record.gear_ratio": RATIO,
     "signals.lines": "lines of uneven encoders are no longer estimated; leave the key out: bounds are widened by their deviation",
     "estimate.options.prior: pullback": "the distance pullback went; set euclidean, or none",
     "stream": "gone, every record is read whole; remove the key, and cut a record that memory does not hold into shorter ones",
@@ -19,7 +25,7 @@ numbers: "record.resample".
 
 
 def gone(path: tuple[str | int, ...], value: Any) -> str | None:
-    """The sentence on a setting that went; None for any other.
+    """The sentence on a setting that is not read; None for any other.
 
     Parameters
     ----------

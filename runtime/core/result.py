@@ -5,7 +5,7 @@ them.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -39,7 +39,7 @@ from runtime.core.rows.prepared import Prepared
 from runtime.core.rows.selection import unused_joints
 from runtime.core.signs import negative_elements
 from runtime.core.study import Study
-from runtime.core.table import IN_LINE, Table, in_lines, notebook, with_intervals
+from runtime.core.table import Table, in_lines, notebook, with_intervals
 from runtime.core.uncertainty import Uncertainty
 from runtime.core.validation import (
     CrossValidation,
@@ -357,45 +357,65 @@ class Identification:
     def __str__(self) -> str:
         return self.brief()
 
-    def brief(self, above: int = 0) -> str:
-        """Values with their 95 % intervals, errors by joint, what to look at, the parts in brief; the verdict with its largest doubt and the next step last.
+    def brief(self, others: int = 0) -> str:
+        """The verdict with its largest doubt and the next step, values with their 95 % intervals, errors by joint, what to look at, the parts in brief.
 
-        Values and notes without room in LIMIT.LINES_PRINTED lines are left to `to_text`; above : so
-        many lines are printed ahead of these.
+        Values and notes without room in LIMIT.LINES_PRINTED lines are left to `to_text`; others : so
+        many lines are printed beside these.
         """
-        fit = self.model_estimate
+        first = [f"{check.finding}." for check in self.checklist.checks if check.ahead]
+        notes = [*self.observation.findings, *self.own_warnings, *self.missing]
+        if len(notes) > LIMIT.NOTES_PRINTED:
+            more = len(notes) - LIMIT.NOTES_PRINTED + 1
+            notes = [*notes[:-more], f"{more} more by --verbose"]
+        head = "\n".join([*first, self.checklist.to_text()])
+        rest = [
+            "\n".join(f"note: {note}" for note in notes),
+            *(part.brief() for part in self.parts),
+        ]
+        if self.determined and self.usable:
+            taken = sum(len(text.splitlines()) + 1 for text in (head, *rest) if text)
+            room = max(LIMIT.LINES_PRINTED - others - taken - 2, LIMIT.LINES_OF_VALUES)
+            rest = [self._values(room, known=bool(first)), *rest]
+        return "\n\n".join(text for text in (head, *rest) if text)
+
+    def _values(self, room: int, *, known: bool) -> str:
+        """Values in at most `room` lines, the essential ones where there is no room for all, and the
+        error of each joint. known : only those that are larger than their intervals.
+        """
+        fit, names = self.model_estimate, list(self.model_estimate.names)
+        index = {name: k for k, name in enumerate(names)}
+        shown = [
+            name
+            for name, k in index.items()
+            if not known or abs(fit.X[k]) > 1.96 * fit.sigma_corrected[k]
+        ]
+        unknown = len(names) - len(shown)
+        lines, more = self._lines(shown), 0
+        if len(lines) > room:
+            shown = [name for name in shown if name in self.essential.names] or shown
+            lines = self._lines(shown)
+            per_line = -(-len(shown) // len(lines))
+            more = len(names) - unknown - min(len(shown), per_line * room)
         by_joint = ", ".join(
             f"{one.joint} {one.relative_error:.1f} %" if one.has_motor else f"{one.joint} no motor"
             for one in fit.per_joint
             if one.rows
         )
-        notes = [*self.observation.findings, *self.own_warnings, *self.missing]
-        if len(notes) > LIMIT.NOTES_PRINTED:
-            more = len(notes) - LIMIT.NOTES_PRINTED + 1
-            notes = [*notes[:-more], f"{more} more by --verbose"]
-        others = [
-            "\n".join(f"note: {note}" for note in notes),
-            *(part.brief() for part in self.parts),
-            self.checklist.to_text(),
-        ]
-        text = "\n\n".join(part for part in others if part)
-        first = [f"{check.finding}." for check in self.checklist.checks if check.ahead]
-        if not (self.determined and self.usable):
-            return "\n\n".join([*first, text])
-        values = in_lines(with_intervals(fit.names, fit.X, fit.sigma_corrected))
-        room = max(
-            LIMIT.LINES_PRINTED - above - len([*first, *text.splitlines()]) - 3,
-            LIMIT.LINES_OF_VALUES,
-        )
-        more = len(fit.names) - IN_LINE * room
         head = (
-            f"{len(fit.names)} of {len(self.estimate.names)} parameters ({self.model_columns}) by "
-            f"{fit.method}, SI units, +- 95 %"
+            f"{len(names)} of {len(self.estimate.names)} parameters ({self.model_columns}) by "
+            f"{fit.method}, +- 95 %"
         )
-        head += f"; {more} more by --verbose" if more > 0 else ""
-        return "\n".join(
-            [*first, head, *values[:room], f"Unexplained by joint: {by_joint}", "", text]
-        )
+        head += f"; {more} more by --verbose" if more else ""
+        head += f"; {unknown} smaller than their intervals by --verbose" if unknown else ""
+        return "\n".join([head, *lines[:room], f"Unexplained by joint: {by_joint}"])
+
+    def _lines(self, names: Sequence[str]) -> list[str]:
+        """Values of some parameters that stand for the robot, with intervals and units."""
+        fit = self.model_estimate
+        k = [fit.names.index(name) for name in names]
+        units = [fit.units.get(name, "") for name in names]
+        return in_lines(with_intervals(names, fit.X[k], fit.sigma_corrected[k], units))
 
     def _repr_html_(self) -> str:
         parameters, joints = (self.model_estimate if self.determined else self.estimate).tables()

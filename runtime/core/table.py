@@ -8,11 +8,12 @@ import csv
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from io import StringIO
+from math import floor, isfinite, log10
 from typing import Any
 
 from runtime.core.markup import Markup, element, symbol, unit
 
-IN_LINE = 4  # of values in a line
+LINE = 80  # characters of a line
 
 
 @dataclass(frozen=True)
@@ -31,10 +32,6 @@ class Table:
         Numbers, from 0, of columns of words, which stand to the left.
     sortable : bool
         By any column, where scripts run.
-    kinds : sequence of str
-        One word per row; a button `only` then leaves the rows of the first kind.
-    only : str
-        Label of that button.
     stacked : bool
         On a narrow screen every row is a block of lines.
     symbols : bool
@@ -47,8 +44,6 @@ class Table:
     note: str = ""
     wide: Sequence[int] = ()
     sortable: bool = False
-    kinds: Sequence[str] = ()
-    only: str = ""
     stacked: bool = False
     symbols: bool = False
 
@@ -58,11 +53,6 @@ class Table:
             raise ValueError(
                 f"table {self.caption!r}: {len(wrong[0])} cells in {tuple(wrong[0])}; expected "
                 f"{len(self.header)}, {self.header}"
-            )
-        if self.kinds and len(self.kinds) != len(self.rows):
-            raise ValueError(
-                f"table {self.caption!r}: {len(self.kinds)} kinds; expected {len(self.rows)}, one "
-                "per row"
             )
 
     def to_text(self) -> str:
@@ -110,17 +100,47 @@ def aligned(lines: Sequence[Sequence[str]]) -> str:
 
 
 def in_lines(cells: Sequence[str]) -> list[str]:
-    """Cells of one width, IN_LINE to a line."""
+    """Cells of one width, as many to a line as LINE characters hold."""
     width = max(map(len, cells), default=0) + 2
-    rows = [cells[k : k + IN_LINE] for k in range(0, len(cells), IN_LINE)]
+    many = max((LINE + 2) // width, 1)
+    rows = [cells[k : k + many] for k in range(0, len(cells), many)]
     return ["".join(cell.ljust(width) for cell in row).rstrip() for row in rows]
 
 
 def with_intervals(
-    names: Iterable[str], values: Iterable[float], sigma: Iterable[float]
+    names: Sequence[str],
+    values: Iterable[float],
+    sigma: Iterable[float],
+    units: Sequence[str] = (),
 ) -> list[str]:
-    """Values with their 95 % intervals, such as ZZ1R 1.79 +- 0.02, from their deviations."""
-    return [f"{n} {x:.4g} +- {1.96 * s:.2g}" for n, x, s in zip(names, values, sigma, strict=True)]
+    """Cells of one layout: name, value, half of its 95 % interval, unit; digits up to the second
+    one of the interval.
+
+    >>> with_intervals(["ZZ1R", "FV1"], [1.79263, 8.0], [0.0104, 0.2], ["kg*m**2", "N*m*s/rad"])
+    ['ZZ1R  1.793 +- 0.020  kg*m**2', 'FV1   8.00  +- 0.39   N*m*s/rad']
+    """
+    pairs = [interval(x, 1.96 * s) for x, s in zip(values, sigma, strict=True)]
+    columns = [list(names), *map(list, zip(*pairs, strict=True)), list(units)]
+    lead = ("", "", "+- ", "")
+    padded = [
+        [mark + cell.ljust(max(map(len, column))) for cell in column]
+        for mark, column in zip(lead, columns, strict=True)
+        if column
+    ]
+    gaps = ("  ", " ", "  ", "")
+    rows = zip(*padded, strict=True)
+    return ["".join(map("".join, zip(row, gaps, strict=False))).rstrip() for row in rows]
+
+
+def interval(value: float, half: float) -> tuple[str, str]:
+    """A value and half of its interval, both up to the second digit of the latter."""
+    if not (isfinite(half) and half > 0 and isfinite(value)):
+        return f"{value:.4g}", f"{half:.2g}"
+    place = floor(log10(half)) - 1
+    rounded = round(value, -place) + 0.0
+    if -7 <= place <= 0 and abs(value) < 1e7:
+        return f"{rounded:.{-place}f}", f"{half:.{-place}f}"
+    return f"{rounded:.6g}", f"{half:.2g}"
 
 
 def csv_text(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:

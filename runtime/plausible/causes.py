@@ -78,6 +78,8 @@ class Cause:
         Factors of `unmodelled_torques` for each joint, N m or N: rho.
     constants : mapping of str to float
         Entries of the table of frames, SI.
+    change : mapping of str to value
+        The remedy as a change of the study, as of a Check; {} where it is none.
     """
 
     kind: str
@@ -91,6 +93,7 @@ class Cause:
     known_factor: Array | float = 1.0
     unmodelled: Array | float = 0.0
     constants: Mapping[str, float] = field(default_factory=dict)
+    change: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def on_torques(self) -> bool:
@@ -222,6 +225,8 @@ class Row:
         In NUMBERS, the largest |xi| that is searched.
     words : function of the Robot, the item and xi
         In NUMBERS, words of the sentences that depend on xi.
+    change : function of the Robot and the item
+        The remedy as a change of the study.
     """
 
     kind: str
@@ -232,6 +237,7 @@ class Row:
     subject: str = ""
     span: float = 0.0
     words: Callable[..., Item] = lambda robot, item, xi: {}
+    change: Callable[[Robot, Item], Mapping[str, Any]] = lambda robot, item: {}
 
     def cause(self, robot: Robot, item: Item, *xi: float) -> Cause:
         """The cause of one item."""
@@ -243,6 +249,7 @@ class Row:
             says=says,
             remedy=self.remedy.format(**words),
             subject=self.subject.format(**words) or says,
+            change=self.change(robot, item),
             **self.maps(robot, item, *xi),
         )
 
@@ -523,6 +530,16 @@ def in_both(robot: Robot, item: Item) -> Maps:
     return robot.positions(item["E"]) | robot.torques(item["E"])
 
 
+def turned(*quantities: str) -> Callable[[Robot, Item], Mapping[str, Any]]:
+    """The sign of the columns of a joint turned, without one of all joints."""
+
+    def change(robot: Robot, item: Item) -> Mapping[str, Any]:
+        signs = robot.one(item["j"], -1) if "j" in item else -np.ones(robot.n)
+        return {f"record.scale.{key}": [int(sign) for sign in signs] for key in quantities}
+
+    return change
+
+
 def transmitted(robot: Robot, *, positions: bool, torques: bool, to_joints: bool) -> Maps:
     """What was recorded at the motors taken to the joints, or the reverse."""
     inverse = np.linalg.inv(robot.R)
@@ -580,6 +597,7 @@ CAUSES = (
         "the torque of joint {joint} has the wrong sign",
         "turn the sign of the torque of joint {joint}: ratio, torque constant or column",
         in_torques,
+        change=turned("tau"),
     ),
     Row(
         "sign",
@@ -587,6 +605,7 @@ CAUSES = (
         "the position of joint {joint} has the wrong sign",
         "turn the sign of the position of joint {joint}, or its axis in the robot file",
         in_positions,
+        change=turned("q"),
     ),
     Row(
         "sign",
@@ -594,6 +613,7 @@ CAUSES = (
         "joint {joint} counts in the other sense, position and torque",
         "turn the sign of the ratio of joint {joint}, or alpha and theta of its frame",
         in_both,
+        change=turned("q", "tau"),
     ),
     Row(
         "sign",
@@ -601,6 +621,7 @@ CAUSES = (
         "all torques have the wrong sign",
         "turn the sign of the torques",
         lambda robot, item: {"T": -np.eye(robot.n)},
+        change=turned("tau"),
     ),
     Row(
         "sign",
@@ -608,6 +629,7 @@ CAUSES = (
         "all positions have the wrong sign",
         "turn the sign of the positions",
         lambda robot, item: {"P": -np.eye(robot.n)},
+        change=turned("q"),
     ),
     Row(
         "exchange",
@@ -640,6 +662,7 @@ CAUSES = (
         "set record.units.tau: {unit}",
         lambda robot, item: {"T": item["factor"] * np.eye(robot.n)},
         "a common factor of all torques",
+        change=lambda robot, item: {"record.units.tau": item["unit"]},
     ),
     Row(
         "unit",
@@ -647,6 +670,7 @@ CAUSES = (
         "positions: {mistake}",
         "set record.units.q: {unit}",
         lambda robot, item: {"P": chosen(item)},
+        change=lambda robot, item: {"record.units.q": item["unit"]} if item["chosen"].all() else {},
     ),
     Row(
         "unit",
@@ -712,6 +736,7 @@ CAUSES = (
         "torques of the motors are taken as torques of the joints: the gear ratio is missing",
         "set record.torque_side: motor",
         lambda robot, item: transmitted(robot, positions=False, torques=True, to_joints=True),
+        change=lambda robot, item: {"record.torque_side": "motor"},
     ),
     Row(
         "side",
@@ -719,6 +744,7 @@ CAUSES = (
         "torques of the joints are taken as torques of the motors: the gear ratio is applied twice",
         "set record.torque_side: joint",
         lambda robot, item: transmitted(robot, positions=False, torques=True, to_joints=False),
+        change=lambda robot, item: {"record.torque_side": "joint"},
     ),
     Row(
         "side",
@@ -726,6 +752,7 @@ CAUSES = (
         "positions of the motors are taken as positions of the joints",
         "set record.side: motor",
         lambda robot, item: transmitted(robot, positions=True, torques=False, to_joints=True),
+        change=lambda robot, item: {"record.side": "motor", "record.torque_side": "joint"},
     ),
     Row(
         "side",
@@ -733,6 +760,7 @@ CAUSES = (
         "positions of the joints are taken as positions of the motors",
         "set record.side: joint, torque_side: motor",
         lambda robot, item: transmitted(robot, positions=True, torques=False, to_joints=False),
+        change=lambda robot, item: {"record.side": "joint", "record.torque_side": "motor"},
     ),
     Row(
         "side",
@@ -740,6 +768,7 @@ CAUSES = (
         "positions and torques of the motors are taken as those of the joints",
         "set record.side: motor",
         lambda robot, item: transmitted(robot, positions=True, torques=True, to_joints=True),
+        change=lambda robot, item: {"record.side": "motor", "record.torque_side": None},
     ),
     Row(
         "side",
@@ -747,6 +776,7 @@ CAUSES = (
         "positions and torques of the joints are taken as those of the motors",
         "set record.side: joint",
         lambda robot, item: transmitted(robot, positions=True, torques=True, to_joints=False),
+        change=lambda robot, item: {"record.side": "joint", "record.torque_side": None},
     ),
     Row(
         "unit",
@@ -775,6 +805,7 @@ CAUSES = (
         "the offsets of the drives are missing",
         "set record.side: motor, or add drives.offset to the positions",
         lambda robot, item: {"p": robot.offset},
+        change=lambda robot, item: {"record.side": "motor", "record.torque_side": robot.sides[1]},
     ),
     Row(
         "zero",

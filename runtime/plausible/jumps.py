@@ -94,7 +94,10 @@ def jumps(case: Case) -> Answer:
         if more := len(first) - 1:
             text += f", and at {more} more {'instant' if more == 1 else 'instants'}"
         if _wrap(q, high, usual, median):
-            remedy = "it wraps: unwrap it, or record counts and let signals: {reader: counts} do so"
+            remedy = (
+                "it starts anew: an angle at a full turn is continued by record: {unwrap: true}, a "
+                "counter by signals: {reader: counts}"
+            )
         elif len(joints) > 1 or len(units) == 1:
             remedy = (
                 "samples are missing there, or two records are joined: give each its own file "

@@ -52,20 +52,23 @@ def rest(case: Case) -> Answer:
     remedy = (
         f"set rows.low_speed: {stated} ({case.units[worst]}/s), or cut the record (rows.window)"
     )
+    change = {"rows.low_speed": stated}
     try:
         moving = replace(study, rows=replace(study.rows, low_speed=proposed))
         without = stacked(model, [record.by(moving) for record in case.given])
     except InputError:
         without = None
     if case.observation is None or without is None:
-        return Answer("doubtful", text, remedy)
+        return Answer("doubtful", text, remedy, change=change)
     before, after = (
         estimate_of(rows, EstimateSettings(), LINEAR, model=model).relative_error
         for rows in (case.observation, without)
     )
     text += f"; without these rows the fit leaves {after:.1f} % in place of {before:.1f} %"
-    state: State = "no" if after < 0.5 * before else "doubtful" if after < 0.8 * before else "good"
-    return Answer(state, text, remedy)
+    state: State = "doubtful" if after < 0.8 * before else "good"
+    if after < 0.5 * before and before > LIMIT.TOTAL_ERROR[0]:  # else friction of that joint alone
+        state = "no"
+    return Answer(state, text, remedy, change=change)
 
 
 def standing_share(samples: Samples, study: Study) -> Array:

@@ -257,4 +257,5 @@ def better(case: Case, named: Sequence[Trial]) -> Answer:
     text += _from_to(fit, before[j], after[j]) or (
         "; the errors stay, the parameters come nearer to the values of the robot file"
     )
-    return Answer("good" if friction else "no", text, named[0].cause.remedy)
+    first = named[0].cause
+    return Answer("good" if friction else "no", text, first.remedy, change=first.change)

@@ -119,9 +119,15 @@ class Plausibility(
 
     @property
     def named_causes(self) -> list[dict[str, Any]]:
-        """Cause, remedy and gain of the changes that are named."""
+        """Cause, remedy, gain and change of the study of what is named."""
         return [
-            {"cause": t.cause.says, "remedy": t.cause.remedy, "gain": t.gain} for t in self.named
+            {
+                "cause": t.cause.says,
+                "remedy": t.cause.remedy,
+                "gain": t.gain,
+                "change": t.cause.change,
+            }
+            for t in self.named
         ]
 
     @property

@@ -105,7 +105,8 @@ def positions(case: Case) -> Answer:
             "degrees read as rad? set record.units.q: deg; or motor side read as joint side "
             "(record.side)"
         )
-        return Answer("no", text, remedy, limit)
+        all_turn = {"record.units.q": "deg"} if turning.all() else {}
+        return Answer("no", text, remedy, limit, all_turn)
     return Answer("no" if far.any() else "doubtful", text, limit=limit)
 
 

@@ -156,6 +156,8 @@ class Conversion:
         Those of the robot, coupled as the record says.
     constant : ndarray, shape (n,), N m/A or N m/V, or None
         Torque constants, of commands that are currents or voltages.
+    turns : ndarray of bool, shape (n,)
+        Which columns of positions are angles that start anew at a full turn.
     """
 
     positions: Array
@@ -164,11 +166,20 @@ class Conversion:
     of_torques: Drives | None
     drives: Drives | None
     constant: Array | None = None
+    turns: Array | None = None
 
     def position(self, q: Array) -> Array:
         """Joint positions, rad or m; q, shape (N, n), as in the file."""
-        q = q * self.positions
+        return self._at_joints(self.continued(q * self.positions))
+
+    def _at_joints(self, q: Array) -> Array:
         return q if self.of_positions is None else self.of_positions.joint_position(q)
+
+    def continued(self, q: Array) -> Array:
+        """Angles, rad, shape (N, n), without the jumps of a full turn where they start anew."""
+        if self.turns is None:
+            return q
+        return np.asarray(np.where(self.turns, np.unwrap(q, axis=0), q))
 
     @property
     def follows(self) -> Array | None:
@@ -180,7 +191,8 @@ class Conversion:
 
     def velocity(self, qd: Array) -> Array:
         """Joint velocities, rad/s or m/s; qd, shape (N, n), as in the file."""
-        return np.asarray(self.position(qd) - self.position(np.zeros_like(qd[:1])))
+        qd = qd * self.positions
+        return np.asarray(self._at_joints(qd) - self._at_joints(np.zeros_like(qd[:1])))
 
     def torque(self, tau: Array) -> Array:
         """Joint torques, N m or N; tau, shape (N, n), as in the file."""
@@ -202,12 +214,14 @@ def conversion(
     n : int
         Number of joints.
     """
-    positions = _scale(settings.scale.q, first, n, "scale.q") * _position_units(settings, n)
+    units_of_positions, angles = _position_units(settings, n)
+    positions = _scale(settings.scale.q, first, n, "scale.q") * units_of_positions
+    turns = angles if settings.unwrap else None
     scale = _scale(settings.scale.tau, last, n, "scale.tau")
     units, constant = _torque_constant(settings, drives, n)
     factors = units if constant is None else units * constant
     if "motor" not in settings.sides:
-        return Conversion(positions, scale * factors, None, None, drives, constant)
+        return Conversion(positions, scale * factors, None, None, drives, constant, turns)
     if drives is None:
         raise InputError(
             "side is motor but the robot has no drives; give them in the robot file, or a record of the joint side",
@@ -223,6 +237,7 @@ def conversion(
         of_torques=motors if at_motors else None,
         drives=drives.decoupled(settings.coupling),
         constant=constant,
+        turns=turns,
     )
 
 
@@ -273,14 +288,15 @@ def _units(units: str | tuple[str, ...], n: int, key: str) -> tuple[str, ...]:
     return each
 
 
-def _position_units(settings: RecordSettings, n: int) -> Array:
-    """Factors to rad or m, shape (n,)."""
+def _position_units(settings: RecordSettings, n: int) -> tuple[Array, Array]:
+    """Factors to rad or m, shape (n,), and which are of angles."""
     units = [position_unit(unit) for unit in _units(settings.units.q, n, "units.q")]
     counts = np.ones(n)
     if settings.counts_per_revolution is not None:
         counts = _per_joint(settings.counts_per_revolution, n, "counts_per_revolution")
     factors = np.array([factor for _, factor in units])
-    return factors / np.where([kind == "counts" for kind, _ in units], counts, 1.0)
+    factors = factors / np.where([kind == "counts" for kind, _ in units], counts, 1.0)
+    return factors, np.array([kind != "length" for kind, _ in units])
 
 
 def _torque_constant(

@@ -28,13 +28,23 @@ WORDS = {  # the first words of a quantity are taken before the others; parts of
         *("zeit", "zeitstempel", "temps", "horodatage", "tempo", "tiempo"),
     ),
     "q": (
-        *("q", "pos", "position", "positions", "angle", "angles"),
+        *("q", "qm", "pos", "position", "positions", "angle", "angles", "theta"),
         *("winkel", "stellung", "lage", "posizione", "posicion", "posición", "gelenkwinkel"),
     ),
     "tau": (
         *("tau", "torque", "torques", "effort", "efforts", "moment", "drehmoment", "trq", "tq"),
         *("couple", "couples", "coppia", "momento"),
-        *("current", "currents", "cur", "strom", "motorstrom", "courant", "corrente", "corriente"),
+        *(
+            "current",
+            "currents",
+            "cur",
+            "curr",
+            "strom",
+            "motorstrom",
+            "courant",
+            "corrente",
+            "corriente",
+        ),
     ),
     "qd": (
         *("qd", "dq", "vel", "velocity", "velocities", "speed", "speeds", "qdot"),
@@ -52,7 +62,16 @@ TARGETS = {
     *("set", "soll", "consigne", "window"),
 }
 SECONDARY = {"se", "secondary", "link"}  # encoders behind the gears
-NAMED_UNITS = {"ms", "deg", "mA"}  # words of a name; others stand in brackets
+NAMED_UNITS = {
+    "ms",
+    "us",
+    "ns",
+    "rad",
+    "deg",
+    "counts",
+    "Nm",
+    "mA",
+}  # words of a name; others stand in brackets
 UNITS = {"grad": "deg", "gradi": "deg", "degrés": "deg", "degres": "deg", "sek": "s"}
 
 

@@ -240,7 +240,7 @@ def _joint_side(
         elif key == "tau_known":
             values = _spread(values, columns.tau_known, 0.0)
         elif key == "q_link":
-            values = _spread(values, columns.q_link, np.nan) * side.positions
+            values = side.continued(_spread(values, columns.q_link, np.nan) * side.positions)
         elif key not in columns.channels:
             values = values * settings.scale.wrench
         held = values[:, ~np.isnan(values[0])] if key == "q_link" else values

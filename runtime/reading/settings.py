@@ -247,6 +247,9 @@ class RecordSettings(Settings):
     decimal : str
         Decimal sign of a text file, "." or "," (columns then separated by semicolons, tabs or
         blanks).
+    unwrap : bool
+        Angles that start anew at a full turn of the side on which they were recorded (180 to -180
+        degrees) are continued from the first sample on; its turn has to suit the zero of the joint.
     resample : Resample or None
         How a time column that is not uniform is made so; null: it is refused.
     controller : Controller or None
@@ -272,6 +275,7 @@ class RecordSettings(Settings):
     simulated: Flag = False
     topic: Text | None = None
     decimal: Literal[".", ","] = "."
+    unwrap: Flag = False
     resample: Resample | None = None
     controller: Controller | None = None
     also: Many[Many[Text]] = ()

@@ -1,4 +1,4 @@
-// Figures come to life, tables are sorted and filtered, what is folded opens for print.
+// Figures come to life, tables are sorted, what is folded opens for print.
 
 (function () {
   const data = JSON.parse(document.getElementById("data").textContent);
@@ -32,17 +32,10 @@
     });
   }
 
-  for (const table of document.querySelectorAll("table[data-only]")) {
-    const bar = htmlNode("div", { className: "tools" });
-    const button = htmlNode("button", { type: "button", textContent: table.dataset.only }, bar);
-    button.setAttribute("aria-pressed", "false");
-    button.addEventListener("click", () => {
-      const only = button.getAttribute("aria-pressed") === "false";
-      button.setAttribute("aria-pressed", String(only));
-      for (const row of table.tBodies[0].rows) row.hidden = only && row.dataset.kind !== table.dataset.kind;
-    });
-    table.parentElement.before(bar);
-  }
-
-  window.addEventListener("beforeprint", () => { for (const fold of document.querySelectorAll("details")) fold.open = true; });
+  let opened = [];
+  window.addEventListener("beforeprint", () => {
+    opened = document.querySelectorAll("details:not([open])");
+    for (const fold of opened) fold.open = true;
+  });
+  window.addEventListener("afterprint", () => { for (const fold of opened) fold.open = false; });
 })();

@@ -89,7 +89,7 @@ class Image:
 
 @dataclass(frozen=True)
 class Section:
-    """A heading, paragraphs, then figures, tables and a listing that opens on demand."""
+    """A heading, paragraphs, then figures, tables and a listing.   folded : opens on demand."""
 
     title: str
     text: Sequence[str] = ()
@@ -97,6 +97,7 @@ class Section:
     tables: Sequence[Table] = ()
     listing: str = ""
     matrices: Sequence[Matrix] = ()
+    folded: bool = False
 
 
 @dataclass(frozen=True)
@@ -166,7 +167,7 @@ def render(page: Page) -> str:
         image for section in page.sections for image in section.images if image.series is not None
     ]
     scripted = bool(images) or any(
-        table.sortable or table.kinds for section in page.sections for table in section.tables
+        table.sortable for section in page.sections for table in section.tables
     )
     style, script = _resource("page.css"), "\n".join(map(_resource, SCRIPTS)) if scripted else ""
     allowed = f"script-src '{_hash(script)}'; " if scripted else ""

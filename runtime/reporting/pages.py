@@ -1,6 +1,4 @@
-"""Pages of results: verdict, key numbers, checks, then everything that was asked for, then settings
-and provenance.
-"""
+"""Pages of results: verdict, figure and values of an identification, then the rest, folded."""
 
 from __future__ import annotations
 
@@ -8,13 +6,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from runtime.core.cestac.result import Cestac
-from runtime.core.checklist import Checklist, rounded
+from runtime.core.checklist import Checklist
 from runtime.core.part import Part
 from runtime.core.result import Identification
 from runtime.core.table import Table
-from runtime.reporting.page import Number, Page, Section, state_mark
+from runtime.reporting.page import Page, Section, state_mark
+from runtime.reporting.parameters import parameter_section
 from runtime.reporting.resolution import level_numbers, resolution_section
-from runtime.reporting.sections import identification_sections, part_section, part_sections
+from runtime.reporting.sections import detail_sections, part_section, torque_section
 
 SIMULATED_WARNING = (
     "Everything here was computed on a SIMULATED record, made from the values of the robot file "
@@ -44,10 +43,9 @@ def identification_page(
     warning : str
         Before the warning on simulated data.
     sections : sequence of Section
-        Further sections, after the torques.
+        Further sections, after the parameters.
     """
     checklist = result.checklist
-    parameters, torques, *others = identification_sections(result)
     simulated = SIMULATED_WARNING if result.source == "simulated" else ""
     return Page(
         title=title or f"{result.model.NAME}: identification on {result.name}",
@@ -56,16 +54,13 @@ def identification_page(
         answer=checklist.answer,
         verdict=verdict or checklist.use,
         remarks=[("Biggest doubt", checklist.doubt), ("Next", checklist.next)],
-        numbers=key_numbers(result),
         warning=" ".join(text for text in (warning, simulated) if text),
         sections=[
-            checks_section(checklist),
-            parameters,
-            torques,
+            torque_section(result),
+            parameter_section(result),
             *sections,
-            *others,
-            *part_sections(result),
-            *([Section("Not done", result.missing)] if result.missing else []),
+            checks_section(checklist),
+            *detail_sections(result),
             settings_section(study),
             provenance_section(result),
         ],
@@ -98,51 +93,30 @@ def part_page(
 
 
 def checks_section(checklist: Checklist) -> Section:
-    """Question, answer, limit, remedy; what is not good first."""
-    ordered = sorted(
-        checklist.checks, key=lambda check: ("no", "doubtful", "open", "good").index(check.state)
-    )
-    rows = [
-        (c.question, state_mark(c.state), c.finding, c.limit, "" if c.state == "good" else c.remedy)
-        for c in ordered
-    ]
-    table = Table(
-        "The verdict is the worst of these",
-        ("question", "answer", "found", "good within", "what to do"),
-        rows,
-        wide=(2, 3, 4),
-        stacked=True,
-    )
-    return Section("Checks", tables=[table])
-
-
-def key_numbers(result: Identification) -> list[Number]:
-    """What a reader compares first."""
-    fit = result.model_estimate
-    worst = fit.worst_joint
-    numbers = [
-        Number("parameters of the model", f"{len(fit.names)} of {len(result.estimate.names)}"),
-        Number("error where fitted", f"{fit.relative_error:.1f} %"),
-        Number("error on unseen data", f"{result.prediction_error:.1f} %"),
-    ]
-    if len(fit.per_joint) > 1:
-        numbers.append(Number("worst joint", f"{worst.joint}: {worst.relative_error:.1f} %"))
-    return [
-        *numbers,
-        Number(
-            "torque samples, worth of independent ones",
-            f"{fit.rows}, {sum(w.effective_rows for w in result.uncertainty.whiteness):.0f}",
-        ),
-        Number("condition number, unit columns", rounded(fit.cond_unit)),
-    ]
+    """Question, answer, limit, remedy where there is one; what is not good first."""
+    order = ("no", "doubtful", "open", "good")
+    ordered = sorted(checklist.checks, key=lambda check: order.index(check.state))
+    header = ("question", "answer", "found", "good within", "what to do")
+    tables = []
+    for caption, good in (("The verdict is the worst of these", False), ("These are good", True)):
+        checks = [check for check in ordered if (check.state == "good") == good]
+        many = 5 if not good and any(check.remedy for check in checks) else 4
+        rows = [
+            (c.question, state_mark(c.state), c.finding, c.limit, c.remedy)[:many] for c in checks
+        ]
+        wide = range(2, many)
+        tables.append(Table(caption, header[:many], rows, wide=wide, stacked=True))
+    return Section("Checks", tables=[table for table in tables if table.rows], folded=True)
 
 
 def settings_section(study: str) -> Section:
-    """Every setting, folded; study : text of study.yaml."""
+    """Every setting that is set, folded; study : text of study.yaml."""
+    lines = [line for line in study.splitlines() if not line.endswith(": null")]
     return Section(
         "Settings",
-        ("Every setting of this study, defaults included; study.yaml beside this file.",),
-        listing=study,
+        ("Settings of this study, defaults included; study.yaml beside this file names all.",),
+        listing="\n".join(lines),
+        folded=True,
     )
 
 
@@ -165,6 +139,7 @@ def provenance_section(result: Identification) -> Section:
         "Provenance",
         text,
         tables=[Table("What these numbers come from", ("", "name", "value"), rows, wide=(1, 2))],
+        folded=True,
     )
 
 

@@ -1,11 +1,12 @@
-"""Parameters on a page and in files: base parameters with deviations, CAD, what became of each, and
-what it is made of; those that trade.
+"""Parameters on a page and in files: those that are used; all of them beside the robot file, with
+what they are made of; those that trade.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import repeat
 from typing import Any, cast
 
 import numpy as np
@@ -15,23 +16,8 @@ from runtime.core.limits import LIMIT
 from runtime.core.markup import element, formula, number, symbol, unit
 from runtime.core.model import GeneratedModel
 from runtime.core.result import Identification
-from runtime.core.table import Table, csv_text
+from runtime.core.table import Table, csv_text, interval
 from runtime.reporting.page import Matrix, Section
-
-HEADER = (
-    "parameter",
-    "value",
-    "σ",
-    "%σ",
-    "corrected σ",
-    "unit",
-    "CAD",
-    "difference %",
-    "all fitted",
-    "%σ of it",
-    "role",
-    "made of",
-)
 
 
 def cad_values(model: GeneratedModel) -> dict[str, float]:
@@ -54,99 +40,103 @@ def cad_values(model: GeneratedModel) -> dict[str, float]:
 
 
 def parameter_section(result: Identification) -> Section:
-    """One line per base parameter."""
-    fit, estimate = result.model_estimate, result.estimate
-    cad, roles = cad_values(result.model), roles_of(result)
-    formulas: Mapping[str, str] = getattr(result.model, "FORMULAS", {})
-    rows = []
-    for i, name in enumerate(estimate.names):
-        made = formulas.get(name, name)
-        fold = element(
-            "details",
-            element("summary", "formula", aria_label=f"formula of {name}"),
-            element("span", symbol(name), " = "),
-            formula(made),
-        )
-        rows.append(
-            (
-                symbol(name),
-                *_own(fit, name),
-                unit(estimate.units.get(name, "")),
-                *_compared(cad.get(name, math.nan), fit[name] if name in fit.names else math.nan),
-                number(estimate.X[i], ".5g"),
-                number(estimate.relative_sigma[i], ".2f"),
-                roles[name],
-                "itself" if made == name else fold,
-            )
-        )
-    carry = result.essential.names
-    kinds = ["essential" if name in carry else "removed" for name in estimate.names]
-    shown = [k for k in range(len(HEADER)) if (cad or k not in (6, 7)) and (formulas or k != 11)]
-    table = Table(
-        f"{len(estimate.names)} base parameters, {len(carry)} of them carry the model",
-        [HEADER[k] for k in shown],
-        [[row[k] for k in shown] for row in rows],
-        wide=[shown.index(k) for k in (10, 11) if k in shown],
-        sortable=True,
-        kinds=kinds,
-        only="only those that carry the model",
-    )
-    text = [
-        "The value to use stands first. σ is eq. (10), which takes residuals as independent; "
-        "filtered ones are not, and the corrected deviation takes blocks of time as independent "
-        "instead: quote it. Two of them hold the truth about 95 times in 100 or more while the "
-        "model is right and the residuals do not remember for longer than two blocks. "
-        "%σ is 100 σ/|value|, eq. (11).",
-        "The role is an aid to reading: essential parameters explain the record nearly as well "
-        "alone, the others are numbered in the order in which they go. "
-        + (
-            "One without a value was removed, as if it were zero; the deviations of the others do "
-            "not know of that and hold the truth less often. "
-            if len(fit.names) < len(estimate.names)
-            else ""
-        )
-        + "The last columns are the fit of all parameters together. Ratio: σρ of eq. (9) without "
-        "the parameter, over its first value.",
+    """The parameters that are used: value, interval, unit."""
+    fit = result.model_estimate
+    rows = [
+        (symbol(name), *_with_interval(fit, name), unit(fit.units.get(name, "")))
+        for name in fit.names
     ]
-    if cad:
-        text.append(
-            "CAD: the values of the robot file through the same formulas; difference: of the value "
-            "to it, in % of it."
-        )
-    return Section("Parameters", text, tables=[table])
-
-
-def roles_of(result: Identification) -> dict[str, str]:
-    """Essential, or when and at which ratio it is removed, by name."""
-    essential = result.essential
-    roles = dict.fromkeys(result.estimate.names, "essential")
-    for k, step in enumerate(essential.trail, start=1):
-        if step.removed:
-            roles[step.name] = f"goes as no. {k}, ratio {step.ratio:.4f}"
-        else:
-            roles[step.name] += f", the next to go: ratio {step.ratio:.4f}"
-    return roles
-
-
-def _own(fit: Estimate, name: str) -> tuple[str, str, str, str]:
-    """Value, sigma, %sigma and corrected sigma; empty for a parameter that is not in the fit."""
-    if name not in fit.names:
-        return "", "", "", ""
-    i = fit.names.index(name)
-    return (
-        number(fit.X[i], ".5g"),
-        number(fit.sigma[i], ".2g"),
-        number(fit.relative_sigma[i], ".2f"),
-        number(fit.sigma_corrected[i], ".2g"),
+    table = Table(
+        f"{len(fit.names)} of {len(result.estimate.names)} base parameters "
+        f"({result.model_columns}) by {fit.method}",
+        ("parameter", "value", "± 95 %", "unit"),
+        rows,
+        sortable=True,
     )
+    return Section("Parameters", tables=[table])
 
 
-def _compared(cad: float, value: float) -> tuple[str, str]:
-    """A CAD value and the difference of an estimate to it, %."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        difference = 100 * (np.float64(value) - cad) / abs(np.float64(cad))
-    return ("" if math.isnan(cad) else number(cad)), (
-        f"{difference:+.1f}" if math.isfinite(difference) else ""
+def every_section(result: Identification) -> Section:
+    """All base parameters: used, fitted together, from the robot file, and what each is made of."""
+    fit, estimate, cad = result.model_estimate, result.estimate, cad_values(result.model)
+    formulas: Mapping[str, str] = getattr(result.model, "FORMULAS", {})
+    columns: list[tuple[str, list[str]]] = [
+        ("parameter", [symbol(name) for name in estimate.names]),
+        ("unit", [unit(estimate.units.get(name, "")) for name in estimate.names]),
+        *_columns("", fit, estimate.names),
+    ]
+    if fit.names != estimate.names:
+        columns += _columns("all fitted: ", estimate, estimate.names)
+    if cad:
+        given = [cad.get(name, math.nan) for name in estimate.names]
+        differences = map(_difference, repeat(fit), estimate.names, given)
+        columns += [
+            ("robot file", ["" if math.isnan(x) else number(x) for x in given]),
+            ("difference %", list(differences)),
+        ]
+    if formulas:
+        columns.append(("made of", [_made_of(name, formulas) for name in estimate.names]))
+    table = Table(
+        f"{len(estimate.names)} base parameters; without a value: removed, as if zero",
+        [title for title, _ in columns],
+        list(zip(*(cells for _, cells in columns), strict=True)),
+        wide=(len(columns) - 1,) if formulas else (),
+        sortable=True,
+    )
+    text = (
+        "± 95 %: 1.96 deviations over blocks of time, whose residuals are taken as independent. "
+        "It holds the truth about 95 times in 100 or more while the model is right and the "
+        "residuals do not remember for longer than two blocks. parameters.csv has σ of eq. (10) "
+        "beside it, which takes every residual as independent.",
+        *(
+            [
+                "Robot file: its values through the same formulas; the difference to it is left "
+                "out where that value is smaller than the interval."
+            ]
+            if cad
+            else []
+        ),
+    )
+    return Section("All base parameters, and what they are made of", text, tables=[table])
+
+
+def _columns(head: str, fit: Estimate, names: Sequence[str]) -> list[tuple[str, list[str]]]:
+    """Values and intervals of some parameters, empty for those that are not in the fit."""
+    cells = [_with_interval(fit, name) if name in fit.names else ("", "") for name in names]
+    values, halves = map(list, zip(*cells, strict=True))
+    return [(f"{head}value", values), (f"{head}± 95 %", halves)]
+
+
+def _with_interval(fit: Estimate, name: str) -> tuple[str, str]:
+    """A value and half of its 95 % interval."""
+    half = _half(fit, name)
+    return interval(fit[name], half) if math.isfinite(half) else (number(fit[name]), "-")
+
+
+def _half(fit: Estimate, name: str) -> float:
+    return 1.96 * float(fit.sigma_corrected[fit.names.index(name)])
+
+
+def _difference(fit: Estimate, name: str, given: float) -> str:
+    """Of a value to that of the robot file, in % of it; empty where that is within the interval of
+    zero.
+    """
+    if name not in fit.names or not abs(given) > (half := _half(fit, name)):
+        return ""
+    value, _ = interval(100 * (fit[name] - given) / abs(given), 100 * half / abs(given))
+    return value if value.startswith("-") else f"+{value}"
+
+
+def _made_of(name: str, formulas: Mapping[str, str]) -> str:
+    """The formula of a base parameter, which opens on demand."""
+    made = formulas.get(name, name)
+    if made == name:
+        return "itself"
+    return element(
+        "details",
+        element("summary", "formula", aria_label=f"formula of {name}"),
+        element("span", symbol(name), " = "),
+        formula(made),
     )
 
 

@@ -4,6 +4,8 @@ here.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from runtime.core.markup import number
 from runtime.core.part import Part
 from runtime.core.result import Identification
@@ -11,27 +13,27 @@ from runtime.core.signals.decimation import CUTOFF
 from runtime.core.table import Table
 from runtime.reporting import figures as plots
 from runtime.reporting.page import Section
-from runtime.reporting.parameters import correlation_section, parameter_section
+from runtime.reporting.parameters import correlation_section, every_section
 from runtime.reporting.series import series
 
 
-def identification_sections(result: Identification) -> list[Section]:
-    """Parameters, torques, errors per joint, residuals, weak directions, trust, trail, validation."""
-    unit = result.torque_unit
-    return [
-        parameter_section(result),
-        torque_section(result),
+def detail_sections(result: Identification) -> list[Section]:
+    """What stands behind the parameters that are used, folded."""
+    trust = result.uncertainty
+    sections = [
+        every_section(result),
+        Section("How far to trust it", trust.verdict, tables=trust.tables()[:2]),
+        trail_section(result),
+        validation_section(result),
         joint_section(result),
         *([record_section(result)] if result.record_errors or result.time_stamps else []),
         *([motion_section(result)] if result.motion_table().rows else []),
-        residual_section(result, unit),
+        residual_section(result, result.torque_unit),
         correlation_section(result),
-        Section(
-            "How far to trust it", result.uncertainty.verdict, tables=result.uncertainty.tables()
-        ),
-        trail_section(result),
-        validation_section(result),
+        *part_sections(result),
+        *([Section("Not done", result.missing)] if result.missing else []),
     ]
+    return [replace(section, folded=True) for section in sections]
 
 
 def torque_section(result: Identification) -> Section:
@@ -100,8 +102,8 @@ def joint_section(result: Identification) -> Section:
     text = (
         f"{fit.rows} rows, {len(fit.names)} parameters, rank {fit.rank}; condition number of W "
         f"{number(fit.cond)}, {number(fit.cond_unit)} with columns of norm 1. Residual norm "
-        f"{number(fit.residual_norm, '.6g')} with all parameters, "
-        f"{number(essential.residual_norm, '.6g')} with the essential ones. The error is 100 ||Y - "
+        f"{number(fit.residual_norm, '.4g')} with all parameters, "
+        f"{number(essential.residual_norm, '.4g')} with the essential ones. The error is 100 ||Y - "
         "W X|| / ||Y||.",
         *([fit.message] if fit.message else []),
     )
@@ -145,34 +147,41 @@ def motion_section(result: Identification) -> Section:
 
 
 def trail_section(result: Identification) -> Section:
-    """How the essential parameters were found."""
-    essential = result.essential
-    first = len(result.estimate.names)
+    """How the essential parameters were found, and whether the removals tell."""
+    essential, trust = result.essential, result.uncertainty
+    first, tests = len(result.estimate.names), trust.f_tests
+    header = ["removed", "left", "%sigma before", "sigma_rho ratio after"]
     rows = [
-        (
+        [
             step.name if step.removed else f"{step.name} (kept)",
             str(first - k - step.removed),
-            number(step.relative_sigma, ".2f"),
+            percent_sigma(step.relative_sigma),
             number(step.ratio, ".4f"),
-        )
+        ]
         for k, step in enumerate(essential.trail)
     ]
-    counts = ", ".join(
-        f"{count} at {threshold:.2f}" for threshold, count in essential.counts.items()
-    )
+    if tests:
+        header += ["F", "p", "F of this one", "p of this one"]
+        for row, t in zip(rows, tests, strict=True):
+            row += [f"{t.F:.3g}", probability(t.p), f"{t.F_step:.3g}", probability(t.p_step)]
     text = (
         "The parameter of largest %sigma is removed and the rest fitted again while sigma_rho "
-        f"stays below {essential.threshold:g} times its first "
-        f"value: {len(essential.names)} of {first} remain. The count depends on that threshold: "
-        f"{counts}.",
+        f"stays below {essential.threshold:g} times its first value: {len(essential.names)} of "
+        f"{first} remain. An F-test asks whether the removals up to a line tell, as many rows as "
+        "are worth one. Without a %sigma: zero is within the interval.",
     )
-    return Section(
-        "Essential parameters",
-        text,
-        tables=[
-            Table("Trail", ("removed", "left", "%sigma before", "sigma_rho ratio after"), rows)
-        ],
-    )
+    tables = [Table("Trail", header, rows), *trust.tables()[3:]]
+    return Section("Essential parameters", text, tables=tables)
+
+
+def percent_sigma(percent: float) -> str:
+    """A relative deviation; empty where zero is within the interval of 1.96 deviations."""
+    return f"{percent:.2g}" if 1.96 * percent < 100 else ""
+
+
+def probability(p: float) -> str:
+    """A probability, small ones by their bound."""
+    return f"{p:.2g}" if p >= 1e-4 else "< 0.0001"
 
 
 def validation_section(result: Identification) -> Section:

@@ -1,8 +1,8 @@
 """Functions of a compiled C file, called in a process of its own, which a wrong index may end.
 
-`python call_c.py` reads {"library": path, "calls": [[name, arguments, size, before]], "tables":
-[[name, count]]} as JSON. The argument null is the result, whose `size` numbers are all `before` when
-the call begins. It prints [status, numbers] of every call, then the numbers of every table of int32.
+`python call_c.py` reads {"library": path, "calls": [[name, arguments, size, before]]} as JSON. The
+argument null is the result, whose `size` numbers are all `before` when the call begins. It prints
+[status, numbers] of every call.
 """
 
 from __future__ import annotations
@@ -21,8 +21,6 @@ def main() -> None:
         result = (ctypes.c_double * size)(*[before] * size)
         status = getattr(library, name)(*(_argument(a, result) for a in arguments))
         results.append([status, list(result)])
-    for name, count in job["tables"]:
-        results.append(list((ctypes.c_int32 * count).in_dll(library, name)))
     json.dump(results, sys.stdout)
 
 

@@ -175,6 +175,16 @@ class Certificate:
         values = {"valid": self.valid, "numeric_valid": self.numeric_valid, **asdict(self)}
         return dict(_plain(values))
 
+    def brief(self) -> str:
+        """The verdict, then what does not hold, a line each."""
+        verdict = "valid" if self.valid else "FALSE"
+        head = (
+            f"{self.name}: certificate {verdict}, {self.count} base parameters of "
+            f"{self.identities}, {self.method}; {len(self.checks)} checks"
+        )
+        wrong = [f"FALSE {text}" for holds, text in self.checks if not holds]
+        return "\n".join([head, *wrong, *self.failures])
+
     def __str__(self) -> str:
         """A line per check, marked `ok` or FALSE, then the verdict."""
         head = f"{self.name}: {self.count} base parameters of {self.identities}, {self.method}"

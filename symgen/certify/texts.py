@@ -14,7 +14,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
@@ -37,15 +37,13 @@ from symgen.version import VERSION
 
 TOLERANCE = 1e-9  # of the largest entry: rounding of some thousand operations, and closed loops
 C_FLAGS = ("-std=c99", "-O0", "-ffp-contract=off", "-shared", "-fPIC")
-WITHOUT_AVX512 = "-D__builtin_cpu_supports(x)=0"  # another way past the caches
 LONGEST_RUN = 300  # s, of the compiler and of the functions
 HELPERS = {"store", "casadi"}
 """Public names that are no models."""
 NUMPY, STACKED, CASADI = "on NumPy's arrays", "stacked as for other packages", "by CasADi"
 DERIVATIVES = "inverse_dynamics_derivatives"
 Use = Callable[[ModuleType, str, Check, Mapping[str, float]], Array]
-TILES = 71  # samples of the functions in C: some tiles, the last not full; odd, so that rows of a
-# store begin anywhere in a line of the cache
+TILES = 71  # samples of the functions in C: some tiles, the last not full
 
 
 @dataclass(frozen=True)
@@ -309,32 +307,27 @@ def same_elements(table: Any, constants: Mapping[str, float], witness: Witness) 
 
 
 def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str, float]:
-    """Errors of the functions of a C file, results written past the caches too."""
+    """Errors of the functions of a C file: of several states, and of one."""
     name, library = witness.robot.name, path.with_suffix(".so")
     rows = np.arange(TILES) % STATES
-    own, constants = witness.own[rows], [*witness.keywords.values(), 0.0]
-    N, n, b = own.shape
+    constants = [*witness.keywords.values(), 0.0]
     found = re.findall(rf"^int32_t {name}_(\w+)\(\s*int64_t", text, re.MULTILINE)
-    checks = {
-        f: replace(
-            c,
-            arguments=tuple(a[rows] if a.ndim > 1 else a for a in c.arguments),
-            expected=c.expected[rows],
-        )
-        for f in found
-        for c in witness.checks.get(f, ())[:1]
-    }
-    asked = [(f, check, flags) for f, check in checks.items() for flags in (0, 1)]
+    several = [(f, check) for f in found for check in witness.checks.get(f, ())[:1]]
+    single = list(_of_one_state(name, text, witness))
     calls: list[tuple[str, list[Any], int, float]] = [
         (
             f"{name}_{f}",
-            [N, *map(_flat, c.arguments), constants, None, flags],
-            c.expected.size,
-            0.0 if MODELS[f].by_columns else np.nan,  # the caller of columns fills what is constant
+            [
+                TILES,
+                *(_flat(a[rows] if a.ndim > 1 else a) for a in check.arguments),
+                constants,
+                None,
+            ],
+            check.expected[rows].size,
+            0.0,  # rows that are always zero are not written
         )
-        for f, c, flags in asked
+        for f, check in several
     ]
-    single = list(_of_one_state(name, text, witness))
     calls += [
         (
             f"{name}_{f}1",
@@ -345,62 +338,33 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
                 None,
             ],
             check.expected[k].size,
-            np.nan,  # as what is not written stays
+            np.nan,
         )
         for f, check in single
         for k in range(len(check.expected))
     ]
-    columns = [_flat(x[rows].T) for x in (witness.q, witness.qd, witness.qdd)]
+    job = {"library": str(library), "calls": calls}
     try:
-        entries, signals, varying = (
-            int(re.findall(rf"{name}_{what}_count = (\d+)", text)[0])
-            for what in ("entry", "signal", "varying")
-        )
-        last = (f"{name}_signals", [N, *columns, N, constants, None, N], signals * N, np.nan)
-        job = {
-            "library": str(library),
-            "calls": [*calls, last],
-            "tables": [[f"{name}_entries", 3 * entries]],
-        }
-        results: list[Any] = []
-        for flags in (C_FLAGS, (*C_FLAGS, WITHOUT_AVX512)):
-            _run([*compiler.split(), *flags, str(path), "-o", str(library), "-lm"])
-            ran = json.loads(_run([sys.executable, "-I", call_c.__file__], json.dumps(job)))
-            results += ran[:-2]
-        (_, computed), table = ran[-2:]
-        row, signal, sign = np.reshape(table, (entries, 3)).T
-        store = np.zeros((b * n, N))
-        store[row] = sign[:, None] * np.reshape(computed, (signals, N))[signal]
-    except (OSError, subprocess.SubprocessError, ValueError, IndexError):
+        _run([*compiler.split(), *C_FLAGS, str(path), "-o", str(library), "-lm"])
+        results = iter(json.loads(_run([sys.executable, "-I", call_c.__file__], json.dumps(job))))
+    except (OSError, subprocess.SubprocessError, ValueError):
         return {"compile": float("inf")}
-    apart = {"abi", "signals", *witness.left_out}
-    unknown = {*found} - {*checks, *apart}
+    unknown = {*found} - {f for f, _ in several}
     unknown |= {f"{f}1" for f in _one_state(name, text)} - {f"{f}1" for f, _ in single}
-    unknown -= {f"{f}1" for f in witness.left_out}
+    unknown -= {*witness.left_out, *(f"{f}1" for f in witness.left_out)}
     errors = dict.fromkeys(unknown, float("inf"))
-    errors["signals"] = difference(store.reshape(b, n, N).T, own, 1.0)
-    store[row[:varying]] = 0.0  # the functions leave to their caller what is constant
-    runs = [results[: len(calls)], results[len(calls) :]]
-    for found_now in runs:
-        of_one = iter(found_now[len(asked) :])
-        for f, check in single:
-            value = np.array(
-                [numbers for _, (_, numbers) in zip(check.expected, of_one, strict=False)]
-            )
-            value = value.reshape(len(value), *_stored(f, check.expected.shape[1:]))
-            if MODELS[f].by_columns:
-                value = value.transpose(0, 2, 1)
-            worst = difference(check.compared(value), check.expected, check.scale)
-            errors[f"{f}1"] = max(errors.get(f"{f}1", 0.0), worst)
-    several = [result for run in runs for result in run[: len(asked)]]
-    for (f, check, _), (status, numbers) in zip(2 * asked, several, strict=True):
-        shape = check.expected.shape[1:]
-        if MODELS[f].by_columns:
-            value = (np.reshape(numbers, (*shape[::-1], N)) + store.reshape(b, n, N)).T
-        else:
-            value = np.moveaxis(np.reshape(numbers, (*shape, N)), -1, 0)
-        worst = float("inf") if status else difference(value, check.expected, check.scale)
-        errors[f] = max(errors.get(f, 0.0), worst)
+    for f, check in several:
+        status, numbers = next(results)
+        shape = _stored(f, check.expected.shape[1:])
+        value = np.moveaxis(np.reshape(numbers, (*shape, TILES)), -1, 0)
+        value = value.transpose(0, 2, 1) if MODELS[f].by_columns else value
+        errors[f] = float("inf") if status else difference(value, check.expected[rows], check.scale)
+    for f, check in single:
+        value = np.array([next(results)[1] for _ in check.expected])
+        value = value.reshape(len(value), *_stored(f, check.expected.shape[1:]))
+        value = value.transpose(0, 2, 1) if MODELS[f].by_columns else value
+        worst = difference(check.compared(value), check.expected, check.scale)
+        errors[f"{f}1"] = max(errors.get(f"{f}1", 0.0), worst)
     return errors
 
 

@@ -211,11 +211,9 @@ class Witness:
             replace(
                 whole,
                 expected=self.tau,
-                compared=lambda qdd: np.asarray((A @ qdd[..., None])[..., 0] + H),
+                compared=lambda qdd: _torque(A, qdd, H),
             ),
-            replace(
-                first, expected=self.tau[0], compared=lambda qdd: np.asarray(A[0] @ qdd + H[0])
-            ),
+            replace(first, expected=self.tau[0], compared=lambda qdd: _torque(A[0], qdd, H[0])),
         ]
         if self.robot.passive:
             place = [self.robot.moving.index(j) for j in self.robot.passive]
@@ -354,3 +352,9 @@ def _sampled(regrouping: Regrouping, fixed: Mapping[str, float]) -> tuple[Sample
             with suppress(DescriptionError):
                 return _at(robot, constants), RANDOM
     return _at(robot, robot.constants), OF_THE_FILE
+
+
+def _torque(A: Array, qdd: Array, H: Array) -> Array:
+    """A qdd + H of accelerations that a wrong text may have made infinite."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.asarray((A @ qdd[..., None])[..., 0] + H)

@@ -40,6 +40,13 @@ def cestac(
     advise: options.Advise = False,
     trust: options.Trust = False,
     exact: options.Exact = False,
+    verbose: Annotated[
+        bool,
+        typer.Option(
+            "--verbose",
+            help="Also print means, residuals, verdicts of each step, and what was assumed.",
+        ),
+    ] = False,
     json: options.Json = False,
 ) -> None:
     """Study the encoder resolution. Exit code 1 if the estimate is biased at one of the steps.
@@ -107,7 +114,6 @@ def cestac(
             runtime.report(result, results, study=study)
         if checkpoint is not None and isinstance(result, runtime.Cestac) and result.lists_runs:
             checkpoint.remove()
-        session.show(
-            result.to_json() if json else f"{result.to_table()}\n\n{said}", results, json=json
-        )
+        text = f"{result.to_table()}\n\n{said}" if verbose else result.brief()
+        session.show(result.to_json() if json else text, results, json=json)
     session.end(good=good)

@@ -16,6 +16,9 @@ def check(
     robot: options.RobotFile,
     at_values: options.AtValues = False,
     exact: options.Exact = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", help="Print every check with its figure.")
+    ] = False,
     json: options.Json = False,
     claim: Annotated[
         Path | None,
@@ -39,5 +42,6 @@ def check(
         if claim is not None:
             text = dumps(claimed(regrouping, certificate), indent=1)
             write_all(claim.parent, {claim.name: text + "\n"})
-        typer.echo(dumps(certificate.mapping(), indent=2) if json else str(certificate))
+        text = str(certificate) if verbose else certificate.brief()
+        typer.echo(dumps(certificate.mapping(), indent=2) if json else text)
     end(good=certificate.valid)

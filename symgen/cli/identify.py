@@ -87,6 +87,6 @@ def identify(
         else:
             said = session.assumptions_of(robot, records, study, exact=exact)
             found = result.to_text() if verbose else result.brief(len(said))
-            text = "\n".join([*(f"assume: {line}" for line in said), found])
-        session.show(text, results, json=json)
+            text = "\n".join([found, *(f"assume: {line}" for line in said)])
+        session.show(text, results, json=json, verdict=result.checklist)
     session.end(good=result.checklist.state != "no")

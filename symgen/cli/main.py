@@ -16,24 +16,38 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
-VERBS = {
-    "generate": "Derive a robot's models and write them as a module.",
-    "show": "Print the base parameters with their regrouping formulas.",
-    "check": "Verify the certificate of a robot's base parameters.",
-    "identify": "Estimate the base parameters from a measured record.",
-    "cestac": "Judge whether the encoder resolves enough for an identification.",
-    "compare": "Find which treatment of the records predicts best.",
-    "report": "Identify a robot from a record and judge the result on one page.",
-    "excite": "Search a motion that excites the parameters within the limits.",
-    "simulate": "Simulate the closed loop of a study file and write its record.",
-    "datasets": "List the measured records that symgen can fetch.",
-    "convert": "Write a robot in another format: .yaml, .urdf.",
-    "apply": "Write identified values into your own URDF or MJCF.",
-    "new": "Write a skeleton robot file.",
-    "schema": "Print the JSON Schema of robot files or of results.",
-    "studio": "Serve a local page where one works: robot, record, check, solve, results.",
-    "demo": "Run the main job from end to end, with a report.",
+PANELS = {
+    "Robot": {
+        "show": "Print the base parameters with their regrouping formulas.",
+        "generate": "Derive a robot's models and write them as a module.",
+        "check": "Verify the certificate of a robot's base parameters.",
+        "new": "Write a skeleton robot file.",
+        "convert": "Write a robot in another format: .yaml, .urdf.",
+    },
+    "Record": {
+        "identify": "Estimate the base parameters from a measured record.",
+        "apply": "Write identified values into your own URDF or MJCF.",
+        "report": "Identify a robot from a record and judge the result on one page.",
+        "compare": "Find which treatment of the records predicts best.",
+        "excite": "Search a motion that excites the parameters within the limits.",
+        "simulate": "Simulate the closed loop of a study file and write its record.",
+    },
+    "Encoder": {
+        "cestac": "Judge whether the encoder resolves enough for an identification.",
+    },
+    "Files": {
+        "demo": "Run the main job from end to end, with a report.",
+        "studio": "Serve a local page where one works: robot, record, check, solve, results.",
+        "datasets": "List the measured records that symgen can fetch.",
+        "schema": "Print the JSON Schema of robot files or of results.",
+    },
 }
+VERBS = {verb: does for panel in PANELS.values() for verb, does in panel.items()}
+MAIN_PATH = (
+    ("symgen identify arm.urdf log.csv --suggest study.yaml", "name its columns"),
+    ("symgen identify arm.urdf study.yaml -o results", "values, verdict"),
+    ("symgen apply results arm.urdf -o new.urdf", "into your URDF"),
+)
 
 WENT = {
     "fleet": "symgen fleet went; docs/examples/dask_many_robots.py is a loop over files on several cores or a cluster",
@@ -70,6 +84,13 @@ class Verbs(TyperGroup):
     def format_help(self, ctx: Any, formatter: Any) -> None:
         self.listing = True
         super().format_help(ctx, formatter)
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        for title, panel in PANELS.items():
+            with formatter.section(title):
+                formatter.write_dl([*panel.items()], col_max=12)
+        with formatter.section("From a log to values"):
+            formatter.write_dl([*MAIN_PATH], col_max=60)
 
 
 ALLOCATIONS = 500_000

@@ -5,11 +5,14 @@ line and exit code 2.
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from shutil import get_terminal_size
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import typer
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
     from symgen.description import Robot
 
 BAD_INPUT, NEGATIVE = 2, 1
+COLOURS = {"good": "green", "doubtful": "yellow", "no": "red"}
 BROKEN_PIPE, INTERRUPTED = 141, 130  # as shells have them: 128 + SIGPIPE, 128 + SIGINT
 
 
@@ -111,13 +115,37 @@ def say(text: str) -> None:
     typer.echo(f"  {text}", err=True)
 
 
-def show(text: str, results: Results | None = None, *, json: bool = False) -> None:
-    """Print a result, and on the error stream where its report is."""
+def show(
+    text: str, results: Results | None = None, *, json: bool = False, verdict: Any = None
+) -> None:
+    """Print a result, and on the error stream where its report is. On a terminal lines are wrapped
+    at its width, and the answer of the `verdict` (a checklist) has its colour.
+    """
     from runtime.core.errors import encodable
 
-    typer.echo(encodable(text), nl=not json)
+    text = encodable(text)
+    if sys.stdout.isatty() and not json:
+        text = on_terminal(text, get_terminal_size().columns, verdict)
+    typer.echo(text, nl=not json)
     if results is not None:
         typer.echo(f"report: {results.folder / 'report.html'}", err=True)
+
+
+def on_terminal(text: str, width: int, verdict: Any = None) -> str:
+    """A text whose lines end between words, where the terminal does, and whose answer has its colour."""
+    text = "\n".join(_wrapped(line, width) for line in text.split("\n"))
+    if verdict is None:
+        return text
+    answer = typer.style(verdict.answer, fg=COLOURS.get(verdict.state), bold=True)
+    return re.sub(rf"^{verdict.answer}(?=\.)", answer, text, count=1, flags=re.MULTILINE)
+
+
+def _wrapped(line: str, width: int) -> str:
+    """A line of words, broken between them where the terminal ends."""
+    lines = wrap(
+        line, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
+    )
+    return "\n".join(lines) if len(line) > width else line
 
 
 def end(*, good: bool) -> None:

@@ -208,15 +208,25 @@ def _of_motors_if_given(value: Any, declared: Declared) -> tuple[float, ...] | N
     return None if value is None else _of_motors(value, declared)
 
 
+def _rows(value: list[Any], _: Declared) -> tuple[tuple[float, ...], ...]:
+    """Rows of a matrix; a list of numbers is its diagonal."""
+    if any(isinstance(x, list) for x in value):
+        return tuple(map(tuple, value))
+    return tuple(
+        tuple(x if k == i else 0.0 for k in range(len(value))) for i, x in enumerate(value)
+    )
+
+
 @dataclass(frozen=True, config=CONFIG)
 class Drives:
     """qm = ratio (q - offset), tau = ratio' (torque_constant * u)."""
 
     ratio: Annotated[
         tuple[tuple[float, ...], ...],
-        Written(list[list[Numeric]], lambda rows, _: tuple(map(tuple, rows))),
+        Written(list[list[Numeric]] | list[Numeric], _rows),
         Field(
-            description="one row per motor: [[100, 0], [0, 80]]; rad per m for a prismatic joint"
+            description="one row per motor: [[100, 0], [0, 80]]; of uncoupled drives [100, 80]; "
+            "rad per m for a prismatic joint"
         ),
     ]
     offset: Annotated[

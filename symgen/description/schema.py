@@ -186,8 +186,8 @@ def _advice(path: Path, given: Any, message: str) -> str:
     """What to write instead, where a value of the wrong type shows what was meant."""
     if path[-1:] == ("sigma",):
         return ": 0 revolute, 1 prismatic, 2 fixed"
-    if path[:2] == ("drives", "ratio") and len(path) == 3:
-        return "; ratio has one row per motor: [[100, 0], [0, 80]]"
+    if path[:2] == ("drives", "ratio"):
+        return "; ratio has one row per motor: [[100, 0], [0, 80]], or one number: [100, 80]"
     if path[:1] == ("constants",) and isinstance(given, int):
         return "; a decimal comma? write 0.06, not 0,06"
     if path[:1] == ("constants",) and "undeclared symbol" in message:

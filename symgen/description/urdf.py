@@ -20,6 +20,7 @@ from symgen.description.expression import Expression, ratio
 from symgen.description.tree import (
     DROPPED,
     FIXED_TYPE,
+    FREE_TYPE,
     MAX_JOINTS,
     MOVING,
     Inertial,
@@ -31,6 +32,7 @@ from symgen.description.xml_text import LARGEST, Array, XmlElement, read_element
 from symgen.errors import DescriptionError
 
 Mimic = tuple[str, Expression]  # joint that is followed, and the position by its own
+FREE = ("floating", "planar")  # joints that have to be held
 MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 # children of an element that are read, and <material>, which says nothing that is left out
 READ = {
@@ -204,11 +206,12 @@ def no_body(M: float, tensor: Array) -> str:
 
 def _joint(e: XmlElement, angles: Angles) -> Joint:
     kind, name = e.word("type"), e.word("name")
-    if kind not in (*MOVING, FIXED_TYPE):
+    if kind not in (*MOVING, FIXED_TYPE, *FREE):
         raise DescriptionError(
             f"joint {name!r} is {kind[:30]!r}; expected {', '.join(MOVING)} or {FIXED_TYPE}",
             line=e.line,
         )
+    kind = FREE_TYPE if kind in FREE else kind
     ends = {tag: child for tag in ("parent", "child") if (child := e.find(tag)) is not None}
     if len(ends) < 2:
         raise DescriptionError(
@@ -217,7 +220,7 @@ def _joint(e: XmlElement, angles: Angles) -> Joint:
     given = e.find("axis")
     axis = np.array([1.0, 0.0, 0.0]) if given is None else given.numbers("xyz", 3, "1 0 0")
     length = float(np.linalg.norm(axis))
-    if kind == FIXED_TYPE:
+    if kind in (FIXED_TYPE, FREE_TYPE):
         axis, length = np.array([0.0, 0.0, 1.0]), 1.0  # of no meaning; some files say 0 0 0
     if length < 1e-6:
         raise DescriptionError(

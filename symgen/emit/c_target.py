@@ -17,7 +17,6 @@ from math import prod
 from typing import Any
 
 from symgen.derive.graph import Scalar
-from symgen.derive.model import Model
 from symgen.description.expression import Expression
 from symgen.description.naming import Namespace
 from symgen.description.robot import FIXED, PRISMATIC
@@ -30,7 +29,6 @@ from symgen.emit.render import WIDTH, laid_out
 from symgen.emit.spec import STATES, Function, ModuleSpec, signals
 from symgen.version import VERSION
 
-ABI = 2
 SCRATCH = 262144  # bytes of stack for the results of one tile
 FLAGS = (
     "-std=c99 -O2 -ftree-vectorize -fno-math-errno -fno-trapping-math -ffp-contract=off "
@@ -82,7 +80,6 @@ def _context(spec: ModuleSpec, command: str | None) -> dict[str, Any]:
         "command": _comment(command or robot.file or robot.name),
         "header": [_comment(line) for line in _header(spec, kernels)],
         "name": robot.name,
-        "abi": ABI,
         "n": len(robot.joints),
         "frames": len(robot.frames),
         "sizes": {"b": len(spec.regrouping), "c": max(len(free), 1)},
@@ -93,7 +90,6 @@ def _context(spec: ModuleSpec, command: str | None) -> dict[str, Any]:
         "parameters": packed([f'"{name}"' for name in spec.regrouping.names]),
         "constant_names": packed([f'"{name}"' for name in free] or ['""']),
         "constants": packed([repr(float(x)) for x in free.values()] or ["0.0"]),
-        "signals": _signals_layout(spec, spec.functions["regressor"].model),
         "helpers": {
             name: any(f"{name}(" in line for line in lines) for name in ("sign", "above", "below")
         },
@@ -149,8 +145,7 @@ def _comment(text: str) -> str:
 def _kernel(spec: ModuleSpec, f: Function, names: Namespace) -> dict[str, Any]:
     """A function over a tile: its lines before the loops, those of sines and cosines, each a loop
     of its own (compilers merge sin(x) and cos(x) of one loop into a call that has no vector form),
-    those of the loop over a tile; its rows {row of the store, signal, sign}, the first `count` of
-    them written by the function; its C signatures.
+    those of the loop over a tile; its rows {row of the store, signal, sign}; its C signatures.
     """
     robot, model, result = spec.robot, f.model, names.own(f.model.result)
     entries = [
@@ -223,7 +218,6 @@ def _kernel(spec: ModuleSpec, f: Function, names: Namespace) -> dict[str, Any]:
         "sections": [s for s in sections if s.lines],
         "rows": packed(rows),
         "entries": len(rows),
-        "count": len(rows) - distinct.constant * model.by_columns,  # its store holds constants
         "computed": len(distinct.entries),
     }
     given = {"X": parameters, "constants": constants}
@@ -260,18 +254,13 @@ def _header(spec: ModuleSpec, kernels: Sequence[Mapping[str, Any]]) -> list[str]
         *line_of(
             "Arguments",
             (
-                "q, qd, qdd (N, n) in C order, rad or m and seconds; S receives (rows, N), samples "
-                "last"
+                "q, qd, qdd (N, n) in C order, rad or m and seconds; S (rows, N), samples last, comes "
+                "zeroed: rows that are always zero are not written"
             ),
         ),
-        *line_of("flags", "1 writes past the caches, for results larger than those"),
         *line_of("constants", ", ".join(spec.regrouping.constants) or "none"),
         *line_of("X, columns", " ".join(spec.regrouping.names)),
-        *line_of(
-            "Results",
-            "0, or 1 if N is negative or a pointer is missing; rows that are zero or constant are "
-            "never written",
-        ),
+        *line_of("Returned", "0, or 1 if N is negative or a pointer is missing"),
         *line_of("Compile", f"cc {FLAGS} {so}"),
         *line_of(
             "",
@@ -294,14 +283,13 @@ def _signatures(
     body = [f"const real *restrict {s}" for s in (*used, *needs)]
     body += [f"real *restrict {s}" for s in (*scratch, result)]
     given = [f"const real *{p}" for p in pointers]
-    own = ["int64_t N", *given, "real *S", "int32_t flags"]
-    partly = "; only rows that are not constant" if model.by_columns else ""
+    own = ["int64_t N", *given, "real *S"]
     shape = ", ".join(map(str, f.shape))
     size = prod(f.shape)
     tile = ", ".join([*(f"{s}_tile" for s in used), *needs, *scratch, result])
     rooms = {"T": calls, result: computed}
     return {
-        "summary": f"/* {model.summary} S has shape ({shape}, N){partly}. */",
+        "summary": f"/* {model.summary} S has shape ({shape}, N). */",
         "one_summary": f"/* {model.summary} S has shape ({shape}). */",
         "size": size,
         "unread": [p for p in pointers if p not in (*used, *needs)],
@@ -314,9 +302,9 @@ def _signatures(
         "one_prototype": signature(f"void {spec.robot.name}_{model.name}1", [*given, "real *S"]),
         "state_prototype": signature(
             f"static void {model.name}_state",
-            [*(f"const real *{p}" for p in (*used, *needs)), "size_t rows", "real *S"],
+            [*(f"const real *{p}" for p in (*used, *needs)), "real *S"],
         ),
-        "state_call": f"{model.name}_state({', '.join([*used, *needs, '{}', 'S'])})",
+        "state_call": f"{model.name}_state({', '.join([*used, *needs, 'S'])})",
         "one_call": ", ".join(["1", *used, *needs, *scratch, result]),
         "one_scratch": ", ".join(f"{x}[{rooms[x]}]" for x in (*scratch, result)),
         "prototype": signature(f"int32_t {spec.robot.name}_{model.name}", own),
@@ -332,21 +320,3 @@ def _signatures(
 
 def _missing(pointers: Sequence[str]) -> str:
     return " || ".join(f"{p} == NULL" for p in pointers)
-
-
-def _signals_layout(spec: ModuleSpec, regressor: Model) -> dict[str, object]:
-    """The function that gives the distinct signals of the regressor, with its table of entries."""
-    states = regressor.states
-    pointers = [f"const real *{s}" for s in states]
-    own = [
-        "int64_t m",
-        *pointers,
-        "int64_t stride",
-        "const real *constants",
-        "real *U",
-        "int64_t ustride",
-    ]
-    return {
-        "prototype": signature(f"int32_t {spec.robot.name}_signals", own),
-        "missing": _missing([*states, "constants", "U"]),
-    }

@@ -111,7 +111,7 @@ class Function:
 
 @dataclass(frozen=True)
 class Signals:
-    """The distinct entries of a function up to sign, those of states before those that are 1.
+    """The distinct entries of a function up to sign.
 
     Attributes
     ----------
@@ -119,13 +119,10 @@ class Signals:
         The first of each, its sign as it stands there, with the comments of all.
     places : tuple of (place, signal, sign)
         Every place of the array that is not zero.
-    constant : int
-        How many of them, the last, are numbers.
     """
 
     entries: tuple[Entry, ...]
     places: tuple[tuple[Place, int, int], ...]
-    constant: int
 
 
 def signals(f: Function, entries: Sequence[Entry]) -> Signals:
@@ -133,7 +130,7 @@ def signals(f: Function, entries: Sequence[Entry]) -> Signals:
     number: dict[tuple[str, int], tuple[int, int]] = {}  # node or number: signal, its sign
     distinct: list[Entry] = []
     places = []
-    for entry in sorted(entries, key=lambda e: isinstance(e.value, int)):
+    for entry in entries:
         value = entry.value
         if isinstance(value, int):
             key, own = ("number", abs(value)), -1 if value < 0 else 1
@@ -146,8 +143,7 @@ def signals(f: Function, entries: Sequence[Entry]) -> Signals:
             comment = f"{distinct[signal].comment}, {entry.comment}".removeprefix(", ")
             distinct[signal] = replace(distinct[signal], comment=comment)
         places += [(place, signal, own * sign) for place in f.places(entry)]
-    constant = sum(isinstance(e.value, int) for e in entries)
-    return Signals(tuple(distinct), tuple(places), constant)
+    return Signals(tuple(distinct), tuple(places))
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,12 +8,15 @@ browser.
     study.yaml                what the record means, and how it is evaluated
     proof.json, check.json    the certificate and the findings
     study-NN-name.yaml, runs/NN-name/    settings and results of one command
+    history/robot/NNNN/, history/study/NNNN/    what a change has replaced, the last one highest
+    history/undone/NNNN/      robots that undo has replaced
 """
 
 from __future__ import annotations
 
 import json
 import shutil
+import warnings
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
@@ -28,11 +31,12 @@ from runtime.reading.formats import BAG, endings, is_measured
 from runtime.reporting.result_files import write_all
 from runtime.study import located, study_from_text, study_of, study_text
 from symgen.description import packaged_robots
-from symgen.description.files import content_of
+from symgen.description.files import content_of, load_robot
 
 ROBOT_ENDINGS = (".yaml", ".urdf", ".xml", ".par")  # the first one that is there is the robot
 OTHER_ENDINGS = {".yml": ".yaml", ".mjcf": ".xml"}
 DRAFT = "robot.draft.yaml"
+MOST_KEPT = 300  # robots and studies before the present one
 RESULT_FILES = ("estimate.json", "cestac.json", "advice.json")  # of a run that is complete
 
 
@@ -77,19 +81,52 @@ class WorkFolder:
         path = self.path / DRAFT if self.read(DRAFT) else self.robot
         return sha256(path.read_bytes()).hexdigest() if path else ""
 
+    def kept(self, history: str) -> list[Path]:
+        """Folders of one history, the oldest first."""
+        return sorted((self.path / "history" / history).glob("[0-9]*"), key=lambda p: int(p.name))
+
+    def keep(self, kind: str, history: str = "") -> None:
+        """Copy robot or study as they are to the end of a history."""
+        place, before = self.path / "history" / (history or kind), self.kept(history or kind)
+        own = [path for path in self.path.glob(f"{kind}.*") if path.is_file()]
+        if own:
+            folder = place / f"{int(before[-1].name) + 1 if before else 1:04d}"
+            folder.mkdir(parents=True)
+            for path in own:
+                shutil.copy2(path, folder)
+        for old in before[: -MOST_KEPT + 1]:
+            remove(old)
+
+    def bring_back(self, history: str = "robot", other: str = "undone") -> None:
+        """The last robot of one history takes the place of the present one, which goes to the other;
+        InputError where there is none.
+        """
+        if not (before := self.kept(history)):
+            raise InputError("nothing to undo; reload the page")
+        self.keep("robot", other)
+        self._remove_robot()
+        for path in before[-1].iterdir():
+            path.replace(self.path / path.name)
+        remove(before[-1])
+
+    def _remove_robot(self) -> None:
+        for name in (DRAFT, *(f"robot{ending}" for ending in ROBOT_ENDINGS)):
+            (self.path / name).unlink(missing_ok=True)
+
     def take_robot(self, name: str, content: bytes) -> None:
-        """A file that was dropped becomes the robot; results and record stay."""
-        ending = OTHER_ENDINGS.get(suffix := Path(name).suffix.lower(), suffix)
-        if ending not in ROBOT_ENDINGS:
-            raise InputError(
-                f"{name[:80]}: expected a robot file that ends in {', '.join(ROBOT_ENDINGS)}"
-            )
-        for other in (DRAFT, *(f"robot{ending}" for ending in ROBOT_ENDINGS)):
-            (self.path / other).unlink(missing_ok=True)
-        self.write(f"robot{ending}", content)
+        """A file becomes the robot; results and record stay, the robot before goes to its history."""
+        self._keep_robot()
+        self._remove_robot()
+        self.write(robot_file(name), content)
+
+    def _keep_robot(self) -> None:
+        self.keep("robot")
+        remove(self.path / "history" / "undone")
 
     def take_robot_of(self, source: str) -> None:
-        """A packaged robot, or the path of the command line."""
+        """A packaged robot, or the path of the command line; SymgenError where it is none."""
+        with warnings.catch_warnings(action="ignore"):  # the page tells them
+            load_robot(source)
         packaged = files("symgen.description") / "robots" / f"{source}.yaml"
         if source in packaged_robots():
             self.take_robot("robot.yaml", packaged.read_bytes())
@@ -97,7 +134,11 @@ class WorkFolder:
             self.take_robot(source, content_of(Path(source)))
 
     def edit_robot(self, text: str, *, draft: bool) -> None:
-        """A text of the table: a draft where it describes no robot, else the robot file."""
+        """A text of the table: a draft where it describes no robot, else the robot file. The history
+        holds whole robots.
+        """
+        if not self.read(DRAFT):
+            self._keep_robot()
         self.write(DRAFT if draft else "robot.yaml", text)
         if not draft:
             (self.path / DRAFT).unlink(missing_ok=True)
@@ -119,6 +160,7 @@ class WorkFolder:
             remove(old)
         part.replace(self.path / f"{kind}{ending}")
         if kind == "record":
+            self.keep("study")
             (self.path / "study.yaml").unlink(missing_ok=True)
 
     def take_record_of(self, source: str) -> None:
@@ -135,12 +177,20 @@ class WorkFolder:
             shutil.copyfile(path, part)
             self.take_measured("record", source, part)
 
+    @property
+    def study_digest(self) -> str:
+        """SHA-256 of study.yaml; "" where there is none."""
+        text = self.read("study.yaml")
+        return sha256(text.encode()).hexdigest() if text else ""
+
     def study(self) -> dict[str, Any]:
-        """The plain values of study.yaml, {} where it holds none; InputError where it is no
-        YAML.
+        """The plain values of study.yaml with a list of records, {} where it holds none; InputError
+        where it is no YAML.
         """
         values = yaml_values(self.read("study.yaml"), file="study.yaml")[0]
-        return values if isinstance(values, dict) else {}
+        values = values if isinstance(values, dict) else {}
+        single = isinstance(values.get("record"), dict)
+        return values | {"record": [values["record"]]} if single else values
 
     def checked_study(self, given: Any) -> str:
         """Text of a study by its text or its values; InputError where it is none, or names a file
@@ -185,6 +235,16 @@ class WorkFolder:
             "command": self.read(f"study-{run.name}.yaml").partition("\n")[0].partition("# ")[2],
             "files": sorted(p.name for p in run.iterdir() if p.is_file() and p.name[0] != "."),
         }
+
+
+def robot_file(name: str) -> str:
+    """Our name of a robot file that its owner calls `name`; InputError where it is none."""
+    ending = OTHER_ENDINGS.get(suffix := Path(name).suffix.lower(), suffix)
+    if ending not in ROBOT_ENDINGS:
+        raise InputError(
+            f"{name[:80]}: expected a robot file that ends in {', '.join(ROBOT_ENDINGS)}"
+        )
+    return f"robot{ending}"
 
 
 def result_of(run: Path) -> str:

@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import Any
 
 from runtime.threads import BLAS_THREADS
-from symgen.studio.folder import result_of
 
 GRACE = 3.0  # s, between the interrupt and the kill
 OUTPUT_KEPT = 500_000  # characters of what a command says that are kept
@@ -41,6 +40,8 @@ class Job:
         What it does, for the eye; of commands with one title only the last counts.
     words : tuple of str
         The command line.
+    result : str
+        Name of the file that it writes, in the work folder; without it, it has failed.
     run : str
         Name of its folder of results; "" without.
     state : str
@@ -56,6 +57,7 @@ class Job:
     number: int
     title: str
     words: tuple[str, ...]
+    result: str
     run: str = ""
     state: str = WAITING
     code: int | None = None
@@ -119,7 +121,7 @@ class Jobs:
         self.all: list[Job] = []
         self.wake = asyncio.Event()
 
-    def add(self, title: str, words: Sequence[str], *, run: str = "") -> None:
+    def add(self, title: str, words: Sequence[str], result: str, *, run: str = "") -> None:
         """Queue a command; one with the same title gives way to it."""
         for job in self.all:
             if job.title == title:
@@ -129,7 +131,7 @@ class Jobs:
                 f"{MOST_COMMANDS} commands wait already; cancel some, or wait for them"
             )
         number = self.all[-1].number + 1 if self.all else 1
-        self.all.append(Job(number, title, tuple(words), run))
+        self.all.append(Job(number, title, tuple(words), result, run))
         self.wake.set()
         self.changed()
 
@@ -140,7 +142,9 @@ class Jobs:
     def cancel(self, job: Job) -> None:
         """Take it out of the queue, or end its process."""
         if job.open:
-            job.state = CANCELLED
+            waited, job.state = job.state == WAITING, CANCELLED
+            if waited:
+                self._tidy(job)
             job.signal(signal.SIGINT)
             asyncio.get_running_loop().call_later(GRACE, job.signal, signal.SIGKILL)
             self.changed()
@@ -164,6 +168,7 @@ class Jobs:
         temporary = self.folder / ".tmp"
         temporary.mkdir(exist_ok=True)
         job.started, job.state = time.monotonic(), RUNNING
+        before = self._written(job)
         self.changed()
         job.process = process = await asyncio.create_subprocess_exec(
             *self.programs[job.words[0]],
@@ -183,7 +188,16 @@ class Jobs:
         await asyncio.gather(*(self._listen(job, *stream) for stream in streams.items()))
         job.code = await process.wait()
         if job.state == RUNNING:
-            job.state = DONE if job.code in (0, 1) else FAILED
+            told = job.code in (0, 1) and self._written(job) not in (
+                0,
+                before,
+            )  # 1: a verdict of no
+            job.state = DONE if told else FAILED
+
+    def _written(self, job: Job) -> int:
+        """When its result was written, ns; 0 where there is none."""
+        path = self.folder / job.result
+        return path.stat().st_mtime_ns if path.is_file() else 0
 
     async def _listen(self, job: Job, name: str, stream: Any) -> None:
         """Keep the end of what a process says."""
@@ -195,10 +209,9 @@ class Jobs:
 
     def _tidy(self, job: Job) -> None:
         """Nothing is left of a command but its result."""
-        shutil.rmtree(self.folder / ".tmp", ignore_errors=True)
-        run = self.folder / "runs" / job.run
-        if job.run and not (job.state == DONE and result_of(run)):
-            shutil.rmtree(run, ignore_errors=True)
+        if job.process is None and not any(j.state == RUNNING for j in self.all):
+            shutil.rmtree(self.folder / ".tmp", ignore_errors=True)
+        if job.run and job.state != DONE:
+            shutil.rmtree(self.folder / "runs" / job.run, ignore_errors=True)
             (self.folder / f"study-{job.run}.yaml").unlink(missing_ok=True)
-            job.state = FAILED if job.state == DONE else job.state
         self.changed()

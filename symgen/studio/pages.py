@@ -27,7 +27,7 @@ from symgen.description.new import skeleton
 from symgen.emit.targets import TARGETS
 from symgen.errors import SymgenError
 from symgen.studio import table, views
-from symgen.studio.folder import DRAFT, json_of
+from symgen.studio.folder import DRAFT, json_of, remove, robot_file
 from symgen.studio.server import Server, page
 
 PAGE_STEPS = ("robot", "record", "check", "solve", "results")
@@ -35,10 +35,10 @@ PAGE_PARTS = ("table", "certificate", "study", "findings", "jobs", "applied")
 SANDBOX = "sandbox allow-scripts allow-downloads allow-popups"
 SHOWN_FILES = {".html": "text/html", ".png": "image/png", ".svg": "image/svg+xml"}
 VIEWS = ("formulas", "model", "module", "preview", "series")
-RUN_COMMANDS = {
-    "identify": ("identify",),
-    "cestac": ("cestac",),
-    "advise": ("cestac", "--advise"),
+RUN_COMMANDS = {  # what each writes, its verb and options
+    "identify": ("estimate.json", "identify"),
+    "cestac": ("cestac.json", "cestac"),
+    "advise": ("advice.json", "cestac", "--advise"),
 }
 MOST_FIELDS = 100  # of a form
 Handler = Callable[[Any], Awaitable[Any]]
@@ -70,7 +70,7 @@ class Pages:
             "/do/upload": self._upload,
         }
         acts: tuple[Handler, ...] = (
-            *(self._packaged, self._edit, self._prove, self._study, self._check),
+            *(self._packaged, self._edit, self._undo, self._prove, self._study, self._check),
             *(self._solve, self._cancel, self._apply),
         )
         posts = {f"/do/{act.__name__[1:]}": self._posted(act) for act in acts}
@@ -86,15 +86,16 @@ class Pages:
                 keep_blank_values=True,
                 max_num_fields=MOST_FIELDS,
             )
-            return await self._changed(await act(dict(fields)))
+            form = dict(fields)
+            return await self._changed(await act(form), form.get("run"))
 
         return posted
 
-    async def _changed(self, name: str) -> Response:
+    async def _changed(self, name: str, run: str | None = None) -> Response:
         self.server.changed()
         if name:
-            return await self._part(name)
-        self.server.before = ""
+            return await self._part(name, run)
+        self.server.before, self.server.left_out = "", []
         return PlainTextResponse("taken", headers={"hx-refresh": "true"})
 
     async def _show(self, request: Request) -> Response:
@@ -110,7 +111,7 @@ class Pages:
         record, validation = folder.measured("record"), folder.measured("validation")
         findings = json_of(folder.path / "check.json")
         own = folder.first(TREES)
-        now = views.digest_of(folder.robot or Path(), folder.path / "study.yaml")
+        run = next((r for r in runs if r["name"] == asked), runs[-1] if runs else None)
         cells, values, wrong = None, {}, ""
         try:
             cells, values = table.cells_of(shown.get("text", "")), folder.study()
@@ -127,6 +128,8 @@ class Pages:
             units=table.UNITS_OF_CELLS,
             left_out=self.server.left_out,
             digest=folder.digest,
+            undo=bool(folder.kept("robot")),
+            redo=bool(folder.kept("undone")),
             file=folder.robot.name if folder.robot else "",
             packaged=packaged_robots(),
             models=sorted(SYMBOLIC),
@@ -135,18 +138,19 @@ class Pages:
             record=record.name if record else "",
             validation=validation.name if validation else "",
             study=folder.read("study.yaml"),
+            study_digest=folder.study_digest,
             values=values,
             wrong=wrong,
             findings=findings,
-            stale=findings.get("of") != now,
+            stale=not self._is_checked(),
             checked=self.jobs.last("check of the record"),
             methods=ESTIMATORS,
             jobs=self.jobs.all,
             now=time.monotonic(),
             runs=runs,
-            run=next((r for r in runs if r["name"] == asked), runs[-1] if runs else None),
+            run=run,
             own=own.name if own else "",
-            applied=self.jobs.last("apply"),
+            applied=self.jobs.last(f"apply {run['name']}") if run else None,
         )
 
     def _proof(self) -> dict[str, Any]:
@@ -165,6 +169,11 @@ class Pages:
             raise InputError("the table describes no robot yet")
         return self.folder.robot
 
+    def _is_checked(self) -> bool:
+        """Whether the findings are of this robot and this study."""
+        now = views.digest_of(self.folder.robot or Path(), self.folder.path / "study.yaml")
+        return bool(json_of(self.folder.path / "check.json").get("of") == now)
+
     async def _view(self, request: Request) -> Response:
         """What is derived from robot, record or run, as a part of a page or as JSON."""
         name, asked = request.path_params["name"], dict(request.query_params)
@@ -174,6 +183,11 @@ class Pages:
         if name not in VIEWS or path is None:
             raise InputError("no such view")
         given: Any = self.server.before if name == "formulas" else asked
+        if name == "preview":
+            shown = await self.server.robot()
+            (record, *_) = self.folder.study().get("record") or [{}]
+            joints = tuple(filter(None, shown.get("labels", ())))
+            given = asked | {"joints": joints, "topic": record.get("topic")}
         if name == "series":
             run = str(self.folder.run(asked.get("run", "")))
             given = {"run": run, "record": asked.get("record", "")}
@@ -186,7 +200,7 @@ class Pages:
         """A file of ours, or one of a run; its pages in a sandbox of their own."""
         name, run = request.path_params["name"], request.path_params.get("run")
         folder, robot = self.folder, self.folder.robot or Path()
-        own = [folder.path / "study.yaml", *folder.path.glob("applied.*"), robot]
+        own = [folder.path / "study.yaml", *folder.path.glob("applied-*.*"), robot]
         places = folder.run(run).iterdir() if run else own
         path = next((p for p in places if p.name == name and p.is_file()), None)
         if path is None:
@@ -198,21 +212,27 @@ class Pages:
         return FileResponse(path, media_type=kind or "application/octet-stream", headers=headers)
 
     async def _upload(self, request: Request) -> Response:
-        """A file as the body, its kind and the name that its owner gave it in the address."""
+        """A file as the body, its kind and the name that its owner gave it in the address; a robot is
+        read before it takes the place of the one that is there.
+        """
         kind, name = (request.query_params.get(key, "") for key in ("kind", "name"))
         if kind not in ("robot", "record", "validation"):
             raise InputError("expected a robot, a record or a validation record")
-        part = self.folder.path / f"{secrets.token_hex(8)}.part"
+        folder = self.folder.path / f"{secrets.token_hex(8)}.part"
+        part = folder / (robot_file(name) if kind == "robot" else kind)
+        folder.mkdir()
         try:
             with part.open("xb") as file:
                 async for piece in request.stream():
                     file.write(piece)
             if kind != "robot":
                 self.folder.take_measured(kind, name, part)
+            elif "error" in (shown := await self.server.view(views.robot, str(part), "")):
+                raise InputError(f"{name[:80]}: {shown['error']}")
             else:
                 self.folder.take_robot(name, content_of(part))
         finally:
-            part.unlink(missing_ok=True)
+            remove(folder)
         return await self._changed("")
 
     async def _packaged(self, form: dict[str, str]) -> str:
@@ -226,8 +246,7 @@ class Pages:
     async def _edit(self, form: dict[str, str]) -> str:
         """An edit of the table, cell by cell or as a text."""
         text = (await self.server.robot()).get("text", "")
-        if form.get("digest") != self.folder.digest:
-            raise InputError("another page has changed the robot; reload this one")
+        self._of_this_robot(form)
         if not self.folder.read(DRAFT):
             self.server.before = text
         text = form["text"].replace("\r\n", "\n") if "text" in form else text
@@ -236,15 +255,28 @@ class Pages:
         self.folder.edit_robot(text, draft=table.wrong(text) is not None)
         return "table"
 
+    async def _undo(self, form: dict[str, str]) -> str:
+        """The robot before the last change; with `redo` the one before the last undo."""
+        self._of_this_robot(form)
+        self.folder.bring_back(*(("undone", "robot") if "redo" in form else ()))
+        return ""
+
+    def _of_this_robot(self, form: dict[str, str]) -> None:
+        if form.get("digest") != self.folder.digest:
+            raise InputError("another page has changed the robot; reload this one")
+
     async def _prove(self, form: dict[str, str]) -> str:
         self.jobs.add(
             "certificate",
             ("symgen", "check", self._source().name, "--certificate", "proof.json"),
+            "proof.json",
         )
         return "certificate"
 
     async def _study(self, form: dict[str, str]) -> str:
         """The study as text, or as values in JSON."""
+        if form.get("digest", "") != self.folder.study_digest:
+            raise InputError("another page has changed the study; reload this one")
         text = form.get("text", "").replace("\r\n", "\n")
         values = json.loads(form["values"]) if "values" in form else text
         self.folder.write("study.yaml", self.folder.checked_study(values))
@@ -257,7 +289,8 @@ class Pages:
         return self._source().name, "study.yaml"
 
     async def _check(self, form: dict[str, str]) -> str:
-        self.jobs.add("check of the record", ("check", *self._command(), "check.json"))
+        words = ("check", *self._command(), "check.json")
+        self.jobs.add("check of the record", words, "check.json")
         return "findings"
 
     async def _solve(self, form: dict[str, str]) -> str:
@@ -265,6 +298,8 @@ class Pages:
         resolution. Its settings begin with its command.
         """
         robot, _ = self._command()
+        if "anyway" not in form and not self._is_checked():
+            raise InputError("check record, study and robot first, or solve anyway")
         kind = form.get("kind", "identify")
         if kind not in RUN_COMMANDS:
             raise InputError(f"expected one of {', '.join(RUN_COMMANDS)}")
@@ -279,9 +314,9 @@ class Pages:
         taken = [job.run for job in self.jobs.all] + [p.name for p in self.folder.results()]
         number = max((int(run[:2]) for run in taken if run[:2].isdigit()), default=0) + 1
         run = f"{number:02d}-{safe(form.get('name', '') or kind)}"
-        verb, *own = RUN_COMMANDS[kind]
+        result, verb, *own = RUN_COMMANDS[kind]
         words = ("symgen", verb, robot, f"study-{run}.yaml", *own, *options, "-o", f"runs/{run}")
-        self.jobs.add(run, words, run=run)
+        self.jobs.add(run, words, f"runs/{run}/{result}", run=run)
         self.folder.write(f"study-{run}.yaml", f"# {shlex.join(words)}\n{text}")
         return "jobs"
 
@@ -296,9 +331,11 @@ class Pages:
         own, robot = self.folder.first(TREES), self._source()
         if own is None:
             raise InputError("the robot did not come from a URDF or MJCF; drop yours on Robot")
-        target = ("-o", f"applied{own.suffix}", "--force", "--diff")
+        target = f"applied-{run.name}{own.suffix}"
+        options = ("-o", target, "--force", "--diff")
         edited = () if robot == own else ("--robot", robot.name)
-        self.jobs.add("apply", ("symgen", "apply", f"runs/{run.name}", own.name, *target, *edited))
+        words = ("symgen", "apply", f"runs/{run.name}", own.name, *options, *edited)
+        self.jobs.add(f"apply {run.name}", words, target)
         return "applied"
 
 
@@ -308,6 +345,8 @@ def answering(handler: Handler) -> Handler:
     async def answer(request: Request) -> Response:
         try:
             return await handler(request)  # type: ignore[no-any-return]
+        except RecursionError:
+            return page("message", 422, text="nested too deeply; expected a plain table or study")
         except (InputError, SymgenError, ValueError, OSError) as e:
             return page("message", 422, text=str(e) or type(e).__name__)
 

@@ -131,14 +131,23 @@ def module(path: str, request: Mapping[str, str]) -> dict[str, Any]:
 
 
 @answered
-def preview(path: str, request: Mapping[str, str]) -> dict[str, Any]:
-    """Names of the columns of a measured file, and of those asked for (`columns`, by commas) first
-    rows and thinned lines; rate and gaps by the column `t`.
+def preview(path: str, request: Mapping[str, Any]) -> dict[str, Any]:
+    """Names of the columns of a measured file, what they tell as `identify --suggest`, and of those
+    asked for (`columns`, by commas) first rows and thinned lines; rate and gaps by the column `t` in
+    its `unit`. Without a `decimal` mark the one that reads more columns.
     """
     from runtime.core.clock import time_stamps
     from runtime.reading.formats import read_table
+    from runtime.reading.likely_columns import known_columns
+    from runtime.reading.units import time_unit
 
-    opened = read_table(Path(path))
+    topic, mark = request["topic"], request.get("decimal", "") or "."
+    opened = read_table(Path(path), topic, mark)
+    if opened.refused and not request.get("decimal"):
+        with suppress(InputError):
+            other = read_table(Path(path), topic, ",")
+            if len(other.refused) < len(opened.refused):
+                opened, mark = other, ","
     if not opened.names:
         nothing = InputError("no columns of numbers", file=opened.file)
         raise next(iter(opened.refused.values()), nothing)
@@ -148,9 +157,13 @@ def preview(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     values = [chosen.read([name])[:, 0] for name in asked]
     columns = dict(zip(asked, values, strict=True))
     N, t = len(values[0]) if values else 0, columns.get(request.get("t", ""))
+    if t is not None:
+        t = t * time_unit(request.get("unit") or "s")
     kept = np.unique(np.linspace(0, max(N - 1, 0), min(N, INSTANTS_DRAWN)).astype(int))
+    known = known_columns(opened.names, request["joints"])
     return {
         "names": names,
+        "known": known | ({"decimal": mark} if mark != "." else {}),
         "rows": N,
         "stamps": "" if t is None else time_stamps(t).to_text(),
         "first": [[f"{x[k]:.6g}" for x in values] for k in range(min(N, FIRST_ROWS))],
@@ -215,6 +228,7 @@ def findings(robot_file: str, study_file: str) -> dict[str, Any]:
     """
     from runtime.plausible.motion import unexcited_shares
 
+    of = digest_of(Path(robot_file), Path(study_file))
     loaded, study, records, _ = _read(robot_file, Path(study_file))
     variants = runtime.load_model(symgen.variants(robot_file))
     judged = runtime.plausibility(loaded, records, study, variants=variants)
@@ -224,7 +238,7 @@ def findings(robot_file: str, study_file: str) -> dict[str, Any]:
         rank = int(np.linalg.matrix_rank(rows.W))
         shares = unexcited_shares(rows, study.signals, records[0].rate)
     return {
-        "of": digest_of(Path(robot_file), Path(study_file)),
+        "of": of,
         "checks": [asdict(check) for check in judged.checks()],
         "named": judged.named_causes,
         "deviations": dict(sorted(shares.items(), key=lambda item: -item[1])),

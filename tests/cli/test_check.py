@@ -18,10 +18,16 @@ def run(*arguments):
 
 @pytest.mark.parametrize("name", ["planar_2r", "haptic", "four_bar"])
 def test_packaged_robots_hold(name):
-    result = run(name)
+    result = run(name, "--verbose")
     assert result.exit_code == 0, result.output
     assert result.stdout.splitlines()[-1] == "certificate valid"
     assert "FALSE" not in result.stdout and "CasADi" in result.stdout
+
+
+def test_one_line_where_every_check_holds():
+    line = "planar_2r: certificate valid, "
+    text = run("planar_2r").stdout
+    assert text.startswith(line) and text.endswith(" checks\n") and text.count("\n") == 1
 
 
 def test_json():
@@ -51,7 +57,9 @@ def test_a_flipped_coefficient_is_caught_twice(monkeypatch):
     assert result.exit_code == 1 and document["valid"] is False
     assert any("M3" in text for text in document["failures"]) and document["torque_error"] > 1e-3
     text = run("tx40")
-    assert text.exit_code == 1 and text.stdout.splitlines()[-1] == "certificate FALSE"
+    lines = text.stdout.splitlines()
+    assert text.exit_code == 1 and lines[0].startswith("tx40: certificate FALSE, ")
+    assert lines[1].startswith("FALSE ") and any("column of M3" in line for line in lines)
 
 
 def test_a_missing_parameter_is_caught(monkeypatch):

@@ -128,7 +128,7 @@ def test_generated_module_and_plain_record(tmp_path):
     assert json.loads(by_name.stdout)["X"] == json.loads(by_module.stdout)["X"]
     brief, verbose = run("planar_2r", record), run("planar_2r", record, "--verbose")
     for text in (brief.stdout, verbose.stdout):
-        assert "\nNo. The model of planar_2r with " in text and "\nNext: " in text
+        assert "No. The model of planar_2r with " in text and "\nNext: " in text
     assert len(brief.stdout.splitlines()) <= 25 and "Ljung-Box" in verbose.stdout
 
 

@@ -34,9 +34,9 @@ def model():
     return runtime.load_model(GENERATED / "planar_2r.py")
 
 
-def measured(model, seed, name="run"):
-    """8 s of the planar arm at 200 Hz with torque noise; another motion for each seed."""
-    t = np.arange(1600)[:, None] / 200
+def measured(model, seed, name="run", rate=200):
+    """8 s of the planar arm with torque noise; another motion for each seed."""
+    t = np.arange(8 * rate)[:, None] / rate
     rng = np.random.default_rng(seed)
     w = 2 * np.pi * np.array([[0.3, 0.4], [0.7, 0.9], [1.6, 1.3]])[:, None]
     amplitude = np.array([[0.8, 0.9], [0.4, 0.3], [0.1, 0.15]])[:, None]
@@ -50,6 +50,16 @@ def measured(model, seed, name="run"):
         q, qd, qdd, model.base_parameters(model.VALUES)
     ) + 0.05 * rng.standard_normal(q.shape)
     return runtime.Record(t[:, 0], q, tau, name=name)
+
+
+@pytest.mark.parametrize("rates", [(250, 125), (1000, 100)])
+def test_records_of_different_rates(model, rates):
+    """Fitted together; true values within four of their deviations."""
+    records = [measured(model, seed, f"run {seed}", rate) for seed, rate in enumerate(rates)]
+    estimate = runtime.identify(model, records, plausible=False).sets["essential"]
+    true = dict(zip(model.BASE_PARAMETERS, model.base_parameters(model.VALUES), strict=True))
+    error = np.abs([x - true[name] for name, x in zip(estimate.names, estimate.X, strict=True)])
+    assert (error < 4 * estimate.sigma).all()
 
 
 def test_one_record_without_a_study(model):

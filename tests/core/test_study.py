@@ -349,3 +349,10 @@ def test_settings_are_values():
     assert replace(study, rows=replace(study.rows, trim=0)).rows == Rows(window=(0, 7.5), trim=0)
     with pytest.raises(FrozenInstanceError):
         study.rows = Rows()
+
+
+def test_a_gear_ratio_belongs_into_the_robot_file() -> None:
+    with pytest.raises(
+        SettingsError, match=r"record\.ratio: gear ratios belong into the robot file"
+    ):
+        study_from_mapping({"record": {"files": ["a.csv"], "ratio": [100, 80]}})

@@ -179,7 +179,8 @@ WRONG = [
     ),
     ("1, sigma: 0", "1, sigma: 1", 8, ["theta = q2", "in r if sigma is 1"]),
     ("1, sigma: 0", "1, sigma: prismatic", 8, ["'prismatic'", "0 revolute, 1 prismatic, 2 fixed"]),
-    ("[[100, 0], [0, 100]]", "[100, 100]", 12, ["found 100", "one row per motor"]),
+    ("[[100, 0], [0, 100]]", "[100, [0, 100]]", 12, ["found 100", "one row per motor"]),
+    ("[[100, 0], [0, 100]]", "100", 12, ["found 100", "one number: [100, 80]"]),
     ("M1: 2.0", "M1R: 2.0", 14, ["'M1R'", "standard ones are: M1"]),
     ("M1: 2.0", "mass2: 2.0", 14, ["'mass2'", "expected names such as XX2", "M2", "FV2"]),
     ("M1: 2.0", "M2: 2.0}\nmassless: [2] #{", 14, ["'M2'", "frame 2 is massless"]),
@@ -290,6 +291,16 @@ def test_bytes_are_hashed_as_they_are():
     assert (
         parse_robot(b"\xef\xbb\xbf" + ARM.encode(), "a").frames == unix.frames
     )  # a byte order mark is no error
+
+
+def test_ratios_of_uncoupled_drives_are_a_diagonal():
+    rows = "[[100, 0], [0, -80]]"
+    robots = [
+        parse_robot(ARM.replace("[[100, 0], [0, 100]]", x).encode(), "a.yaml")
+        for x in (rows, "[100, -80]")
+    ]
+    assert robots[0].drives == robots[1].drives
+    assert robots[1].drives.ratio == ((100.0, 0.0), (0.0, -80.0))
 
 
 def test_defaults_and_expressions():

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from oracles.urdf_robots import panda, ur5
 from symgen.description import Robot, load_robot, parse
+from symgen.description.tree import TreePart
 from symgen.description.tree_robot import read_tree
 from symgen.description.urdf_write import write_urdf
 from symgen.description.xml_text import MAX_BYTES
@@ -57,7 +58,8 @@ WRONG = [
     ('<link name="b"/>', '<link name="a"/>', 5, "given twice"),
     ('<link name="b"/>', '<link nome="b"/>', 5, "has no name"),
     ('<link name="b"/>', '<link name="b"/><link name="c"/>', 1, "links without parent"),
-    ('type="revolute"', 'type="floating"', 6, "'floating'"),
+    ('type="revolute"', 'type="floating"', 6, "free joint 's': a robot stands on a base"),
+    ('type="revolute"', 'type="ball"', 6, "expected revolute, continuous, prismatic or fixed"),
     ('xyz="0 0 2"', 'xyz="0 0 0"', 6, "no direction"),
     ('xyz="0 0 2"', 'xyz="0 2"', 6, "expected 3 numbers"),
     ('xyz="0 0 2"', 'xyz="0 0 nan"', 6, "expected 3 numbers"),
@@ -74,6 +76,26 @@ WRONG = [
     ("<gazebo/>", '<xacro:include filename="x"/>', 8, "xacro"),
     ("</robot>", "", 10, "no element found"),
 ]
+
+
+@pytest.mark.parametrize("kind", ["floating", "planar"])
+def test_a_free_base_rests_on_request(kind: str) -> None:
+    """Held where the file has it: the robot of the same file whose base is fixed."""
+    free = ARM.replace(
+        '<link name="base"/>',
+        '<link name="base"/><link name="world"/><joint name="root" type="KIND"><parent link="world"/>'
+        '<child link="base"/><origin xyz="0 0 1" rpy="0.3 0.2 0"/></joint>',
+    )
+    with pytest.raises(DescriptionError, match=r"free joint 'root'.*--lock root=0"):
+        read_tree(free.replace("KIND", kind).encode(), "arm.urdf")
+    with pytest.raises(DescriptionError, match="where the file has it"):
+        read_tree(free.replace("KIND", kind).encode(), "arm.urdf", part=TreePart({"root": 0.3}))
+    held, notes = read_tree(
+        free.replace("KIND", kind).encode(), "arm.urdf", part=TreePart({"root": 0.0})
+    )
+    fixed, _ = read_tree(free.replace("KIND", "fixed").encode(), "arm.urdf")
+    assert "held: root at 0" in notes
+    assert (held.frames, held.gravity, held.values) == (fixed.frames, fixed.gravity, fixed.values)
 
 
 @pytest.mark.parametrize(("old", "new", "line", "words"), WRONG)

@@ -10,6 +10,7 @@ import shutil
 import subprocess
 from dataclasses import replace
 from functools import cache
+from math import prod
 from pathlib import Path
 from types import ModuleType
 
@@ -83,13 +84,12 @@ def call(
     states: np.ndarray,
     X: np.ndarray,
     shape: tuple[int, ...],
-    flags: int,
 ) -> np.ndarray:
-    """The result of one C function, in an array that held NaN or, for the regressor, the store of
-    the module.
-    """
+    """The result of one C function, in an array that held zeros; nothing around it is written."""
     N, used = states.shape[1], FUNCTIONS[name]
-    S = module.store(N).view(np.ndarray) if name == "regressor" else np.full((*shape, N), np.nan)
+    memory = np.full(prod(shape) * N + 16, np.nan)
+    S = memory[8:-8].reshape(*(shape[::-1] if name == "regressor" else shape), N)
+    S[:] = 0
     constants = np.array([*module.CONSTANTS.values(), 0.0])
     arrays = [
         *(np.ascontiguousarray(x) for x in states[: len(used)]),
@@ -98,12 +98,8 @@ def call(
         S,
     ]
     pointers = [ctypes.c_void_p(x.ctypes.data) for x in arrays]
-    assert (
-        getattr(library, f"{module.NAME}_{name}")(
-            ctypes.c_int64(N), *pointers, ctypes.c_int32(flags)
-        )
-        == 0
-    )
+    assert getattr(library, f"{module.NAME}_{name}")(ctypes.c_int64(N), *pointers) == 0
+    assert np.isnan(memory[:8]).all() and np.isnan(memory[-8:]).all()
     return np.moveaxis(S.transpose(1, 0, 2) if name == "regressor" else S, -1, 0)
 
 
@@ -116,14 +112,11 @@ def compare(library: ctypes.CDLL, module: ModuleType, samples: tuple[int, ...]) 
         for name, used in FUNCTIONS.items():
             arguments = [*states[: len(used)], *([] if name == "regressor" else [X])]
             expected = getattr(module, name)(*arguments)
-            for flags in (0, 1):
-                found = call(library, module, name, states, X, shapes.get(name, (n,)), flags)
-                assert found.shape == expected.shape
-                if N:
-                    scale = (
-                        np.abs(expected).reshape(-1, expected.shape[-1]).max(axis=0)
-                    )  # each column's maximum
-                    assert (np.abs(found - expected) <= 1e-12 * scale).all(), (name, N, flags)
+            found = call(library, module, name, states, X, shapes.get(name, (n,)))
+            assert found.shape == expected.shape
+            if N:
+                scale = np.abs(expected).reshape(-1, expected.shape[-1]).max(axis=0)  # by column
+                assert (np.abs(found - expected) <= 1e-12 * scale).all(), (name, N)
 
 
 @needs_compiler
@@ -195,26 +188,20 @@ def test_general_loops_have_none() -> None:
 MAIN = """
 #include <stdint.h>
 #include <stdlib.h>
-int32_t {name}_regressor(int64_t, const double *, const double *, const double *, const double *, double *, int32_t);
-int32_t {name}_inertia_matrix(int64_t, const double *, const double *, const double *, double *, int32_t);
-int32_t {name}_signals(int64_t, const double *, const double *, const double *, int64_t, const double *, double *, int64_t);
-extern const int32_t {name}_signal_count;
+int32_t {name}_regressor(int64_t, const double *, const double *, const double *, const double *, double *);
+int32_t {name}_inertia_matrix(int64_t, const double *, const double *, const double *, double *);
 int main(void)
 {{
     const double constants[] = {{{constants}}};
-    for (int64_t N = 0; N < 200; N += 33)
-        for (int32_t flags = 0; flags < 2; flags++) {{
-            double *q = calloc((size_t)(N*{n} + 1), sizeof *q), *X = calloc({b}, sizeof *X);
-            double *S = calloc((size_t)(N*{b}*{n} + 1), sizeof *S), *A = calloc((size_t)(N*{n}*{n} + 1), sizeof *A);
-            if ({name}_regressor(N, q, q, q, constants, S, flags) || {name}_inertia_matrix(N, q, X, constants, A, flags))
-                return 1;
-            if ({name}_regressor(-1, q, q, q, constants, S, flags) != 1 || {name}_regressor(N, q, q, NULL, constants, S, flags) != 1)
-                return 2;
-            double *U = calloc((size_t)(N*{name}_signal_count + 1), sizeof *U);
-            if ({name}_signals(N, q, q, q, N, constants, U, N) || {name}_signals(N, q, q, q, N, constants, NULL, N) != 1)
-                return 3;
-            free(q), free(X), free(S), free(A), free(U);
-        }}
+    for (int64_t N = 0; N < 200; N += 33) {{
+        double *q = calloc((size_t)(N*{n} + 1), sizeof *q), *X = calloc({b}, sizeof *X);
+        double *S = calloc((size_t)(N*{b}*{n} + 1), sizeof *S), *A = calloc((size_t)(N*{n}*{n} + 1), sizeof *A);
+        if ({name}_regressor(N, q, q, q, constants, S) || {name}_inertia_matrix(N, q, X, constants, A))
+            return 1;
+        if ({name}_regressor(-1, q, q, q, constants, S) != 1 || {name}_regressor(N, q, q, NULL, constants, S) != 1)
+            return 2;
+        free(q), free(X), free(S), free(A);
+    }}
     return 0;
 }}
 """
@@ -372,38 +359,11 @@ def test_nan_and_infinity_as_in_numpy(tmp_path: Path) -> None:
     with np.errstate(invalid="ignore"):
         expected = module.regressor(*states)
     np.testing.assert_allclose(
-        call(library, module, "regressor", states, np.ones(b), (2, b), 0),
+        call(library, module, "regressor", states, np.ones(b), (2, b)),
         expected,
         rtol=1e-12,
         atol=1e-12,
     )
-
-
-@needs_compiler
-@pytest.mark.parametrize("shift", range(8))
-def test_streamed_rows_at_every_place_in_a_cache_line(tmp_path: Path, shift: int) -> None:
-    """Written past the caches in whole lines: the bits of ordinary stores, nothing beside the rows,
-    whatever their length.
-    """
-    texts = files("planar_2r")
-    module = numpy_module("planar_2r", texts["planar_2r.py"])
-    library = ctypes.CDLL(str(compiled(tmp_path, texts["planar_2r.c"], COMPILERS[0], FAST)))
-    constants, (b, n) = np.array([*module.CONSTANTS.values(), 0.0]), module.STRUCTURE.shape
-    for N in (*range(1, 68), 203):
-        given = np.random.default_rng(0).uniform(-2, 2, (3, N, n))
-        results = []
-        for flags in (0, 1):
-            memory = np.full(b * n * N + 32, np.nan)
-            start = (-memory.ctypes.data // 8) % 8 + 8 + shift
-            rows = memory[start : start + b * n * N]
-            pointers = [ctypes.c_void_p(x.ctypes.data) for x in (*given, constants, rows)]
-            assert (
-                library.planar_2r_regressor(ctypes.c_int64(N), *pointers, ctypes.c_int32(flags))
-                == 0
-            )
-            assert np.isnan(memory[:start]).all() and np.isnan(memory[start + b * n * N :]).all()
-            results.append(rows)
-        assert np.array_equal(*results, equal_nan=True) and np.isfinite(results[0]).any(), N
 
 
 @needs_compiler

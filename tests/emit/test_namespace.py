@@ -63,12 +63,13 @@ def regressor_in_c(folder: Path, module: ModuleType, *states: np.ndarray) -> np.
     flags = ["-std=c11", "-O1", "-shared", "-fPIC"]
     compiler = os.environ.get("CC") or "cc"
     subprocess.run([compiler, *flags, folder / "pendulum.c", "-o", library, "-lm"], check=True)
-    store = module.store(len(states[0])).view(np.ndarray)
+    b, n = module.STRUCTURE.shape
+    store = np.zeros((b, n, len(states[0])))
     constants = np.array([*module.CONSTANTS.values(), 0.0])
     arrays = (*(np.ascontiguousarray(x) for x in states), constants, store)
     pointers = [ctypes.c_void_p(x.ctypes.data) for x in arrays]
     function = ctypes.CDLL(str(library)).pendulum_regressor
-    assert function(ctypes.c_int64(len(states[0])), *pointers, ctypes.c_int32(0)) == 0
+    assert function(ctypes.c_int64(len(states[0])), *pointers) == 0
     return store.transpose(2, 1, 0)
 
 

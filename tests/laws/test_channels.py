@@ -135,7 +135,10 @@ def test_columns_of_channels_are_those_of_casadi() -> None:
     [
         ('torque: "channel.pressure*qd", unit: N', "channel.pressure' is unknown"),
         ('energy: "channel.temperature*q", unit: N', "positions only"),
-        ('torque: "channel.temperature*temperature*qd", unit: N', "used as a constant, but channel.temperature"),
+        (
+            'torque: "channel.temperature*temperature*qd", unit: N',
+            "used as a constant, but channel.temperature",
+        ),
     ],
 )
 def test_laws_that_no_record_can_give_are_refused(column: str, message: str) -> None:

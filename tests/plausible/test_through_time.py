@@ -88,7 +88,7 @@ def test_jumps_are_told(
 
 def test_angles_that_wrap_are_told(right: runtime.Record) -> None:
     worst = judged(replace(right, q=np.mod(right.q, 2 * np.pi))).worst
-    assert worst is not None and "unwrap it" in worst.remedy
+    assert worst is not None and "unwrap: true" in worst.remedy
 
 
 def test_clipped_torques_are_told(right: runtime.Record) -> None:

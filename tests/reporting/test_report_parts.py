@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from runtime.advisor.advice import resolved
-from runtime.core.check import state_of
+from runtime.core.check import Check, state_of
 from runtime.core.checklist import checklist_of, lost_joints, separate
 from runtime.core.least_squares.estimate import Estimate, JointFit
 from runtime.core.markup import split, symbol, unit
@@ -22,8 +22,14 @@ from runtime.core.study import Decimate, Signals
 from runtime.core.validation import JointComparison
 from runtime.expected import Expected, expected_off
 from runtime.physical.consistency import Consistency
-from runtime.reporting.parameters import cad_values, correlation_matrix, roles_of
-from runtime.reporting.sections import decimation_cutoff
+from runtime.reporting.pages import checks_section, settings_section
+from runtime.reporting.parameters import (
+    cad_values,
+    correlation_matrix,
+    every_section,
+    parameter_section,
+)
+from runtime.reporting.sections import decimation_cutoff, percent_sigma, probability
 from runtime.reporting.series import extremes, gaps, series
 from symgen.symbols.printers import letter as other_symbol
 
@@ -292,24 +298,59 @@ def test_correlations_by_name():
     assert separate(fit(correlation=0.89)).state == "good"
 
 
-def test_roles_tell_the_order_of_removal():
-    steps = [
-        SimpleNamespace(name=n, ratio=r, removed=x)
-        for n, r, x in (("C1", 1.001, True), ("D1", 1.01, True), ("B1", 1.05, False))
-    ]
-    kept = SimpleNamespace(names=("A1", "B1"))
-    essential = SimpleNamespace(estimate=kept, names=kept.names, trail=steps)
-    result = SimpleNamespace(
-        essential=essential,
-        model_columns="essential",
-        estimate=SimpleNamespace(names=("A1", "B1", "C1", "D1")),
+def identified(robot_file=(1.0, 0.01)):
+    """Two parameters of which the model uses one, and the values of the robot file."""
+    every, used = fit(X=(1.23456, 0.0001), sigma=(0.01, 0.02)), fit(X=(1.23456,), sigma=(0.01,))
+    model = SimpleNamespace(
+        VALUES=dict(zip(every.names, robot_file, strict=True)),
+        STANDARD_PARAMETERS=every.names,
+        BASE_PARAMETERS=every.names,
+        FORMULAS={"A1": "A1"},
+        base_parameters=lambda chi: chi,
     )
-    assert roles_of(result) == {
-        "A1": "essential",
-        "B1": "essential, the next to go: ratio 1.0500",
-        "C1": "goes as no. 1, ratio 1.0010",
-        "D1": "goes as no. 2, ratio 1.0100",
-    }
+    return SimpleNamespace(
+        model=model, model_estimate=used, estimate=every, model_columns="essential"
+    )
+
+
+def test_values_have_the_digits_of_their_intervals():
+    (table,) = parameter_section(identified()).tables
+    assert table.header == ("parameter", "value", "± 95 %", "unit")
+    assert table.rows == [(symbol("A1"), "1.235", "0.039", "")]
+
+
+@pytest.mark.parametrize(("given", "difference"), [(1.0, "+23.5"), (0.039, ""), (0.0, "")])
+def test_no_difference_to_a_value_within_the_interval(given, difference):
+    (table,) = every_section(identified((given, 0.01))).tables
+    first, second = (dict(zip(table.header, row, strict=True)) for row in table.rows)
+    assert (first["value"], first["difference %"]) == ("1.235", difference)
+    assert (second["value"], second["difference %"], second["made of"]) == ("", "", "itself")
+    assert (second["all fitted: value"], second["all fitted: ± 95 %"]) == ("0.000", "0.078")
+
+
+def test_small_and_large_statistics_keep_few_digits():
+    assert [percent_sigma(x) for x in (0.456, 23.45, 51.0, 1.3e12)] == ["0.46", "23", "51", ""]
+    assert [probability(p) for p in (0.92, 0.0049, 4.5e-176, 0.0)] == [
+        "0.92", "0.0049", "< 0.0001", "< 0.0001",
+    ]  # fmt: skip
+
+
+def test_what_to_do_stands_where_there_is_something():
+    checks = [
+        Check("a?", "good", "fine", "1", "not said"),
+        Check("b?", "doubtful", "so", "1", ""),
+        Check("c?", "no", "bad", "1", "mend it"),
+    ]
+    bad, good = checks_section(SimpleNamespace(checks=checks)).tables
+    assert [row[0] for row in bad.rows] == ["c?", "b?"] and bad.header[-1] == "what to do"
+    assert [row[0] for row in good.rows] == ["a?"] and good.header[-1] == "good within"
+    (only,) = checks_section(SimpleNamespace(checks=checks[1:2])).tables
+    assert only.header[-1] == "good within"
+
+
+def test_settings_are_those_that_are_set():
+    section = settings_section("a:\n  b: null\n  c: 1\nd: null\n")
+    assert section.folded and section.listing == "a:\n  c: 1"
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from browser import Browser, started_browser
 from starlette.testclient import TestClient
 
 from symgen.studio import folder, server, serving
@@ -63,6 +64,12 @@ def studio(tmp_path: Path, process: ViewProcess) -> Iterator[Studio]:
     with own.client:
         yield own
         own.server.process = ViewProcess()
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Browser]:
+    with started_browser() as browser:
+        yield browser
 
 
 class Running:

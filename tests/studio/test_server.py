@@ -6,7 +6,6 @@ import asyncio
 import gzip
 import io
 import json
-import re
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -217,7 +216,7 @@ def test_a_folder_of_ros_2_is_a_record_of_the_command_line(studio: Any, tmp_path
 
 def test_what_a_bar_draws_in_a_terminal_is_a_count_on_the_page() -> None:
     bar = "\x1b[?25lruns \x1b[38;5;237m━━━━\x1b[0m  \x1b[32m0/?\x1b[0m \x1b[36m-:--:--\x1b[0m"
-    job = Job(1, "01-cestac", ("symgen",), progress=bar)
+    job = Job(1, "01-cestac", ("symgen",), "", progress=bar)
     assert job.said == ["runs 0/? -:--:--"] and job.counted == []
     job.progress += (
         "\r\x1b[2Kruns \x1b[35m━━\x1b[0m\x1b[90m╺━\x1b[0m 12/40 \x1b[36m0:00:07\x1b[0m\r"
@@ -233,7 +232,11 @@ def test_the_settings_of_a_run_begin_with_its_command(studio: Any) -> None:
     studio.upload("record", "run.csv", csv())
     values = {"symgen": 1, "record": [{"files": ["record.csv"]}]}
     studio.post("study", {"values": json.dumps(values)})
-    asked = {"kind": "advise", "delta": "2*pi/500,\n1\x85record: {files: /etc/passwd}\u2028x"}
+    asked = {
+        "kind": "advise",
+        "anyway": "1",
+        "delta": "2*pi/500,\n1\x85record: {files: /etc/passwd}\u2028x",
+    }
     assert studio.post("solve", asked).status_code == 200
     first, _, rest = (studio.path / "study-01-advise.yaml").read_text().partition("\n")
     assert first.startswith("# symgen cestac robot.yaml study-01-advise.yaml --advise ")
@@ -423,7 +426,13 @@ def test_what_is_no_table_is_refused(studio: Any, cells: str) -> None:
 def test_a_file_that_is_no_robot_is_told_on_the_page(
     studio: Any, name: str, content: bytes
 ) -> None:
-    assert studio.upload("robot", name, content).status_code == 200
+    studio.upload("robot", "arm.yaml", TEXT.encode())
+    answer = studio.upload("robot", name, content)
+    assert answer.status_code == 422 and name in answer.text
+    assert [p.name for p in studio.path.iterdir() if p.is_file()] == ["robot.yaml"]
+    assert (studio.path / "robot.yaml").read_text() == TEXT
+    (studio.path / "robot.yaml").unlink()
+    (studio.path / f"robot{Path(name).suffix}").write_bytes(content)  # by an editor
     for step in ("robot", "record", "check", "solve", "results"):
         assert studio.get(step).status_code == 200
     assert 'class="no"' in studio.get("robot").text
@@ -472,10 +481,32 @@ def test_a_check_that_is_refused_ends_with_2(tmp_path, monkeypatch, capsys):
     assert ended.value.code == 2 and capsys.readouterr().err.startswith("error: ")
 
 
-def test_an_error_fills_the_box_of_messages_and_does_not_replace_it():
-    """With the swap of the button that asked, outerHTML, the first error took the box away."""
-    from importlib.resources import files
+def test_what_is_nested_without_end_is_refused(studio: Any) -> None:
+    studio.upload("robot", "arm.yaml", TEXT.encode())
+    deep = "[" * 100_000
+    digest = studio.server.folder.digest
+    for name, form in (
+        ("study", {"values": deep}),
+        ("study", {"text": deep}),
+        ("solve", {"values": deep}),
+        ("edit", {"digest": digest, "cells": deep}),
+        ("edit", {"digest": digest, "text": deep}),
+    ):
+        answer = studio.post(name, form)
+        assert answer.status_code < 500, (name, [*form])
+        assert studio.get("robot").status_code == 200
+        digest = studio.server.folder.digest
 
-    base = files("symgen.studio").joinpath("templates/base.html.jinja").read_text()
-    errors = re.search(r'\{"code":"\[45\]\.\."[^}]*\}', base)
-    assert errors and '"swapOverride":"innerHTML"' in errors[0]
+
+def test_a_run_that_was_cancelled_while_it_waited_leaves_nothing(studio: Any) -> None:
+    studio.upload("robot", "arm.yaml", TEXT.encode())
+    studio.upload("record", "run.csv", csv())
+    values = json.dumps({"symgen": 1, "record": [{"files": ["record.csv"]}]})
+    studio.post("study", {"values": values})
+    asked = {"values": values, "kind": "advise", "anyway": "1"}
+    for _ in range(2):
+        assert studio.post("solve", asked).status_code == 200
+    waiting = studio.server.jobs.all[-1]
+    assert waiting.state == "waiting" and (studio.path / f"study-{waiting.run}.yaml").exists()
+    studio.post("cancel", {"number": str(waiting.number)})
+    assert waiting.state == "cancelled" and not (studio.path / f"study-{waiting.run}.yaml").exists()

@@ -203,25 +203,20 @@ class Cestac(Result, Part):
 
     @property
     def message(self) -> str:
-        """The verdict of every step, in one sentence."""
+        """The verdict of every step with what changes most there, in one sentence."""
+        if not self.levels:
+            return "Nothing was perturbed."
         by_verdict: dict[str, list[str]] = {}
         for level in self.levels:
-            by_verdict.setdefault(level.verdict, []).append(level.level.label)
+            name, error = next(iter(level.decided_by.items()), ("rho", 0.0))
+            largest = f"{'the residual' if name == 'rho' else name} {error:.1f} %"
+            by_verdict.setdefault(level.verdict, []).append(f"{level.level.label} ({largest})")
         meaning = {"unbiased": "practically unbiased", "doubtful": "doubtful", "biased": "biased"}
         parts = [
             f"{meaning[verdict]} at {', '.join(labels)}" for verdict, labels in by_verdict.items()
         ]
-        worst = max(
-            self.levels, key=lambda level: max(level.decided_by.values(), default=0.0), default=None
-        )
-        if worst is None:
-            return "Nothing was perturbed."
-        name, error = next(iter(worst.decided_by.items()))
-        change = (
-            f"{'the residual' if name == 'rho' else name}, {error:.1f} % at {worst.level.label}"
-        )
         method = "Least squares" if self.estimator == "LS" else self.estimator
-        return f"{method} is {'; '.join(parts)}; largest change: {change}."
+        return f"{method} is {'; '.join(parts)}."
 
     @property
     def estimator(self) -> str:
@@ -232,6 +227,11 @@ class Cestac(Result, Part):
     def lists_runs(self) -> bool:
         """Whether the JSON text holds every run."""
         return bool(sum(len(level.runs) for level in self.levels) <= LIMIT.RUNS_LISTED)
+
+    def brief(self) -> str:
+        """The verdict of every step, then the changes of every parameter."""
+        errors = self.error_table()
+        return "\n".join([self.message, "", errors.caption, errors.to_text(), *self.notes])
 
     def to_table(self) -> str:
         """Means as the chapter's Table 3, residual and verdict, then %e with %sigma, then every

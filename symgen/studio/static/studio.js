@@ -5,7 +5,7 @@
   const say = (text, kind = "no") => one("#message").replaceChildren(node("p", { textContent: text, className: kind }));
   // --- files that are dropped or chosen ---
   async function send(drop, file) {
-    if (!file) return;
+    if (!file || (drop.dataset.ask && !confirm(drop.dataset.ask))) return;
     say(`${file.name}: sending …`, "busy");
     try {
       const answer = await fetch(`${drop.dataset.upload}&name=${encodeURIComponent(file.name)}`, { method: "POST", body: file });
@@ -16,7 +16,7 @@
     }
   }
   for (const drop of all("[data-upload]")) {
-    one("input", drop).addEventListener("change", (event) => send(drop, event.target.files[0]));
+    one("input", drop).addEventListener("change", ({ target }) => { send(drop, target.files[0]); target.value = ""; }); // the same file may be chosen again
     for (const [name, over] of [["dragover", true], ["dragleave", false], ["drop", false]])
       drop.addEventListener(name, (event) => {
         event.preventDefault();
@@ -104,7 +104,7 @@
     const options = (select, names, k) => select.replaceChildren(...names.map((name, i) => new Option(name, name, i === k, i === k)));
     const at = (t) => {
       const k = nearest(data.t, t);
-      cursor.value = data.t[k];
+      cursor.value = t;
       one("#now").textContent = `${plain(data.t[k], 2)} s`;
       plots.at(data.t[k]);
       if (!arm.robot) return;
@@ -138,8 +138,10 @@
     play.addEventListener("click", () => {
       if (timer || !data) { clearInterval(timer); timer = null; play.textContent = "Play"; return; }
       play.textContent = "Stop";
+      let last = performance.now();
       timer = setInterval(() => {
-        const t = Number(cursor.value) + 0.05;
+        const now = performance.now(), t = Number(cursor.value) + (now - last) / 1000;
+        last = now;
         at(t > data.t.at(-1) ? data.t[0] : t);
       }, 50);
     });
@@ -191,7 +193,7 @@
       const values = { digest: one("#cells").dataset.digest, cells: JSON.stringify(pending.table || cells()), ...(pending.act ? { resized: "1" } : {}) };
       sent = pending.act === "remove" ? {} : Object.fromEntries(all("#cells input").map((input) => [input.id, input.value]));
       pending = null;
-      await htmx.ajax("POST", "do/edit", { target: "#table", swap: "outerHTML", values });
+      await htmx.ajax("POST", "do/edit", { target: "#table", swap: "outerHTML", values }).catch(() => {}); // told by htmx:sendError
     }
     busy = false;
   }
@@ -211,7 +213,10 @@
   });
 
   let typed = [];
-  document.addEventListener("htmx:beforeSwap", () => { typed = all("#cells input").filter(({ id, value }) => id in sent && value !== sent[id]); });
+  document.addEventListener("htmx:beforeSwap", ({ detail }) => {
+    if (detail.isError) detail.swapOverride = "innerHTML"; // the box of messages stays, however the request would swap
+    typed = all("#cells input").filter(({ id, value }) => id in sent && value !== sent[id]);
+  });
   document.addEventListener("htmx:afterSwap", () => { // at once: a key pressed before it settles is of the new field
     for (const { id, value, selectionStart } of typed) {
       const field = document.getElementById(id);
@@ -225,7 +230,7 @@
     if (event.target.id === "table" || one("#table")?.contains(event.target)) read();
   });
   document.addEventListener("htmx:sendError", () => say("The server has ended; what was saved is in the work folder. Start symgen studio again."));
-  document.addEventListener("htmx:beforeRequest", () => one("#message").replaceChildren());
+  document.addEventListener("htmx:beforeRequest", ({ target }) => target.matches("[hx-trigger]") || one("#message").replaceChildren()); // parts that load by themselves clear nothing
 
   document.addEventListener("click", async (event) => {
     const button = event.target.closest("[data-copy], [data-download]");

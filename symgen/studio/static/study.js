@@ -1,43 +1,20 @@
-// The study: columns by their names, answers, remedies, estimators, values side by side.
+// The study: answers, remedies, estimators, values side by side.
 "use strict";
 (function () {
   const page = one("#values")?.dataset || {}, joints = Number(page.joints) || 99;
-  const study = () => JSON.parse((one("#study[data-values], #findings[data-values]") || one("#values")).dataset.values);
+  const holder = () => (one("#study[data-values], #findings[data-values]") || one("#values")).dataset;
+  const study = () => JSON.parse(holder().values), written = (values) => ({ values: JSON.stringify(values), digest: holder().digest });
   const number = (text) => (text.trim() !== "" && Number.isFinite(Number(text)) ? Number(text) : text.trim());
   const listed = (x) => (x === null || x === undefined ? "" : Array.isArray(x) ? x.join(", ") : String(x));
-  // --- columns by their names ---
-  const WORDS = {
-    "columns.t": /^(.*_)?(t|time|timestamps?|stamp)$/,
-    "columns.q": /^(.*_)?(q|qm|pos|positions?|angles?|theta|joint)$/,
-    "columns.tau": /^(.*_)?(tau|torques?|cur|curr|currents?|i|effort|gam|gamma|force)$/,
-  };
-  const UNITS = {
-    "columns.t": { ms: "ms", us: "us", ns: "ns", s: "s", sec: "s" },
-    "columns.q": { deg: "deg", degrees: "deg", rad: "rad", counts: "counts", inc: "counts", ticks: "counts", rev: "rev", mm: "mm" },
-    "columns.tau": { a: "A", ma: "mA", nm: "N*m", mnm: "mN*m", v: "V" },
-  };
-
-  function guessed(names) {
-    const found = { "columns.t": [], "columns.q": [], "columns.tau": [] }, units = {};
-    for (const name of names) {
-      const words = name.toLowerCase().split(/[^a-z]+/).filter(Boolean);
-      for (const [key, pattern] of Object.entries(WORDS)) {
-        const unit = words.length > 1 ? UNITS[key][words.at(-1)] : undefined;
-        const stems = [words.join("_"), (unit ? words.slice(0, -1) : words).join("_"), words.filter((word) => word !== "joint").join("_")];
-        if (!stems.some((stem) => pattern.test(stem))) continue;
-        found[key].push(name);
-        if (unit) units[key.replace("columns", "units")] = unit;
-        break;
-      }
-    }
-    const order = (name) => Number(/(\d+)(?!.*\d)/.exec(name)?.[1] ?? 0);
-    for (const key of ["columns.q", "columns.tau"]) found[key] = found[key].map((name, k) => [order(name), k, name]).sort((a, b) => a[0] - b[0] || a[1] - b[1]).slice(0, joints).map((entry) => entry[2]);
-    found["columns.t"] = found["columns.t"].slice(0, 1);
-    return { ...found, ...units };
-  }
   // --- the questions ---
   const LISTS = ["columns.q", "columns.tau"];
-  let guess = {}, shown = null;
+  let guess = {}, shown = null; // what the names of the columns tell
+
+  /** A value of a field; a choice that it does not have is one of its choices then. */
+  function choose(field, value) {
+    if (field.options && ![...field.options].some((option) => option.value === value)) field.append(new Option(value));
+    field.value = value;
+  }
 
   function fill() {
     const form = one("#questions");
@@ -45,8 +22,8 @@
     const record = study().record?.[0] || {};
     for (const field of form.elements) {
       if (!field.name) continue;
-      const [key, inner] = field.name.split("."), own = inner ? record[key]?.[inner] : record[key];
-      field.value = listed(own ?? guess[field.name]);
+      const [key, inner] = field.name.split("."), of = (part) => (inner ? part[key]?.[inner] : part[key]);
+      choose(field, listed(of(record) ?? of(guess)));
     }
     if (!one("[name='units.t']", form).value) one("[name='units.t']", form).value = "s";
     one("#currents").hidden = !/cur|effort|(^|[_, ])i\d/i.test(one("[name='columns.tau']", form).value);
@@ -60,7 +37,7 @@
     }
   };
   document.addEventListener("change", (event) => {
-    if (event.target.closest("#questions")) ask();
+    if (event.target.closest("#questions")) { ask(); drawn(); }
     else if (event.target.closest("#jobs")) compare();
   });
 
@@ -69,7 +46,7 @@
     for (const field of form.elements) {
       if (!field.name) continue;
       const [key, inner] = field.name.split("."), text = field.value.trim();
-      const value = LISTS.includes(field.name) ? text.split(",").map((part) => part.trim()).filter(Boolean)
+      const value = field.name === "decimal" ? text || undefined : LISTS.includes(field.name) ? text.split(",").map((part) => part.trim()).filter(Boolean)
         : field.name === "columns.t" ? text || null : text.includes(",") ? text.split(",").map(number) : text === "" ? undefined : number(text);
       if (inner) record[key] = { ...record[key], [inner]: value };
       else record[key] = value;
@@ -83,76 +60,84 @@
       event.preventDefault();
       const open = all("strong.ask:not([hidden])", event.target);
       if (open.length) return document.getElementById(open[0].parentElement.htmlFor).focus();
-      htmx.ajax("POST", "do/study", { target: "#study", swap: "outerHTML", values: { values: JSON.stringify(answered(event.target)) } });
+      htmx.ajax("POST", "do/study", { target: "#study", swap: "outerHTML", values: written(answered(event.target)) });
     }
     if (event.target.id !== "solve" && event.target.id !== "resolution") return;
     event.preventDefault();
-    (event.target.id === "solve" ? solve : round)(new FormData(event.target));
+    (event.target.id === "solve" ? solve : round)(new FormData(event.target, event.submitter));
   });
 
+  // --- the file as the form says that it is read ---
+  let turn = 0;
+
+  async function previewed(query) {
+    const own = ++turn, answer = await fetch(`view/preview?${new URLSearchParams(query)}`), value = answer.ok ? await answer.json() : { error: await answer.text() };
+    if (own !== turn) return { late: true }; // another question has been asked since
+    if (value.error) one("#preview").replaceChildren(node("p", { className: "no", textContent: value.error }));
+    return value;
+  }
+
   async function preview() {
-    const place = one("#preview");
-    if (!place) return;
-    const asked = async (query) => { const answer = await fetch(`view/preview?${new URLSearchParams(query)}`); return answer.ok ? answer.json() : { error: await answer.text() }; };
-    const names = await asked({});
-    if (names.error) return place.replaceChildren(node("p", { className: "no", textContent: names.error }));
-    guess = guessed(names.names);
+    if (!one("#preview")) return;
+    const value = await previewed(study().record?.[0]?.decimal ? { decimal: study().record[0].decimal } : {});
+    if (value.late) return;
+    guess = value.known || {};
     fill();
-    const of = study().record?.[0]?.columns || {}, columns = ["t", "q", "tau"].map((key) => [of[key] ?? guess[`columns.${key}`]].flat().filter((name) => names.names.includes(name)));
-    const used = columns.flat().length ? columns.flat() : names.names.slice(0, 12);
-    const value = await asked({ columns: used.join(","), t: columns[0][0] || "" });
-    if (value.error) return place.replaceChildren(node("p", { className: "no", textContent: value.error }));
+    if (!value.error) drawn(value.names);
+  }
+
+  /** First rows and plots by the fields of the form; `names` where it says none. */
+  async function drawn(names = []) {
+    const place = one("#preview"), text = (name) => one(`#questions [name='${name}']`).value.trim();
+    const [t, q, tau] = ["t", "q", "tau"].map((key) => text(`columns.${key}`).split(",").map((name) => name.trim()).filter(Boolean));
+    const asked = [...t, ...q, ...tau], columns = (asked.length ? asked : names.slice(0, 12)).join(",");
+    const value = await previewed({ columns, t: t[0] || "", unit: text("units.t"), decimal: text("decimal") });
+    if (value.error || value.late) return;
     const cells = (kind, row) => node("tr", {}, ...row.map((x) => node(kind, { textContent: x })));
     const first = node("div", { className: "scroll", tabIndex: 0 }, node("table", {}, node("caption", { textContent: "First rows" }), cells("th", Object.keys(value.lines)), ...value.first.map((row) => cells("td", row))));
     first.setAttribute("role", "region");
     first.setAttribute("aria-label", "First rows");
     const plots = node("div", { className: "plots" });
-    place.replaceChildren(node("p", { textContent: value.stamps || `${value.rows} samples` }), node("p", { className: "note", textContent: `Columns: ${names.names.join(", ")}` }), first, plots);
-    const lines = (list) => Object.fromEntries(list.map((name) => [name, value.lines[name]]));
-    new Plots(plots, value.t, columns[1].length + columns[2].length ? [{ title: "q, as in the file", lines: lines(columns[1]) }, { title: "tau, as in the file", lines: lines(columns[2]) }] : [{ title: "as in the file", lines: value.lines }]);
+    place.replaceChildren(node("p", { textContent: value.stamps || `${value.rows} samples` }), node("p", { className: "note", textContent: `Columns: ${value.names.join(", ")}` }), first, plots);
+    const lines = (list) => Object.fromEntries(list.filter((name) => value.lines[name]).map((name) => [name, value.lines[name]]));
+    new Plots(plots, value.t, q.length + tau.length ? [{ title: "q, as in the file", lines: lines(q) }, { title: "tau, as in the file", lines: lines(tau) }] : [{ title: "as in the file", lines: value.lines }]);
   }
-  // --- remedies as one change of the study ---
-  const SET = /\bset ((?:record|signals|rows|estimate)\.[a-z_.]+): (\[[^\]]*\]|[^\s,;()]+)/;
-  const SIGN = /turn the sign of the (torque|position)s?(?: of joint (\d+))?(?=[:,]|$)/;
+  // --- remedies as one change of the study: {"record.units.q": "deg"}; what is of record.scale multiplies ---
+  const multiplies = (key) => key.startsWith("record.scale.");
 
-  function change(remedy) {
-    const set = SET.exec(remedy), sign = SIGN.exec(remedy);
-    if (!set && !sign) return null;
-    const key = set ? set[1] : `record.scale.${sign[1] === "torque" ? "tau" : "q"}`;
-    const [section, ...keys] = key.split(".");
-    return {
-      text: set ? `Set ${key}: ${set[2]}` : `Turn the sign: ${key}, joint ${sign[2] || "all"}`,
-      of(values) {
-        const new_ = structuredClone(values), several = section === "record";
-        for (const part of several ? new_.record : [(new_[section] ??= {})]) {
-          const place = keys.slice(0, -1).reduce((at, name) => (at[name] ??= {}), part), last = keys.at(-1);
-          if (set) place[last] = set[2].startsWith("[") ? set[2].slice(1, -1).split(",").map(number) : number(set[2]);
-          else place[last] = Array.from({ length: joints }, (_, k) => [place[last] ?? 1].flat().at(Array.isArray(place[last]) ? k : 0) * (!sign[2] || Number(sign[2]) === k + 1 ? -1 : 1));
-        }
-        return new_;
-      },
-    };
+  function changed(values, change) {
+    const made = structuredClone(values);
+    for (const [path, value] of Object.entries(change)) {
+      const [section, ...keys] = path.split("."), last = keys.pop();
+      for (const part of section === "record" ? [made.record, made.validate?.record ?? []].flat() : [(made[section] ??= {})]) {
+        const place = keys.reduce((at, name) => (at[name] ??= {}), part), before = [place[last] ?? 1].flat();
+        place[last] = multiplies(path) ? value.map((factor, k) => factor * (before.length > 1 ? before[k] : before[0])) : value;
+      }
+    }
+    return made;
   }
 
   function remedies() {
-    for (const place of all("[data-remedy]")) {
-      const found = change(place.dataset.remedy);
-      if (!found || one("button", place)) continue;
-      const button = node("button", { type: "button", textContent: found.text });
+    for (const place of all("[data-change]")) {
+      const change = JSON.parse(place.dataset.change), steps = Object.entries(change);
+      if (!steps.length || one("button", place)) continue;
+      const text = steps.map(([key, value]) => (multiplies(key) ? `multiply ${key} by ${listed(value)}` : `set ${key}: ${listed(value) || "null"}`)).join(", ");
+      const button = node("button", { type: "button", textContent: text[0].toUpperCase() + text.slice(1) });
       button.addEventListener("click", async () => {
-        await htmx.ajax("POST", "do/study", { target: "#values", swap: "none", values: { values: JSON.stringify(found.of(study())) } });
+        await htmx.ajax("POST", "do/study", { target: "#values", swap: "none", values: written(changed(study(), change)) });
         htmx.ajax("POST", "do/check", { target: "#findings", swap: "outerHTML" });
       });
       place.append(button);
     }
   }
   // --- estimators and settings, each a run ---
+  const chosen = (data, ...names) => Object.fromEntries(names.filter((name) => data.get(name)).map((name) => [name, "1"]));
   const run = (values, more) => htmx.ajax("POST", "do/solve", { target: "#jobs", swap: "outerHTML", values: { values: JSON.stringify(values), ...more } });
 
   function round(data) {
     const kind = data.get("kind"), delta = data.get("delta").split(",").map((text) => text.trim()).filter(Boolean), values = study();
     values.cestac = { ...values.cestac, ...(delta.length ? { delta } : {}), ...(data.get("runs") ? { runs: number(data.get("runs")) } : {}) };
-    return run(values, { kind, ...(kind === "advise" ? { delta: delta.join(",") } : {}) });
+    return run(values, { kind, ...chosen(data, "anyway"), ...(kind === "advise" ? { delta: delta.join(",") } : {}) });
   }
 
   async function solve(data) {
@@ -162,8 +147,7 @@
         const values = study();
         values.estimate = { ...values.estimate, method };
         if (cutoff) values.signals = { ...values.signals, lowpass: { ...values.signals?.lowpass, cutoff: number(cutoff) } };
-        const options = Object.fromEntries(["physical", "friction"].filter((name) => data.get(name)).map((name) => [name, "1"]));
-        await run(values, { name: cutoff ? `${method}-${cutoff}` : method, ...options });
+        await run(values, { name: cutoff ? `${method}-${cutoff}` : method, ...chosen(data, "physical", "friction", "anyway") });
       }
   }
   // --- values side by side ---
@@ -195,7 +179,7 @@
   }
 
   document.addEventListener("htmx:afterSettle", (event) => {
-    if (event.target.id === "study") fill();
+    if (event.target.id === "study" && one("#preview")) { fill(); drawn(); }
     remedies();
     compare();
   });

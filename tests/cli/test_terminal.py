@@ -1,0 +1,53 @@
+"""What a terminal shows: lines as wide as it is, the answer in colour; nothing of it in a pipe."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from runtime.core.table import interval, with_intervals
+from symgen.cli import session
+
+TEXT = "With care. " + "The model leaves a part unexplained. " * 4 + "\nZZ1R 1.79 +- 0.02"
+
+
+def test_lines_end_between_words_where_the_terminal_does() -> None:
+    verdict = SimpleNamespace(answer="With care", state="doubtful")
+    lines = session.on_terminal(TEXT, 60, verdict).splitlines()
+    assert lines[0].startswith("\x1b[33m\x1b[1mWith care\x1b[0m. The model")
+    assert lines[-1] == "ZZ1R 1.79 +- 0.02"
+    plain = session.on_terminal(TEXT, 60).splitlines()
+    assert all(len(line) <= 60 for line in plain) and len(plain) == 4
+    words = " ".join(line.strip() for line in plain).split()
+    assert words == TEXT.split()
+
+
+def test_a_pipe_gets_the_lines_as_they_are(capsys: pytest.CaptureFixture) -> None:
+    session.show(TEXT, verdict=SimpleNamespace(answer="With care", state="doubtful"))
+    assert capsys.readouterr().out == TEXT + "\n"
+
+
+@pytest.mark.parametrize(
+    ("value", "half", "text"),
+    [
+        (0.165215, 0.000519, "0.16522 +- 0.00052"),
+        (8.0, 0.4, "8.00 +- 0.40"),
+        (-1e-9, 0.02, "0.000 +- 0.020"),
+        (1234.56, 17.0, "1235 +- 17"),
+        (7.693e8, 9.3e8, "7.7e+08 +- 9.3e+08"),
+        (1.5, 0.0, "1.5 +- 0"),
+        (1.5, float("nan"), "1.5 +- nan"),
+        (1e-12, 3e-13, "1e-12 +- 3e-13"),
+    ],
+)
+def test_digits_end_with_the_second_one_of_the_interval(value, half, text) -> None:
+    assert " +- ".join(interval(value, half)) == text
+
+
+def test_cells_stand_below_each_other() -> None:
+    first, second = with_intervals(
+        ["ZZ1R", "OFFSET1"], [1.79, -0.5], [0.01, 0.1], ["kg*m**2", "N*m"]
+    )
+    assert first.index("+-") == second.index("+-")
+    assert first.index("kg") == second.index("N*m")
