@@ -131,7 +131,7 @@ class Simulated:
             Slip(7, "torques of the controller's model", r"no noise", lambda c: target(c, True)),
             Slip(8, "rate 125 for 94", r"sampling rate is [^;]*0\.7[345]", lambda c: replace(c, rate=125 / 94)),
             Slip(9, "rate 300 for 500", r"sampling rate is [^;]*1\.[67]", lambda c: replace(c, rate=0.6)),
-            Slip(10, "angle of the last joint wraps", r"wraps", wrapped),
+            Slip(10, "angle of the last joint wraps", r"starts anew", wrapped),
             Slip(11, "a load not told", rf"(gravity|inertia) torque of joint|unexplained.*{last}|they leave", lambda c: self.case(self.with_load(0.1))),
             Slip(12, "g = 9810", r"gravity is [^;]*(9810|1/1000|1000)", lambda c: c.text("g: 9.81", "g: 9810.0")),
             Slip(13, "zero of joint 3 off by 10 degrees", r"zero of joint 3", zero(2, 10)),

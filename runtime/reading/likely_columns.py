@@ -153,7 +153,7 @@ def families_of(names: Sequence[str], joints: Sequence[str] = ()) -> Iterator[Fa
         stem, found = re.subn(rf"(?<![^\W_]){re.escape(joint)}(?![^\W_])", "#", name)
         if found:
             stems.setdefault(stem, []).append(name)
-    for name in sorted(names, key=lambda name: [int(x) for x in re.findall("[0-9]+", name)]):
+    for name in sorted(names, key=lambda name: [int(x) for x in re.findall("[0-9]{1,9}", name)]):
         for number in re.finditer("[0-9]+", name):
             stems.setdefault(f"{name[: number.start()]}#{name[number.end() :]}", []).append(name)
     for stem, alike in stems.items():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import log2, pi
 
 from runtime.core.cestac.result import Cestac, error_against_resolution
 from runtime.reporting import figures as plots
@@ -29,6 +30,18 @@ def resolution_section(
 
 
 def level_numbers(result: Cestac) -> list[Number]:
-    """The verdict of every step, for the head of a page."""
+    """The verdict of every step, in counts per turn and bits, with what changes most, for the head
+    of a page.
+    """
     states: dict[str, State] = {"unbiased": "good", "doubtful": "doubtful", "biased": "no"}
-    return [Number(r.level.label, r.verdict, states[r.verdict]) for r in result.levels]
+    turns = not {*result.reference.units.values()} & {"N*s/m", "kg"}
+    numbers = []
+    for level in result.levels:
+        label, delta = level.level.label, level.level.delta
+        if turns and delta and not level.level.torque:
+            counts = 2 * pi / delta
+            label += f": {counts:.0f} counts per turn, {log2(counts):.1f} bits"
+        name, error = next(iter(level.decided_by.items()), ("rho", 0.0))
+        most = f"{'residual' if name == 'rho' else name} {error:.1f} %"
+        numbers.append(Number(label, f"{level.verdict}, {most}", states[level.verdict]))
+    return numbers

@@ -59,7 +59,7 @@ def test_they_are_told_and_judged(arm, count, state) -> None:
     check = next(c for c in found.checks() if c.question == "Are the positions those of a motion?")
     assert check.state == state
     assert f"held the positions at {count} instants, {6 * count} samples" in check.finding
-    assert "wraps" not in check.remedy
+    assert "starts anew" not in check.remedy
 
 
 def test_the_reader_of_counts_takes_no_catch_up_for_lost_counts(arm) -> None:

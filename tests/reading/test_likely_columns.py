@@ -122,3 +122,7 @@ def test_rows_of_another_topic_are_dropped(tmp_path) -> None:
     result = CliRunner().invoke(app, command)
     assert result.exit_code == 0, result.output
     assert re.search(r"MX1R +1\.0+ +\+- ", result.stdout)  # 3 kg at 0.2 m, 1 kg at 0.4 m
+
+
+def test_a_name_of_many_digits() -> None:
+    assert known_columns(["q" + "9" * 5000, "tau1"]) is not None

@@ -360,16 +360,17 @@ def error_against_resolution(result: Cestac, names: Sequence[str] = ()) -> Figur
     """%e (21) against Delta on logarithmic axes, with the limits of the verdict and the increase of
     the residual.
 
-    names : parameters drawn in colour; default: the six of smallest %sigma (11). The other deciding
-    ones are grey.
+    names : parameters drawn in colour; default: the six deciding ones that change most. The others
+    are grey.
     """
     levels = [level for level in result.levels if level.level.delta and not level.level.torque]
     levels.sort(key=lambda level: level.level.delta)
     lengths = {result.reference.units.get(name, "") for name in result.names} & {"N*s/m", "kg"}
     delta = np.array([level.level.delta for level in levels])
     e = np.array([level.e for level in levels]).reshape(len(levels), -1)
-    order = np.argsort(result.reference.relative_sigma, kind="stable")[: len(MARKED)]
-    coloured = [name for name in names if name in result.names] or [result.names[i] for i in order]
+    largest = dict(zip(result.names, np.nan_to_num(e).max(axis=0), strict=True))
+    most = sorted(result.deciding, key=lambda name: -largest[name])[: len(MARKED)]
+    coloured = [name for name in names if name in result.names] or most
 
     def draw(ax: Any) -> None:
         def line(values: np.ndarray, **style: Any) -> None:
