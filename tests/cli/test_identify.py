@@ -95,7 +95,7 @@ def test_files_are_complete_and_readable(emps):
     )
     assert written["warnings"] == [] and written["weak_directions"]["groups"] == []
     assert load_study(folder / "study.yaml").signals.lowpass.cutoff == 100
-    assert "95.109" in (folder / "report.html").read_text(encoding="utf-8")
+    assert "95.11" in (folder / "report.html").read_text(encoding="utf-8")
     assert (folder / "parameters.csv").read_text().splitlines()[1].startswith("M1R,95.10")
     assert r"\toprule" in (folder / "parameters.tex").read_text()
 
