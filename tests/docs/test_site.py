@@ -79,7 +79,7 @@ class Addresses(HTMLParser):
 
 def links_and_addresses(site: Path) -> None:
     pages = {page: Addresses(page.read_text(encoding="utf-8")) for page in site.rglob("*.html")}
-    assert {f"{name}.html" for name in packaged_robots()} == {
+    assert {f"{name}.{kind}" for name in packaged_robots() for kind in ("html", "svg")} == {
         page.name for page in (site / "robots").iterdir()
     }
     for page, addresses in pages.items():
