@@ -55,7 +55,7 @@ def test_measured_record_of_one_joint(emps_data, tmp_path):
         "Friction curves",
         "Resolution advice",
         "Resolution study",
-        "95.109",
+        "95.11",
         "SHA-256",
     ):
         assert words in html
