@@ -22,6 +22,7 @@ from runtime.reading.table import WIDEST, Array, Options, Table
 
 CLOCK = re.compile(r"\d:\d\d|\d{4}-\d\d-\d\d")  # a time of day, a date
 UTF8 = "save it so (Excel: CSV UTF-8; elsewhere: iconv -f CP1252 -t UTF-8)"
+BLOCK = 2**18  # characters read at a time, and the rest of their last line
 Lines = Iterator[tuple[int, str]]  # number of a line, from 1, and what stands there
 
 
@@ -68,12 +69,25 @@ def _lines(path: Path) -> Lines:
     number = 0
     try:
         with opened(path) as stream, TextIOWrapper(stream, encoding="utf-8-sig") as text:
-            for number, line in enumerate(map(str.strip, text), 1):
-                if line and line[0] != "#":
-                    yield number, line
-    except UnicodeDecodeError as e:
-        byte = f"byte 0x{e.object[e.start]:02x} behind line {number}"
-        raise InputError(f"not a text file in UTF-8 ({byte}); {UTF8}", file=path.name) from None
+            while block := text.read(BLOCK) + text.readline():
+                for number, line in enumerate(block.removesuffix("\n").split("\n"), number + 1):
+                    if line and (line := line.strip()) and line[0] != "#":
+                        yield number, line
+    except UnicodeDecodeError:
+        raise _not_utf8(path) from None
+
+
+def _not_utf8(path: Path) -> InputError:
+    """The error for a file that is not UTF-8: its first such byte, and the line of it."""
+    with opened(path) as stream:
+        for number, line in enumerate(stream, 1):
+            try:
+                line.decode()
+            except UnicodeDecodeError as e:
+                byte = f"byte 0x{line[e.start]:02x}"
+                message = f"not a text file in UTF-8 ({byte}); {UTF8}"
+                return InputError(message, file=path.name, row=f"line {number}")
+    return InputError(f"not a text file in UTF-8; {UTF8}", file=path.name)
 
 
 def _row(path: Path, has_header: bool, i: int) -> str:

@@ -557,9 +557,10 @@ def test_separators_of_thousands_are_no_decimals(tmp_path):
 
 
 def test_a_log_of_another_encoding_says_how_to_save_it(tmp_path):
-    (tmp_path / "log.csv").write_text("Winkel [°];q1\n", encoding="latin-1")
+    (tmp_path / "log.csv").write_text("# arm\nWinkel [°];q1\n", encoding="latin-1")
     with pytest.raises(
-        InputError, match=r"not a text file in UTF-8 .*; save it so \(Excel: CSV UTF-8"
+        InputError,
+        match=r"line 2: not a text file in UTF-8 \(byte 0xb0\); save it so \(Excel: CSV UTF-8",
     ):
         read_record(settings(files="log.csv"), folder=tmp_path)
 

@@ -211,8 +211,9 @@ def test_members_that_overlap_and_names_that_climb(reader, tmp_path):
 @campaign
 def test_gzip_bombs(reader):
     refused(reader, "csv.gz", gzip.compress(b"1," * 150_000_000, 1), "unpacks to")
-    for unit in (b"\n", b"1,", b"12\n", b"\x00"):
+    for unit in (b"\n", b"1,", b"\x00"):
         refused(reader, "csv.gz", gzip.compress(unit * (30_000_000 // len(unit)), 1), "case.csv.gz")
+    refused(reader, "csv.gz", gzip.compress(b"12\n" * 4_000_000, 1), "case.csv.gz")
 
 
 @campaign
