@@ -70,7 +70,8 @@ def _lines(path: Path) -> Lines:
     try:
         with opened(path) as stream, TextIOWrapper(stream, encoding="utf-8-sig") as text:
             while block := text.read(BLOCK) + text.readline():
-                for number, line in enumerate(block.removesuffix("\n").split("\n"), number + 1):
+                lines = enumerate(block.removesuffix("\n").split("\n"), number + 1)
+                for number, line in lines:
                     if line and (line := line.strip()) and line[0] != "#":
                         yield number, line
     except UnicodeDecodeError:
