@@ -1,8 +1,8 @@
 """Functions of a compiled C file, called in a process of its own, which a wrong index may end.
 
 `python call_c.py` reads {"library": path, "calls": [[name, arguments, size, before]]} as JSON. The
-argument null is the result, whose `size` numbers are all `before` when the call begins. It prints
-[status, numbers] of every call.
+argument null is the result, whose `size` numbers are all `before` when the call begins, or those of
+the library that `before` names. It prints [status, numbers] of every call.
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ def main() -> None:
     library = ctypes.CDLL(job["library"])
     results: list[Any] = []
     for name, arguments, size, before in job["calls"]:
-        result = (ctypes.c_double * size)(*[before] * size)
+        numbers = ctypes.c_double * size
+        named = isinstance(before, str)
+        result = numbers(*(numbers.in_dll(library, before) if named else [before] * size))
         status = getattr(library, name)(*(_argument(a, result) for a in arguments))
         results.append([status, list(result)])
     json.dump(results, sys.stdout)

@@ -29,9 +29,11 @@ from symgen.certify import call_c
 from symgen.certify.importing import END, HEAD, imported, without_certificate
 from symgen.certify.witness import STATES, Check, Witness
 from symgen.derive.exact import Array
+from symgen.derive.loops import close
 from symgen.derive.models import MODELS
 from symgen.derive.regressor import acting, element_names
 from symgen.emit.generate import EMITTERS
+from symgen.emit.spec import STATES as STATE_NAMES
 from symgen.emit.targets import TARGETS
 from symgen.version import VERSION
 
@@ -43,6 +45,8 @@ HELPERS = {"store", "casadi"}
 NUMPY, STACKED, CASADI = "on NumPy's arrays", "stacked as for other packages", "by CasADi"
 DERIVATIVES = "inverse_dynamics_derivatives"
 Use = Callable[[ModuleType, str, Check, Mapping[str, float]], Array]
+Call = tuple[str, list[Any], int, float | str]
+CLOSED = "closed"  # what closes the loops in C
 TILES = 71  # samples of the functions in C: some tiles, the last not full
 
 
@@ -313,46 +317,47 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
     constants = [*witness.keywords.values(), 0.0]
     found = re.findall(rf"^int32_t {name}_(\w+)\(\s*int64_t", text, re.MULTILINE)
     several = [(f, check) for f in found for check in witness.checks.get(f, ())[:1]]
-    single = list(_of_one_state(name, text, witness))
-    calls: list[tuple[str, list[Any], int, float]] = [
-        (
-            f"{name}_{f}",
-            [
-                TILES,
-                *(_flat(a[rows] if a.ndim > 1 else a) for a in check.arguments),
-                constants,
-                None,
-            ],
-            check.expected[rows].size,
-            0.0,  # rows that are always zero are not written
-        )
-        for f, check in several
-    ]
-    calls += [
-        (
-            f"{name}_{f}1",
-            [
-                *check.keywords.values(),
-                *(_flat(a[k] if a.ndim > 1 else a) for a in check.arguments),
-                constants,
-                None,
-            ],
-            check.expected[k].size,
-            np.nan,
-        )
-        for f, check in single
-        for k in range(len(check.expected))
-    ]
-    job = {"library": str(library), "calls": calls}
+    single = [(f, check) for f, check in _of_one_state(name, text, witness) if f != CLOSED]
     try:
         _run([*compiler.split(), *C_FLAGS, str(path), "-o", str(library), "-lm"])
-        results = iter(json.loads(_run([sys.executable, "-I", call_c.__file__], json.dumps(job))))
+        closed = _closed(library, witness, constants) if witness.tied else None
+        if closed is not None and np.isnan(closed).any():
+            return {f"{CLOSED}1": float("inf")}
+
+        def given(f: str, check: Check, k: Any) -> list[list[float]]:
+            """Arguments at the states k; those of closed mechanisms are one."""
+            named = dict(zip(MODELS[f].arguments, check.arguments, strict=True))
+            if closed is not None:
+                named = {"s": closed} | {x: a for x, a in named.items() if x not in STATE_NAMES}
+            return [*(_flat(a[k] if a.ndim > 1 else a) for a in named.values()), constants]
+
+        calls: list[Call] = [  # rows that are always zero are not written
+            (f"{name}_{f}", [TILES, *given(f, c, rows), None], c.expected[rows].size, 0.0)
+            for f, c in several
+        ]
+        calls += [
+            (
+                f"{name}_{f}1",
+                [*c.keywords.values(), *given(f, c, k), None],
+                c.expected[k].size,
+                np.nan,
+            )
+            for f, c in single
+            for k in range(len(c.expected))
+        ]
+        results = iter(_results(library, calls))
     except (OSError, subprocess.SubprocessError, ValueError):
         return {"compile": float("inf")}
     unknown = {*found} - {f for f, _ in several}
     unknown |= {f"{f}1" for f in _one_state(name, text)} - {f"{f}1" for f, _ in single}
     unknown -= {*witness.left_out, *(f"{f}1" for f in witness.left_out)}
+    unknown -= {f"{CLOSED}1"} if closed is not None else set()
     errors = dict.fromkeys(unknown, float("inf"))
+    if closed is not None:
+        place = [witness.robot.moving.index(j) for j in close(witness.robot).independent]
+        motion = np.hstack([x[:, place] for x in (witness.x, witness.xd, witness.xdd)])
+        size = np.abs(motion).max(axis=0)
+        errors[f"{CLOSED}1"] = difference(closed[:, : motion.shape[1]], motion, size)
     for f, check in several:
         status, numbers = next(results)
         shape = _stored(f, check.expected.shape[1:])
@@ -366,6 +371,29 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
         worst = difference(check.compared(value), check.expected, check.scale)
         errors[f"{f}1"] = max(errors.get(f"{f}1", 0.0), worst)
     return errors
+
+
+def _closed(library: Path, witness: Witness, constants: list[float]) -> Array:
+    """The closed mechanism of the C file at every state, NaN where it does not get there."""
+    name, closure = witness.robot.name, close(witness.robot)
+    n, m = len(witness.robot.joints), len(closure.tied)
+    calls: list[Call] = [
+        (
+            f"{name}_{CLOSED}1",
+            [*map(_flat, state), constants, None],
+            3 * (n + m) + m * n + m,
+            f"{name}_start",
+        )
+        for state in zip(witness.q, witness.qd, witness.qdd, strict=True)
+    ]
+    results = _results(library, calls)
+    return np.array([[np.nan if status else x for x in numbers] for status, numbers in results])
+
+
+def _results(library: Path, calls: list[Call]) -> Any:
+    """[status, numbers] of calls of functions of a library."""
+    job = {"library": str(library), "calls": calls}
+    return json.loads(_run([sys.executable, "-I", call_c.__file__], json.dumps(job)))
 
 
 def _of_one_state(name: str, text: str, witness: Witness) -> Iterator[tuple[str, Check]]:

@@ -4,8 +4,10 @@ they fill, the header.
 The body of a function stands once, over `lanes` samples side by side: its compiler makes it anew for
 one state and for a tile.
 
-Everything is computed here; the template only lays it out. Joints that only the closure equations
-tie have no C kernels: their Newton iteration stays in the NumPy module.
+Joints that only the closure equations tie stand in a state of their own, which one function closes by
+Newton's method; every other function reads it.
+
+Everything is computed here; the template only lays it out.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ from math import prod
 from typing import Any
 
 from symgen.derive.graph import Scalar
+from symgen.derive.loop_equations import loop_system
 from symgen.description.expression import Expression
 from symgen.description.naming import Namespace
 from symgen.description.robot import FIXED, PRISMATIC
@@ -24,7 +27,7 @@ from symgen.emit.blocks import label
 from symgen.emit.c_printer import C, CText, is_word
 from symgen.emit.header import header, line_of, packed, plain
 from symgen.emit.printers import Section, under_titles
-from symgen.emit.python_target import signature
+from symgen.emit.python_target import IN_METRES, signature
 from symgen.emit.render import WIDTH, laid_out
 from symgen.emit.spec import STATES, Function, ModuleSpec, signals
 from symgen.version import VERSION
@@ -65,10 +68,11 @@ def _context(spec: ModuleSpec, command: str | None) -> dict[str, Any]:
         for f in spec.functions.values()
         if {*f.model.axes} <= {*RESULTS}
     ]
+    closing = [_kernel(spec, f, names.inner()) for f in spec.functions.values() if f.model.of_loops]
     most = max(kernel["computed"] for kernel in kernels)
     lines = [
         line
-        for kernel in kernels
+        for kernel in (*closing, *kernels)
         for section in (*kernel["sections"], Section("", kernel["before"]))
         for line in section.lines
     ]
@@ -80,13 +84,17 @@ def _context(spec: ModuleSpec, command: str | None) -> dict[str, Any]:
         "command": _comment(command or robot.file or robot.name),
         "header": [_comment(line) for line in _header(spec, kernels)],
         "name": robot.name,
-        "n": len(robot.joints),
-        "frames": len(robot.frames),
+        **{size: spec.sizes[size] for size in ("n", "m", "frames")},
         "sizes": {"b": len(spec.regrouping), "c": max(len(free), 1)},
         "tile": 16
         if 8 * 16 * most <= SCRATCH
         else 8,  # the rows of a short tile stay in the first cache
         "kernels": kernels,
+        "closing": closing,
+        "widths": widths(spec),
+        "state_text": "s, tau"
+        if spec.tied
+        else f"q, qd, qdd, tau ({len(robot.joints)},) in rad or m and seconds",
         "parameters": packed([f'"{name}"' for name in spec.regrouping.names]),
         "constant_names": packed([f'"{name}"' for name in free] or ['""']),
         "constants": packed([repr(float(x)) for x in free.values()] or ["0.0"]),
@@ -94,6 +102,46 @@ def _context(spec: ModuleSpec, command: str | None) -> dict[str, Any]:
             name: any(f"{name}(" in line for line in lines) for name in ("sign", "above", "below")
         },
         **_kinematics(spec, names.inner()),
+        **(_loops(spec) if spec.tied else {"tied": ()}),
+    }
+
+
+def widths(spec: ModuleSpec) -> dict[str, int]:
+    """How many numbers each state of one sample has; of closed mechanisms in the order of their
+    struct.
+    """
+    size = spec.sizes
+    if not spec.tied:
+        return dict.fromkeys(STATES, size["n"])
+    return {**dict.fromkeys(("q", "qd", "qdd"), size["k"]), "G": size["m"] * size["n"]} | {
+        "qdd0": size["m"]
+    }
+
+
+def _loops(spec: ModuleSpec) -> dict[str, Any]:
+    """What closes the loops: the start, units and steps of Newton's method, signatures."""
+    name, loops = spec.robot.name, loop_system(spec.robot)
+    kinds = [spec.robot.frame(j).sigma for j in spec.derivation.closure.independent]
+    start = f"{{{', '.join(map(repr, loops.start.tolist()))}}}"
+    states = [f"const real *{x}_a" for x in ("q", "qd", "qdd")]
+    called = {
+        f.model.name: f"{f.model.name}_state({', '.join([*f.model.states, 'constants', f.model.result])})"
+        for f in spec.functions.values()
+        if f.model.of_loops
+    }
+    return {
+        "tied": [f"q{u}" for u in spec.tied],
+        "start": ", ".join([start, *["{0}"] * (len(widths(spec)) - 1)]),
+        "units": ", ".join(repr(spec.robot.longest) if x == PRISMATIC else "1" for x in kinds),
+        "closed": 1e-13 if spec.robot.longest > IN_METRES else 1e-16,
+        "pace": f"{loops.pace():.2g}",
+        "mode": int(loops.mode()),
+        "curvatures": spec.functions["curvature"].shape[0],
+        "closure_call": called["linearised_closure"],
+        "curvature_call": called["curvature"],
+        "closed1": signature(
+            f"int32_t {name}_closed1", [*states, "const real *constants", f"{name}_state *s"]
+        ),
     }
 
 
@@ -109,7 +157,12 @@ def _kinematics(spec: ModuleSpec, names: Namespace) -> dict[str, Any]:
     ]
     read = {symbol for _, _, rate in moved for symbol in rate.symbols}
     free, n = [*spec.regrouping.constants], len(robot.joints)
-    pointers = [f"const real *{x}" for x in ("q", "qd", "tau", "X", "constants")]
+    rates: dict[int, list[str]] = {}  # of a frame by an actuated joint, tied ones by G
+    for j, k, rate in moved:
+        for i in (k,) if k < n else range(n):
+            by_tied = "" if k < n else f"*G[{(k - n) * n + i}]"
+            rates.setdefault((j - 1) * n + i, []).append(f"({_constant(rate)}){by_tied}")
+    pointers = [*_states(spec, ("q", "qd")), *(f"const real *{x}" for x in ("tau", "X"))]
     return {
         "ant": ", ".join(str(f.ant) for f in robot.frames),
         "sigma": ", ".join(str(int(f.sigma == PRISMATIC)) for f in robot.frames),
@@ -118,14 +171,16 @@ def _kinematics(spec: ModuleSpec, names: Namespace) -> dict[str, Any]:
             for k, c in enumerate(free)
             if c in read
         ],
-        "rates": [f"rate[{(j - 1) * n + k}] = {_constant(rate)};" for j, k, rate in moved],
+        "rates": [f"rate[{place}] = {' + '.join(terms)};" for place, terms in rates.items()],
         "jacobian": signature(
             f"int32_t {name}_jacobian1",
-            ["int32_t frame", "const real *q", "const real *constants", "real *J"],
+            ["int32_t frame", *_states(spec, ["q"]), "const real *constants", "real *J"],
         ),
         "forward": ""
         if robot.loaded
-        else signature(f"int32_t {name}_forward_dynamics1", [*pointers, "real *qdd"]),
+        else signature(
+            f"int32_t {name}_forward_dynamics1", [*pointers, "const real *constants", "real *qdd"]
+        ),
     }
 
 
@@ -174,6 +229,12 @@ def _kernel(spec: ModuleSpec, f: Function, names: Namespace) -> dict[str, Any]:
         for state, letter in STATES.items()
         for k, j in enumerate(independent)
     }
+    for k, u in enumerate(spec.tied):
+        if "qdd" not in model.arguments:
+            place[f"QDP{u}"] = ("qdd0", k)
+        for i, j in enumerate(robot.joints):
+            rate = spec.derivation.algebra.named("G", u, j)
+            place[rate] = ("G", k * len(robot.joints) + i)
     needed = text.inputs
     free = spec.regrouping.constants
     constants, parameters = (
@@ -202,11 +263,13 @@ def _kernel(spec: ModuleSpec, f: Function, names: Namespace) -> dict[str, Any]:
     inputs = [_input(name, *place[name]) for name in place if name in text.main_inputs]
     recalled = [f"const real {called} = AT(T, {k});" for k, (called, _) in enumerate(trigonometry)]
     trigonometry_loops = tuple(
-        Section(title, (*angles, *text.angles, *lines)) for title, lines in waves if lines
+        Section(title, (*_read_by(lines, [*angles, *text.angles]), *lines))
+        for title, lines in waves
+        if lines
     )
     sections = [Section("Inputs", (*inputs, *recalled)), *text.sections, *results]
     read = text.trigonometry_inputs | text.main_inputs
-    used = [s for s in model.states if any(place[x][0] == s for x in read if x in place)]
+    used = [s for s in widths(spec) if any(place[x][0] == s for x in read if x in place)]
     laid: dict[str, Any] = {
         "name": model.name,
         "text": text,
@@ -232,6 +295,16 @@ def _row(place: Sequence[int], shape: Sequence[int]) -> int:
     return row
 
 
+def _read_by(lines: Sequence[str], steps: Sequence[str]) -> list[str]:
+    """Those of the steps `const real x = ...;` that the lines read, or steps that they read."""
+    read, needed = set(re.findall(r"\w+", " ".join(lines))), []
+    for step in reversed(steps):
+        if step.split()[2] in read:
+            read |= set(re.findall(r"\w+", step))
+            needed.append(step)
+    return needed[::-1]
+
+
 def _input(name: str, state: str, k: int) -> str:
     return f"const real {name} = AT({state}, {k});"
 
@@ -254,8 +327,8 @@ def _header(spec: ModuleSpec, kernels: Sequence[Mapping[str, Any]]) -> list[str]
         *line_of(
             "Arguments",
             (
-                "q, qd, qdd (N, n) in C order, rad or m and seconds; S (rows, N), samples last, comes "
-                "zeroed: rows that are always zero are not written"
+                f"{'s (N,)' if spec.tied else 'q, qd, qdd (N, n) in C order, rad or m and seconds'}; "
+                "S (rows, N), samples last, comes zeroed: rows that are always zero are not written"
             ),
         ),
         *line_of("constants", ", ".join(spec.regrouping.constants) or "none"),
@@ -274,16 +347,18 @@ def _signatures(
     spec: ModuleSpec, f: Function, laid: Mapping[str, Any], needs: Sequence[str]
 ) -> dict[str, object]:
     """A kernel's C signatures; `needs` of X and constants."""
-    n, model, result = len(spec.robot.joints), f.model, laid["result"]
+    model, result, name = f.model, laid["result"], spec.robot.name
     used, computed, calls = laid["used"], laid["computed"], laid["calls"]
-    pointers = [*model.states, *(["X"] if model.reads_X else []), "constants"]
+    states = ["s"] if spec.tied else [*model.states]
+    pointers = [*(["X"] if model.reads_X else []), "constants"]
     long = sum(len(section.lines) for section in laid["sections"]) > LONGEST
     inline, kernel = ("static", "static") if long else ("INLINE", "KERNEL static")
     scratch = ["T"] * bool(calls)
     body = [f"const real *restrict {s}" for s in (*used, *needs)]
     body += [f"real *restrict {s}" for s in (*scratch, result)]
-    given = [f"const real *{p}" for p in pointers]
+    given = [*_states(spec, states), *(f"const real *{p}" for p in pointers)]
     own = ["int64_t N", *given, "real *S"]
+    read = [f"s->{x}" for x in used] if spec.tied else used
     shape = ", ".join(map(str, f.shape))
     size = prod(f.shape)
     tile = ", ".join([*(f"{s}_tile" for s in used), *needs, *scratch, result])
@@ -292,30 +367,42 @@ def _signatures(
         "summary": f"/* {model.summary} S has shape ({shape}, N). */",
         "one_summary": f"/* {model.summary} S has shape ({shape}). */",
         "size": size,
-        "unread": [p for p in pointers if p not in (*used, *needs)],
+        "unread": [
+            p for p in (*states, *pointers) if p not in (*used, *["s"] * bool(used), *needs)
+        ],
+        "load": "sizeof *s/sizeof(real), s[start].{}"
+        if spec.tied
+        else f"{len(spec.robot.joints)}, {{}} + {len(spec.robot.joints)}*start",
         "body_prototype": signature(
             f"{inline} void {model.name}_body", ["const size_t lanes", *body]
         ),
         "tile_prototype": signature(f"{kernel} void {model.name}_lanes", body),
         "tile_call": ", ".join(["TILE", *used, *needs, *scratch, result]),
         "tile_arguments": tile,
-        "one_prototype": signature(f"void {spec.robot.name}_{model.name}1", [*given, "real *S"]),
+        "one_prototype": signature(f"void {name}_{model.name}1", [*given, "real *S"]),
         "state_prototype": signature(
             f"static void {model.name}_state",
             [*(f"const real *{p}" for p in (*used, *needs)), "real *S"],
         ),
-        "state_call": f"{model.name}_state({', '.join([*used, *needs, 'S'])})",
+        "state_call": f"{model.name}_state({', '.join([*read, *needs, 'S'])})",
         "one_call": ", ".join(["1", *used, *needs, *scratch, result]),
         "one_scratch": ", ".join(f"{x}[{rooms[x]}]" for x in (*scratch, result)),
-        "prototype": signature(f"int32_t {spec.robot.name}_{model.name}", own),
+        "prototype": signature(f"int32_t {name}_{model.name}", own),
         "scratch": ", ".join(
             [
-                *(f"{s}_tile[{n}*TILE]" for s in used),
+                *(f"{s}_tile[{widths(spec)[s]}*TILE]" for s in used),
                 *(f"{x}[{rooms[x]}*TILE]" for x in (*scratch, result)),
             ]
         ),
-        "missing": _missing([*pointers, "S"]),
+        "missing": _missing([*states, *pointers, "S"]),
     }
+
+
+def _states(spec: ModuleSpec, states: Sequence[str]) -> list[str]:
+    """Parameters of a function that reads these states: of a closed mechanism, one struct."""
+    if spec.tied:
+        return [f"const {spec.robot.name}_state *s"]
+    return [f"const real *{x}" for x in states]
 
 
 def _missing(pointers: Sequence[str]) -> str:

@@ -34,8 +34,8 @@ TARGETS = {
     "casadi": Target(
         "{}.py", "CasADi", 'in CasADi {}.casadi("inverse_dynamics") is a casadi.Function of columns'
     ),
-    "c": Target("{}.c", "C"),
-    "h": Target("{}.h", "C", "{}.h declares what {}.c has; --target c writes both"),
+    "c": Target("{}.c", "C", iterates=True),
+    "h": Target("{}.h", "C", "{}.h declares what {}.c has; --target c writes both", iterates=True),
     "xp": Target(
         "{}.py",
         "arrays of any package",
