@@ -102,7 +102,7 @@ def _context(spec: ModuleSpec, command: str | None) -> dict[str, Any]:
             name: any(f"{name}(" in line for line in lines) for name in ("sign", "above", "below")
         },
         **_kinematics(spec, names.inner()),
-        **(_loops(spec) if spec.tied else {"tied": ()}),
+        **(_loops(spec, closing) if spec.tied else {"tied": ()}),
     }
 
 
@@ -118,17 +118,12 @@ def widths(spec: ModuleSpec) -> dict[str, int]:
     }
 
 
-def _loops(spec: ModuleSpec) -> dict[str, Any]:
+def _loops(spec: ModuleSpec, closing: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """What closes the loops: the start, units and steps of Newton's method, signatures."""
     name, loops = spec.robot.name, loop_system(spec.robot)
     kinds = [spec.robot.frame(j).sigma for j in spec.derivation.closure.independent]
     start = f"{{{', '.join(map(repr, loops.start.tolist()))}}}"
     states = [f"const real *{x}_a" for x in ("q", "qd", "qdd")]
-    called = {
-        f.model.name: f"{f.model.name}_state({', '.join([*f.model.states, 'constants', f.model.result])})"
-        for f in spec.functions.values()
-        if f.model.of_loops
-    }
     return {
         "tied": [f"q{u}" for u in spec.tied],
         "start": ", ".join([start, *["{0}"] * (len(widths(spec)) - 1)]),
@@ -137,8 +132,7 @@ def _loops(spec: ModuleSpec) -> dict[str, Any]:
         "pace": f"{loops.pace():.2g}",
         "mode": int(loops.mode()),
         "curvatures": spec.functions["curvature"].shape[0],
-        "closure_call": called["linearised_closure"],
-        "curvature_call": called["curvature"],
+        "calls": {kernel["name"]: kernel["state_call"] for kernel in closing},
         "closed1": signature(
             f"int32_t {name}_closed1", [*states, "const real *constants", f"{name}_state *s"]
         ),
@@ -358,7 +352,9 @@ def _signatures(
     body += [f"real *restrict {s}" for s in (*scratch, result)]
     given = [*_states(spec, states), *(f"const real *{p}" for p in pointers)]
     own = ["int64_t N", *given, "real *S"]
-    read = [f"s->{x}" for x in used] if spec.tied else used
+    own_state = spec.tied and not model.of_loops
+    read = [f"s->{x}" for x in used] if own_state else used
+    filled = model.result if model.of_loops else "S"
     shape = ", ".join(map(str, f.shape))
     size = prod(f.shape)
     tile = ", ".join([*(f"{s}_tile" for s in used), *needs, *scratch, result])
@@ -384,7 +380,7 @@ def _signatures(
             f"static void {model.name}_state",
             [*(f"const real *{p}" for p in (*used, *needs)), "real *S"],
         ),
-        "state_call": f"{model.name}_state({', '.join([*read, *needs, 'S'])})",
+        "state_call": f"{model.name}_state({', '.join([*read, *needs, filled])})",
         "one_call": ", ".join(["1", *used, *needs, *scratch, result]),
         "one_scratch": ", ".join(f"{x}[{rooms[x]}]" for x in (*scratch, result)),
         "prototype": signature(f"int32_t {name}_{model.name}", own),
