@@ -105,9 +105,7 @@ def emitted(
         for name in targets:
             target = TARGETS[name]
             if tied and not target.iterates:
-                said = (
-                    f"no {name} target, its loops are closed by iteration; the NumPy module serves"
-                )
+                said = f"no {name} target, its loops are closed by iteration; NumPy and C have it"
                 typer.echo(f"{robot.name}: {said}", err=True)
             elif target.use:
                 file = target.file.format(robot.name)
