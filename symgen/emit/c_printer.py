@@ -21,8 +21,8 @@ KEYWORDS = """auto break case char const continue default do double else enum ex
 if inline int long register restrict return short signed sizeof static struct switch typedef union
 unsigned void volatile while"""
 MACROS = """asm typeof errno linux unix NULL NAN INFINITY HUGE_VAL TILE KERNEL STREAM PORTABLE
-WIDTH REAL AT INLINE"""
-OWN = """sin cos sqrt exp tanh pow sign above below load save real lanes rate constants flags m t start row
+WIDTH REAL AT INLINE PART"""
+OWN = """sin cos sqrt exp tanh pow sign above below load save real lanes kept rate constants m t start row
 tile U T S N size_t int32_t int64_t memcpy memset"""
 RESERVED = frozenset(f"{KEYWORDS} {MACROS} {OWN}".split())
 HEADERS = re.compile(r"(M|FP|HUGE|MATH|U?INT\w*|SIZE|PTRDIFF|SIG|WCHAR|WINT)_\w+")

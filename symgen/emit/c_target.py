@@ -24,6 +24,7 @@ from symgen.description.expression import Expression
 from symgen.description.naming import Namespace
 from symgen.description.robot import FIXED, PRISMATIC
 from symgen.emit.blocks import label
+from symgen.emit.c_parts import Part, in_parts, read_by, words
 from symgen.emit.c_printer import C, CText, is_word
 from symgen.emit.header import header, line_of, packed, plain
 from symgen.emit.printers import Section, under_titles
@@ -37,7 +38,7 @@ FLAGS = (
     "-std=c99 -O2 -ftree-vectorize -fno-math-errno -fno-trapping-math -ffp-contract=off "
     "-shared -fPIC"
 )
-LONGEST = 1000  # lines of a body that compilers take several times; a longer one is compiled once
+LONGEST, OF_PART = 1000, 400  # steps of a body; a longer one is cut into parts and compiled once
 RESULTS = (
     *("joints", "parameters", "energies", "wrench", "standard parameters"),
     *("frames", "pose"),
@@ -73,7 +74,8 @@ def _context(spec: ModuleSpec, command: str | None) -> dict[str, Any]:
     lines = [
         line
         for kernel in (*closing, *kernels)
-        for section in (*kernel["sections"], Section("", kernel["before"]))
+        for body in (kernel, *kernel["parts"])
+        for section in (*body["sections"], Section("", tuple(body["before"])))
         for line in section.lines
     ]
     return {
@@ -209,11 +211,10 @@ def _kernel(spec: ModuleSpec, f: Function, names: Namespace) -> dict[str, Any]:
         [label(f, e) for e in entries],
     )
     distinct = signals(f, entries)
-    results = under_titles(
-        (e.heading, line)
+    results = [
+        (e.heading, _result(result, k, text.expression(e.value), e.comment))
         for k, e in enumerate(distinct.entries)
-        for line in _result(result, k, text.expression(e.value), e.comment)
-    )
+    ]
     rows = [
         f"{{{_row(place, f.shape)}, {signal}, {sign}}}" for place, signal, sign in distinct.places
     ]
@@ -257,11 +258,22 @@ def _kernel(spec: ModuleSpec, f: Function, names: Namespace) -> dict[str, Any]:
     inputs = [_input(name, *place[name]) for name in place if name in text.main_inputs]
     recalled = [f"const real {called} = AT(T, {k});" for k, (called, _) in enumerate(trigonometry)]
     trigonometry_loops = tuple(
-        Section(title, (*_read_by(lines, [*angles, *text.angles]), *lines))
+        Section(title, (*read_by(words(lines), [*angles, *text.angles]), *lines))
         for title, lines in waves
         if lines
     )
-    sections = [Section("Inputs", (*inputs, *recalled)), *text.sections, *results]
+    before = (*fixed, *constants, *parameters, *text.fixed)
+    steps = [(section.title, [line]) for section in text.sections for line in section.lines]
+    parts: list[Part] = []
+    kept = 0
+    sections = under_titles(
+        (title, line)
+        for title, lines in [("Inputs", [*inputs, *recalled]), *steps, *results]
+        for line in lines
+    )
+    if len(steps) > LONGEST:
+        parts, kept = in_parts([*inputs, *recalled], steps, results, OF_PART)
+        sections = ()
     read = text.trigonometry_inputs | text.main_inputs
     used = [s for s in widths(spec) if any(place[x][0] == s for x in read if x in place)]
     laid: dict[str, Any] = {
@@ -269,10 +281,12 @@ def _kernel(spec: ModuleSpec, f: Function, names: Namespace) -> dict[str, Any]:
         "text": text,
         "result": result,
         "used": used,
-        "before": (*fixed, *constants, *parameters, *text.fixed),
+        "before": before,
         "trigonometry": trigonometry_loops,
         "calls": len(trigonometry),
-        "sections": [s for s in sections if s.lines],
+        "sections": sections,
+        "parts": parts,
+        "kept": kept,
         "rows": packed(rows),
         "entries": len(rows),
         "computed": len(distinct.entries),
@@ -287,16 +301,6 @@ def _row(place: Sequence[int], shape: Sequence[int]) -> int:
     for k, size in zip(place, shape, strict=True):
         row = row * size + k
     return row
-
-
-def _read_by(lines: Sequence[str], steps: Sequence[str]) -> list[str]:
-    """Those of the steps `const real x = ...;` that the lines read, or steps that they read."""
-    read, needed = set(re.findall(r"\w+", " ".join(lines))), []
-    for step in reversed(steps):
-        if step.split()[2] in read:
-            read |= set(re.findall(r"\w+", step))
-            needed.append(step)
-    return needed[::-1]
 
 
 def _input(name: str, state: str, k: int) -> str:
@@ -345,11 +349,14 @@ def _signatures(
     used, computed, calls = laid["used"], laid["computed"], laid["calls"]
     states = ["s"] if spec.tied else [*model.states]
     pointers = [*(["X"] if model.reads_X else []), "constants"]
-    long = sum(len(section.lines) for section in laid["sections"]) > LONGEST
-    inline, kernel = ("static", "static") if long else ("INLINE", "KERNEL static")
+    inline, kernel = ("static", "static") if laid["parts"] else ("INLINE", "KERNEL static")
     scratch = ["T"] * bool(calls)
     body = [f"const real *restrict {s}" for s in (*used, *needs)]
     body += [f"real *restrict {s}" for s in (*scratch, result)]
+    parts = [
+        _part(laid, k, part, [*body, "real *restrict kept"])
+        for k, part in enumerate(laid["parts"], 1)
+    ]
     given = [*_states(spec, states), *(f"const real *{p}" for p in pointers)]
     own = ["int64_t N", *given, "real *S"]
     own_state = spec.tied and not model.of_loops
@@ -359,7 +366,10 @@ def _signatures(
     size = prod(f.shape)
     tile = ", ".join([*(f"{s}_tile" for s in used), *needs, *scratch, result])
     rooms = {"T": calls, result: computed}
+    read_first = words([line for section in laid["trigonometry"] for line in section.lines])
     return {
+        "parts": parts,
+        "before": read_by(read_first, laid["before"]) if parts else laid["before"],
         "summary": f"/* {model.summary} S has shape ({shape}, N). */",
         "one_summary": f"/* {model.summary} S has shape ({shape}). */",
         "size": size,
@@ -391,6 +401,22 @@ def _signatures(
             ]
         ),
         "missing": _missing([*states, *pointers, "S"]),
+    }
+
+
+def _part(
+    laid: Mapping[str, Any], number: int, part: Part, parameters: Sequence[str]
+) -> dict[str, object]:
+    """A part of a body as a function, which takes those of the parameters that it reads."""
+    before = read_by(part.read, laid["before"])
+    read = part.read | words(before)
+    given = [p for p in parameters if p.split()[-1].lstrip("*") in read]
+    name = f"{laid['name']}_part{number}"
+    return {
+        "sections": part.sections,
+        "before": before,
+        "prototype": signature(f"PART void {name}", ["const size_t lanes", *given]),
+        "call": f"{name}({', '.join(['lanes', *(p.split()[-1].lstrip('*') for p in given)])})",
     }
 
 

@@ -361,10 +361,11 @@ def test_nan_and_infinity_as_in_numpy(tmp_path: Path) -> None:
 
 
 @needs_compiler
-def test_long_bodies_are_compiled_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of many joints: one body for one state and for a tile; the same numbers."""
+def test_long_bodies_are_cut_into_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of many joints: functions of a size that compilers take; the same numbers."""
     monkeypatch.setattr("symgen.emit.c_target.LONGEST", 0)
+    monkeypatch.setattr("symgen.emit.c_target.OF_PART", 7)
     text = generate_files(load_robot("scara"), targets=("c",), command="scara")["scara.c"]
-    assert "INLINE void" not in text and "KERNEL static void" not in text
+    assert "PART void regressor_part3(" in text and "KERNEL static void regressor" not in text
     library = ctypes.CDLL(str(compiled(tmp_path, text, COMPILERS[0], SOON)))
     compare(library, numpy_module("scara", files("scara")["scara.py"]), (0, 1, 33))
