@@ -30,7 +30,7 @@ from runtime.compose import estimate_of, excite, observe
 from runtime.core.rows.predicted import kept_correlation
 from runtime.core.settings import structure
 from runtime.core.signals.filters import decimated, decimation_factor
-from runtime.excitation.criteria import excesses, planned, weights_of
+from runtime.excitation.criteria import excesses, plan_rows, weights_of
 from runtime.excitation.settings import ExcitationSettings
 from runtime.loop.control_law import parameters_of
 from runtime.loop.reference import Reference
@@ -128,7 +128,7 @@ def confirm(model: object, study: object, motion: object, s: np.ndarray, records
         observe(model, clean, asked), kept_correlation(asked.signals, RATE)
     )
     promised = everything.relative_sigma(
-        planned(model, motion, asked, RATE), kept_correlation(asked.signals, RATE)
+        plan_rows(model, motion, asked, RATE), kept_correlation(asked.signals, RATE)
     )
     estimates = []
     for _ in range(records):

@@ -159,7 +159,7 @@ EXTRAS: list[Extra] = [
 Records = Record | Sequence[Record]
 
 
-def given(study: Study | None) -> Study:
+def require_study(study: Study | None) -> Study:
     """The study, by default Study(); InputError for anything else."""
     study = Study() if study is None else study
     require_kind(
@@ -168,7 +168,7 @@ def given(study: Study | None) -> Study:
     return study
 
 
-def listed(records: Records) -> tuple[Record, ...]:
+def list_records(records: Records) -> tuple[Record, ...]:
     """One record or several as several; InputError for anything else."""
     if isinstance(records, Record):
         return (records,)
@@ -176,7 +176,7 @@ def listed(records: Records) -> tuple[Record, ...]:
     return tuple(records)
 
 
-def known(study: Study) -> Study:
+def complete_study(study: Study) -> Study:
     """The study with all options of its reader; SettingsError where its method or reader is not in the lists."""
     signals = study.signals
     for path, name, names in (
@@ -193,7 +193,7 @@ def known(study: Study) -> Study:
     return replace(study, signals=replace(signals, options=options))
 
 
-def stated(
+def state_problem(
     model: GeneratedModel,
     records: Records,
     study: Study | None = None,
@@ -201,7 +201,7 @@ def stated(
     simulator: Simulator | None = None,
 ) -> Problem:
     """The problem of model, records and study as it is stated, before any step."""
-    study = known(given(study))
+    study = complete_study(require_study(study))
     methods: Mapping[str, Method] = METHODS
     if simulator is not None:
         observe = partial(observed_loop, simulator=simulator)
@@ -210,7 +210,12 @@ def stated(
             for name, method in METHODS.items()
         }
     return Problem(
-        model, listed(records), listed(unseen), study, READERS[study.signals.reader].states, methods
+        model,
+        list_records(records),
+        list_records(unseen),
+        study,
+        READERS[study.signals.reader].states,
+        methods,
     )
 
 
@@ -242,10 +247,10 @@ def problem(
     InputError
         A record, model or setting that a step cannot work with.
     """
-    return prepared(stated(model, records, study, unseen, simulator), STEPS)
+    return prepared(state_problem(model, records, study, unseen, simulator), STEPS)
 
 
-def recorded(
+def records_of(
     settings: Sequence[RecordSettings], model: GeneratedModel, study: Study
 ) -> list[Record]:
     """Records of a study, read from their files."""
@@ -262,7 +267,7 @@ def observe(
     simulator: Simulator | None = None,
 ) -> Observation:
     """Y = W X + rho, eqs. (6) and (14), of one record or several: filtered, differentiated, decimated, rows left out."""
-    return estimation.observed(problem(model, records, study, simulator=simulator))
+    return estimation.observe_rows(problem(model, records, study, simulator=simulator))
 
 
 @single_threaded
@@ -612,7 +617,7 @@ def simulate(
     from runtime.loop import simulation
 
     require_emitted(model)
-    study = given(study)
+    study = require_study(study)
     if study.controller is None:
         raise InputError(
             "the study has no section `controller`; it says law, rate and reference of the closed loop"
@@ -648,14 +653,16 @@ def _with_loaded(
     simulator: Simulator | None,
 ) -> Problem:
     """The prepared problem, with a note of the records with the load of study.payload, prepared by the same steps."""
-    study = given(study)
+    study = require_study(study)
     if unseen is None:
-        unseen = recorded(study.validate.record, model, study)
+        unseen = records_of(study.validate.record, model, study)
     if loaded is None:
-        loaded = () if study.payload is None else recorded(study.payload.record, model, study)
-    unseen = listed(unseen)
+        loaded = () if study.payload is None else records_of(study.payload.record, model, study)
+    unseen = list_records(unseen)
     count = len(unseen)
-    whole = problem(model, records, study, unseen=(*unseen, *listed(loaded)), simulator=simulator)
+    whole = problem(
+        model, records, study, unseen=(*unseen, *list_records(loaded)), simulator=simulator
+    )
     note = Note(LOADED, "", result=whole.unseen[count:])
     return whole.changed(note, unseen=whole.unseen[:count])
 
@@ -663,15 +670,15 @@ def _with_loaded(
 def _candidate(model: GeneratedModel, candidate: Study | tuple[Study, Records, Records]) -> Problem:
     """The problem of a treatment, as stated."""
     if isinstance(candidate, Study):
-        fitted = recorded(candidate.record, model, candidate)
-        predicted = recorded(candidate.validate.record, model, candidate)
-        return stated(model, fitted, candidate, predicted)
+        fitted = records_of(candidate.record, model, candidate)
+        predicted = records_of(candidate.validate.record, model, candidate)
+        return state_problem(model, fitted, candidate, predicted)
     if not (isinstance(candidate, tuple) and len(candidate) == 3):
         raise InputError(
             f"a candidate is {kind_of(candidate)}; expected a Study, or (study, records, validation records)"
         )
     study, records, unseen = candidate
-    return stated(model, records, study, listed(unseen))
+    return state_problem(model, records, study, list_records(unseen))
 
 
 __all__ = [

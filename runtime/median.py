@@ -24,7 +24,7 @@ from runtime.core.study import Study
 Array = np.ndarray
 
 
-def taken(tau: Array, q: Array, rate: float, window: int) -> Array:
+def share_taken(tau: Array, q: Array, rate: float, window: int) -> Array:
     """Share of the torques tau, shape (N, n), that a median over `window` samples takes with the
     motion q, shape (N, n), shape (n,); 0 where most of what it takes goes with no motion.
     """
@@ -55,7 +55,9 @@ def torque_median(problem: Problem) -> Problem:
     shares = []
     for record in problem.records:
         samples = excerpt(record, problem.settings.rows)
-        shares.append(taken(record.tau[samples], record.q[samples], record.rate, signals.median))
+        shares.append(
+            share_taken(record.tau[samples], record.q[samples], record.rate, signals.median)
+        )
     if np.max(shares, initial=0.0) <= LIMIT.MEDIAN_TAKES:
         return problem.changed(settings=_with_window(problem, signals.median))
     worst = np.max(shares, axis=0)

@@ -79,7 +79,7 @@ def fit(start: Beginning) -> Fitted:
     if options.loss == "tukey":
         again = _iterated(start, W, found.X, "tukey")
         found = replace(again, passes=found.passes + again.passes)
-    return _fitted(start, W, found)
+    return _fit_of_last_pass(start, W, found)
 
 
 def weight(u: Array, loss: str, tuning: float) -> Array:
@@ -135,7 +135,7 @@ def _scales(observation: Observation, raw: Factor, e: Array) -> Array:
     return wls.floored(raw, S)
 
 
-def _fitted(start: Beginning, W: Array, fit: Robust) -> Fitted:
+def _fit_of_last_pass(start: Beginning, W: Array, fit: Robust) -> Fitted:
     """What the last pass gives, with the covariance of a robust estimate."""
     observation, options = start.observation, start.options
     r, b = W.shape
@@ -172,12 +172,12 @@ def _fitted(start: Beginning, W: Array, fit: Robust) -> Fitted:
         replace(system.solve(), X=fit.X),
         C,
         np.sqrt(np.diag(C_b)),
-        message=_told(shares),
+        message=_note_of_shares(shares),
         details={"loss": loss, "tuning": tuning, "scales": fit.S, "down_weighted": shares},
     )
 
 
-def _told(shares: Mapping[str, float]) -> str:
+def _note_of_shares(shares: Mapping[str, float]) -> str:
     """Shares of down-weighted rows in words."""
     text = (
         f"Share of rows with a weight below {LIMIT.DOWN_WEIGHTED:g}: "

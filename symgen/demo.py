@@ -331,7 +331,7 @@ def percent(value: float, reference: float) -> float:
     return 100 * (value / reference - 1)
 
 
-def _fitted(fit: Estimate, name: str) -> tuple[str, str, str]:
+def _fit_cells(fit: Estimate, name: str) -> tuple[str, str, str]:
     """Value, difference from Table 2 in % and %sigma; of a parameter that was removed, so."""
     if name not in fit.names:
         return "removed", "-", "-"
@@ -347,7 +347,7 @@ def _table_2(demo: Demonstration) -> Section:
             name,
             number(value),
             number(TABLE_2_SIGMA[name], ".2f"),
-            *(cell for fit in fits for cell in _fitted(fit, name)),
+            *(cell for fit in fits for cell in _fit_cells(fit, name)),
         )
         for name, value in TABLE_2.items()
     ]

@@ -199,7 +199,7 @@ class Advice(Result, Part):
 
     def checks(self) -> tuple[Check, ...]:
         """Whether the encoder resolves enough."""
-        return (resolved(self),)
+        return (answer(self),)
 
     def entries(self) -> dict[str, Any]:
         """Nothing: it has a file of its own."""
@@ -515,7 +515,7 @@ def _panel(ax: Any, reader: str, encoder: EncoderAdvice, line: str, points: str,
     "Does the encoder resolve enough?",
     f"bias below {LIMIT.NEGLIGIBLE:g} % (usable to {LIMIT.BIASED:g} %)",
 )
-def resolved(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer:
+def answer(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer:
     """The answer of the advisor, and of the step in use where it is given.
 
     steps, share : where no advice was asked for, the steps that the positions show, in words, and the
@@ -568,7 +568,7 @@ class NoAdvice(Part):
     def checks(self) -> tuple[Check, ...]:
         """Whether the encoder resolves enough."""
         simulated = self.result.study.estimate.method in ("iv", "didim")
-        return (resolved(None, *(("", 0.0) if simulated else visible_steps(self.result))),)
+        return (answer(None, *(("", 0.0) if simulated else visible_steps(self.result))),)
 
 
 def _summary(advice: EncoderAdvice) -> dict[str, Any]:
@@ -583,7 +583,7 @@ def _summary(advice: EncoderAdvice) -> dict[str, Any]:
     }
 
 
-def confirmed(
+def confirm_by_runs(
     advice: EncoderAdvice, reference: Estimate, level: Callable[[float], Sampled]
 ) -> EncoderAdvice:
     """The advice with runs at the steps of its limits; of all encoders, also between and above

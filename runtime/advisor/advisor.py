@@ -41,14 +41,14 @@ from runtime.advisor.advice import (
     EncoderAdvice,
     Limit,
     ReaderAdvice,
-    confirmed,
+    confirm_by_runs,
     limits_of,
 )
 from runtime.advisor.coarse_encoders import READERS, CoarseEncoders, ReaderName
 from runtime.advisor.position_errors import Perturbation, perturbation, solution
 from runtime.advisor.readers import reader_advice
 from runtime.core.cestac.perturbed import study_columns
-from runtime.core.cestac.result import deciding_names, judged
+from runtime.core.cestac.result import deciding_names, names_judged
 from runtime.core.cestac.rounding import VARIANCE, Mode
 from runtime.core.drives import Drives
 from runtime.core.errors import InputError, SettingsError
@@ -167,7 +167,7 @@ def advise(
         stack([part.observation for part in parts]) if len(parts) > 1 else parts[0].observation
     )
     rows = stacked(model, as_measured, names)
-    origins = {**problem.provenance, **judged(study.cestac), **(provenance or {})}
+    origins = {**problem.provenance, **names_judged(study.cestac), **(provenance or {})}
     reference = linear_estimate(rows, linear, model=model, provenance=origins)
     system = linear_system(measured, linear)
     predictor = Predictor(parts, 1 / np.array(system.scales), VARIANCE[law])
@@ -212,7 +212,7 @@ def advise(
     for label, own in selections.items() if law != "phase" else ():
         advice = _advice(predictor, label, own, reference, units[label])
         if runs is not None:
-            advice = confirmed(advice, reference, partial(runs.sampled, own))
+            advice = confirm_by_runs(advice, reference, partial(runs.sampled, own))
         advices.append(advice)
         advance()
     steps = np.array([predictor.change(delta, every) for delta in asked]).reshape(

@@ -26,7 +26,7 @@ from math import floor, log
 
 import numpy as np
 
-from runtime.advisor.sign_errors import Kernels, Switched, kernels, switched
+from runtime.advisor.sign_errors import Kernels, Switched, kernels, switch_with_error
 from runtime.core.drives import Drives, encoder_drives, encoder_root
 from runtime.core.missing import require_positions
 from runtime.core.model import GeneratedModel
@@ -127,7 +127,7 @@ class Perturbation:
         key = (switch.column, node)
         if key not in self.known:
             factor, settings = self.selection.factor, self.selection.signals.decimate
-            self.known[key] = switched(
+            self.known[key] = switch_with_error(
                 switch,
                 self.along[switch.column],
                 NODE**node,

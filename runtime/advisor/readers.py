@@ -20,7 +20,7 @@ from runtime.advisor.advice import (
     NAMES,
     EncoderAdvice,
     ReaderAdvice,
-    confirmed,
+    confirm_by_runs,
     limits_of,
     step_text,
 )
@@ -58,7 +58,7 @@ def reader_advice(
         limits = limits_of(delta, change, reference)
         advice = EncoderAdvice(label, limits, delta, change, unit=units[label])
         if confirm:
-            advice = confirmed(advice, reference, partial(real.sampled, own))
+            advice = confirm_by_runs(advice, reference, partial(real.sampled, own))
         encoders.append(advice)
         progress()
     deviation = by_label[encoders[0].label][1][:, 1]

@@ -77,7 +77,7 @@ class Switched:
         return Switched(sigma, shift, slope / sigma, variance * sigma)
 
 
-def switched(
+def switch_with_error(
     switch: Switch,
     s: Array,
     sigma: float,

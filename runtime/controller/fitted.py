@@ -145,7 +145,7 @@ def law_estimate(problem: Problem, law: Law, saturation: Array) -> LawEstimate:
     cuts = bool(asked) and bool(np.isfinite(saturation).any())
     starts = LIMIT.LAW_STARTS if cuts else (0.0,)
     stiffness = law.gains(n)["P"]
-    ends = [_searched(torques, asked, law.delay == "fit", s * stiffness, cuts) for s in starts]
+    ends = [_search_kd(torques, asked, law.delay == "fit", s * stiffness, cuts) for s in starts]
     kd, delay, _ = min(ends, key=lambda end: end[2])
     fit = torques.fit(asked, law.delay == "fit", kd, delay)
     gains = [name for name in asked if name in fit.names and _apart(fit, name)]
@@ -153,7 +153,7 @@ def law_estimate(problem: Problem, law: Law, saturation: Array) -> LawEstimate:
         lost = np.array([f"KD{j}" not in gains for j in labels])
         torques = replace(torques, saturation=np.where(lost, np.inf, saturation))
         start = np.where(lost, 0.0, kd)
-        kd, delay, _ = _searched(torques, gains, law.delay == "fit", start, cuts)
+        kd, delay, _ = _search_kd(torques, gains, law.delay == "fit", start, cuts)
         fit = torques.fit(gains, law.delay == "fit", kd, delay)
     sigma = dict(zip(fit.names, np.fmax(fit.sigma, fit.sigma_corrected), strict=True))
     sigmas = np.array([sigma.get(f"KD{j}", np.nan) for j in labels])
@@ -163,7 +163,7 @@ def law_estimate(problem: Problem, law: Law, saturation: Array) -> LawEstimate:
     return LawEstimate(tuple(labels), kd, sigmas, late_by[0], late_by[1], text, fit.relative_error)
 
 
-def _searched(
+def _search_kd(
     torques: TorquesOfLaw, gains: Sequence[str], late_too: bool, kd: Array, cuts: bool
 ) -> tuple[Array, float, float]:
     """kd, the delay and the misfit where passes from `kd` end. cuts : the law is not linear in kd."""

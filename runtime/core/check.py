@@ -96,7 +96,7 @@ def worst_of(checks: Sequence[Check]) -> Check | None:
     return next((c for state in WORST[:2] for c in checks if c.state == state), None)
 
 
-def named(names: Sequence[str]) -> str:
+def first_names(names: Sequence[str]) -> str:
     """The first LIMIT.PARAMETERS_NAMED names, and how many more there are."""
     more = len(names) - LIMIT.PARAMETERS_NAMED
     listed = ", ".join(names[: LIMIT.PARAMETERS_NAMED])

@@ -15,7 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.check import WORST, Answer, Check, Question, State, named, state_of, worst_of
+from runtime.core.check import (
+    WORST,
+    Answer,
+    Check,
+    Question,
+    State,
+    first_names,
+    state_of,
+    worst_of,
+)
 from runtime.core.documents import Result
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.limits import LIMIT
@@ -169,7 +178,7 @@ def checklist_of(
     def of_parts(about: About) -> list[Check]:
         return [check for part in parts if part.about == about for check in part.checks()]
 
-    rank = determined(estimate, fit)
+    rank = rank_and_condition(estimate, fit)
     record = of_parts("record")
     if rank.state != "doubtful":
         record = [rank, *record]
@@ -182,7 +191,7 @@ def checklist_of(
         counts = single or bool(np.isnan(expected_error))
         checks = [
             *record,
-            explained(fit),
+            total_error(fit),
             explained_by_joint(estimate, fit, expected_error),
             predicted(fit, prediction_error, halves, differ=differ, expected=expected_error),
             *of_parts("prediction"),
@@ -212,7 +221,7 @@ def remark(check: Check, counts: bool) -> Check:
     "record a motion that moves the joints in more combinations (symgen excite), or use "
     "fewer parameters (essential.threshold)",
 )
-def determined(estimate: Estimate, fit: Estimate) -> Answer:
+def rank_and_condition(estimate: Estimate, fit: Estimate) -> Answer:
     """Rank and condition of W with all columns (`estimate`) and with those of the model (`fit`)."""
     for one in (estimate, fit):
         if one.status == "rank-deficient":
@@ -238,7 +247,7 @@ def determined(estimate: Estimate, fit: Estimate) -> Answer:
     "look at the joints below: units, signs and ratios of the drives first, then friction "
     "(--friction)",
 )
-def explained(fit: Estimate) -> Answer:
+def total_error(fit: Estimate) -> Answer:
     """Error of the fit in total."""
     text = f"{fit.relative_error:.1f} % of them stay unexplained"
     return Answer(state_of(fit.relative_error, *LIMIT.TOTAL_ERROR), text)
@@ -373,7 +382,7 @@ def certain(fit: Estimate, bootstrap: Mapping[str, float]) -> Answer:
         return Answer("good", text)
     # a physical set has all columns, held together by the conditions and the values of the file
     most = 2 * len(above) > len(fit.names) and "standard" not in fit.details
-    text += f"; above {LIMIT.LARGE_DEVIATION:g} %: {named(above)}"
+    text += f"; above {LIMIT.LARGE_DEVIATION:g} %: {first_names(above)}"
     return Answer("no" if most else "doubtful", text)
 
 

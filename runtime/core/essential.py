@@ -144,7 +144,7 @@ def essential_of(
     system = linear_system(observation, estimate or EstimateSettings())
     wanted = sorted({*THRESHOLDS, settings.threshold})
     steps = _trail(system, wanted[-1])
-    removed = {threshold: _accepted(steps, threshold) for threshold in wanted}
+    removed = {threshold: _removals(steps, threshold) for threshold in wanted}
     accepted = removed[settings.threshold]
     trail = tuple(replace(step, removed=k < accepted) for k, step in enumerate(steps))
     gone = {step.name for step in trail if step.removed}
@@ -161,7 +161,7 @@ def essential_of(
     )
 
 
-def _accepted(steps: Sequence[Removal], threshold: float) -> int:
+def _removals(steps: Sequence[Removal], threshold: float) -> int:
     """Removals before the first whose ratio reaches the threshold."""
     return next((k for k, step in enumerate(steps) if not step.ratio < threshold), len(steps))
 

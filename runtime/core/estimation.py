@@ -26,7 +26,7 @@ from runtime.core.study import EstimateSettings
 Array = np.ndarray
 
 
-def observed(problem: Problem) -> Observation:
+def observe_rows(problem: Problem) -> Observation:
     """Rows of the fitted records, as the method of the settings needs them.
 
     Parameters
@@ -57,7 +57,7 @@ def observed_unseen(problem: Problem, k: int) -> Observation:
     alone = problem.changed(records=(problem.unseen[k],), unseen=())
     if "prepared_unseen" in vars(problem):
         alone.prepared[0].take_states(problem.prepared_unseen[k])
-    return observed(alone)
+    return observe_rows(alone)
 
 
 def estimated(
@@ -73,14 +73,14 @@ def estimated(
 
 def estimate(problem: Problem) -> Estimate:
     """All parameters of a prepared problem by the method of its settings."""
-    return estimated(problem, observed(problem), provenance=problem.provenance)
+    return estimated(problem, observe_rows(problem), provenance=problem.provenance)
 
 
 def essential(problem: Problem) -> Essential:
     """Essential parameters of a prepared problem, by its method or the linear companion of that method."""
     settings = problem.settings
     return essential_of(
-        observed(problem),
+        observe_rows(problem),
         settings.essential,
         linear_companion(settings.estimate),
         model=problem.model,

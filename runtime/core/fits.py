@@ -57,7 +57,7 @@ class Fits:
         return self.sets.get(best_set(errors, study.essential.first), self.estimate)
 
 
-def fitted(problem: Problem, observation: Observation, provenance: Mapping[str, Any]) -> Fits:
+def fit_problem(problem: Problem, observation: Observation, provenance: Mapping[str, Any]) -> Fits:
     """All parameters and the essential ones."""
     study, model = problem.settings, problem.model
     at("least squares, essential parameters")

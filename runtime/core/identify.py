@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 from runtime.core.errors import InputError, SettingsError
-from runtime.core.estimation import observed, observed_unseen
-from runtime.core.fits import fitted, validated
+from runtime.core.estimation import observe_rows, observed_unseen
+from runtime.core.fits import fit_problem, validated
 from runtime.core.part import Part
 from runtime.core.problem import SIGNALS, Problem
 from runtime.core.provenance import record_names
@@ -90,12 +90,12 @@ def identify(
     names = record_names([*problem.records, *problem.unseen])
     fitted_names = names[: len(problem.records)]
     unseen_names = names[len(problem.records) :]
-    observation = observed(problem)
+    observation = observe_rows(problem)
     notes = tuple(note.text for note in problem.notes if note.text and note.kind != SIGNALS)
     if notes:
         observation = replace(observation, findings=(*observation.findings, *notes))
     unseen = {name: observed_unseen(problem, k) for k, name in enumerate(unseen_names)}
-    fits = fitted(problem, observation, provenance)
+    fits = fit_problem(problem, observation, provenance)
     fits, validation, missing = validated(
         problem, fits, observation, unseen, ", ".join(fitted_names)
     )

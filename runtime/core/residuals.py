@@ -90,7 +90,7 @@ def joint_whiteness(joint: JointComparison, rate: float, lags: int = LIMIT.LAGS)
     place = np.concatenate(
         [[0], np.cumsum(np.where(apart, m + 1, steps))]
     )  # on a grid of period 1/rate
-    products, pairs = _lagged(error, place, np.flatnonzero(apart) + 1)
+    products, pairs = _lagged_sums(error, place, np.flatnonzero(apart) + 1)
     rho, pairs = correlation(products, pairs), pairs[1 : m + 1]
     first, used = rho[:m], pairs > 0
     Q = float(
@@ -121,7 +121,9 @@ def joint_whiteness(joint: JointComparison, rate: float, lags: int = LIMIT.LAGS)
 def residual_correlation(residual: Array) -> Array:
     """rho_k, k = 1 ... N - 1, of residuals, shape (N,), at even distances."""
     return correlation(
-        *_lagged(residual - residual.mean(), np.arange(len(residual)), np.empty(0, dtype=np.intp))
+        *_lagged_sums(
+            residual - residual.mean(), np.arange(len(residual)), np.empty(0, dtype=np.intp)
+        )
     )
 
 
@@ -165,7 +167,7 @@ def unseen_by_blocks(observation: Observation, fit: Estimate) -> float:
     return float(1 / (1 + ratio * np.expm1(-1 / ratio)))
 
 
-def _lagged(x: Array, place: Array, starts: Array) -> tuple[Array, Array]:
+def _lagged_sums(x: Array, place: Array, starts: Array) -> tuple[Array, Array]:
     """Sums of x_t x_(t+k), k = 0, 1 ..., and the number of pairs; x, shape (N,), at places on a
     grid. No pair spans `starts` of other records.
     """

@@ -393,12 +393,14 @@ def weak_directions(
     return WeakDirections(
         pairs=tuple(sorted(pairs, key=lambda pair: -abs(pair.correlation))),
         groups=tuple(group for group in groups if len(group) > 1),
-        directions=tuple(Direction(float(s[i] / s[0]), _named(Vt[i], names)) for i in weakest),
+        directions=tuple(
+            Direction(float(s[i] / s[0]), _named_entries(Vt[i], names)) for i in weakest
+        ),
         threshold=threshold,
     )
 
 
-def _named(v: Array, names: Sequence[str]) -> dict[str, float]:
+def _named_entries(v: Array, names: Sequence[str]) -> dict[str, float]:
     """Entries of a singular vector worth a name, largest first, the largest positive."""
     order = np.argsort(-np.abs(v), kind="stable")
     v = v * np.sign(v[order[0]])

@@ -233,7 +233,9 @@ def read_stretch(
     moving = np.flatnonzero(most > least)
     states = [np.full((N, n), value) for value in (0.0, 0.0, 0.0, 12**-0.5, 0.0, 0.0)]
     states[0][:] = np.where(np.isfinite(least), least, rest)
-    part = _moved(k, moving, states, rate, uneven, starts or {}) if len(moving) else None
+    part = (
+        _positions_of_counts(k, moving, states, rate, uneven, starts or {}) if len(moving) else None
+    )
     missing = np.isnan(counts)
     unknown = missing & (states[3] > UNKNOWN)
     for j in np.flatnonzero(missing.any(axis=0)):
@@ -246,7 +248,7 @@ def read_stretch(
     return part, states, unknown
 
 
-def _moved(
+def _positions_of_counts(
     k: Array,
     moving: Array,
     states: Sequence[Array],

@@ -148,7 +148,7 @@ def smoothed(
         f"counts jump by {by} at {at * Ts:.4g} s, as if some were lost; taken out"
         for at, by in jumps
     ]
-    said += _told(read.errors, sizes[0], len(boxes.sites))
+    said += _error_notes(read.errors, sizes[0], len(boxes.sites))
     return Smoothed(boxes.basis, read, origin, "; ".join(said))
 
 
@@ -230,11 +230,13 @@ class Counts:
             density = start.density
             c, _ = _through(basis, basis.filled(tau), basis.filled(nu), density, np.zeros(basis.P))
         else:
-            c, density = _passed(basis, tau, nu, (np.ptp(self.y) + 1) ** 2 * FIRST_DENSITY)
+            c, density = _spline_through_sites(
+                basis, tau, nu, (np.ptp(self.y) + 1) ** 2 * FIRST_DENSITY
+            )
             h = np.clip(RESOLVED * density.max() ** -0.2, KNOTS, FARTHEST)
             if (m := max(1, round(h / self.Ts))) > least:
                 basis = Basis(N, m, self.Ts)
-                c, density = _passed(basis, tau, nu, float(density.max()))
+                c, density = _spline_through_sites(basis, tau, nu, float(density.max()))
         sites = self.sites(density.mean())
         bounds = self.y[sites] - 0.5, self.y[sites] + 0.5
         y, rest = basis.filled(self.y), basis.filled(self.rest)
@@ -332,7 +334,7 @@ class Counts:
         return None
 
 
-def _told(errors: Errors, least: float, sites: int) -> list[str]:
+def _error_notes(errors: Errors, least: float, sites: int) -> list[str]:
     """Sentences about errors beside the rounding; none where they are the least that is taken, or
     sites too few to tell.
     """
@@ -350,7 +352,9 @@ def _told(errors: Errors, least: float, sites: int) -> list[str]:
     return said
 
 
-def _passed(basis: Basis, tau: Array, nu: Array, density: float) -> tuple[Array, Array]:
+def _spline_through_sites(
+    basis: Basis, tau: Array, nu: Array, density: float
+) -> tuple[Array, Array]:
     """The spline through Gaussian sites, and the jerk density that goes with it, shape (M,), after
     at most FIRST passes from `density`.
     """

@@ -190,7 +190,7 @@ def criterion_of(weights: Weights, observation: Observation, criterion: str) -> 
     )
 
 
-def planned(problem: Problem, motion: Motion, rate: float) -> Observation:
+def plan_rows(problem: Problem, motion: Motion, rate: float) -> Observation:
     """W of the identification that a motion sampled at `rate`, Hz, will give; Y is zero. The time window of the rows is left out."""
     t, q, *_ = motion.sampled(rate)
     record = Record(t=t, q=q, tau=np.zeros_like(q), rate=rate, name="planned motion")

@@ -64,10 +64,10 @@ def one_start(search: Search, number: int) -> Start:
     guess = Motion(
         tuple(Part(family, _guess(search, family, rng)) for family in search.settings.parts)
     )
-    return improved(search, number, guess)
+    return improve(search, number, guess)
 
 
-def improved(search: Search, number: int, guess: Motion) -> Start:
+def improve(search: Search, number: int, guess: Motion) -> Start:
     """The motion that IPOPT reaches from `guess`."""
     settings, n = search.settings, len(search.weights.s)
     model = search.model

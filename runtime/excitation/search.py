@@ -20,15 +20,15 @@ import numpy as np
 
 from runtime.core.errors import InputError
 from runtime.core.essential import essential_of
-from runtime.core.estimation import estimated, observed
+from runtime.core.estimation import estimated, observe_rows
 from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel, require, require_no_channels
 from runtime.core.problem import Problem
 from runtime.core.rows.predicted import Weights, kept_correlation
 from runtime.core.signals.states import require_motion
 from runtime.core.study import Study
-from runtime.excitation.criteria import criterion_of, excesses, limits_of, planned, weights_of
-from runtime.excitation.optimiser import Search, improved, one_start
+from runtime.excitation.criteria import criterion_of, excesses, limits_of, plan_rows, weights_of
+from runtime.excitation.optimiser import Search, improve, one_start
 from runtime.excitation.result import Excitation, Known, Start
 from runtime.excitation.settings import ExcitationSettings
 from runtime.loop.control_law import parameters_of
@@ -67,7 +67,7 @@ def excite(
     require_no_channels(model, "a motion that is sought")
     require_motion(study.signals, "a motion that is sought (poses: excitation: {poses: N})")
     settings = study.excitation or ExcitationSettings()
-    known = _known(problem, settings)
+    known = _known_estimate(problem, settings)
     limits, weights = limits_of(model, settings.limits), known.weights
     if settings.criterion == "record" and not known.relative_sigma:
         raise InputError(
@@ -103,7 +103,7 @@ def excite(
         )
     candidates = []
     for motion, margin in _within(model, search, kept[: LIMIT.STARTS_COMPARED]):
-        observation = planned(problem, motion, settings.rate)
+        observation = plan_rows(problem, motion, settings.rate)
         candidates.append(
             (criterion_of(weights, observation, settings.criterion), motion, margin, observation)
         )
@@ -145,10 +145,10 @@ def _within(
                 yield motion, settings.margin
                 break
             settings = replace(settings, margin=max(2 * settings.margin, 0.01))
-            start = improved(replace(search, settings=settings), start.number, motion)
+            start = improve(replace(search, settings=settings), start.number, motion)
 
 
-def _known(problem: Problem, settings: ExcitationSettings) -> Known:
+def _known_estimate(problem: Problem, settings: ExcitationSettings) -> Known:
     """From records: estimate, deviations, essential parameters, condition and %sigma. Without: the
     values of the robot file.
     """
@@ -160,7 +160,7 @@ def _known(problem: Problem, settings: ExcitationSettings) -> Known:
             "values of the robot file",
             weights_of(model, settings, dict(zip(model.BASE_PARAMETERS, X, strict=True))),
         )
-    observation = observed(problem)
+    observation = observe_rows(problem)
     linear = replace(study.estimate, method="ols", weights="none", options={}, columns="all")
     fit = estimated(problem, observation, linear)
     if fit.status == "rank-deficient":

@@ -51,7 +51,7 @@ from runtime.friction.laws import (
     LAWS,
     Terms,
     deviations,
-    fitted,
+    fit_law,
     held_out_error,
     joined,
     law_torque,
@@ -377,7 +377,7 @@ def _curve(joint: str, terms: Terms) -> FrictionCurve:
         )
     all_rows = np.ones(len(terms.f), dtype=bool)
     even = terms.block % 2 == 0
-    fits = {name: fitted(terms, names, all_rows) for name, names in LAWS.items()}
+    fits = {name: fit_law(terms, names, all_rows) for name, names in LAWS.items()}
     first = next(iter(LAWS))
     residuals = {name: terms.f - law_torque(terms, fit) for name, fit in fits.items()}
     squares = {name: float(r @ r) for name, r in residuals.items()}

@@ -91,7 +91,7 @@ def _columns(terms: Terms, names: Sequence[str], VS: float | None) -> Array:
     )
 
 
-def fitted(terms: Terms, names: Sequence[str], rows: Array) -> dict[str, float]:
+def fit_law(terms: Terms, names: Sequence[str], rows: Array) -> dict[str, float]:
     """Least squares of a law on some rows; VS by a search on a logarithmic axis."""
     f = terms.f[rows]
     VS = _excess_velocity(terms, names, rows) if "VS" in names else None
@@ -141,7 +141,7 @@ def held_out_error(terms: Terms, names: Sequence[str], even: Array) -> float:
     """Error in % of rows predicted from the other half of the blocks."""
     residual = np.empty_like(terms.f)
     for rows in (even, ~even):
-        residual[~rows] = (terms.f - law_torque(terms, fitted(terms, names, rows)))[~rows]
+        residual[~rows] = (terms.f - law_torque(terms, fit_law(terms, names, rows)))[~rows]
     return percent(residual, terms.f)
 
 

@@ -48,7 +48,7 @@ def transmitted_torque(problem: Problem) -> Problem:
     records = [torque.given(record, None) for record in problem.prepared]
     before = np.zeros(0)
     for k in range(PASSES):
-        X = _solved([record.observation(model) for record in records], weighted)
+        X = _solve([record.observation(model) for record in records], weighted)
         records = [torque.given(record, X) for record in records]
         tau = np.concatenate([r.record.channels[c] for r in records for c in read])[:, 0]
         if k and np.linalg.norm(tau - before) <= SAME_TORQUE * np.linalg.norm(tau):
@@ -68,7 +68,7 @@ def transmitted_torque(problem: Problem) -> Problem:
     )
 
 
-def _solved(observations: Sequence[Observation], weights: bool) -> Array:
+def _solve(observations: Sequence[Observation], weights: bool) -> Array:
     """Least squares of all columns, with rows of each joint divided by the deviation of its
     residual where `weights`.
     """

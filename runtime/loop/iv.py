@@ -52,7 +52,7 @@ def fit(start: Beginning) -> Fitted:
         rows = np.repeat(1 / s, observation.rows)
         Z = loop.simulated(runs, observation, exact=False).W * rows[:, None]
         W = observation.W * rows[:, None]
-        X, C, A = _solved(W, Z, observation.Y * rows)
+        X, C, A = _solve(W, Z, observation.Y * rows)
         rest = observation.Y - observation.W @ X
         norm = float(np.linalg.norm(rest / np.repeat(s, observation.rows)))
         return Step(X, C, norm, (W, Z, s, A))
@@ -105,7 +105,7 @@ def hausman(names: Sequence[str], d: Array, U: Array) -> dict[str, Any]:
     return statistics
 
 
-def _solved(W: Array, Z: Array, Y: Array) -> tuple[Array, Array, Array]:
+def _solve(W: Array, Z: Array, Y: Array) -> tuple[Array, Array, Array]:
     """X, C and A = (Z'VW)^-1 of weighted rows."""
     size = np.linalg.norm(W, axis=0)
     W, Z = W / size, Z / size

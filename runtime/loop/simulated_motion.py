@@ -111,7 +111,7 @@ def simulated_motion(
     )
 
 
-def judged(
+def judge_motion(
     loop: ClosedLoop, observation: Observation, X: Array
 ) -> tuple[Status, str, Mapping[str, Any]]:
     """Status, message, and `motion` for the details of an Estimate with all base parameters X."""
@@ -143,7 +143,7 @@ def beside_record(fit: Callable[[Beginning], Fitted], start: Beginning) -> Fitte
     fitted = fit(start)
     loop = loop_of(start.observation, start.settings.method)
     X = full(start.system.names, fitted.solution.X, loop.model.BASE_PARAMETERS)
-    status, note, motion = judged(loop, start.observation, X)
+    status, note, motion = judge_motion(loop, start.observation, X)
     return replace(
         fitted,
         status=status if fitted.status == "ok" else fitted.status,

@@ -114,7 +114,7 @@ def mount(
     ]
     if link is not None and link not in carrying:
         raise InputError(
-            f"frame {frame} is not fixed to link {link}; it is fixed to {_named(carrying)}"
+            f"frame {frame} is not fixed to link {link}; it is fixed to {_link_names(carrying)}"
         )
     if not carrying:
         raise InputError(
@@ -206,5 +206,5 @@ def ten_parameters(P: Array) -> Array:
     return np.array([*J[np.triu_indices(3)], *P[:3, 3], P[3, 3]])
 
 
-def _named(links: list[int]) -> str:
+def _link_names(links: list[int]) -> str:
     return f"link {', '.join(map(str, links))}" if links else "no link with inertia"

@@ -301,7 +301,7 @@ def units(physical: PhysicalModel) -> Array:
     return sizes
 
 
-def pulled(physical: PhysicalModel, kind: Distance, weight: float) -> Prior | None:
+def pull_to_file(physical: PhysicalModel, kind: Distance, weight: float) -> Prior | None:
     """The pull to the values of the robot file; InputError where they are missing."""
     if kind == "none" or weight == 0:
         return None

@@ -60,7 +60,7 @@ from runtime.physical.feasibility import (
     known_inertia,
     limit_rows,
     nearest_standard,
-    pulled,
+    pull_to_file,
     units,
     unsolved,
 )
@@ -122,14 +122,14 @@ def fit(start: Beginning) -> Fitted:
     system = start.system
     free = start.solution
     physical = physical_model(start.model)
-    options = decided(start.options, start.model, physical)
+    options = decide_options(start.options, start.model, physical)
     guess = reach_text(options) if start.options.reach == "auto" else ""
     without_prior = None
     if guess:
-        open_options = decided(replace(start.options, reach=None), start.model, physical)
+        open_options = decide_options(replace(start.options, reach=None), start.model, physical)
         unbounded, bounded = by_reach(system.weighted, physical, open_options, options)
         without_prior = bounded
-        if contradicted(system.weighted, physical, unbounded, bounded):
+        if bounds_contradict(system.weighted, physical, unbounded, bounded):
             options = open_options
             without_prior = unbounded
             guess += " The record contradicts them: they are left out."
@@ -152,7 +152,7 @@ def fit(start: Beginning) -> Fitted:
             searched = replace(options, weight=found)
         known = isinstance(searched.weight, float)
         at(f"feasible, weight of the prior {searched.weight:g}" if known else "feasible")
-        chi, weight = weighed(system.weighted, physical, searched, without_prior)
+        chi, weight = solve_with_weight(system.weighted, physical, searched, without_prior)
         X = physical.rows(system.names) @ chi
     if weight == 0:  # nothing was pulled: chi is one of many
         chi = nearest_standard(physical, system.names, X, chi, options)
@@ -222,7 +222,7 @@ def within_limits(
     return replace(bounded, physical=True, blocking=blocking)
 
 
-def weighed(
+def solve_with_weight(
     rows: Factor,
     physical: PhysicalModel,
     options: FeasibleOptions,
@@ -234,16 +234,18 @@ def weighed(
     """
     if options.prior == "none":
         if without_prior is None:
-            without_prior = fitted(rows, physical, options, 0.0)
+            without_prior = solve_feasible(rows, physical, options, 0.0)
         return without_prior, 0.0
     if not isinstance(options.weight, str):
-        return fitted(rows, physical, options, options.weight), options.weight
+        return solve_feasible(rows, physical, options, options.weight), options.weight
     K = physical.rows(rows.names)
-    free = without_prior if without_prior is not None else fitted(rows, physical, options, 0.0)
+    free = (
+        without_prior if without_prior is not None else solve_feasible(rows, physical, options, 0.0)
+    )
     allowed = LIMIT.WEIGHT_INCREASE * residual_norm(rows, K @ free)
     for weight in map(float, WEIGHTS):
         try:
-            chi = fitted(rows, physical, options, weight)
+            chi = solve_feasible(rows, physical, options, weight)
         except SettingsError:
             raise
         except InputError:  # as in `held_out_weight`
@@ -281,7 +283,7 @@ def held_out_weight(
             for rows, part, left in zip(others, parts, least, strict=True):
                 if squares + left > best:
                     return float("inf")
-                squares += residual_norm(part, K @ weighed(rows, physical, fixed)[0]) ** 2
+                squares += residual_norm(part, K @ solve_with_weight(rows, physical, fixed)[0]) ** 2
         except SettingsError:
             raise
         except InputError:  # a weight by which the program is too badly scaled for the solver
@@ -298,7 +300,7 @@ def held_out_weight(
     return chosen
 
 
-def decided(
+def decide_options(
     options: FeasibleOptions, model: GeneratedModel, physical: PhysicalModel
 ) -> FeasibleOptions:
     """The options with the prior and the bounds that they leave to the robot.
@@ -354,13 +356,13 @@ def by_reach(
     for limits in (unbounded, bounded):
         options = replace(limits, prior="none", weight="auto")  # a weight is of a prior
         try:
-            found.append(fitted(rows, physical, options, 0.0))
+            found.append(solve_feasible(rows, physical, options, 0.0))
         except InputError:
             found.append(None)
     return found[0], found[1]
 
 
-def contradicted(
+def bounds_contradict(
     rows: Factor, physical: PhysicalModel, unbounded: Array | None, bounded: Array | None
 ) -> bool:
     """Whether guessed bounds raise the residual by more than LIMIT.WEIGHT_INCREASE, or let no robot be."""
@@ -389,14 +391,16 @@ def part_factor(part: Observation, system: System) -> Factor:
     )
 
 
-def fitted(rows: Factor, physical: PhysicalModel, options: FeasibleOptions, weight: float) -> Array:
+def solve_feasible(
+    rows: Factor, physical: PhysicalModel, options: FeasibleOptions, weight: float
+) -> Array:
     """chi, shape (p,), of min ||R (z - K chi)||^2 + weight D(chi) under the conditions, of a
     factored system.
     """
     size = float(np.hypot(np.linalg.norm(rows.r12), rows.r22)) or 1.0
     R, z = rows.R11 @ physical.rows(rows.names) / size, rows.r12 / size
     bounds, space = limit_rows(physical, options), everything(units(physical))
-    pull = pulled(physical, "none" if options.prior == "auto" else options.prior, weight)
+    pull = pull_to_file(physical, "none" if options.prior == "auto" else options.prior, weight)
 
     def attempt(within: LinearBounds) -> Optimum:
         return closest(R, z, physical.conditions, within, space, least=options.margin, pull=pull)

@@ -121,7 +121,7 @@ def fit_of(grams: Grams, X: Array, N: float, penalty: float = 0.0) -> Fit:
     return Fit(X, sigma, errors, float(N * np.log(sigma[grams.rows > 0]).sum() + penalty), penalty)
 
 
-def solved(A: Array, g: Array, ridge: float = LIMIT.RIDGE) -> Array:
+def solve_scaled(A: Array, g: Array, ridge: float = LIMIT.RIDGE) -> Array:
     """A^-1 g, A positive semidefinite, its columns scaled."""
     d = np.diag(A)
     D = 1 / np.sqrt(np.where(d > 0, d, 1.0))
@@ -138,7 +138,7 @@ def least_squares(grams: Grams, N: float, bodies: Bodies | None = None) -> Fit:
     sigma = grams.sigma(np.zeros(grams.of_joints.shape[1] - 1))
     for _ in range(LIMIT.WEIGHT_PASSES):
         A, g = grams.weighted(sigma)
-        X = solved(A, g) if bodies is None else solved(A + bodies.H, g + bodies.h)
+        X = solve_scaled(A, g) if bodies is None else solve_scaled(A + bodies.H, g + bodies.h)
         before, sigma = sigma, grams.sigma(X)
         if np.abs(np.log(sigma / before)).max() < LIMIT.SAME_WEIGHTS:
             break

@@ -130,7 +130,7 @@ def unmodelled_torques(samples: Samples) -> Array:
     return np.stack([np.ones_like(qd), slow], axis=2)
 
 
-def unchanged(n: int, **changed: Any) -> Cause:
+def unchanged_study(n: int, **changed: Any) -> Cause:
     """The study of n joints as it is, but for what is given."""
     plain = {"kind": "", "says": "", "remedy": "", "subject": ""}
     return Cause(**plain | {"P": np.eye(n), "p": np.zeros(n), "T": np.eye(n)} | changed)
@@ -243,7 +243,7 @@ class Row:
         """The cause of one item."""
         words = {**item, **(self.words(robot, item, *xi) if xi else {})}
         says = self.says.format(**words)
-        return unchanged(
+        return unchanged_study(
             robot.n,
             kind=self.kind,
             says=says,

@@ -29,7 +29,7 @@ from runtime.core.problem import Problem
 from runtime.core.rows.regressor import in_time
 from runtime.core.signals.states import require_motion
 from runtime.core.table import Table
-from runtime.plausible.bodies import Grams, solved
+from runtime.plausible.bodies import Grams, solve_scaled
 from runtime.plausible.samples import Filtered, filtered, usable
 
 Array = np.ndarray
@@ -212,7 +212,7 @@ class Shifts:
         rows = np.maximum(self.mask.sum(axis=0), 1)
         sigma = np.sqrt(np.where(grams.measured > 0, grams.measured, 1.0) / rows)
         for _ in range(4):
-            X = solved(*grams.weighted(sigma))
+            X = solve_scaled(*grams.weighted(sigma))
             sigma = np.maximum(np.sqrt(grams.squares(X) / rows), 1e-6 * sigma)
         return X, sigma, (Y - self.D @ X) * self.mask
 

@@ -169,9 +169,9 @@ def cut_torques(case: Case) -> Answer | None:
     at_bounds, beside, shares = np.zeros_like(moving), np.zeros_like(moving), np.zeros(samples.n)
     for number, one in enumerate(case.straight):
         record, drives, own = one.record, one.drives, samples.record == number
-        held = np.stack([_held(tau) for tau in record.tau.T], axis=1)
+        held = np.stack([_at_bound(tau) for tau in record.tau.T], axis=1)
         if drives is not None:  # a motor that is clipped shows in every joint that it moves
-            motors = np.stack([_held(u) for u in drives.motor_command(record.tau).T], axis=1)
+            motors = np.stack([_at_bound(u) for u in drives.motor_command(record.tau).T], axis=1)
             held |= motors @ (drives.ratio != 0)
         reach = max(1, round(0.5 * record.rate / samples.cutoff))
         k = np.searchsorted(record.t, samples.t[own])
@@ -216,7 +216,7 @@ def cut_torques(case: Case) -> Answer | None:
     )
 
 
-def _held(tau: Array) -> Array:
+def _at_bound(tau: Array) -> Array:
     """Whether each sample is at a bound at which the torque stays, (N,)."""
     held = np.zeros(len(tau), dtype=bool)
     span = float(np.ptp(tau))

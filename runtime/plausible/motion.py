@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from runtime.core.check import Answer, Question, State, named
+from runtime.core.check import Answer, Question, State, first_names
 from runtime.core.errors import InputError
 from runtime.core.estimation import estimate_of
 from runtime.core.least_squares.method import LINEAR
@@ -131,7 +131,7 @@ def excited(observation: Observation, signals: Signals, rate: float) -> Answer |
     order = sorted(shares, key=lambda name: -shares[name])
     unseen = [name for name in order if shares[name] > LIMIT.UNEXCITED]
     if unseen:
-        return Answer("doubtful", f"It cannot tell {named(unseen)}, whatever their values")
+        return Answer("doubtful", f"It cannot tell {first_names(unseen)}, whatever their values")
     text = f"Least excited is {order[0]}, {shares[order[0]]:.2g} %"
     if weak := [name for name in order if shares[name] > LIMIT.LARGE_DEVIATION]:
         listed = ", ".join(weak[: LIMIT.PARAMETERS_NAMED])

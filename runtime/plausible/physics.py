@@ -155,7 +155,7 @@ def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
     if own.any() and not own.all():
         which = f"Torques of joint {case.joints(own)} are"
         shift, sigma = late.shift[own], float(late.sigma[own].max())
-    first = not named or late_gain(case) >= explained(case, named[0])
+    first = not named or late_gain(case) >= gain_of_alternative(case, named[0])
     state: State = "good" if not own.any() else "doubtful" if first else "open"
     j = int(np.nanargmax(np.where(own | ~own.any(), gain, -np.inf)))
     sense, each = (
@@ -204,13 +204,13 @@ def late_joints(late: Delay) -> Array:
     return np.asarray(own & (late.shift * strongest > 0))
 
 
-def gained(case: Case, late: Delay) -> float:
+def gain_of_delays(case: Case, late: Delay) -> float:
     """What delays gain, nats."""
     N = 0.0 if case.baseline is None else case.baseline.N
     return N * float(np.log(late.before / np.maximum(late.after, 0.1)).sum())
 
 
-def explained(case: Case, trial: Trial) -> float:
+def gain_of_alternative(case: Case, trial: Trial) -> float:
     """What an alternative gains, nats, rows counted as for a delay."""
     assert case.baseline is not None and trial.fit is not None
     return case.baseline.given.score - trial.fit.score
@@ -220,7 +220,7 @@ def late_gain(case: Case) -> float:
     """What certain delays gain, nats; 0 where there are none."""
     if case.baseline is None or case.late is None:
         return 0.0
-    return gained(case, case.late) if certain_joints(case).any() else 0.0
+    return gain_of_delays(case, case.late) if certain_joints(case).any() else 0.0
 
 
 def certain_joints(case: Case) -> Array:
@@ -228,7 +228,7 @@ def certain_joints(case: Case) -> Array:
     LIMIT.LATE_GAIN.
     """
     assert case.late is not None
-    return np.asarray(late_joints(case.late) & (gained(case, case.late) >= LIMIT.LATE_GAIN))
+    return np.asarray(late_joints(case.late) & (gain_of_delays(case, case.late) >= LIMIT.LATE_GAIN))
 
 
 @Question(

@@ -34,7 +34,7 @@ from runtime.plausible.motion import motion_excites, recorded_speeds, rest
 from runtime.plausible.physics import (
     better,
     delayed,
-    explained,
+    gain_of_alternative,
     late_gain,
     measured,
     not_asked,
@@ -53,7 +53,7 @@ from runtime.plausible.sizes import (
     times,
     torques,
 )
-from runtime.plausible.trials import Trial, decisive, regressor, tried
+from runtime.plausible.trials import Trial, decisive, regressor, try_causes
 
 CHECKS: tuple[Callable[[Case], Check | None], ...] = (
     standing,
@@ -214,7 +214,7 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
     trials: list[Trial] = []
     if variants is not None or worst_of(checks) is not None:
         at("what would explain the record better")
-        trials = tried(case.baseline, case.sides)
+        trials = try_causes(case.baseline, case.sides)
         if case.robot_values is not None and case.robot_values.heavy:
             trials = [t for t in trials if t.cause.kind != "rate"]
         if variants is not None and "free_alpha" not in " ".join(variants.CONSTANTS):
@@ -224,7 +224,7 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
     named = [
         t
         for t in decisive(trials, case.baseline, case.noise_floor, case.validation, case.alone)
-        if explained(case, t) > late_gain(case)
+        if gain_of_alternative(case, t) > late_gain(case)
     ]
     wrong = [t for t in named if named[0].cause.kind != "friction"]
     asked = EXPLAINED if trials else EXPLAINED[:-1]

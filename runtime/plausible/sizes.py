@@ -49,7 +49,7 @@ def standing(case: Case) -> Answer | None:
     one = still.sum() == 1
     digits = max(0, -int(np.floor(np.log10(max(rms, 1e-6)))))  # the noise is no angle
     where = np.round(q.mean(axis=0), digits) + 0.0
-    held = " ".join(f"--lock {name}={where[j]:g}" for j, name in _named(case, still))
+    held = " ".join(f"--lock {name}={where[j]:g}" for j, name in _joint_names(case, still))
     them, it, move = ("it", "it", "does") if one else ("them", "they", "do")
     moving = [case.model.JOINTS[j] for j in np.flatnonzero(~still)]
     columns = ", ".join(
@@ -65,7 +65,7 @@ def standing(case: Case) -> Answer | None:
     )
 
 
-def _named(case: Case, still: Array) -> list[tuple[int, str]]:
+def _joint_names(case: Case, still: Array) -> list[tuple[int, str]]:
     """Number and name of each joint of a mask, as --lock takes it."""
     names = getattr(case.model, "LABELS", {})
     joints = case.model.JOINTS

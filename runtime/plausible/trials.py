@@ -37,7 +37,7 @@ from runtime.plausible.bodies import (
     least_squares,
     physical_fit,
     quick_fit,
-    solved,
+    solve_scaled,
 )
 from runtime.plausible.causes import (
     NUMBERS,
@@ -45,7 +45,7 @@ from runtime.plausible.causes import (
     Robot,
     Row,
     causes,
-    unchanged,
+    unchanged_study,
     unmodelled_torques,
 )
 from runtime.plausible.samples import Samples, moving
@@ -148,7 +148,7 @@ class Baseline:
     @cached_property
     def as_given(self) -> tuple[Array, Array, Array]:
         """Rows of the study."""
-        rows = self.rows(unchanged(self.samples.n))
+        rows = self.rows(unchanged_study(self.samples.n))
         assert rows is not None
         return rows
 
@@ -285,7 +285,7 @@ class Baseline:
         WJ = np.einsum("kjp,akj->pa", W * weight[:, :, None], J * weight)
         J = J * weight
         size = np.einsum("akj,bkj->ab", J, J)
-        left = size - WJ.T @ np.column_stack([solved(H, column) for column in WJ.T])
+        left = size - WJ.T @ np.column_stack([solve_scaled(H, column) for column in WJ.T])
         share = max(self.N / max(float(mask.sum(axis=0).mean()), 1.0), LIMIT.LEAST_SHARE)
         eigenvalues, V = np.linalg.eigh(left)
         least = max(0.1 / share, LIMIT.NEARLY_HIDDEN**2 * float(np.diag(size).max()))
@@ -373,7 +373,7 @@ def reach(model: GeneratedModel, q: Array) -> float:
     return float(np.clip(np.nanmax(distance), 0.1, 1e6)) if np.isfinite(distance).any() else 1.0
 
 
-def tried(baseline: Baseline, sides: Sequence[str] = ("joint", "joint")) -> list[Trial]:
+def try_causes(baseline: Baseline, sides: Sequence[str] = ("joint", "joint")) -> list[Trial]:
     """All causes, the best first.
 
     Another sampling rate has to gain LIMIT.RATE_GAIN more, since a slower motion gives the
@@ -453,13 +453,13 @@ def _of_numbers(baseline: Baseline, robot: Robot) -> list[Trial]:
                 steps.append((gain, xi, row, change))
     steps.sort(key=lambda item: -item[0])
     for _, xi, row, number in steps[: LIMIT.NUMBERS_SEARCHED]:
-        trial = _searched(baseline, row, number, xi)
+        trial = _search_number(baseline, row, number, xi)
         if trial is not None:
             trials.append(trial)
     return trials
 
 
-def _searched(baseline: Baseline, row: Row, change: Change, first: float) -> Trial | None:
+def _search_number(baseline: Baseline, row: Row, change: Change, first: float) -> Trial | None:
     """A number at its best value, which pays half of log N for each parameter.
 
     A coarse grid, weights those of the study, then golden section, weights those of each value by
@@ -551,7 +551,7 @@ def decisive(
         return []
     least = (1 - LIMIT.GAIN_ALIKE) * better[0].gain
     alike = [trial for trial in better if trial.gain >= least]
-    before = baseline.unseen(unchanged(baseline.samples.n))
+    before = baseline.unseen(unchanged_study(baseline.samples.n))
     named = [
         trial
         for trial in alike[: LIMIT.ALTERNATIVES_NAMED]
@@ -598,7 +598,7 @@ def helps(trial: Trial, baseline: Baseline, other: Baseline) -> bool:
         return np.inf if rows is None else _misfit(other.standard(Grams.of(*rows, other.tau)), X)
 
     assert trial.fit is not None
-    given = unchanged(other.samples.n)
+    given = unchanged_study(other.samples.n)
     after = min(misfit(cause, trial.fit.X) for cause in (given, trial.cause))
     return bool(misfit(given, baseline.given.X) - after > np.log(LIMIT.VISIBLE) / 2)
 
@@ -615,7 +615,7 @@ def loads(baseline: Baseline) -> list[Trial]:
     if not baseline.bodies.known_links[-1:].any():
         return []
     link = baseline.physical.links[-1]
-    load = unchanged(
+    load = unchanged_study(
         baseline.samples.n,
         kind="load",
         says=f"link {link} has other values than those of the robot file: a load?",

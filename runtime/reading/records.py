@@ -155,10 +155,10 @@ def _signals(
         "q_r": (first, columns.q_ref),
         "qd": (first, columns.qd),
         "qd_ref": (first, columns.qd_ref),
-        "q_link": (first, _named(columns.q_link)),
-        "tau": (last, _named(columns.tau)),
+        "q_link": (first, _columns_of_joints(columns.q_link)),
+        "tau": (last, _columns_of_joints(columns.tau)),
         "tau_ff": (last, columns.tau_ff),
-        "tau_known": (other, _named(columns.tau_known)),
+        "tau_known": (other, _columns_of_joints(columns.tau_known)),
         **{key: (first, names) for key, names in columns.further.items()},
     }
     asked = {key: place for key, place in places.items() if place[1]}
@@ -249,7 +249,7 @@ def _joint_side(
     return samples
 
 
-def _named(names: Sequence[str]) -> tuple[str, ...]:
+def _columns_of_joints(names: Sequence[str]) -> tuple[str, ...]:
     """The columns of the joints that have one."""
     return tuple(name for name in names if name != NONE)
 
@@ -313,8 +313,8 @@ def _places(settings: RecordSettings, tables: Sequence[Table]) -> tuple[Table, T
     columns = settings.columns
     if len(tables) == 3 or not columns.tau_known:
         return first, tables[min(1, len(tables) - 1)], last
-    known = {*_named(columns.tau_known)}
-    torques = {*_named(columns.tau)} or {"tau1"}
+    known = {*_columns_of_joints(columns.tau_known)}
+    torques = {*_columns_of_joints(columns.tau)} or {"tau1"}
     in_first = known <= {*first.names}
     apart = not in_first and torques <= {*first.names}
     return first, first if apart else last, first if in_first else last

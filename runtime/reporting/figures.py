@@ -47,7 +47,7 @@ ERROR: Any = {"color": BLUE, "linewidth": 0.7, "label": "error"}
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def drawn(
+def draw_figure(
     caption: str, figure: Figure, alt: str, name: str = "", series: Series | None = None
 ) -> Image:
     """The figure for a page.   name : of its files beside the page, PNG and SVG; none: the page
@@ -219,7 +219,7 @@ def of_part(figure: PartFigure) -> Image:
         image.supxlabel(figure.x, fontsize=9)
     if figure.y:
         image.supylabel(figure.y, fontsize=9)
-    return drawn(figure.caption, image, figure.alt, figure.name)
+    return draw_figure(figure.caption, image, figure.alt, figure.name)
 
 
 def legend_above(ax: Axes, **style: Any) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from runtime.core.limits import LIMIT
 from runtime.core.model import joint_labels
 from runtime.core.part import BLUE, DOTTED, GREY, ORANGE
-from runtime.reporting.figures import drawn, legend_above, panels
+from runtime.reporting.figures import draw_figure, legend_above, panels
 from runtime.reporting.page import Page, Section
 from runtime.reporting.series import extremes
 
@@ -100,7 +100,7 @@ def excitation_page(excitation: Excitation) -> Page:
         sections=[
             Section(
                 "Motion",
-                images=[drawn("The motion", motion_figure(excitation), shown, "motion")],
+                images=[draw_figure("The motion", motion_figure(excitation), shown, "motion")],
                 tables=[excitation.usage_table()],
             ),
             Section("What it will tell", tables=[excitation.sigma_table()]),

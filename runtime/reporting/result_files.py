@@ -115,7 +115,7 @@ def results_in(folder: str | Path | None) -> Iterator[Any]:
         yield None
         return
     results = Results(Path(folder))
-    with _made(results.folder):
+    with _new_folder(results.folder):
         with _clear_errors(results.folder):
             results.recover()
             Path(mkdtemp(prefix=UNFINISHED, dir=results.folder)).rmdir()  # it can be written
@@ -138,7 +138,7 @@ def _require_plain(path: Path) -> None:
 
 
 @contextmanager
-def _made(folder: Path) -> Iterator[None]:
+def _new_folder(folder: Path) -> Iterator[None]:
     """The folder is there; if it was not before and nothing was written, it is not afterwards."""
     with _clear_errors(folder):
         made = [path for path in (folder, *folder.parents) if not path.exists()]

@@ -43,7 +43,7 @@ def torque_section(result: Identification) -> Section:
         result.model_columns
     ]
     images = [
-        plots.drawn(
+        plots.draw_figure(
             (
                 f"Joint {joint.joint}: {result.source}, predicted by {columns} parameters, and "
                 f"error below; {joint.relative_error:.2f} % of the {result.source} norm"
@@ -216,12 +216,12 @@ def residual_section(result: Identification, unit: str = "N m") -> Section:
             f"decimation ends at {cutoff:g} Hz (dotted)."
         )
     images = [
-        plots.drawn(
+        plots.draw_figure(
             "Spectral density of the residuals",
             plots.spectra_figure(joints, unit, cutoff),
             "Spectral density of the residuals of every joint, by frequency",
         ),
-        plots.drawn(
+        plots.draw_figure(
             "Residuals over their deviation; line: normal law",
             plots.residual_histogram(result.comparison, unit),
             "Histograms of the residuals, joint by joint",

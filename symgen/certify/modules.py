@@ -9,7 +9,7 @@ from types import ModuleType
 
 from symgen.certify.certificate import Certificate, certify_formulas, hair_off
 from symgen.certify.importing import cached_path, imported, stored_path
-from symgen.certify.texts import headed, text_check
+from symgen.certify.texts import text_check, with_certificate
 from symgen.certify.witness import Witness
 from symgen.derive.doubts import nearly_round
 from symgen.derive.time_limit import limited
@@ -83,7 +83,7 @@ def _certified(
     certificate = certify(regrouping, files, options)
     require_valid(certificate)
     texts = {
-        file: headed(text, certificate.texts[file], certificate.formulas)
+        file: with_certificate(text, certificate.texts[file], certificate.formulas)
         for file, text in files.items()
     }
     for file, text in texts.items():  # runtime runs what lies in the cache

@@ -150,7 +150,7 @@ def text_check(file: str, text: str, target: str, witness: Witness) -> TextCheck
 # --- what the certificate says ---
 
 
-def headed(text: str, check: TextCheck, formulas: str) -> str:
+def with_certificate(text: str, check: TextCheck, formulas: str) -> str:
     """The text with what its certificate says: at the end of the docstring of a module, else in
     comments before it.
     """

@@ -20,7 +20,7 @@ from types import ModuleType
 from typing import Any
 
 from symgen.certify.importing import cached_path, imported, stored_path
-from symgen.certify.texts import headed, text_check
+from symgen.certify.texts import text_check, with_certificate
 from symgen.certify.witness import Witness, ungrouped
 from symgen.description.expression import Expression
 from symgen.description.files import load_robot
@@ -56,7 +56,7 @@ def variants(robot: str | Path | Robot) -> ModuleType:
         check = text_check(file, text, "numpy", Witness(regrouping))
         if check.wrong:
             raise CertificateError(f"{robot.name}: {', '.join(check.wrong)} of variants", check)
-        path = stored_path(file, headed(text, check, "of standard parameters"))
+        path = stored_path(file, with_certificate(text, check, "of standard parameters"))
     return imported(path)
 
 

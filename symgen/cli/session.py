@@ -246,7 +246,7 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
     stated, folder = study_of(records[0])
     if Path(records[0]).suffix.lower() in (".yaml", ".yml"):
         with lines_of(records[0]):
-            stated = compose.known(stated)
+            stated = compose.complete_study(stated)
     study = located(stated, folder)
     if recorded:
         require_record(study, records[0])

@@ -31,13 +31,13 @@ def numbered(robot: Robot) -> Robot:
     """
     followed = {a for e in robot.constraints.values() for a in e.atoms}
     chained = any(f"q{j}" in followed for j in robot.constraints)
-    result = mapped(robot, kept, kept_angle)
+    result = mapped(robot, keep_rationals, kept_angle)
     if not chained:
         return result
     return replace(result, constraints={j: kept_angle(e) for j, e in robot.constraints.items()})
 
 
-def kept(e: Expression) -> Expression:
+def keep_rationals(e: Expression) -> Expression:
     """The same polynomial with its rational coefficients as atoms, those inside square roots and
     inverses too.
     """
@@ -51,7 +51,7 @@ def kept(e: Expression) -> Expression:
                 and a.function in ("sqrt", "inv")
                 and a.argument.constant is None
             ):
-                base = call(a.function, kept(a.argument))
+                base = call(a.function, keep_rationals(a.argument))
             term = term * base**n
         total = total + term
     return total

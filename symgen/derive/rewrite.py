@@ -159,7 +159,7 @@ class Rewrite:
 
     def _sum(self, a: Scalar | int, b: Scalar | int) -> Scalar | int:
         """a + b, without a term of a that b takes away: (x + y) + (z - x) = y + z."""
-        for (x, y), (o, z) in product(_parted(a), _parted(b)):
+        for (x, y), (o, z) in product(_parts(a), _parts(b)):
             if o.node is x.node and o.sign != x.sign:
                 return self._sum(y, z)
         return a + b
@@ -207,7 +207,7 @@ class Rewrite:
         return first if sign > 0 else -first
 
 
-def _parted(s: Scalar | int) -> Iterator[tuple[Scalar, Scalar | int]]:
+def _parts(s: Scalar | int) -> Iterator[tuple[Scalar, Scalar | int]]:
     """Each term of a value, the value itself first, and what is left without it."""
     if isinstance(s, Scalar):
         yield s, 0

@@ -32,7 +32,7 @@ def khalil_values(robot: Robot) -> dict[str, float]:
         known = np.array([name in values for name in names])
         if child is None or not known.any() or not (child.alpha or child.d):
             continue
-        T = _moved(child.alpha.value(robot.constants), child.d.value(robot.constants))
+        T = _transport(child.alpha.value(robot.constants), child.d.value(robot.constants))
         enters = T != 0
         whole = ~(enters & ~known).any(axis=1)
         lost = known & ~(enters & whole[:, None]).any(axis=0)
@@ -51,7 +51,7 @@ def khalil_values(robot: Robot) -> dict[str, float]:
     return values
 
 
-def _moved(alpha: float, d: float) -> Array:
+def _transport(alpha: float, d: float) -> Array:
     """The ten parameters of a body in Khalil's frame from those in the frame at the end, (10, 10)."""
     c, s = np.cos(alpha), np.sin(alpha)
     R = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])

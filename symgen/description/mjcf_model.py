@@ -120,7 +120,7 @@ def compiled(content: bytes) -> Mjcf:
         _no_mesh(geom)
     for drawn in (*spec.geoms, *spec.sites):
         drawn.material = ""
-    model = _told(spec.compile, lines)
+    model = _errors_with_lines(spec.compile, lines)
     notes += [key for key in FLUID if np.any(getattr(model.opt, key))]
     notes += [f"<{tag[:30]}>" for tag in sorted(tendons - {"fixed"})]
     notes += [f"flag {key[:30]}" for key, value in sorted(flags.items()) if value != "enable"]
@@ -209,10 +209,10 @@ def _spec(root: XmlElement) -> tuple[Any, list[int]]:
     lines: list[int] = []
     for line in text.splitlines():
         lines.append(lines[-1] if line.startswith("</") else next(elements).line)
-    return _told(lambda: mujoco.MjSpec.from_string(text), lines), lines
+    return _errors_with_lines(lambda: mujoco.MjSpec.from_string(text), lines), lines
 
 
-def _told(act: Callable[[], Any], lines: Sequence[int]) -> Any:
+def _errors_with_lines(act: Callable[[], Any], lines: Sequence[int]) -> Any:
     """What MuJoCo makes; its errors with the line of the file, and without its remarks on its own
     simulation, which would go to the screen and to a file of the working folder.
     """

@@ -96,7 +96,7 @@ def _massless(links: list[int], declared: Declared) -> frozenset[int]:
     return frozenset((*links, *(f.j for f in declared.frames[declared.rows :])))
 
 
-def _keyed(name: str) -> BeforeValidator:
+def _rows_by_name(name: str) -> BeforeValidator:
     """Rows of a table with their keys as the field `name`."""
 
     def row_of(key: Any, row: Any) -> Any:
@@ -119,7 +119,7 @@ class Robot:
     frames: Annotated[
         tuple[Frame, ...],
         Written(dict[Whole, Frame], _frames),
-        _keyed("j"),
+        _rows_by_name("j"),
         Field(description="1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}"),
     ]
     gravity: Annotated[
@@ -145,7 +145,7 @@ class Robot:
     elements: Annotated[
         tuple[Element, ...],
         Written(dict[str, Element], lambda rows, _: tuple(rows.values())),
-        _keyed("family"),
+        _rows_by_name("family"),
         Field(description="FV: {kind: viscous, along: all} makes FV1, FV2 ..."),
     ] = Field(default={})  # type: ignore[arg-type]  # of the form in a file
     loops: Annotated[

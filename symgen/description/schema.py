@@ -63,7 +63,7 @@ def robot_of(data: Mapping[str, Any], file: str, sha256: str) -> Robot:
             return replace(robot, values=khalil_values(robot))
         return robot
     except (ValidationError, DescriptionError) as error:
-        wrong = explained(error) if isinstance(error, ValidationError) else error
+        wrong = explain(error) if isinstance(error, ValidationError) else error
         if wrong.path[:1] == ("elements",) and wrong.path[1:2] and wrong.path[1] in columns:
             path: Path = ("columns", *wrong.path[1:])
             wrong = DescriptionError(wrong.message.replace("elements.", "columns.", 1), path=path)
@@ -138,7 +138,7 @@ _EXPECTED = {
 _UNKNOWN, _OURS = "unexpected_keyword_argument", "described"
 
 
-def explained(error: ValidationError) -> DescriptionError:
+def explain(error: ValidationError) -> DescriptionError:
     """The first thing that is wrong; a misspelt key comes before the one it leaves missing, what an
     expression says after both.
     """

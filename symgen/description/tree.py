@@ -195,11 +195,11 @@ def part_of(tree: Tree, part: TreePart) -> Tree:
     notes = list(tree.notes)
     if part.lock:
         notes.append(f"held: {_names([f'{name} at {x:.6g}' for name, x in part.lock.items()])}")
-        tree = _held(tree, part.lock)
+        tree = _hold(tree, part.lock)
     if part.chain:
         base, tip = part.chain
         others = _beside(tree, base, tip)
-        tree = _held(tree, others)
+        tree = _hold(tree, others)
         moving = [joint.name for joint in tree.joints if joint.kind != FIXED_TYPE]
         notes.append(f"chain from {base!a:.60} to {tip!a:.60}: {_names(moving)} move")
         notes += [f"held at zero: {_names(others)}"] if others else []
@@ -245,7 +245,7 @@ def _require_independent(tree: Tree, name: str) -> None:
         raise DescriptionError(f"joint {name!a:.60} to lock follows others; lock {_names(leaders)}")
 
 
-def _held(tree: Tree, positions: Mapping[str, float]) -> Tree:
+def _hold(tree: Tree, positions: Mapping[str, float]) -> Tree:
     """The tree with joints held at `positions`, and with them the joints that follow no other."""
     exact = {name: Expression.number(repr(x)) for name, x in positions.items()}
     relations = {

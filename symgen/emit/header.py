@@ -32,7 +32,7 @@ def header(spec: ModuleSpec, texts: Mapping[str, Text], formulas: bool) -> list[
         "",
         "Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS",
         *(f"    {line}" for line in frame_table(robot)),
-        *(wrapped(f"Angles      {robot.angles}", "") if robot.angles else ()),
+        *(wrap_text(f"Angles      {robot.angles}", "") if robot.angles else ()),
         *line_of("Gravity", f"acceleration ({gravity}) in frame 0, m/s**2"),
         *line_of(
             "Torques",
@@ -53,21 +53,21 @@ def header(spec: ModuleSpec, texts: Mapping[str, Text], formulas: bool) -> list[
         ),
         "",
         f"Base parameters, {len(regrouping)} of {len(robot.parameters)}; Gautier and Khalil (1990)",
-        *wrapped(regrouping.method, "    "),
+        *wrap_text(regrouping.method, "    "),
     ]
     if formulas:
         for name, formula in grouped(regrouping).items():
-            lines += wrapped(f"{name} = {formula}", "    ")
+            lines += wrap_text(f"{name} = {formula}", "    ")
     else:
         lines.append("    FORMULAS says what they are made of; what it leaves out is as it is")
     without = [name for name in regrouping.no_effect if name not in robot.assume]
-    lines += wrapped("No effect: " + (" ".join(without) or "none"), "    ")
+    lines += wrap_text("No effect: " + (" ".join(without) or "none"), "    ")
     if robot.assume:
         zero = [name for name in robot.parameters if name in robot.assume]
-        lines += wrapped("Assumed zero: " + " ".join(zero), "    ")
+        lines += wrap_text("Assumed zero: " + " ".join(zero), "    ")
     absorbing = one_sided_friction_that_absorbs(regrouping)
     if absorbing:
-        lines += wrapped(
+        lines += wrap_text(
             f"In motion only: {' '.join(absorbing)} take in a constant force that no offset tells "
             "from friction; at rest, in `gravity` and in `bias` at qd = 0, that force is missing.",
             "    ",
@@ -85,7 +85,7 @@ def header(spec: ModuleSpec, texts: Mapping[str, Text], formulas: bool) -> list[
     given |= {"GAM1"} | {e.comment for e in spec.functions["regressor"].computed}
     lines += [f"    {family:<4} {FAMILIES[family]}" for family in families_of(given)]
     for name, of in sorted(next(iter(texts.values())).names.renamed.items()):
-        lines += wrapped(f"{name} stands for {of}, which is another name of this text", "    ")
+        lines += wrap_text(f"{name} stands for {of}, which is another name of this text", "    ")
     return [
         *lines,
         "",
@@ -96,7 +96,7 @@ def header(spec: ModuleSpec, texts: Mapping[str, Text], formulas: bool) -> list[
 
 def line_of(title: str, text: str) -> list[str]:
     """A line of the header, its title in the first column."""
-    return wrapped(f"{title:<11} {text}", "", " " * 12)
+    return wrap_text(f"{title:<11} {text}", "", " " * 12)
 
 
 def grouped(regrouping: Regrouping) -> dict[str, str]:
@@ -161,7 +161,7 @@ def element_lines(robot: Robot) -> list[str]:
         parts += [f"{e.family}{j} in the form {_form_text(form)}" for j, form in e.form.items()]
         when = f", {e.when} motion only" if e.when else ""
         when += _law_text(e)
-        lines += wrapped(f"{e.family:<7} {e.kind}{when}: {'; '.join(parts)}", "", "            ")
+        lines += wrap_text(f"{e.family:<7} {e.kind}{when}: {'; '.join(parts)}", "", "            ")
     return lines
 
 
@@ -362,7 +362,7 @@ def packed(entries: Sequence[str], indent: str = "    ") -> list[str]:
     return [*lines, line.rstrip()]
 
 
-def wrapped(text: str, indent: str, hanging: str | None = None) -> list[str]:
+def wrap_text(text: str, indent: str, hanging: str | None = None) -> list[str]:
     """Text broken at spaces."""
     more = indent + "    " if hanging is None else hanging
     return wrap(

@@ -20,7 +20,7 @@ from symgen.derive.regressor import acting, element_names
 from symgen.description.expression import ZERO, Expression
 from symgen.description.robot import FIXED, PRISMATIC, Robot
 from symgen.emit.blocks import Block, FunctionPrinter
-from symgen.emit.header import data, header, literal, packed, plain, tables, wrapped
+from symgen.emit.header import data, header, literal, packed, plain, tables, wrap_text
 from symgen.emit.printers import PYTHON, Section
 from symgen.emit.render import WIDTH, laid_out
 from symgen.emit.spec import SHARING, Function, ModuleSpec
@@ -60,7 +60,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
         "module.py",
         {
             **spec.sizes,
-            "opening": wrapped(
+            "opening": wrap_text(
                 f'"""{plain(robot.title or robot.name)}: base parameters, regressor, dynamics.', ""
             ),
             "file": plain(robot.file or robot.name),
@@ -78,9 +78,9 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
             "shapes": {name: f.shape for name, f in spec.functions.items()},
             "outputs": _outputs(spec, models.values()),
             "constants": constants,
-            "passed": {name: _passed(robot, names) for name, names in constants.items()},
+            "passed": {name: _passed_constants(robot, names) for name, names in constants.items()},
             "tuple_of": tuple_of,
-            "listed": listed,
+            "listed": further_arguments,
             "keywords": "".join(f", {c}={c}" for c in free),
             "channels": robot.channels,
             "tied": spec.tied,
@@ -210,7 +210,7 @@ def _filled_at_once(
     return at_once, left
 
 
-def _passed(robot: Robot, names: Sequence[str]) -> str:
+def _passed_constants(robot: Robot, names: Sequence[str]) -> str:
     """Constants as arguments of `_evaluated`: one tuple, and one of those that are functions of
     time.
     """
@@ -343,7 +343,7 @@ def tuple_of(names: Sequence[object]) -> str:
     return f"({', '.join(map(str, names))}{',' * (len(names) == 1)})"
 
 
-def listed(names: Iterable[str]) -> str:
+def further_arguments(names: Iterable[str]) -> str:
     """Names as text that follows other arguments: ", D3, RL4"."""
     return "".join(f", {name}" for name in names)
 

@@ -24,10 +24,10 @@ def _environment() -> Environment:
 def laid_out(template: str, context: Mapping[str, object]) -> str:
     """The text of `templates/<template>.jinja` with the values of `context`, in lines that fit."""
     text = _environment().get_template(f"{template}.jinja").render(context)
-    return "\n".join(_fitted(text.split("\n"), template.endswith((".c", ".h"))))
+    return "\n".join(_lines_that_fit(text.split("\n"), template.endswith((".c", ".h"))))
 
 
-def _fitted(lines: Iterable[str], in_c: bool) -> Iterator[str]:
+def _lines_that_fit(lines: Iterable[str], in_c: bool) -> Iterator[str]:
     """Lines of at most WIDTH columns: long ones go on, indented, behind a space that may end
     one.
     """

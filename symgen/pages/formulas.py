@@ -10,7 +10,7 @@ from typing import Any
 
 from symgen.derive.derivation import derive
 from symgen.description.expression import ONE, Expression
-from symgen.emit.header import loop_lines, wrapped
+from symgen.emit.header import loop_lines, wrap_text
 from symgen.emit.spec import function, is_inertial, is_inertial_or_actuator
 from symgen.errors import SymgenError
 from symgen.regroup.formula import Formula
@@ -37,7 +37,7 @@ def printed(regrouping: Regrouping, form: str, only: str | None = None) -> str:
     lines = [
         line
         for b in absorbing
-        for line in wrapped(f"{b.name:<{width}} = {b.formula}", "", " " * (width + 3))
+        for line in wrap_text(f"{b.name:<{width}} = {b.formula}", "", " " * (width + 3))
     ]
     return "\n".join(lines if only else _page(regrouping, lines))
 
@@ -51,7 +51,7 @@ def _page(regrouping: Regrouping, formulas: list[str]) -> list[str]:
     frames = ", ".join(f"{j} {label}" for j, label in robot.labels.items())
     passive = loop_lines(robot, derive(robot).closure)[len(robot.loops) :] if robot.passive else []
     relations = [
-        *(wrapped(f"frames: {frames}", "") if frames else []),
+        *(wrap_text(f"frames: {frames}", "") if frames else []),
         *(f"passive: {line}" for line in passive),
     ]
     return [
@@ -62,9 +62,9 @@ def _page(regrouping: Regrouping, formulas: list[str]) -> list[str]:
         *([""] if relations else []),
         *formulas,
         "",
-        *wrapped("as they are: " + alone, ""),
+        *wrap_text("as they are: " + alone, ""),
         "",
-        *wrapped("no effect: " + (" ".join(regrouping.no_effect) or "none"), ""),
+        *wrap_text("no effect: " + (" ".join(regrouping.no_effect) or "none"), ""),
     ]
 
 

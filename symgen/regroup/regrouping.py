@@ -32,7 +32,7 @@ from symgen.description.robot import PRISMATIC, Robot
 from symgen.regroup.finite_field import rref
 from symgen.regroup.floats import float_relations, numeric_coefficients
 from symgen.regroup.formula import Formula
-from symgen.regroup.residues import drawn, sample, states_for
+from symgen.regroup.residues import draw_states, sample, states_for
 from symgen.regroup.rules import Combination, Step, Transfer
 from symgen.regroup.solve import coefficients
 
@@ -139,7 +139,7 @@ def _regrouped(robot: Robot, seed: int) -> Regrouping:
     names = preference(robot, transfer.remaining)
     reason = ""
     try:
-        draw = drawn(given, seed, states_for(given, names))
+        draw = draw_states(given, seed, states_for(given, names))
         pivots, R = rref(sample(draw, names).reshape(-1, len(names)), draw.p)
     except ArithmeticError as error:
         base, relations = float_relations(given, names)

@@ -16,7 +16,7 @@ from symgen.description.robot import Robot
 from symgen.regroup.closed_draw import closed_draw
 
 
-def drawn(
+def draw_states(
     robot: Robot,
     seed: int,
     samples: int,

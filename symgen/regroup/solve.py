@@ -30,7 +30,7 @@ from symgen.derive.time_limit import require_time
 from symgen.description.expression import Call, Expression, Number
 from symgen.description.robot import Robot
 from symgen.regroup.finite_field import rref, small_rational, solve_each
-from symgen.regroup.residues import drawn, sample, states_for
+from symgen.regroup.residues import draw_states, sample, states_for
 
 MAX_UNKNOWNS = 500
 MAX_PRIMES = 24  # of 31 bits each: numerators and denominators of some 110 digits
@@ -120,7 +120,7 @@ class Pool:
         """{dependent: residues of its coefficients, shape (count, support), or None if it does not
         depend at every geometry}.
         """
-        draw = drawn(self.robot, 11, self.samples, p=self.p, geometry=geometry, count=count)
+        draw = draw_states(self.robot, 11, self.samples, p=self.p, geometry=geometry, count=count)
         W = sample(draw, self.names)
         index = {name: k for k, name in enumerate(self.names)}
         return {

@@ -19,7 +19,7 @@ from symgen.derive.models import SYMBOLIC
 from symgen.derive.names import Names
 from symgen.description.expression import Expression
 from symgen.description.robot import Robot
-from symgen.emit.header import frame_table, informative_columns, wrapped
+from symgen.emit.header import frame_table, informative_columns, wrap_text
 from symgen.emit.render import WIDTH
 from symgen.errors import SymgenError
 from symgen.regroup.formula import Formula
@@ -171,7 +171,7 @@ def angle_lines(angles: Mapping[str, Expression]) -> list[str]:
         f"{name} = {'cos' if name[0] == 'C' else 'sin'}({e})".replace(" ", "\0")
         for name, e in angles.items()
     )
-    return [line.replace("\0", " ") for line in wrapped(told, "", "")]
+    return [line.replace("\0", " ") for line in wrap_text(told, "", "")]
 
 
 # --- text ---

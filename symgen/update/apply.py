@@ -82,7 +82,7 @@ def apply(
     result = _estimate(estimate)
     _require_same_joints(result, described, of)
     physical = physical_model(load_model(emitted(described)))
-    names, X, lost = _determined(result, physical, of)
+    names, X, lost = _determined_names(result, physical, of)
     links = text.links
     if not links:
         raise DescriptionError(
@@ -182,7 +182,7 @@ def _inertial(physical: PhysicalModel) -> set[str]:
     return {physical.standard[k] for j in physical.links for k in physical.link(j)}
 
 
-def _determined(
+def _determined_names(
     result: Estimate, physical: PhysicalModel, of: str
 ) -> tuple[list[str], Array, list[str]]:
     """Names and values of the base parameters that the record tells, and names of the others."""

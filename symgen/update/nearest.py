@@ -302,17 +302,17 @@ def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple
             f"the links of this file cannot have {lost}: a body without inertial has no place for "
             "it; add an inertial to the link that moves"
         )
-    u = _solved(part, K, rest, part.u0, ~part.masses)
+    u = _solve(part, K, rest, part.u0, ~part.masses)
     if u is None or _violated(part, u):
         answer = feasibility(part.physical, names, rest)
         if not answer.feasible:
             return None, answer.text
-        u = _held(part, nearest_standard(part.physical, names, rest, answer.chi))
+        u = _hold(part, nearest_standard(part.physical, names, rest, answer.chi))
     near = NEAR * part.size
     alone = [c.numbers[0] for c in part.physical.conditions if len(c.numbers) == 1]
     near[alone] += BARRIER
     moved = np.abs(u - part.u0) > near
-    clean = _solved(part, K, rest, np.where(moved, u, part.u0), moved)
+    clean = _solve(part, K, rest, np.where(moved, u, part.u0), moved)
     if clean is None or np.abs(K @ part.chi(clean) - rest).max() > MISSED * sizes.max():
         return u, ""
     return (u if _violated(part, clean) else clean), ""
@@ -325,7 +325,7 @@ def _violated(part: Numbers, u: Array) -> bool:
     return any(c.smallest(chi) < -TINY for c in conditions)
 
 
-def _solved(part: Numbers, K: Array, rest: Array, start: Array, free: Array) -> Array | None:
+def _solve(part: Numbers, K: Array, rest: Array, start: Array, free: Array) -> Array | None:
     """The numbers with K chi(u) = rest nearest to `start`, of which those that are `free` move; None
     where Newton's steps do not find them.
     """
@@ -345,7 +345,7 @@ def _solved(part: Numbers, K: Array, rest: Array, start: Array, free: Array) -> 
     return u if np.all(missed <= NEAR * sizes) else None
 
 
-def _held(part: Numbers, chi: Array) -> Array:
+def _hold(part: Numbers, chi: Array) -> Array:
     """Numbers of chi; of each link those that no base parameter tells are the file's, unless that
     is no physical link.
     """

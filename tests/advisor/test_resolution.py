@@ -14,7 +14,7 @@ import runtime
 from runtime.advisor.advice import crossing, sampled
 from runtime.advisor.advisor import ALL, Predictor, torque_sigma
 from runtime.advisor.position_errors import perturbation
-from runtime.advisor.sign_errors import kernels, switched
+from runtime.advisor.sign_errors import kernels, switch_with_error
 from runtime.compose import advise, observe
 from runtime.core.bound import BoundModel
 from runtime.core.drives import encoder_drives
@@ -145,7 +145,7 @@ def test_a_switch_under_noise_against_sampling(half):
     delta = 2e-4
     sigma = delta * np.sqrt(band.before[1, 1])
     switch = Switch(0, np.ones(1), 0.5, 0.0, 0.5) if half else Switch(0, np.ones(1), 0.0, 1.0, 0.0)
-    found = switched(
+    found = switch_with_error(
         switch,
         s,
         sigma,

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime.compose import cestac, estimate_of, observe, stated
+from runtime.compose import cestac, estimate_of, observe, state_problem
 from runtime.core.essential import essential_of
 from runtime.core.model import load_model
 from runtime.core.study import EstimateSettings
@@ -112,7 +112,7 @@ def test_weights_sharpen_the_wrist(observation, study, model, found):
 
 def test_essential_parameters_predict_better(observation, study, found, model):
     result = split_validation(
-        stated(model, ()),
+        state_problem(model, ()),
         observation,
         study.validate.split,
         {"all": EstimateSettings(), "essential": EstimateSettings(columns=found.names)},

@@ -9,7 +9,7 @@ import symgen
 from runtime.core.signals.cutoff import cutoff
 from runtime.core.signals.filters import median_filtered
 from runtime.core.study import Signals
-from runtime.median import taken
+from runtime.median import share_taken
 from runtime.study import Study
 
 RATE = 1000.0
@@ -102,11 +102,11 @@ def test_a_median_of_torques_is_none_where_a_controller_answers_every_count():
     spoilt = torque.copy()
     spoilt[::301] += 40 * rng.standard_normal(spoilt[::301].shape)
     for usual in (torque, spoilt, np.zeros_like(q), torque[:500]):
-        assert not taken(usual, q[: len(usual)], RATE, 5).any()
+        assert not share_taken(usual, q[: len(usual)], RATE, 5).any()
     driven = torque + pulses(q, 0.1, 6.0)
     d = median_filtered(driven, 5) - driven
-    share = taken(driven, q, RATE, 5)
-    assert share[1] > 0.02 and not taken(driven, q, RATE, 1).any()
+    share = share_taken(driven, q, RATE, 5)
+    assert share[1] > 0.02 and not share_taken(driven, q, RATE, 1).any()
     blocks = d.reshape(100, 100, 2).mean(axis=1), driven.reshape(100, 100, 2).mean(axis=1)
     whole = [np.linalg.norm(x, axis=0) for x in blocks]
     assert share[1] == pytest.approx((whole[0] / whole[1])[1], rel=0.1)

@@ -8,7 +8,7 @@ from dataclasses import FrozenInstanceError, replace
 import numpy as np
 import pytest
 
-from runtime.compose import METHODS, known
+from runtime.compose import METHODS, complete_study
 from runtime.core import gone
 from runtime.core.arithmetic import number
 from runtime.core.errors import InputError, SettingsError
@@ -172,7 +172,7 @@ def test_one_record_or_several():
 )
 def test_errors_give_the_path(mapping, path, said):
     with pytest.raises(SettingsError) as e:
-        known(study_from_mapping(mapping))
+        complete_study(study_from_mapping(mapping))
     assert e.value.path[: len(path)] == path or e.value.path == path[:-1]
     assert said in str(e.value)
 
@@ -184,7 +184,7 @@ def test_a_setting_that_went_names_what_to_use_instead():
         for part in reversed(key.split(".")):
             mapping = {part: mapping}
         with pytest.raises(SettingsError) as e:
-            study = known(study_from_mapping(mapping))
+            study = complete_study(study_from_mapping(mapping))
             settings = replace(study.estimate, method="feasible")  # the method reads its options
             METHODS["feasible"].checked(settings)
         assert (e.value.path, e.value.reason) == (tuple(key.split(".")), said)

@@ -8,7 +8,7 @@ import planar_2r_model as planar
 import pytest
 from planar_data import OLS, TRUE, motion, observation
 
-from runtime.compose import estimate_of, stated
+from runtime.compose import estimate_of, state_problem
 from runtime.core.errors import InputError
 from runtime.core.parameter_sets import held_out_validation
 from runtime.core.study import EstimateSettings
@@ -20,7 +20,7 @@ from runtime.core.validation import (
     weak_directions,
 )
 
-PROBLEM = stated(planar, ())
+PROBLEM = state_problem(planar, ())
 
 
 def test_comparison_holds_the_torques_of_every_joint():

@@ -17,8 +17,8 @@ from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
 from runtime.core.settings import structure
 from runtime.core.study import Decimate, Lowpass, Signals
-from runtime.excitation.criteria import Weights, excesses, limits_of, planned, usage, weights_of
-from runtime.excitation.optimiser import Search, improved, one_start, smoothed
+from runtime.excitation.criteria import Weights, excesses, limits_of, plan_rows, usage, weights_of
+from runtime.excitation.optimiser import Search, improve, one_start, smoothed
 from runtime.excitation.settings import ExcitationSettings, Sphere
 from runtime.loop.dry_friction import dry_friction
 from runtime.loop.trajectories import Motion, Part, motion_from_mapping
@@ -150,8 +150,8 @@ def test_motion_within_limits_and_better_than_the_start(planar: tuple, criterion
     smooth = dry_friction(model).smooth
     once = replace(asked, iterations=1)
     first = one_start(Search(model, once, weights, limits, X, smooth), 0)
-    begun = planned(problem(model, (), STUDY), motion_from_mapping(first.motion), asked.rate)
-    seen = planned(problem(model, (), STUDY), found.motion, asked.rate)
+    begun = plan_rows(problem(model, (), STUDY), motion_from_mapping(first.motion), asked.rate)
+    seen = plan_rows(problem(model, (), STUDY), found.motion, asked.rate)
     assert weights.relative_sigma(seen).max() < 0.8 * weights.relative_sigma(begun).max()
     assert found.condition == pytest.approx(np.linalg.cond(weights.matrix(seen)))
     parts = found.motion.parts
@@ -333,5 +333,5 @@ def test_a_wider_margin_starts_from_the_motion_found(planar: tuple) -> None:
     )
     start = one_start(search, 0)
     motion = motion_from_mapping(start.motion)
-    again = improved(search, 0, Motion(tuple(Part(p.family, p.p) for p in motion.parts)))
+    again = improve(search, 0, Motion(tuple(Part(p.family, p.p) for p in motion.parts)))
     assert again.criterion <= start.criterion + 1e-3

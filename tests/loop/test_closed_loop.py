@@ -22,7 +22,7 @@ from runtime.loop.closed_loop import loop_of, slips
 from runtime.loop.control_law import parameters_of
 from runtime.loop.reference import Reference, reference_of
 from runtime.loop.settings import ReferenceSettings
-from runtime.loop.simulated_motion import judged, simulated_motion
+from runtime.loop.simulated_motion import judge_motion, simulated_motion
 from runtime.loop.simulation import Simulator
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
@@ -467,7 +467,7 @@ def test_a_simulation_that_does_not_follow_is_no_result(arm, clean):
     other = Reference.sampled(reference.q[::-1].copy(), reference.rate)
     loop = loop_of_records(model, [clean[0]], study, simulator, around=0.05)
     loop = replace(loop, parts=tuple(replace(part, reference=other) for part in loop.parts))
-    status, message, details = judged(loop, loop.measured(), truth)
+    status, message, details = judge_motion(loop, loop.measured(), truth)
     assert status == "simulation-apart" and details["motion"][0]["position"] > 20
     assert "does not follow the record: position of joint 1 off by" in message
     assert estimate_of(loop.measured(), EstimateSettings("didim"), model=model).status in (

@@ -15,7 +15,7 @@ from scipy.optimize import minimize
 import symgen
 from oracles.pinocchio_model import PinocchioModel
 from runtime import InputError, observe
-from runtime.compose import estimate_of, stated
+from runtime.compose import estimate_of, state_problem
 from runtime.core.errors import SettingsError
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.method import linear_companion, linear_system
@@ -29,15 +29,15 @@ from runtime.physical.feasibility import (
     RobotLimits,
     feasibility,
     limit_rows,
-    pulled,
+    pull_to_file,
     scales,
     standard_parameters,
 )
 from runtime.physical.feasible import (
     FeasibleOptions,
-    decided,
+    decide_options,
     residual_norm,
-    weighed,
+    solve_with_weight,
     within_limits,
 )
 from runtime.physical.inertia import INERTIAL, physical_model, pseudo_inertia
@@ -162,7 +162,7 @@ def test_feasible_is_least_squares_where_that_is_feasible(name: str) -> None:
     assert found.details["least_squares"]["feasible"]
     np.testing.assert_array_equal(found.X, ols.X)
     physical, options = physical_model(model), FeasibleOptions(prior="none", margin=1e-9)
-    chi, weight = weighed(
+    chi, weight = solve_with_weight(
         linear_system(seen, linear_companion(FEASIBLE)).weighted, physical, options
     )
     assert weight == 0 and np.abs((physical.K @ chi - ols.X) / ols.sigma).max() < 1e-2
@@ -423,7 +423,7 @@ def test_the_pull_is_at_its_minimum(arm) -> None:
     makes it smaller.
     """
     physical = physical_model(arm)
-    prior = pulled(physical, "euclidean", 1e-2)
+    prior = pull_to_file(physical, "euclidean", 1e-2)
     rng = np.random.default_rng(3)
     p = len(physical.standard)
     R, z = rng.standard_normal((6, p)) / 3, rng.standard_normal(6) / 3
@@ -530,7 +530,7 @@ def test_tx40_record(tx40, tx40_data) -> None:
         study.validate.split[::-1],
     ):  # each half predicts the other better than by least squares
         errors = [
-            split_validation(stated(tx40, ()), seen, split, {"all": how})
+            split_validation(state_problem(tx40, ()), seen, split, {"all": how})
             .predictions[1]
             .relative_error
             for how in (EstimateSettings(), FEASIBLE)
@@ -568,7 +568,7 @@ def test_a_weight_that_the_solver_cannot_do_is_passed_over(arm, monkeypatch, wei
     seen, solid, whole = (
         simulated(arm, arm.base_parameters(arm.VALUES), 0.5, N=60),
         replace_values(arm),
-        method.fitted,
+        method.solve_feasible,
     )
     settings = EstimateSettings(
         "feasible", options={**PLAIN, "prior": "euclidean", "weight": weight, "explain": False}
@@ -581,7 +581,7 @@ def test_a_weight_that_the_solver_cannot_do_is_passed_over(arm, monkeypatch, wei
             )
         return whole(rows, physical, options, weight)
 
-    monkeypatch.setattr(method, "fitted", failing)
+    monkeypatch.setattr(method, "solve_feasible", failing)
     found = estimate_of(seen, settings, model=solid)
     assert found.status == "ok" and found.details["weight"] <= 1e-3
 
@@ -616,7 +616,7 @@ def test_bounds_are_told_as_bounds() -> None:
         chi[physical.link(j)[1::3]] = 0.0
         chi[physical.link(j)[3]] = chi[physical.link(j)[5]] = 2.0
     X = physical.K @ chi
-    options = decided(FeasibleOptions(reach=0.1, prior="none"), arm, physical)
+    options = decide_options(FeasibleOptions(reach=0.1, prior="none"), arm, physical)
     judged = within_limits(physical, physical.base, X, options)
     assert judged.physical and not judged.feasible
     assert "NOT" not in judged.text and "bounds of masses and centres" in judged.text

@@ -18,7 +18,7 @@ from symgen import Robot, SymgenError, load_robot, parse_robot, regrouping
 from symgen.certify.certificate import Certificate, certify_formulas
 from symgen.certify.modules import certified_files, certify
 from symgen.derive.angles import units_of
-from symgen.derive.numbers import kept
+from symgen.derive.numbers import keep_rationals
 from symgen.description.at_values import at_values, exact
 from symgen.description.expression import Expression, Number, call
 from symgen.regroup.regrouping import EXACT, BaseParameter, Regrouping
@@ -222,8 +222,10 @@ def test_roots_are_one_normal_form() -> None:
 
 def test_kept_numbers_have_their_value() -> None:
     e = Expression.number("0.4318") * Expression.symbol("a") - 2
-    assert kept(e) != e and kept(e).value({"a": 3.0}) == e.value({"a": 3.0})
-    assert {a for a in kept(e).atoms if isinstance(a, Number)} and str(kept(e)) == "0.4318*a - 2"
+    assert keep_rationals(e) != e and keep_rationals(e).value({"a": 3.0}) == e.value({"a": 3.0})
+    assert {a for a in keep_rationals(e).atoms if isinstance(a, Number)} and str(
+        keep_rationals(e)
+    ) == "0.4318*a - 2"
 
 
 def test_values_at_which_a_formula_divides_by_zero_are_told() -> None:

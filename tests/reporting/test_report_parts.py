@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from runtime.advisor.advice import resolved
+from runtime.advisor.advice import answer
 from runtime.core.check import Check, state_of
 from runtime.core.checklist import checklist_of, lost_joints, separate
 from runtime.core.least_squares.estimate import Estimate, JointFit
@@ -154,7 +154,7 @@ class Asking(Part):
 
 
 def checked(estimate, unseen=5.0, *, every=None, **asked):
-    asked = {"parts": [Consistency(estimate, estimate), Asking("values", resolved(None))], **asked}
+    asked = {"parts": [Consistency(estimate, estimate), Asking("values", answer(None))], **asked}
     deviations = dict(zip(estimate.names, 2.5 * estimate.sigma, strict=True))
     return checklist_of(
         every or estimate,
@@ -267,14 +267,14 @@ def test_encoder_in_use_counts(error, state):
         asked=(1e-3,),
         worst=lambda k: ("A1", error),
     )
-    asked = checked(fit(), parts=[Asking("values", resolved(advice))])
+    asked = checked(fit(), parts=[Asking("values", answer(advice))])
     assert "5 % up to 0.0002 rad (2*pi/31416) at the motors" in asked.checks[-1].finding
     assert (
         asked.state == state
         and asked.answer == {"good": "Yes", "doubtful": "With care", "no": "No"}[state]
     )
     advice.asked = ()
-    checklist = checked(fit(), parts=[Asking("values", resolved(advice))])
+    checklist = checked(fit(), parts=[Asking("values", answer(advice))])
     assert (
         checklist.state == "good"
         and checklist.checks[-1].state == "open"

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from runtime.compose import READERS, problem, stated
+from runtime.compose import READERS, problem, state_problem
 from runtime.core.automatic import automatic_cutoff
 from runtime.core.problem import prepared
 from runtime.core.record import Origin, Record
@@ -17,7 +17,7 @@ def resolved(study, records):
     """The settings after the automatic ones have their numbers, and what the steps say."""
     model = SimpleNamespace(JOINTS=range(records[0].n), NAME="none", DRIVES=None)
     steps = (torque_median, recorded_speeds, automatic_cutoff)
-    problem = prepared(stated(model, records, study), steps)
+    problem = prepared(state_problem(model, records, study), steps)
     return problem.settings, " ".join(note.text for note in problem.notes)
 
 

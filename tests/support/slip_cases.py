@@ -23,7 +23,7 @@ from runtime.compose import problem
 from runtime.core.drives import Drives
 from runtime.core.errors import InputError
 from runtime.core.limits import LIMIT
-from runtime.plausible.causes import unchanged
+from runtime.plausible.causes import unchanged_study
 from runtime.plausible.samples import samples_of
 from runtime.plausible.trials import Baseline, baseline_of, regressor
 from runtime.study import study_from_mapping
@@ -142,9 +142,9 @@ def equivalent(right: Baseline | None, slipped: Baseline | None) -> bool:
     T = np.linalg.lstsq(right.tau, slipped.tau, rcond=None)[0].T
     if np.linalg.norm(slipped.tau - right.tau @ T.T) > 1e-9 * np.linalg.norm(slipped.tau):
         return False
-    D, Y, _ = right.rows(unchanged(right.samples.n))
+    D, Y, _ = right.rows(unchanged_study(right.samples.n))
     V = np.einsum("ij,kjp->kip", T, D / np.abs(D).max(axis=(0, 1)))
-    known = slipped.rows(unchanged(right.samples.n))[1] - Y @ T.T
+    known = slipped.rows(unchanged_study(right.samples.n))[1] - Y @ T.T
     known[np.abs(known) < 1e-9 * np.abs(slipped.tau).max()] = 0.0
     within = slipped.beyond(np.concatenate([V, known[:, :, None]], axis=2)) < LIMIT.WITHIN_SPAN
     return (

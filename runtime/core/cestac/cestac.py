@@ -36,7 +36,7 @@ from runtime.core.cestac.perturbed import (
     prepared_records,
     study_columns,
 )
-from runtime.core.cestac.result import Cestac, judged, level_result
+from runtime.core.cestac.result import Cestac, level_result, names_judged
 from runtime.core.cestac.run import USABLE, run_block
 from runtime.core.cestac.runs import Level, Runs
 from runtime.core.cestac.sources import Checkpoint, EncoderOf, LoopOf
@@ -141,7 +141,7 @@ def cestac(
     )
     measured = measured_rows(task, as_measured)
     whole = [reading.record for reading in as_measured]
-    origins = {**problem.provenance, **judged(study.cestac), **(provenance or {})}
+    origins = {**problem.provenance, **names_judged(study.cestac), **(provenance or {})}
     point = point_estimate(task.estimate, problem.methods)
     reference = estimate_of(measured, point, problem.methods, model=model, provenance=origins)
     _refuse(reference)

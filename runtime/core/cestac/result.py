@@ -455,7 +455,7 @@ def texts(words: Iterable[str]) -> Array:
     return np.array(list(words), dtype=np.str_)
 
 
-def judged(settings: CestacSettings) -> dict[str, tuple[str, ...]]:
+def names_judged(settings: CestacSettings) -> dict[str, tuple[str, ...]]:
     """Provenance of a reference of which some parameters alone are judged: their names."""
     return {} if isinstance(settings.columns, str) else {JUDGED: settings.columns}
 
@@ -518,7 +518,7 @@ def level_result(
         increase=100 * (rho - rho_ls) / norm_Y,
         increase_own=100 * (own - rho_ls) / norm_Y,
         verdict=verdict,
-        residual_verdict=_judged(100 * abs(rho - rho_ls) / norm_Y),
+        residual_verdict=_verdict_of_error(100 * abs(rho - rho_ls) / norm_Y),
         decided_by=decided_by,
         runs_needed=needed,
         message=_message(
@@ -554,14 +554,14 @@ def _verdict(errors: Mapping[str, float]) -> tuple[Verdict, dict[str, float]]:
     negligible.
     """
     ordered = sorted(errors.items(), key=lambda item: -item[1])
-    verdict = _judged(ordered[0][1])
+    verdict = _verdict_of_error(ordered[0][1])
     if verdict == "unbiased":
         return verdict, dict(ordered[:1])
     limit = LIMIT.BIASED if verdict == "biased" else LIMIT.NEGLIGIBLE
     return verdict, {name: value for name, value in ordered if value >= limit}
 
 
-def _judged(error: float) -> Verdict:
+def _verdict_of_error(error: float) -> Verdict:
     """Verdict of one error, in %."""
     return (
         "unbiased" if error < LIMIT.NEGLIGIBLE else "biased" if error > LIMIT.BIASED else "doubtful"
