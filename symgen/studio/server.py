@@ -20,6 +20,7 @@ from symgen.studio.jobs import Jobs
 
 VIEW_PATIENCE = 60.0  # s that a page waits for a view
 REMEMBERED = 30  # views
+DERIVING = (views.formulas, views.model, views.module)  # pages do not wait for these
 PAGE_TEMPLATES = Environment(
     loader=PackageLoader("symgen.studio", "templates"),
     autoescape=True,
@@ -45,8 +46,8 @@ class Server:
         self.version, self.pages = 0, 0
         self.before, self.left_out = "", list[str]()
         self.news = asyncio.Event()
-        self.process = child.ViewProcess()
-        self.viewing = asyncio.Lock()
+        self.process, self.deriving = child.ViewProcess(), child.ViewProcess()
+        self.viewing = asyncio.Lock(), asyncio.Lock()
         self.views: dict[Any, dict[str, Any]] = {}
 
     def changed(self) -> None:
@@ -56,20 +57,23 @@ class Server:
         self.news = asyncio.Event()
 
     async def view(self, view: Callable[..., dict[str, Any]], *args: Any) -> dict[str, Any]:
-        """A view of files in the process of views, ended where it takes too long; what it gave
-        before where the robot, the file of the view and the arguments are the same.
+        """A view of files in a process of views, which ends if it takes too long; its earlier value
+        if the robot, the file of the view and the arguments are the same. Views that derive have a
+        process of their own, so that pages do not wait for them.
         """
         file = Path(args[0])
         written = file.stat().st_mtime_ns if file.exists() else 0
         key = (view.__name__, self.folder.digest, written, str(args))
-        async with self.viewing:
+        derives = view in DERIVING
+        process = self.deriving if derives else self.process
+        async with self.viewing[derives]:
             if key in self.views:
                 return self.views[key]
             try:
-                future = asyncio.wrap_future(self.process.submit(view, *args))
+                future = asyncio.wrap_future(process.submit(view, *args))
                 value: dict[str, Any] = await asyncio.wait_for(future, VIEW_PATIENCE)
             except (TimeoutError, BrokenProcessPool):
-                await asyncio.to_thread(self.process.end)
+                await asyncio.to_thread(process.end)
                 return {
                     "error": f"takes more than {VIEW_PATIENCE:g} s, or than the memory that there "
                     "is; the terminal has no such limit"

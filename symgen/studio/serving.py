@@ -45,6 +45,7 @@ def application(server: Server, port: int, end: Callable[[], None]) -> Guard:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
             server.process.end()
+            server.deriving.end()
 
     mounts = [
         Mount(f"/{name}", StaticFiles(directory=str(files("symgen").joinpath(place))))

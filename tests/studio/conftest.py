@@ -60,10 +60,10 @@ def process() -> Iterator[ViewProcess]:
 @pytest.fixture
 def studio(tmp_path: Path, process: ViewProcess) -> Iterator[Studio]:
     own = Studio(tmp_path / "work")
-    own.server.process = process
+    own.server.process = own.server.deriving = process
     with own.client:
         yield own
-        own.server.process = ViewProcess()
+        own.server.process, own.server.deriving = ViewProcess(), ViewProcess()
 
 
 @pytest.fixture(scope="module")

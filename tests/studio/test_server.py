@@ -7,6 +7,7 @@ import gzip
 import io
 import json
 import zipfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from bag_files import joint_states, write_bag
 
 import symgen
 from symgen.studio import guard, server, serving, table
+from symgen.studio.child import ViewProcess
 from symgen.studio.folder import WorkFolder
 from symgen.studio.jobs import Job
 
@@ -510,3 +512,23 @@ def test_a_run_that_was_cancelled_while_it_waited_leaves_nothing(studio: Any) ->
     assert waiting.state == "waiting" and (studio.path / f"study-{waiting.run}.yaml").exists()
     studio.post("cancel", {"number": str(waiting.number)})
     assert waiting.state == "cancelled" and not (studio.path / f"study-{waiting.run}.yaml").exists()
+
+
+def test_pages_do_not_wait_for_formulas(studio: Any) -> None:
+    """Those of a long chain take seconds; an edit of the table meanwhile is read in a blink."""
+    rows = [
+        f"  {j}: {{ant: {j - 1}, sigma: 0, alpha: {('0', 'pi/2', '-pi/2')[j % 3]}, d: 0.{j}, theta: q{j}, r: 0.2}}"
+        for j in range(1, 19)
+    ]
+    chain = "symgen: 1\nname: chain\ngravity: [0, 0, 9.81]\nframes:\n" + "\n".join(rows) + "\n"
+    studio.upload("robot", "chain.yaml", chain.encode())
+    studio.server.deriving = ViewProcess()
+    try:
+        studio.server.deriving.start()
+        with ThreadPoolExecutor() as pool:
+            formulas = pool.submit(studio.get, "view/formulas")
+            assert "chain" in studio.get("robot").text
+            assert not formulas.done()
+        assert "ZZ18" in formulas.result().text
+    finally:
+        studio.server.deriving.end()
