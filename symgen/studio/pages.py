@@ -233,6 +233,9 @@ class Pages:
                 self.folder.take_robot(name, content_of(part))
         finally:
             remove(folder)
+        if kind == "validation" and (taken := self.folder.measured(kind)):  # the page stays
+            self.server.changed()
+            return PlainTextResponse(taken.name)
         return await self._changed("")
 
     async def _packaged(self, form: dict[str, str]) -> str:

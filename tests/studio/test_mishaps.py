@@ -380,3 +380,55 @@ def test_two_pages_do_not_overwrite_their_studies(
     page.run("document.querySelector('#study-text').value += '# mine'")
     page.run("document.querySelector('#study-text').form.requestSubmit()")
     wait_for(lambda: file.read_text().endswith("# mine"), 10)
+
+
+def test_quick_clicks_add_as_many_frames(page: Browser, running: Callable[..., Any]) -> None:
+    studio = running("planar_2r")
+    go(page, studio.address + "robot")
+    until(page, "!!document.querySelector('[data-act^=add]')", 20)
+    page.run("for (let k = 0; k < 3; k++) document.querySelector('[data-act^=add]').click()")
+    until(page, "!!document.querySelector('#f-5-alpha')", 20)
+    wait_for(lambda: any("q5" in p.read_text() for p in studio.work.glob("robot*.yaml")), 10)
+
+
+def test_a_model_leaves_with_its_choice(page: Browser, running: Callable[..., Any]) -> None:
+    """An old result does not stay under a new choice, and work shows that it is done."""
+    studio = running("planar_2r")
+    go(page, studio.address + "robot")
+    result = "document.querySelector('#model').textContent.trim()"
+    page.run("document.querySelector('[hx-target=\"#model\"] button').click()")
+    assert "deriving" in until(page, result, 5)
+    until(page, f"{result}.includes('GAM') || {result}.includes('Q')", 60)
+    page.run(
+        "const s = document.querySelector('[hx-target=\"#model\"] select'); s.value = 'closure';"
+        "s.dispatchEvent(new Event('change', {bubbles: true}))"
+    )
+    assert page.run(result) == ""
+
+
+def test_a_validation_record_leaves_the_answers(
+    page: Browser, running: Callable[..., Any], tmp_path: Path
+) -> None:
+    studio = running(lever(tmp_path)[0])
+    record(tmp_path / "second.csv")
+    go(page, studio.address + "record")
+    give(page, "#record-file", tmp_path / "run.csv")
+    until(page, "!!document.querySelector('#preview table')", 30)
+    typed = "document.querySelector('#questions [name=\"columns.q\"]').value"
+    page.run(f"{typed} = 'b, a'")
+    page.run("document.querySelector('details.start').open = true")
+    give(page, "#validation-file", tmp_path / "second.csv")
+    until(page, "document.querySelector('[data-named] b').textContent === 'second.csv'", 20)
+    assert page.run("document.querySelector('#values').dataset.validation") == "validation.csv"
+    assert page.run(typed) == "b, a"
+
+
+def test_a_draft_says_why_there_are_no_formulas(page: Browser, running: Callable[..., Any]) -> None:
+    studio = running("planar_2r")
+    go(page, studio.address + "robot")
+    until(page, "!!document.querySelector('#cells')", 20)
+    page.click("#f-2-alpha")
+    type_in(page, "f-2-alpha", "pi/")
+    wait_for((studio.work / "robot.draft.yaml").is_file, 10)
+    go(page, studio.address + "robot")
+    until(page, "document.body.textContent.includes('when the table describes a robot')", 20)

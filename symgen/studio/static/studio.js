@@ -9,6 +9,11 @@
     say(`${file.name}: sending …`, "busy");
     try {
       const answer = await fetch(`${drop.dataset.upload}&name=${encodeURIComponent(file.name)}`, { method: "POST", body: file });
+      if (answer.ok && drop.dataset.named !== undefined) { // what is typed below stays
+        one("#values").dataset.validation = await answer.text();
+        one("b", drop).textContent = file.name;
+        return one("#message").replaceChildren();
+      }
       if (answer.ok) return location.reload();
       say(new DOMParser().parseFromString(await answer.text(), "text/html").body.textContent.trim() || `refused, ${answer.status}`);
     } catch {
@@ -148,7 +153,7 @@
     load();
   }
   // --- the table: every cell to the server, one edit at a time; what is typed meanwhile stays ---
-  let pending = null, busy = false, resting = null, sent = {};
+  let waiting = [], busy = false, resting = null, sent = {};
 
   function cells() {
     const form = one("#cells"), found = { frames: {}, constants: {}, gravity: [], loops: [] }, names = {};
@@ -183,16 +188,16 @@
     return { ...table, frames: Object.fromEntries(rows.map((row, k) => [k + 1, row])) };
   }
 
-  /** Send a table, or the cells as they then are; `act` is what added or removed a frame. */
-  async function edit(table, act) {
+  /** Send the cells as they are when the edits before are done; `act` adds or removes row j of frames or loops. */
+  async function edit(act = "", j = 0) {
     clearTimeout(resting);
-    pending = { table, act };
+    if (act || !waiting.length) waiting.push([act, j]);
     if (busy) return;
     busy = true;
-    while (pending) {
-      const values = { digest: one("#cells").dataset.digest, cells: JSON.stringify(pending.table || cells()), ...(pending.act ? { resized: "1" } : {}) };
-      sent = pending.act === "remove" ? {} : Object.fromEntries(all("#cells input").map((input) => [input.id, input.value]));
-      pending = null;
+    while (waiting.length) {
+      const [act, j] = waiting.shift(), table = act ? changed(cells(), act, j) : cells();
+      const values = { digest: one("#cells").dataset.digest, cells: JSON.stringify(table), ...(act && !act.endsWith("loop") ? { resized: "1" } : {}) };
+      sent = act === "remove" ? {} : Object.fromEntries(all("#cells input").map((input) => [input.id, input.value]));
       await htmx.ajax("POST", "do/edit", { target: "#table", swap: "outerHTML", values }).catch(() => {}); // told by htmx:sendError
     }
     busy = false;
@@ -200,7 +205,7 @@
   document.addEventListener("input", (event) => {
     if (!event.target.closest("#cells")) return;
     clearTimeout(resting);
-    resting = setTimeout(edit, 250);
+    resting = setTimeout(() => edit(), 250);
   });
   document.addEventListener("submit", (event) => {
     if (event.target.id !== "cells") return;
@@ -209,7 +214,19 @@
   });
   document.addEventListener("click", (event) => {
     const [act, j] = event.target.closest("[data-act]")?.dataset.act.split(" ") || [];
-    if (act) edit(changed(cells(), act, Number(j)), act.endsWith("loop") ? "" : act);
+    if (act && !(busy && (act === "remove" || act === "unloop"))) edit(act, Number(j)); // rows move when one goes
+  });
+  // --- forms that derive: a sign of work in the place of what an earlier choice gave ---
+  const resultOf = (form) => one(form.getAttribute("hx-target"));
+  document.addEventListener("change", ({ target }) => {
+    const form = target.closest("form[hx-get]");
+    if (form) resultOf(form).replaceChildren();
+  });
+  document.addEventListener("htmx:beforeRequest", ({ target }) => {
+    if (target.matches("form[hx-get]")) resultOf(target).replaceChildren(node("p", { className: "note", textContent: "deriving …" }));
+  });
+  document.addEventListener("htmx:responseError", ({ target }) => {
+    if (target.matches("form[hx-get]")) resultOf(target).replaceChildren();
   });
 
   let typed = [];
