@@ -153,7 +153,7 @@
     load();
   }
   // --- the table: every cell to the server, one edit at a time; what is typed meanwhile stays ---
-  let waiting = [], busy = false, resting = null, sent = {};
+  let waiting = [], busy = false, moving = false, resting = null, sent = {};
 
   function cells() {
     const form = one("#cells"), found = { frames: {}, constants: {}, gravity: [], loops: [] }, names = {};
@@ -200,7 +200,7 @@
       sent = act === "remove" ? {} : Object.fromEntries(all("#cells input").map((input) => [input.id, input.value]));
       await htmx.ajax("POST", "do/edit", { target: "#table", swap: "outerHTML", values }).catch(() => {}); // told by htmx:sendError
     }
-    busy = false;
+    busy = moving = false;
   }
   document.addEventListener("input", (event) => {
     if (!event.target.closest("#cells")) return;
@@ -214,7 +214,9 @@
   });
   document.addEventListener("click", (event) => {
     const [act, j] = event.target.closest("[data-act]")?.dataset.act.split(" ") || [];
-    if (act && !(busy && (act === "remove" || act === "unloop"))) edit(act, Number(j)); // rows move when one goes
+    if (!act || moving) return; // the rows that were clicked on move when one goes
+    moving = act === "remove" || act === "unloop";
+    edit(act, Number(j));
   });
   // --- forms that derive: a sign of work in the place of what an earlier choice gave ---
   const resultOf = (form) => one(form.getAttribute("hx-target"));
