@@ -227,7 +227,7 @@ def problem(
     unseen: Sequence[Record] = (),
     simulator: Simulator | None = None,
 ) -> Problem:
-    """The problem of model, records and study, prepared by all steps.
+    """Prepare model, records and study for all analyses: every step of `STEPS` is applied.
 
     Parameters
     ----------
@@ -266,7 +266,7 @@ def observe(
     *,
     simulator: Simulator | None = None,
 ) -> Observation:
-    """Y = W X + rho, eqs. (6) and (14), of one record or several: filtered, differentiated, decimated, rows left out."""
+    """Observation Y = W X + rho, eqs. (6) and (14), of one or several records after filters, decimation and selection of rows."""
     return estimation.observe_rows(problem(model, records, study, simulator=simulator))
 
 
@@ -278,7 +278,7 @@ def estimate(
     *,
     simulator: Simulator | None = None,
 ) -> Estimate:
-    """All parameters of one record or several by the method of the study, eqs. (7) to (11).
+    """Estimate all parameters from one or several records by the method of the study, eqs. (7) to (11).
 
     Parameters
     ----------
@@ -328,7 +328,10 @@ def essential(
     *,
     simulator: Simulator | None = None,
 ) -> Essential:
-    """Essential parameters (section 4.1.1) of one record or several, by the method of the study or its linear companion."""
+    """Find the essential parameters (section 4.1.1) of one or several records.
+
+    The method is that of the study, or least squares with the same weights if that method is not linear.
+    """
     return estimation.essential(problem(model, records, study, simulator=simulator))
 
 
@@ -347,7 +350,7 @@ def identify(
     plausible: bool | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Identification:
-    """Parameters of a robot from its records, and how far to trust them.
+    """Identify the parameters of a robot from its records and judge how far they can be trusted.
 
     Parameters
     ----------
@@ -431,7 +434,7 @@ def compare(
     *,
     variants: GeneratedModel | None = None,
 ) -> Ranking:
-    """Identify with each of several treatments, and order them by what they predict.
+    """Identify with several studies and order these by their error on unseen data.
 
     Parameters
     ----------
@@ -473,7 +476,7 @@ def cestac(
     map: Callable[..., Iterable[Any]] = map,
     **options: Any,
 ) -> Cestac:
-    """Change of the estimate under coarser encoders and torque sensors, eqs. (15) to (22), (28).
+    """Change of the estimate with coarser encoders and torque sensors, eqs. (15) to (22), (28).
 
     map : as the built-in one; makes the runs, in processes (`runtime.parallel.processes.processes`) or on a Dask cluster (`runtime.parallel.cluster.cluster`).
     options : columns, progress, checkpoint, provenance, as of `runtime.core.cestac.cestac.cestac`.
@@ -493,7 +496,7 @@ def cestac(
 def advise(
     model: GeneratedModel, records: Records, study: Study | None = None, **options: Any
 ) -> Advice:
-    """Coarsest encoders that keep the change of the estimate below 1 % and below 5 %, predicted.
+    """Predict the coarsest encoders that change the estimate by less than 1 % and by less than 5 %.
 
     options : columns, asked, encoders, confirm, progress, provenance, readers, as of `runtime.advisor.advisor.advise`.
     """
@@ -510,7 +513,7 @@ def plausibility(
     *,
     variants: GeneratedModel | None = None,
 ) -> Plausibility:
-    """Whether record, study and robot file suit each other, and what explains the record better where they do not."""
+    """Check whether record, study and robot file agree, and search single changes that explain the record better."""
     from runtime.plausible import plausibility as checks
 
     return checks.plausibility(problem(model, records, study), variants=variants)
@@ -520,7 +523,7 @@ def plausibility(
 def delay(
     model: GeneratedModel, record: Record, study: Study | None = None, **options: Any
 ) -> Delay:
-    """The time shift between positions and torques of a record, by joint.
+    """Estimate the time shift between positions and torques of a record, joint by joint.
 
     options : longest, s, the largest delay looked for.
     """
@@ -548,7 +551,7 @@ def excite(
     map: Callable[..., Iterable[Any]] = map,
     progress: Callable[[int, int], None] | None = None,
 ) -> Excitation:
-    """The motion of smallest criterion over all starts of study.excitation, within the limits at the controller rate.
+    """Search the motion with the smallest criterion over all starts of study.excitation, within the limits.
 
     Without records, the values of the robot file serve as parameters.
     """
@@ -562,8 +565,9 @@ def excite(
 def static_poses(
     model: GeneratedModel, records: Records = (), study: Study | None = None
 ) -> StaticPoses:
-    """Poses at rest, within the limits of q, from which the gravity parameters are best
-    estimated together with the recorded poses; study.excitation.poses of them, default 20.
+    """Search poses at rest that, together with recorded poses, determine the gravity parameters best.
+
+    study.excitation.poses is their number, default 20. They keep the limits of q.
     """
     from runtime.excitation import poses
 
@@ -591,8 +595,9 @@ def simulate(
     ideal: bool = False,
     name: str | None = None,
 ) -> Simulation:
-    """The closed loop of study.controller along its reference. Many runs of one loop, other
-    parameters: make a `runtime.loop.simulation.Simulator`.
+    """Simulate the closed loop of study.controller along its reference.
+
+    To run one loop many times, use `runtime.loop.simulation.Simulator`.
 
     Parameters
     ----------

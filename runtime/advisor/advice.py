@@ -152,7 +152,7 @@ class ReaderAdvice:
 
 @dataclass(frozen=True, eq=False)
 class Advice(Result, Part):
-    """Advice on the encoders of one robot, and on its torque sensors.
+    """Largest encoder steps that keep the estimate of one robot unbiased, and the effect of torque noise.
 
     Attributes
     ----------
@@ -190,35 +190,36 @@ class Advice(Result, Part):
     title = "Resolution advice"
 
     def text(self) -> str:
-        """The answer, the steps asked for, what was assumed."""
+        """The verdict, the changes at the requested steps, and the assumptions."""
         return "\n".join([self.verdict, *self.asked_lines(), *self.assumptions])
 
     def figures(self) -> tuple[Figure, ...]:
-        """%e against Delta of every parameter that matters; none where none does."""
+        """%e against Delta of every deciding parameter; no figure without such a parameter."""
         return (advice_figure(self),) if self.deciding else ()
 
     def checks(self) -> tuple[Check, ...]:
-        """Whether the encoder resolves enough."""
+        """Check of the verdict: does the encoder resolve enough?"""
         return (answer(self),)
 
     def entries(self) -> dict[str, Any]:
-        """Nothing: it has a file of its own."""
+        """Empty: the advice is written to its own file, advice.json."""
         return {}
 
     def files(self) -> dict[str, str]:
-        """advice.json."""
+        """The file advice.json."""
         return {"advice.json": self.to_json()}
 
     @property
     def deciding(self) -> tuple[str, ...]:
-        """Parameters that matter: %sigma (11) at most 10."""
+        """Parameters that decide the verdict: those with %sigma (11) of at most 10."""
         return deciding_names(self.reference)
 
     @property
     def ways(self) -> tuple[tuple[str, tuple[EncoderAdvice, ...], Array], ...]:
-        """How encoders were judged, in words, the advice on them, and the change at the steps
-        asked for: by the chapter's law, without words, unless real encoders alone were; then real
-        ones by both readers.
+        """Label, advice and changes at the requested steps for each rounding law.
+
+        The chapter's law comes first, without a label, unless only real encoders were judged.
+        Real encoders follow, once for each reader.
         """
         real = tuple((NAMES[one.reader], one.encoders, one.steps) for one in self.real)
         if self.real and self.encoders is self.real[0].encoders:
@@ -227,21 +228,20 @@ class Advice(Result, Part):
 
     @property
     def unit(self) -> str:
-        """Unit of the first steps: "rad", "m", or "rad or m" where encoders of both kinds are
-        coarse.
-        """
+        """Unit of the first steps: "rad", "m", or "rad or m" if the group has encoders of both kinds."""
         return self.encoders[0].unit
 
     @property
     def place(self) -> str:
-        """Where the encoders stand."""
+        """Side of the encoders, motor or joint, in words."""
         return {"joint": "at the joints", "motor": "at the motors"}[
             self.settings.get("cestac", {}).get("side", "joint")
         ]
 
     def worst(self, step: int, steps: Array | None = None) -> tuple[str, float]:
-        """The parameter that matters most at the step asked for, and its %e. steps : changes;
-        default: those of the advice.
+        """The deciding parameter with the largest %e at a requested step, and this %e.
+
+        steps : changes at the requested steps; default: those of the advice.
         """
         decisive = [self.names.index(name) for name in self.deciding]
         e = np.abs((self.steps if steps is None else steps)[step])[decisive]
@@ -250,16 +250,14 @@ class Advice(Result, Part):
 
     @property
     def negative(self) -> bool:
-        """Whether least squares would be biased at one of the steps asked for, or the runs
-        contradict the prediction.
-        """
+        """Whether least squares would be biased at a requested step, or the runs contradict the prediction."""
         several = (encoder for _, encoders, _ in self.ways for encoder in encoders)
         contradicted = any(not limit.agrees for encoder in several for limit in encoder.limits)
         return contradicted or any(self.worst(k)[1] > LIMIT.BIASED for k in range(len(self.asked)))
 
     @property
     def verdict(self) -> str:
-        """The answer in words."""
+        """The verdict in one text."""
         parts: list[str] = []
         for name, encoders, _ in self.ways:
             parts += [f"Real encoders read as {name}:"] if name else []
@@ -331,12 +329,12 @@ class Advice(Result, Part):
         return text + ")."
 
     def brief(self) -> str:
-        """The answer, then the steps by encoder, and those asked for."""
+        """The verdict, then the steps of each encoder, then the changes at the requested steps."""
         steps = [f"{table.caption}\n{table.to_text()}" for table in self.tables()[:-1]]
         return "\n\n".join([self.verdict, *steps, *self.asked_lines()])
 
     def to_table(self) -> str:
-        """Steps by encoder, then by parameter, then what was assumed."""
+        """Tables of the steps by encoder and by parameter, then the assumptions."""
         tables = [table.to_text() for table in self.tables()]
         notes = [note for reader in self.real for note in reader.notes]
         return "\n\n".join(
@@ -348,9 +346,7 @@ class Advice(Result, Part):
         )
 
     def tables(self) -> list[Table]:
-        """Steps by encoder, by the chapter's law and of real encoders by both readers, then by
-        parameter.
-        """
+        """Tables: steps by encoder for each rounding law and reader, then steps by parameter."""
         law, real = ([way for way in self.ways if bool(way[0]) == real] for real in (False, True))
         captions = (
             "Coarsest step of each encoder, the others exact; sampled: %e of that parameter with "
@@ -387,9 +383,7 @@ class Advice(Result, Part):
         return Table(caption, headers, rows)
 
     def parameter_table(self) -> Table:
-        """By parameter: %sigma, steps of all encoders at the limits, deviation per N m (N) of
-        torque noise in %.
-        """
+        """For each parameter: %sigma, steps of all encoders at the limits, deviation in % per N m (N) of torque noise."""
         first = self.encoders[0]
         reached = [first.reached(limit.percent) for limit in first.limits]
         header = (
@@ -414,7 +408,7 @@ class Advice(Result, Part):
         return Table(caption, header, rows)
 
     def asked_lines(self) -> list[str]:
-        """One line per step asked for."""
+        """One line for each requested step."""
         lines = []
         for k, delta in enumerate(self.asked):
             for reader, _, steps in self.ways:
@@ -429,7 +423,7 @@ class Advice(Result, Part):
         return ["\n".join(lines)] if lines else []
 
     def to_json(self) -> str:
-        """JSON text of everything."""
+        """JSON text of all fields."""
         return json_text(
             {
                 "schema": 1,

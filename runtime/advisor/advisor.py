@@ -117,8 +117,9 @@ def advise(
     provenance: Mapping[str, Any] | None = None,
     readers: Sequence[ReaderName] | None = None,
 ) -> Advice:
-    """Coarsest encoders that keep the change of the estimate below 1 % and below 5 %, predicted;
-    side, rounding, columns and runs by study.cestac.
+    """Predict the coarsest encoders that change the estimate by less than 1 % and by less than 5 %.
+
+    Side, rounding law, columns and number of runs are those of study.cestac.
 
     Real encoders, law phase, are judged by each of `readers`: read as positions, read as counts
     (`runtime.advisor.readers`).

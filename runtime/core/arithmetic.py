@@ -24,8 +24,9 @@ _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
 
 
 def number(text: str) -> float:
-    """The value of an arithmetic text; ValueError for other texts and for values that are not
-    finite and real.
+    """Value of an arithmetic expression such as "2*pi/1000".
+
+    Raises ValueError for any other text, and if the value is not finite and real.
     """
     if len(text) > LIMIT.NUMBER_CHARACTERS:
         raise ValueError(f"a number of {len(text)} characters; at most {LIMIT.NUMBER_CHARACTERS}")

@@ -31,7 +31,7 @@ dtype."""
 
 
 def real(x: Any, label: str, file: str | None = None) -> Array:
-    """The numbers of x, float64: x itself where it is such an array.
+    """Convert x to float64 numbers; an array of float64 is returned without a copy.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def real(x: Any, label: str, file: str | None = None) -> Array:
 
 
 def real_number(x: Any, label: str, file: str | None = None) -> float:
-    """One real number; InputError for anything else."""
+    """Return x as a real number; raise InputError for anything else."""
     if not _is_real(x):
         raise InputError(f"{label} is {kind_of(x)}; expected a number", file=file)
     return float(x)
@@ -87,7 +87,7 @@ def _is_real(x: Any) -> bool:
 
 
 def kind_of(x: Any) -> str:
-    """A value in words: None, '250' (str), a list, a dict."""
+    """A value and its type for messages: None, '250' (str), a list, a dict."""
     if x is None:
         return "None"
     if isinstance(x, str | bytes | int | float | complex):
@@ -97,6 +97,9 @@ def kind_of(x: Any) -> str:
 
 
 def require_kind(x: Any, kinds: type | tuple[type, ...], label: str, hint: str) -> None:
-    """InputError unless x is of one of the kinds; hint : what was expected, and how to get it."""
+    """Raise InputError unless x has one of the given types.
+
+    hint : what was expected, and how to get it.
+    """
     if not isinstance(x, kinds):
         raise InputError(f"{label} is {kind_of(x)}; expected {hint}")

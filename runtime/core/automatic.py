@@ -12,7 +12,7 @@ from runtime.core.signals.cutoff import cutoff
 
 
 def automatic_cutoff(problem: Problem) -> Problem:
-    """The cut-off of least bias by motion and noise, one for all fitted records (`runtime.core.signals.cutoff`)."""
+    """The cut-off with the smallest bias, the same for all fitted records (`runtime.core.signals.cutoff`)."""
     signals = problem.settings.signals
     low = signals.lowpass
     if low is None or low.cutoff != "auto":

@@ -13,7 +13,7 @@ from runtime.core.model import GeneratedModel
 
 
 class BoundModel:
-    """`model` with `constants` in the place of those of the robot file.
+    """A model whose constants replace those of the robot file.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ P = ParamSpec("P")
 
 @dataclass(frozen=True)
 class Check:
-    """One question.
+    """One question of the verdict with its answer.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Check:
 
 
 class Answer(NamedTuple):
-    """State and finding of a Check; remedy and limit where they are not those of its Question."""
+    """State and finding of a Check; remedy and limit replace those of its Question."""
 
     state: State
     finding: str
@@ -68,8 +68,9 @@ class Answer(NamedTuple):
 
 @dataclass(frozen=True)
 class Question:
-    """What a function answers, with the limit of a good answer and the remedy of another one: a
-    decorator that makes a Check of its Answer, and None of None.
+    """A decorator for functions that answer one question: it turns their Answer into a Check, and None into None.
+
+    It holds the limit of a good answer and the remedy for the others.
     """
 
     question: str
@@ -92,19 +93,19 @@ class Question:
 
 
 def worst_of(checks: Sequence[Check]) -> Check | None:
-    """The first check of the worst answer; None where all are good, open ones aside."""
+    """The first check with the worst answer; None if all answered checks are good."""
     return next((c for state in WORST[:2] for c in checks if c.state == state), None)
 
 
 def first_names(names: Sequence[str]) -> str:
-    """The first LIMIT.PARAMETERS_NAMED names, and how many more there are."""
+    """The first LIMIT.PARAMETERS_NAMED names, and the number of the others."""
     more = len(names) - LIMIT.PARAMETERS_NAMED
     listed = ", ".join(names[: LIMIT.PARAMETERS_NAMED])
     return f"{listed} and {more} more" if more > 0 else listed
 
 
 def state_of(value: float, good: float, usable: float) -> State:
-    """State of a number that should be small."""
+    """State of a number that should be small, from its two limits."""
     if value <= good:
         return "good"
     return "doubtful" if value <= usable else "no"

@@ -36,8 +36,7 @@ ANSWERS = {"good": "Yes", "doubtful": "With care", "no": "No"}
 
 @dataclass(frozen=True)
 class Checklist(Result):
-    """The verdict on an identification: whether its values can be used, the largest doubt, the next
-    step.
+    """Verdict on an identification: can its values be used, the largest doubt, and the next step.
 
     Attributes
     ----------
@@ -54,14 +53,14 @@ class Checklist(Result):
 
     @property
     def state(self) -> State:
-        """The worst answer."""
+        """The worst state of all checks."""
         return next(
             (state for state in WORST if any(check.state == state for check in self.checks)), "open"
         )
 
     @property
     def answer(self) -> str:
-        """Yes, with care, or no; a yes says where something was not judged."""
+        """Yes, With care or No; a Yes mentions that some checks did not run."""
         unanswered = any(check.state == "open" for check in self.checks)
         return ANSWERS[self.state] + (
             ", as far as judged" if self.state == "good" and unanswered else ""
@@ -69,12 +68,12 @@ class Checklist(Result):
 
     @property
     def worst(self) -> Check | None:
-        """The first check that is not good; None where all are, open ones aside."""
+        """The first check that is not good; None if all answered checks are good."""
         return worst_of(self.checks)
 
     @property
     def doubt(self) -> str:
-        """The largest doubt, in a sentence."""
+        """The largest doubt, in one sentence."""
         if self.worst is not None:
             return f"{self.worst.question} {self.worst.finding}."
         unanswered = [check.question for check in self.checks if check.state == "open"]
@@ -82,7 +81,7 @@ class Checklist(Result):
 
     @property
     def next(self) -> str:
-        """What to do, in a sentence."""
+        """The next step for the user, in one sentence."""
         if self.worst is not None:
             return f"{self.worst.remedy}."
         asked = [c.remedy for c in self.checks if c.state == "open" and c.remedy][:1]
@@ -109,7 +108,7 @@ class Checklist(Result):
         return f"{self.answer}. {self.use}\nBiggest doubt: {self.doubt}\nNext: {self.next}"
 
     def summary(self) -> dict[str, Any]:
-        """For JSON."""
+        """The verdict as a mapping for JSON."""
         checks = [
             {
                 "question": c.question,
@@ -144,9 +143,9 @@ def checklist_of(
     halves: bool = False,
     single: bool = False,
 ) -> Checklist:
-    """The checklist of an identification: what is wrong with the record, then what its predictions are worth, then its values.
+    """Check an identification: first its record, then its predictions, then its values.
 
-    Questions of the record alone are asked where it does not determine the parameters.
+    If the record does not determine the parameters, only the checks of the record are made.
 
     Parameters
     ----------
@@ -208,7 +207,7 @@ def checklist_of(
 
 
 def remark(check: Check, counts: bool) -> Check:
-    """The check, a remark where it does not count and has something to tell."""
+    """Turn a check that does not count into a remark, or into None if it has nothing to report."""
     if counts or check.state == "good":
         return check
     finding = f"Single values are not asked for. {check.finding}; {check.remedy}"
@@ -222,7 +221,7 @@ def remark(check: Check, counts: bool) -> Check:
     "fewer parameters (essential.threshold)",
 )
 def rank_and_condition(estimate: Estimate, fit: Estimate) -> Answer:
-    """Rank and condition of W with all columns (`estimate`) and with those of the model (`fit`)."""
+    """Check rank and condition of W with all columns (`estimate`) and with the used ones (`fit`)."""
     for one in (estimate, fit):
         if one.status == "rank-deficient":
             groups = "; ".join(", ".join(group) for group in one.groups)
@@ -248,7 +247,7 @@ def rank_and_condition(estimate: Estimate, fit: Estimate) -> Answer:
     "(--friction)",
 )
 def total_error(fit: Estimate) -> Answer:
-    """Error of the fit in total."""
+    """Check the relative error of the fit over all joints."""
     text = f"{fit.relative_error:.1f} % of them stay unexplained"
     return Answer(state_of(fit.relative_error, *LIMIT.TOTAL_ERROR), text)
 
@@ -257,8 +256,9 @@ def total_error(fit: Estimate) -> Answer:
 def explained_by_joint(
     estimate: Estimate, fit: Estimate, expected: float = float("nan")
 ) -> Answer | None:
-    """Error of the worst joint, which a total hides; no check of a single joint. Where predictions
-    are expected to be good (`expected`, %), a joint is no reason for a "no".
+    """Check the relative error of the worst joint, which the total may hide; not for a single joint.
+
+    If predictions are expected to be good (`expected`, %), the answer is never "no".
     """
     worst = fit.worst_joint
     if sum(joint.has_motor for joint in fit.per_joint) < 2 or worst.is_axis:
@@ -274,11 +274,10 @@ def explained_by_joint(
 
 
 def lost_joints(estimate: Estimate, fit: Estimate) -> str:
-    """The joints whose torque the removed parameters explained, and what to do; "" where there is
-    none.
+    """Joints whose torque was explained by removed parameters, and a remedy, in words; "" without such joints.
 
-    The threshold of the essential parameters looks at ||Y - W X|| of all joints. Without weights a
-    joint of large forces rules it, such as a lift in N beside a wrist in N m.
+    The threshold of the essential parameters uses ||Y - W X|| of all joints. Without weights it
+    mostly depends on the joint with the largest forces, such as a lift in N next to a wrist in N m.
     """
     if len(fit.names) == len(estimate.names):
         return ""
@@ -313,11 +312,11 @@ def predicted(
     differ: bool = False,
     expected: float = float("nan"),
 ) -> Answer:
-    """Largest relative error, %, on data that did not give the parameters; open where it is nan.
+    """Check the largest relative error, %, on data outside the fit; open if it is nan.
 
-    halves : it is that of a half of the record, fitted from the other half. Half a record may lack
-    what the whole one shows: good up to the second limit, or up to the last one where predictions
-    of the whole are expected to be good (`expected`, %); never a "no".
+    halves : the error is that of one half of the record, fitted from the other half. Half a record
+    may not excite all parameters: the answer is good up to the second limit, or up to the last one
+    if predictions of the whole are expected to be good (`expected`, %), and never "no".
     differ : records disagree by more than LIMIT.RELEVANT_DIFFERENCE.
     """
     limits = [
@@ -353,7 +352,7 @@ def predicted(
     "coupling, units and frame; fit again",
 )
 def signs(negative: Sequence[str]) -> Answer:
-    """Friction and motor inertias certainly below zero. Usual cause: the sign of a ratio."""
+    """Check that no friction or motor inertia is certainly below zero. Usual cause: the sign of a ratio."""
     if negative:
         return Answer("no", f"Below zero: {', '.join(negative)}")
     return Answer("good", "None is certainly below zero")
@@ -366,9 +365,7 @@ def signs(negative: Sequence[str]) -> Answer:
     "longer record, or one that excites them",
 )
 def certain(fit: Estimate, bootstrap: Mapping[str, float]) -> Answer:
-    """Deviations without the assumption of independent residuals; bootstrap : as for
-    `checklist_of`.
-    """
+    """Check the deviations, which do not assume independent residuals; bootstrap : as for `checklist_of`."""
     deviations = np.fmax(fit.sigma_corrected, [bootstrap.get(name, np.nan) for name in fit.names])
     with np.errstate(divide="ignore", invalid="ignore"):
         percent = 100 * np.where(np.isfinite(deviations), deviations, fit.sigma) / np.abs(fit.X)
@@ -392,7 +389,7 @@ def certain(fit: Estimate, bootstrap: Mapping[str, float]) -> Answer:
     "use them together or not at all; a motion that moves them apart tells them (symgen excite)",
 )
 def separate(fit: Estimate) -> Answer:
-    """Correlations of the estimates, eq. (10)."""
+    """Check the correlations of the estimates, eq. (10)."""
     deviation = np.sqrt(np.diag(fit.covariance))
     with np.errstate(divide="ignore", invalid="ignore"):
         correlation = fit.covariance / np.outer(deviation, deviation)
@@ -408,5 +405,5 @@ def separate(fit: Estimate) -> Answer:
 
 
 def rounded(cond: float) -> str:
-    """A condition number, three digits, without a power of ten where it is short."""
+    """A condition number with three digits, with a power of ten only if it is long."""
     return f"{float(f'{cond:.3g}'):.0f}" if 100 <= cond < 1e6 else f"{cond:.3g}"

@@ -32,13 +32,13 @@ BRIDGED_PERIODS = 10.0
 
 
 def sample(i: int) -> str:
-    """The place of sample i, from 0, of arrays."""
+    """Place of sample i, counted from 0, for messages about arrays."""
     return f"sample {i + 1}"
 
 
 @dataclass(frozen=True)
 class Stamps:
-    """Time stamps of one record and how messages name them.
+    """Time stamps of one record, with their names for messages.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Stamps:
 
 
 def rate_of(stamps: Stamps, t: Array) -> float:
-    """Sampling rate, Hz, of the stamps t, shape (N,), s: the stated one where there is one.
+    """Sampling rate, Hz, of the time stamps t, shape (N,), s; the stated rate if there is one.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def rate_of(stamps: Stamps, t: Array) -> float:
 
 
 def remedy(stamps: TimeStamps) -> dict[str, Any]:
-    """The settings `record.resample` that fit such a clock: short gaps are bridged, the record is split at long ones."""
+    """Settings `record.resample` that suit this clock: bridge short gaps, split the record at long ones."""
     periods = [gap.step / stamps.period for gap in stamps.gaps]
     most = max(BRIDGED / stamps.period, BRIDGED_PERIODS)
     short = [gap for gap in periods if gap <= most]
@@ -118,7 +118,10 @@ def remedy(stamps: TimeStamps) -> dict[str, Any]:
 
 
 def remedy_text(t: Array, stamps: TimeStamps, *, arrays: bool = False) -> str:
-    """Sentences: the rate that the samples have beside that of the period, the remedy that fits, and that for samples that are uniform though their stamps are not; arrays : the record is made of arrays, and the remedy is a call."""
+    """Sentences for a user: the mean rate compared with that of the period, the remedy, and a remedy for uniform samples with jittering stamps.
+
+    arrays : the record is made of arrays, and the remedy is a call.
+    """
     settings = remedy(stamps)
     step = np.diff(t)
     taken = step[(step > 0) & (step <= max(BRIDGED, BRIDGED_PERIODS * stamps.period))]
@@ -141,7 +144,7 @@ def remedy_text(t: Array, stamps: TimeStamps, *, arrays: bool = False) -> str:
 
 @dataclass(frozen=True)
 class Irregular:
-    """A step that is no jitter.
+    """An irregular step of the time stamps, larger than jitter.
 
     Attributes
     ----------
@@ -157,7 +160,7 @@ class Irregular:
 
     @property
     def step(self) -> float:
-        """Length, s."""
+        """Length of the step, s."""
         return self.after - self.before
 
 
@@ -190,11 +193,11 @@ class TimeStamps:
 
     @property
     def regular(self) -> bool:
-        """Whether every step is one period, jitter aside."""
+        """Whether every step is one period, within the jitter."""
         return not (self.gaps or self.resets or self.repeats)
 
     def to_text(self, row: Callable[[int], str] = lambda i: f"sample {i + 1}") -> str:
-        """One sentence; row : how the file counts sample i, from 0."""
+        """The regularity in one sentence; row : function from a sample number to its place in the file."""
         parts = [
             (
                 f"{self.samples} samples, median step {self.period:.6g} s, jitter up to "
@@ -222,13 +225,13 @@ class TimeStamps:
 
 
 def times(number: int, kind: str) -> str:
-    """1 gap, 2 steps back."""
+    """A number with its noun: "1 gap", "2 steps back"."""
     several = "steps back" if kind == "step back" else f"{kind}s"
     return f"{number} {kind if number == 1 else several}"
 
 
 def time_stamps(t: Array, *, gap: float = GAP, file: str = "record") -> TimeStamps:
-    """What the stamps t, shape (N,), s, are like."""
+    """Regularity of the time stamps t, shape (N,), s."""
     step = np.diff(t)
     forward = step[step > 0]
     if not len(forward):

@@ -14,12 +14,11 @@ from runtime.core.errors import encodable
 
 
 class Result:
-    """A dataclass with a text and a JSON text, whose keys it declares: `class Delay(Result,
-    keys="joints shift")`.
+    """Base of dataclasses with a text and a JSON text: `class Delay(Result, keys="joints shift")`.
 
-    keys : fields and properties in the order of JSON, key:name where JSON calls one otherwise;
-    default:
-    all fields.   schema : kind and version, the first key; None: a part of another result.
+    keys : fields and properties in the order of JSON, "key:name" for another name in JSON; default:
+    all fields.
+    schema : kind and version, the first key; None: a part of another result.
     """
 
     _keys: ClassVar[str]
@@ -34,7 +33,7 @@ class Result:
         return str(text())
 
     def summary(self) -> dict[str, Any]:
-        """What JSON holds of it, as a mapping."""
+        """The content of the JSON text as a mapping."""
         head = {} if self._schema is None else {"schema": self._schema}
         names = [word.partition(":") for word in self._keys.split() or self.__dataclass_fields__]
         return head | {key: getattr(self, name or key) for key, _, name in names}
@@ -45,8 +44,7 @@ class Result:
 
 
 def plain(value: Any) -> Any:
-    """`value` as JSON knows it: mappings, lists, text, finite numbers; what is not finite becomes
-    null.
+    """Convert `value` to types of JSON: mappings, lists, texts, finite numbers; null for nan and infinity.
 
     Results become their summaries, other dataclasses mappings of their fields, arrays lists,
     anything else its text.

@@ -67,8 +67,9 @@ def cestac(
     checkpoint: Checkpoint | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Cestac:
-    """Change of the estimate under coarser encoders and torque sensors, by the settings
-    study.cestac and the method of study.estimate.
+    """Change of the estimate with coarser encoders and torque sensors, eqs. (15) to (22), (28).
+
+    study.cestac has the settings, study.estimate the method.
 
     Parameters
     ----------
@@ -191,8 +192,9 @@ def _refuse(reference: Estimate) -> None:
 
 
 def levels_of(settings: CestacSettings) -> tuple[Level, ...]:
-    """Positions alone for every Delta; then torques alone, and torques with the first Delta, for
-    every Phi. In the loop, that of the study first.
+    """Levels of a study: each Delta alone, then each Phi alone and together with the first Delta.
+
+    In a simulated loop: a level without steps, then each Delta.
     """
     if settings.place == "loop":
         return (Level(0.0), *map(Level, settings.delta))
@@ -206,9 +208,10 @@ def levels_of(settings: CestacSettings) -> tuple[Level, ...]:
 
 
 def key_blocks(keys: Sequence[Key], runs: int, levels: int, common: bool) -> list[tuple[Key, ...]]:
-    """Keys (level, run) in tasks of at most LIMIT.TASK_RUNS runs with fixed borders: contiguous
-    runs of one level or, where levels share their random numbers, all levels of contiguous runs. A
-    study of few runs has small tasks, so that there are some for every worker.
+    """Split the runs into tasks of at most LIMIT.TASK_RUNS runs; the split does not depend on the workers.
+
+    A task holds contiguous runs of one level, or of all levels if these share their random numbers.
+    Tasks of a study with few runs are small, so that every worker gets some.
     """
     size = max(1, min(LIMIT.TASK_RUNS, runs // 4) // (levels if common else 1))
 
@@ -287,7 +290,10 @@ def _identity(
 
 
 def resolution(result: Identification, own_encoder: EncoderOf, loop_of: LoopOf) -> Cestac:
-    """The study of an identification at the steps of settings.cestac, of the columns that these name; own_encoder, loop_of : as of `cestac`."""
+    """Resolution study of an identification, with the steps and columns of settings.cestac.
+
+    own_encoder, loop_of : as for `cestac`.
+    """
     if not result.determined:
         raise InputError("the record does not determine the parameters")
     essential = result.study.cestac.columns != "all"

@@ -41,7 +41,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class PreparedRecord:
-    """One record, with what does not change from run to run.
+    """Data of one record that are the same in every run.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class PreparedRecord:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What every run needs; travels once to each process.
+    """Data that every run needs; sent once to each process.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ class Task:
 
     @property
     def columns(self) -> Columns:
-        """Its columns of W, for some runs one after the other."""
+        """Columns of W for several successive runs."""
         return Columns(self.model, self.names)
 
 
@@ -129,11 +129,10 @@ def prepared_record(
     drives: Drives | None = None,
     part: LoopRecord | None = None,
 ) -> PreparedRecord:
-    """Rows and torques of the measured record, through the filters of the study with the median of
-    study.cestac.
+    """Prepare one measured record: rows and torques through the filters of the study, with the median of study.cestac.
 
-    own_encoder : from a record to the encoder that made it.
-    part : rows of a simulated loop, chosen by its reference; default: by the measured velocities.
+    own_encoder : callable from a record to the encoder that measured it.
+    part : rows of a simulated loop, selected by its reference; default: by the measured velocities.
     """
     signals, record = replace(study.signals, median=study.cestac.median), own.record
     encoder, counts, note = own_encoder(record, study, drives), None, ""
@@ -194,9 +193,7 @@ def prepared_records(
     drives: Drives | None = None,
     loop: Loop | None = None,
 ) -> tuple[PreparedRecord, ...]:
-    """Rows and torques of every record; none where the encoder stands in the loop, whose records
-    are made anew.
-    """
+    """Prepare every measured record; empty if the encoder is in a simulated loop, which makes new records."""
     if study.cestac.place == "loop":
         return ()
     parts = [None] * len(records) if loop is None else list(loop.parts)
@@ -212,11 +209,13 @@ def study_columns(
     columns: Sequence[str] | None,
     loop: Loop | None = None,
 ) -> tuple[str, ...]:
-    """Columns that are fitted: all, or the essential ones of the identification that the problem describes. Names of
-    settings.cestac.columns come first, and the other essential ones follow: a fit without these would move what is judged.
+    """Columns that the runs fit: all, or the essential ones.
 
-    columns : essential names where they are known.
-            Raises SettingsError for a name that is no base parameter, and for poses at rest.
+    Names of settings.cestac.columns come first. The other essential columns are fitted too, because
+    without them their torques would change the named parameters.
+
+    columns : essential names if they are known.
+    Raises SettingsError for a name that is no base parameter, and for poses at rest.
     """
     settings, asked = problem.settings, problem.settings.cestac.columns
     require_motion(settings.signals, "the study of encoders")
@@ -244,8 +243,9 @@ def _measured(problem: Problem, records: Sequence[Prepared]) -> Observation:
 
 
 def stream_keys(draw: tuple[int, ...], k: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Streams of the positions and of the torques of record k: (*draw, 2 k) and (*draw, 2 k + 1),
-    positions of record 0 `draw` itself.
+    """Keys of the random streams of record k: (*draw, 2 k) for positions, (*draw, 2 k + 1) for torques.
+
+    Positions of record 0 have the key `draw` itself.
     """
     return ((*draw, 2 * k) if k else draw), (*draw, 2 * k + 1)
 
@@ -253,8 +253,9 @@ def stream_keys(draw: tuple[int, ...], k: int) -> tuple[tuple[int, ...], tuple[i
 def perturbed_position(
     q: Array, level: Level, settings: CestacSettings, drives: Drives | None, key: Sequence[int]
 ) -> Array:
-    """q_CESTAC of eqs. (15), (28), shape (N, n), from the measured q; `key` of its random
-    stream.
+    """Perturbed positions q_CESTAC of eqs. (15), (28), shape (N, n), from measured q.
+
+    key : of the random stream.
     """
     if not level.delta:
         return q
@@ -269,8 +270,9 @@ def perturbed_position(
 def perturbed_torque(
     tau: Array, level: Level, settings: CestacSettings, drives: Drives | None, key: Sequence[int]
 ) -> Array:
-    """Joint torques, shape (N, n), with motor torques (N m) rounded in steps of Phi; joint torques
-    where there are no drives.
+    """Joint torques, shape (N, n), after rounding motor torques (N m) in steps of Phi.
+
+    Without drives, joint torques are rounded.
     """
     rng = stream(settings.seed, *key)
     if drives is None:
@@ -282,9 +284,7 @@ def perturbed_torque(
 
 
 def torque_rows(task: Task, record: PreparedRecord, level: Level, key: Sequence[int]) -> Array:
-    """Y of one record before rows are left out, shape (n, K): as measured, or rounded in steps of
-    Phi.
-    """
+    """Y of one record, shape (n, K), before the selection of rows: as measured, or rounded in steps of Phi."""
     if not level.torque:
         return record.torque
     return decimated_torque(
@@ -293,9 +293,7 @@ def torque_rows(task: Task, record: PreparedRecord, level: Level, key: Sequence[
 
 
 def perturbed(columns: Columns, task: Task, level: Level, draw: tuple[int, ...]) -> Observation:
-    """The system with perturbed measurements; that of the measurements themselves at a level
-    without steps.
-    """
+    """System of equations with perturbed measurements; without steps, that of the measurements."""
     loop = task.loop
     if loop is not None and task.settings.place == "loop":
         rows = loop.rows(level, draw) if draw else loop.measured()
@@ -312,15 +310,20 @@ def perturbed(columns: Columns, task: Task, level: Level, draw: tuple[int, ...])
 
 
 def measured_rows(task: Task, records: Sequence[Prepared]) -> Observation:
-    """Rows of the records as the identification has them, with the median of its signals; those of a run without steps where the loop is simulated and where positions that are no counts count as exact."""
+    """Rows of the measured records, as the identification has them.
+
+    They are the rows of a run without steps if the loop is simulated, or if a counts reader takes the positions as exact.
+    """
     if task.loop is not None or any(record.note for record in task.records):
         return perturbed(task.columns, task, Level(0.0), ())
     return stacked(task.model, records, task.names)
 
 
 def run_position(task: Task, record: PreparedRecord, level: Level, key: Sequence[int]) -> Array:
-    """q_CESTAC of one run, from the measured positions or, where steps are hardly coarser than
-    those of the record, from a draw.
+    """q_CESTAC of one run.
+
+    It starts from the measured positions. If the steps are hardly coarser than those of the record,
+    it starts from a random motion that the recorded counts allow.
     """
     q = record.q
     if level.delta and record.own is not None:
@@ -329,8 +332,9 @@ def run_position(task: Task, record: PreparedRecord, level: Level, key: Sequence
 
 
 def run_states(task: Task, record: PreparedRecord, q: Array, level: Level) -> States:
-    """States of joint positions q, shape (N, n), by the reader of the study, which knows the steps
-    of the level but not their phase.
+    """States of joint positions q, shape (N, n), by the reader of the study.
+
+    The reader knows the steps of the level, but not their phase.
     """
     signals = record.selection.signals
     if signals.reader == "lowpass" or not level.delta:
@@ -361,10 +365,9 @@ def system_of(
     torques: Sequence[Array],
     level: Level | None = None,
 ) -> Observation:
-    """The stacked system of positions, shape (N, n), and torque rows, shape (n, K), of every
-    record, by the way of the identification.
+    """System of all records from positions, shape (N, n), and torque rows, shape (n, K), of each.
 
-    level : steps that the reader of counts is told; default: none, positions as they are.
+    level : steps for the counts reader; default: none, positions as they are.
     """
     observations = [
         observation_of(

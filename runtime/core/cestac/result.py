@@ -73,7 +73,7 @@ Verdict = Literal["unbiased", "doubtful", "biased"]
 
 @dataclass(frozen=True, eq=False)
 class LevelResult:
-    """One level of a study. Arrays are in the order of the names.
+    """Results of one level of steps. Arrays are in the order of the names.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ class LevelResult:
 
 @dataclass(frozen=True, eq=False)
 class Cestac(Result, Part):
-    """A resolution study.
+    """Result of a resolution study.
 
     Attributes
     ----------
@@ -163,8 +163,9 @@ class Cestac(Result, Part):
 
     @cached_property
     def deciding(self) -> tuple[str, ...]:
-        """Parameters that decide the verdict: %sigma (11) of the reference at most
-        LIMIT.DECIDING, of those that study.cestac.columns names.
+        """Parameters that decide the verdict.
+
+        Their %sigma (11) is at most LIMIT.DECIDING, and study.cestac.columns names them or is "essential" or "all".
         """
         return deciding_names(self.reference)
 
@@ -179,9 +180,7 @@ class Cestac(Result, Part):
 
     @property
     def finer_for_values(self) -> str:
-        """Why single values ask for a finer step than the residual does, a sentence after a blank;
-        "" where they do not.
-        """
+        """Sentence if single parameters need a finer step than the residual does, else ""."""
         apart = (
             level
             for level in self.levels
@@ -203,7 +202,7 @@ class Cestac(Result, Part):
 
     @property
     def message(self) -> str:
-        """The verdict of every step with what changes most there, in one sentence."""
+        """One sentence: the verdict of every step and the parameter that changes most."""
         if not self.levels:
             return "Nothing was perturbed."
         by_verdict: dict[str, list[str]] = {}
@@ -220,7 +219,7 @@ class Cestac(Result, Part):
 
     @property
     def estimator(self) -> str:
-        """Name of the method in tables: LS for least squares, whatever its weights."""
+        """Short name of the method for tables; LS for least squares with any weights."""
         return "LS" if self.reference.method in LINEAR else self.reference.method.upper()
 
     @property
@@ -229,47 +228,45 @@ class Cestac(Result, Part):
         return bool(sum(len(level.runs) for level in self.levels) <= LIMIT.RUNS_LISTED)
 
     def brief(self) -> str:
-        """The verdict of every step, then the changes of every parameter."""
+        """The verdict of every step, then the table of changes."""
         errors = self.error_table()
         return "\n".join([self.message, "", errors.caption, errors.to_text(), *self.notes])
 
     def to_table(self) -> str:
-        """Means as the chapter's Table 3, residual and verdict, then %e with %sigma, then every
-        verdict in words.
-        """
+        """Means as in Table 3 of the chapter, residual and verdict, %e with %sigma, then the verdicts as text."""
         means, residual, errors = self.mean_table(), self.residual_table(), self.error_table()
         notes = "\n".join([*(f"{r.level.label}: {r.message}" for r in self.levels), *self.notes])
         below = f"{errors.caption}\n{errors.to_text()}"
         return f"{means.to_text()}\n\n{residual.to_text()}\n\n{notes}\n\n{below}"
 
     def text(self) -> str:
-        """How the verdicts are to be read, then every verdict in words."""
+        """How to read the verdicts, then the verdict of every step."""
         verdicts = [f"{r.level.label}: {r.message}" for r in self.levels]
         return "\n".join([VERDICTS, *verdicts, *self.notes])
 
     def tables(self) -> list[Table]:
-        """Means, errors, residual and verdict."""
+        """Tables of means, changes, residuals and verdicts."""
         return [self.mean_table(), self.error_table(), self.residual_table()]
 
     def figures(self) -> tuple[Figure, ...]:
-        """%e against Delta; none without a step of the encoders."""
+        """Figure of %e against Delta; no figure without a step of the encoders."""
         steps = [r for r in self.levels if r.level.delta and not r.level.torque]
         return (error_against_resolution(self),) if steps else ()
 
     def entries(self) -> dict[str, Any]:
-        """Nothing: it has a file of its own."""
+        """Empty: the study is written to its own file, cestac.json."""
         return {}
 
     def files(self) -> dict[str, str]:
-        """cestac.json, and cestac.csv."""
+        """The files cestac.json and cestac.csv."""
         return {"cestac.json": self.to_json(), "cestac.csv": cestac_csv(self)}
 
     def arrays(self) -> dict[str, dict[str, Array]]:
-        """Names, levels and figures."""
+        """Arrays for NPZ and MAT files: names, levels and results."""
         return {"cestac": cestac_arrays(self)}
 
     def mean_table(self) -> Table:
-        """Mean of the runs of every parameter and level."""
+        """Mean over the runs for every parameter and level."""
         rows = [
             (name, number(self.reference.X[i]), *(number(r.mean[i]) for r in self.levels))
             for i, name in enumerate(self.names)
@@ -281,9 +278,7 @@ class Cestac(Result, Part):
         )
 
     def error_table(self) -> Table:
-        """%e (21) and, in brackets, %sigma (20) of every parameter and level; `*` marks parameters
-        that do not decide.
-        """
+        """%e (21) and, in brackets, %sigma (20) for every parameter and level; `*` marks parameters that do not decide."""
         rows = [
             (
                 name if name in self.deciding else f"{name} *",
@@ -303,7 +298,7 @@ class Cestac(Result, Part):
         )
 
     def residual_table(self) -> Table:
-        """Both readings of %e(rho), the increase of the norm, and the verdict, by level."""
+        """By level: both forms of %e(rho), the increase of the norm, and the verdict."""
         levels = self.levels
         rows = [
             (
@@ -335,7 +330,7 @@ class Cestac(Result, Part):
         )
 
     def summary(self) -> dict[str, Any]:
-        """What `to_json` writes, as a mapping."""
+        """The content of `to_json` as a mapping."""
         return {
             "schema": SCHEMA,
             "names": self.names,
@@ -357,8 +352,7 @@ class Cestac(Result, Part):
 
 
 def error_against_resolution(result: Cestac, names: Sequence[str] = ()) -> Figure:
-    """%e (21) against Delta on logarithmic axes, with the limits of the verdict and the increase of
-    the residual.
+    """Draw %e (21) against Delta on logarithmic axes, with the limits of the verdict and the increase of the residual.
 
     names : parameters drawn in colour; default: the six deciding ones that change most. The others
     are grey.
@@ -407,7 +401,7 @@ def error_against_resolution(result: Cestac, names: Sequence[str] = ()) -> Figur
 
 
 def cestac_arrays(result: Cestac) -> dict[str, Array]:
-    """Names, levels and figures of a resolution study; shapes (b,), (levels,) and (levels, b)."""
+    """Names, levels and results of a study as arrays of shape (b,), (levels,) and (levels, b)."""
     reference, levels, b = result.reference, result.levels, len(result.names)
     by_parameter = ("mean", "sigma", "relative_sigma", "e", "half_width", "half_width_percent")
     by_level = ("e_rho", "e_rho_own", "increase", "increase_own", "runs_needed")
@@ -434,8 +428,9 @@ def cestac_arrays(result: Cestac) -> dict[str, Array]:
 
 
 def cestac_csv(result: Cestac) -> str:
-    """cestac.csv: one line per level and parameter, then one for the residual ("rho": e is %e(rho),
-    its increase beside it).
+    """Text of cestac.csv: one line for each level and parameter, then one for the residual.
+
+    The residual is called "rho"; its e is %e(rho), and the next column is its increase.
     """
     reference, numbers = result.reference, ("mean", "sigma", "relative_sigma", "e", "half_width")
     rows: list[Sequence[Any]] = []
@@ -451,17 +446,17 @@ def cestac_csv(result: Cestac) -> str:
 
 
 def texts(words: Iterable[str]) -> Array:
-    """Words as an array."""
+    """Strings as an array."""
     return np.array(list(words), dtype=np.str_)
 
 
 def names_judged(settings: CestacSettings) -> dict[str, tuple[str, ...]]:
-    """Provenance of a reference of which some parameters alone are judged: their names."""
+    """Names of the judged parameters as an entry of the provenance, if not all of them are judged."""
     return {} if isinstance(settings.columns, str) else {JUDGED: settings.columns}
 
 
 def deciding_names(reference: Estimate) -> tuple[str, ...]:
-    """Names whose %sigma (11) is at most LIMIT.DECIDING, of those that are judged."""
+    """Judged names whose %sigma (11) is at most LIMIT.DECIDING."""
     asked = reference.provenance.get(JUDGED, reference.names)
     return tuple(
         name
@@ -473,8 +468,9 @@ def deciding_names(reference: Estimate) -> tuple[str, ...]:
 def level_result(
     level: Level, runs: Runs, measured: Observation, reference: Estimate
 ) -> LevelResult:
-    """Eqs. (18)-(22) and the verdict of one level; `measured` is the unperturbed system with the
-    columns of the runs.
+    """Eqs. (18) to (22) and the verdict of one level.
+
+    measured : the unperturbed system with the columns of the runs.
     """
     found = np.isfinite(runs.X).all(axis=1)
     runs, failed = runs.where(found), int(np.sum(~found))
@@ -535,8 +531,8 @@ def level_result(
 
 
 def runs_needed(spread: float) -> int:
-    """Fewest runs whose Student interval of the mean is narrower than LIMIT.NEGLIGIBLE on either
-    side;
+    """Smallest number of runs for a Student interval of the mean within LIMIT.NEGLIGIBLE.
+
     spread : 100 sigma / |X_LS|.
     """
     return 2 + bisect_left(

@@ -37,17 +37,16 @@ ADDED = ("two-point", "gaussian", "uniform")  # Modes that add Delta xi
 
 
 def stream(seed: int, *key: int) -> np.random.Generator:
-    """Random numbers of one draw: the same ones for the same seed and key, independent ones for
-    others.
-    """
+    """Random generator of one draw: equal for equal seed and key, independent for others."""
     return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=key)))
 
 
 def rounded(
     x: Array, step: float, mode: Mode, rng: np.random.Generator, uneven: float = 0.0
 ) -> Array:
-    """x, shape (N, n) or (N,), as measured with steps of `step` (in the unit of x). uneven :
-    deviation of the lines of mode phase, in steps.
+    """Perturb x, shape (N, n) or (N,), like an encoder with steps of `step` (in the unit of x).
+
+    uneven : deviation of the lines of law phase from even spacing, in steps.
     """
     if mode in ADDED:
         return np.asarray(x + step * noise(x.shape, mode, rng))
@@ -68,7 +67,7 @@ def rounded(
 
 
 def counted(x: Array, step: float, phase: float, uneven: float, rng: np.random.Generator) -> Array:
-    """Positions, shape (N,), that an encoder of these lines shows of x."""
+    """Positions, shape (N,), that an encoder with these lines shows for the motion x."""
     cell = (x - phase) / step
     if not uneven:
         return np.asarray(phase + step * np.floor(cell + 0.5))
@@ -88,25 +87,23 @@ def counted(x: Array, step: float, phase: float, uneven: float, rng: np.random.G
 
 
 def noise(shape: tuple[int, ...], mode: Mode, rng: np.random.Generator) -> Array:
-    """xi of a mode that adds, shape (N, n)."""
+    """Additive perturbation xi, shape (N, n)."""
     if mode == "two-point":
         return signs(shape, rng)
     return rng.standard_normal(shape) if mode == "gaussian" else rng.uniform(-1.0, 1.0, shape)
 
 
 def signs(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
-    """+1.0 or -1.0 with probability 1/2, one random bit each; columns are contiguous, as filters
-    want them.
-    """
+    """Random +1.0 or -1.0 with probability 1/2; columns are contiguous, as the filters need."""
     return np.take([-1.0, 1.0], np.ascontiguousarray(bits(shape, rng).T)).T
 
 
 def bits(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
-    """1 or 0 with probability 1/2."""
+    """Random 1 or 0 with probability 1/2."""
     size = int(np.prod(shape))
     return np.unpackbits(packed_bits(size, rng), count=size).reshape(shape)
 
 
 def packed_bits(size: int, rng: np.random.Generator) -> Array:
-    """`size` random bits, the high ones of a byte first, and one byte more."""
+    """`size` random bits in bytes, high bits first, and one byte more."""
     return np.frombuffer(rng.bytes(-(-size // 8) + 1), dtype=np.uint8)

@@ -25,14 +25,15 @@ USABLE = ("ok", "weak-instruments")  # Status of an estimate that counts as a ru
 
 
 def run_block(task: Task, keys: Sequence[tuple[int, int]]) -> Runs:
-    """Several runs, one after the other; key = (level, run)."""
+    """Compute several runs one after the other; key = (level, run)."""
     columns = task.columns
     return Runs.of([one_run(columns, task, key) for key in keys], len(task.names))
 
 
 def one_run(columns: Columns, task: Task, key: tuple[int, int]) -> Run:
-    """One estimate from perturbed measurements; key = (level, run). X of nan where the method finds
-    no estimate.
+    """Estimate from perturbed measurements, eq. (17); key = (level, run).
+
+    X is nan if the method finds no estimate.
     """
     level = task.levels[key[0]]
     draw = key[1:] if task.settings.common else key

@@ -34,7 +34,7 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Runs(Sequence[Run]):
-    """R runs as arrays, which is what travels between processes and lies on disk.
+    """R runs as arrays, for transfer between processes and for files.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Runs(Sequence[Run]):
 
     @classmethod
     def of(cls, runs: Sequence[Run], b: int) -> Runs:
-        """Runs with b parameters each."""
+        """Arrays of single runs with b parameters each."""
         return cls(
             np.array([run.level for run in runs], dtype=np.int64),
             np.array([run.run for run in runs], dtype=np.int64),
@@ -60,7 +60,7 @@ class Runs(Sequence[Run]):
 
     @classmethod
     def joined(cls, parts: Sequence[Runs], b: int) -> Runs:
-        """All runs of the parts, by level and number; of a run that comes twice, the first."""
+        """All runs of several parts, sorted by level and number; a repeated run is kept once."""
         parts = [cls.of((), b), *parts]
         fields = [
             np.concatenate([getattr(part, name) for part in parts])
@@ -70,7 +70,7 @@ class Runs(Sequence[Run]):
         return cls(*(field[first] for field in fields))
 
     def where(self, selected: Array) -> Runs:
-        """The selected runs; bool of shape (R,), or numbers."""
+        """Select runs by a mask of shape (R,) or by their numbers."""
         return Runs(*(getattr(self, name)[selected] for name in self.__dataclass_fields__))
 
     @property
@@ -92,7 +92,7 @@ class Runs(Sequence[Run]):
 
 @dataclass(frozen=True)
 class Level:
-    """Steps of one column of the study; 0 means not perturbed.
+    """Steps of one level of a study; 0 means not perturbed.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class Level:
 
     @property
     def label(self) -> str:
-        """Such as `2*pi/10000`, or `Phi 0.01` for a torque."""
+        """Label of the level: `2*pi/10000` for a position, `Phi 0.01` for a torque."""
         parts = []
         if self.delta:
             counts = 2 * np.pi / self.delta

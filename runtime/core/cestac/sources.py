@@ -20,7 +20,7 @@ Array = np.ndarray
 
 
 class RecordEncoder(Protocol):
-    """The encoder of one record.
+    """Encoder that measured one record.
 
     step : ndarray, shape (n,), rad or m.   read : whether its counts have been read.
     """
@@ -32,11 +32,14 @@ class RecordEncoder(Protocol):
     def read(self) -> bool: ...
 
     def positions(self, q: Array, delta: float, rng: np.random.Generator) -> Array:
-        """Joint positions, shape (N, n), that an encoder of step delta may be judged on."""
+        """Joint positions, shape (N, n), from which a coarser encoder of step delta can be simulated."""
 
 
 class LoopRecord(Protocol):
-    """Rows of one record of a simulated loop; torque, shape (n, K), before rows are left out."""
+    """Rows of one record of a simulated loop.
+
+    torque : ndarray, shape (n, K), before the selection of rows.
+    """
 
     @property
     def prepared(self) -> Prepared: ...
@@ -49,9 +52,9 @@ class LoopRecord(Protocol):
 
 
 class Loop(Protocol):
-    """A closed loop that is simulated.
+    """Closed loop that a study simulates again in each run.
 
-    estimate : settings of the estimate without what is the loop's.   described : for JSON.   notes : sentences for the reader of the study.
+    estimate : settings of the estimate without those of the loop.   described : description for JSON.   notes : sentences for the user.
     """
 
     @property
@@ -67,26 +70,26 @@ class Loop(Protocol):
     def notes(self) -> tuple[str, ...]: ...
 
     def measured(self) -> Observation:
-        """Rows of the records as measured."""
+        """Rows of the measured records."""
 
     def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
-        """`observation` of the perturbed positions of every record, with the loop attached."""
+        """`observation` from the perturbed positions of every record, with this loop attached."""
 
     def rows(self, level: Level, draw: tuple[int, ...]) -> Observation:
-        """Rows of a record made with encoders of steps of level.delta."""
+        """Rows of a record that is simulated with encoder steps of level.delta."""
 
 
 class Checkpoint(Protocol):
-    """Where runs are kept while a study lasts."""
+    """Store for the runs of a study that may be interrupted."""
 
     def resume(self, identity: Mapping[str, Any], b: int) -> Runs:
-        """The runs, b parameters each, that an earlier study of this identity left."""
+        """Runs, with b parameters each, that an interrupted study with the same identity has stored."""
 
     def add(self, runs: Runs) -> None:
-        """Take new runs."""
+        """Add new runs."""
 
     def flush(self) -> None:
-        """Keep all that were taken."""
+        """Write all added runs."""
 
 
 EncoderOf: TypeAlias = Callable[[Record, Study, Drives | None], RecordEncoder | None]
