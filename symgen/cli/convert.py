@@ -74,6 +74,7 @@ def convert(
         from symgen.description.files import read_robot, write_robot
         from symgen.description.tree import DROPPED
         from symgen.description.values import assignment, values_of_csv, with_estimate, with_values
+        from symgen.regroup.regrouping import regroup
 
         if output.exists() and not force:
             fail(f"{output} exists already; choose another name or add --force")
@@ -85,6 +86,8 @@ def convert(
             lock=dict(assignment(text, "--lock") for text in lock or ()),
             chain=chain,
         )
+        if robot.impossible:
+            regroup(robot)  # whose note names the base parameters
         if values is not None:
             from runtime.reading.files import read_bytes
 

@@ -16,6 +16,7 @@ from symgen.cli.session import described_robot, fail, reported_errors
 
 if TYPE_CHECKING:
     from symgen.description import Robot
+    from symgen.regroup.regrouping import Regrouping
 
 FORMATS = ("text", "latex", "latex-fragment", "json", "sympy")
 OF_MODELS = ("latex-fragment", "sympy")
@@ -124,23 +125,34 @@ def show(
         described = described_robot(robot, at_values, exact)
         if model is not None:
             typer.echo(model_text(described, model, kind, asked))
-        elif html:
-            typer.echo(page_file(described, output))
         else:
-            from symgen.pages.formulas import printed
-            from symgen.regroup.regrouping import regroup
+            regrouping = regrouping_of(described, decimals=at_values)
+            if html:
+                typer.echo(page_file(regrouping, output))
+            else:
+                from symgen.pages.formulas import printed
 
-            form = "recursive" if recursive else kind
-            typer.echo(printed(regroup(described), form, only))
+                typer.echo(printed(regrouping, "recursive" if recursive else kind, only))
 
 
-def page_file(robot: Robot, output: Path | None) -> Path:
-    """Path of the page of a robot, written to `output` or to <name>.html."""
-    from symgen.pages.page import robot_page
+def regrouping_of(robot: Robot, *, decimals: bool) -> Regrouping:
+    """The base parameters of a robot; decimals : coefficients without a symbol as decimals."""
     from symgen.regroup.regrouping import regroup
 
-    path = output or Path(f"{robot.name}.html")
-    return write_all(path.parent, {path.name: robot_page(regroup(robot))})[0]
+    regrouping = regroup(robot)
+    if decimals:
+        from symgen.symbols.expressions import in_decimals
+
+        regrouping = in_decimals(regrouping)
+    return regrouping
+
+
+def page_file(regrouping: Regrouping, output: Path | None) -> Path:
+    """Path of the page of a robot, written to `output` or to <name>.html."""
+    from symgen.pages.page import robot_page
+
+    path = output or Path(f"{regrouping.robot.name}.html")
+    return write_all(path.parent, {path.name: robot_page(regrouping)})[0]
 
 
 def model_text(robot: Robot, model: str, kind: str, asked: Mapping[str, Any]) -> str:

@@ -18,6 +18,10 @@ class RobotFileWarning(UserWarning):
     """What a foreign robot file says that its author probably did not mean."""
 
 
+class InertiaWarning(RobotFileWarning):
+    """A link of a URDF has an inertia that no body can have."""
+
+
 class AngleWarning(RobotFileWarning):
     """Angles of a file were taken as multiples of pi/12; `exact=True` takes them as written."""
 

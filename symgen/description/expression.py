@@ -18,6 +18,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, lru_cache
+from heapq import heappop, heappush
 from typing import Any, NamedTuple, TypeAlias
 
 from symgen.errors import DescriptionError
@@ -72,6 +73,13 @@ class Number:
     """
 
     value: Fraction
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:  # of a fraction: slow
+        return hash(self.value)
 
     @cached_property
     def text(self) -> str:
@@ -215,13 +223,14 @@ class Expression:
 
     def mapped(self, image: Callable[[Atom], Expression]) -> Expression:
         """Replace every atom by its image."""
-        result = Expression()
+        terms: dict[Monomial, Fraction] = {}
         for m, c in self.terms.items():
             term = Expression({(): c})
             for a, n in m:
                 term = term * image(a) ** n
-            result = result + term
-        return result
+            for new, value in term.terms.items():
+                terms[new] = terms.get(new, Fraction(0)) + value
+        return Expression(terms)
 
     def substitute(self, values: Mapping[str, Expression]) -> Expression:
         """Replace symbols by expressions."""
@@ -539,19 +548,53 @@ def with_known_cosines(e: Expression) -> Expression:
 
 def simplified(e: Expression) -> Expression:
     """cos(a)**2 m + sin(a)**2 m = m and m - cos(a)**2 m = sin(a)**2 m wherever both terms are there
-    with one coefficient.
+    with one coefficient: of the first term that has a partner, until none has.
     """
+    terms: dict[Monomial, Fraction] = {}
+    monomials: list[Monomial] = []  # by their place
+    places: dict[Monomial, int] = {}
+    partners: dict[Monomial, list[Monomial]] = {}  # terms that a monomial may be taken with
+    waiting: list[int] = []  # places of terms that may have a partner
+
+    def add(m: Monomial, c: Fraction) -> None:
+        if m not in terms:
+            places[m] = len(monomials)
+            monomials.append(m)
+            for pair in _sine_and_rest(m):
+                for other in pair:
+                    partners.setdefault(other, []).append(m)
+        terms[m] = terms.get(m, Fraction(0)) + c
+        if not terms[m]:
+            del terms[m]
+        for changed in (m, *partners.get(m, ())):
+            heappush(waiting, places[changed])
+
+    def shorten(m: Monomial, c: Fraction) -> None:
+        for sine, rest in _sine_and_rest(m):
+            for partner, shorter, value in ((sine, rest, c), (rest, sine, -c)):
+                if terms.get(partner) == value:
+                    del terms[m], terms[partner]
+                    add(shorter, value)
+                    return
+
     for m, c in e.terms.items():
-        for a, n in m:
-            if isinstance(a, Call) and a.function == "cos" and n >= 2:
-                rest = tuple((b, k - 2 if b == a else k) for b, k in m if b != a or k > 2)
-                cosine, common = Expression({m: c}), Expression({rest: c})
-                sine = common * _atom(Call("sin", a.argument)) ** 2
-                for partner, shorter in ((sine, common), (-common, -sine)):
-                    ((key, value),) = partner.terms.items()
-                    if e.terms.get(key) == value:
-                        return simplified(e - cosine - partner + shorter)
-    return e
+        add(m, c)
+    while waiting:
+        place = heappop(waiting)
+        m = monomials[place]
+        if m in terms and places[m] == place:
+            shorten(m, terms[m])
+    return Expression(terms)
+
+
+def _sine_and_rest(m: Monomial) -> list[tuple[Monomial, Monomial]]:
+    """m with sin(a)**2 in place of cos(a)**2, and m without it, for each a."""
+    pairs = []
+    for a, n in m:
+        if isinstance(a, Call) and a.function == "cos" and n >= 2:
+            rest = tuple((b, k - 2 if b == a else k) for b, k in m if b != a or k > 2)
+            pairs.append((_product(rest, ((Call("sin", a.argument), 2),)), rest))
+    return pairs
 
 
 def quarter_turns(angle: Expression) -> tuple[int, Expression]:

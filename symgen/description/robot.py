@@ -205,6 +205,8 @@ class Robot:
         ),
     ] = Field(default={})
     angles: Annotated[str, *UNWRITTEN] = ""  # how those of a foreign file were read
+    # of links whose inertia no body can have: the frame, and what is wrong
+    impossible: Annotated[tuple[tuple[int, str], ...], *UNWRITTEN] = ()
     file: Annotated[str, *UNWRITTEN] = ""
     sha256: Annotated[str, *UNWRITTEN] = ""
 

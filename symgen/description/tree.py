@@ -38,11 +38,14 @@ class Inertial:
         Frame at the centre of mass, in the link frame.
     I : ndarray, shape (3, 3), kg m^2
         Tensor elements about the centre of mass, in that frame.
+    wrong : str
+        Which link of the file it is and why no body has this inertia; "" where one has.
     """
 
     M: float
     pose: Array
     I: Array
+    wrong: str = ""
 
 
 @dataclass(frozen=True)

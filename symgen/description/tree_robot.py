@@ -154,6 +154,12 @@ def _robot(table: Table, file: str, sha256: str) -> Robot:
         values=values,
         labels=_labels(table),
         angles=table.tree.angles,
+        impossible=tuple(
+            (j, own.wrong)
+            for j, body in table.bodies.items()
+            for own in map(table.tree.links.__getitem__, body.links)
+            if own is not None and own.wrong
+        ),
         file=file,
         sha256=sha256,
     )

@@ -9,13 +9,12 @@ line.
 from __future__ import annotations
 
 import sys
-import warnings
 from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
 
-from symgen.description.angles import Angles, RobotFileWarning
+from symgen.description.angles import Angles
 from symgen.description.expression import Expression, ratio
 from symgen.description.tree import (
     DROPPED,
@@ -43,10 +42,6 @@ READ = {
 
 
 ROUNDING = 1e-6  # of moments that a file rounds
-
-
-class InertiaWarning(RobotFileWarning):
-    """A link of a URDF has an inertia that no body can have."""
 
 
 def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
@@ -171,15 +166,9 @@ def _inertial(link: XmlElement, angles: Angles) -> Inertial | None:
         return Inertial(M, pose, np.zeros((3, 3)))
     xx, xy, xz, yy, yz, zz = (inertia.number(name) for name in MOMENTS)
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    if wrong := no_body(M, tensor):
-        warnings.warn(
-            f"link {link.word('name')!a:.60} (line {inertia.line}): {wrong}; it enters the base parameters "
-            "of this link and of those before it. Give the moments about the centre of mass, kg m^2, of CAD "
-            "or of a box, or identify them",
-            InertiaWarning,
-            stacklevel=2,
-        )
-    return Inertial(M, pose, tensor)
+    wrong = no_body(M, tensor)
+    name = f"link {link.word('name')!a:.60} (line {inertia.line})"
+    return Inertial(M, pose, tensor, f"{name}: {wrong}" if wrong else "")
 
 
 def no_body(M: float, tensor: Array) -> str:

@@ -8,6 +8,7 @@ checks the whole.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -20,6 +21,7 @@ from symgen.derive.loops import close
 from symgen.derive.numbers import numbered
 from symgen.derive.regressor import element_names, inertial_names
 from symgen.derive.time_limit import limited
+from symgen.description.angles import InertiaWarning
 from symgen.description.expression import (
     ONE,
     ZERO,
@@ -28,7 +30,7 @@ from symgen.description.expression import (
     with_known_cosines,
 )
 from symgen.description.kinds import OWN_LAWS
-from symgen.description.robot import PRISMATIC, Robot
+from symgen.description.robot import INERTIAL, PRISMATIC, Robot, parameter
 from symgen.regroup.finite_field import rref
 from symgen.regroup.floats import float_relations, numeric_coefficients
 from symgen.regroup.formula import Formula
@@ -128,7 +130,22 @@ def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
         time than its limit.
     """
     with limited(f"the regrouping of {robot.name}"):
-        return _regrouped(robot, seed)
+        regrouping = _regrouped(robot, seed)
+    _warn(regrouping)
+    return regrouping
+
+
+def _warn(regrouping: Regrouping) -> None:
+    """An InertiaWarning for each link whose inertia no body can have, with what it enters."""
+    for j, wrong in regrouping.robot.impossible:
+        moments = {parameter(p, j) for p in INERTIAL[:6]}
+        names = [b.name for b in regrouping.base if moments & b.combination.keys()]
+        warnings.warn(
+            f"{wrong}; it enters {', '.join(names) or 'no base parameter'}. Give the moments about "
+            "the centre of mass, kg m^2, of CAD or of a box, or identify them",
+            InertiaWarning,
+            stacklevel=3,
+        )
 
 
 @lru_cache(maxsize=16)

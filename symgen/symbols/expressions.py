@@ -6,6 +6,7 @@ SymPy's printers write them so with order="none"; `evaluated` makes ordinary obj
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -13,8 +14,10 @@ import sympy
 
 from symgen.description.expression import FUNCTIONS, ONE, Call, Expression, Monomial, Number
 from symgen.regroup.formula import Formula
+from symgen.regroup.regrouping import Regrouping
 
 Tree = Any  # a SymPy expression that is not evaluated
+DIGITS = 15
 MINUS = sympy.S.NegativeOne
 
 
@@ -140,6 +143,21 @@ def evaluated(x: Tree, values: Mapping[str, Any]) -> Any:
     if not x.name[0].isidentifier():
         return sympy.Rational(x.name.strip("()"))
     return values.get(x.name, symbol(x.name))
+
+
+def in_decimals(regrouping: Regrouping) -> Regrouping:
+    """The same formulas to be read: each coefficient without a symbol as a decimal of DIGITS digits."""
+
+    def rounded(c: Expression) -> Expression:
+        digits = sympy.N(evaluated(expression(c), {}), DIGITS)
+        return c if c.symbols else Expression.number(str(digits))
+
+    base = (
+        replace(b, combination={name: rounded(c) for name, c in b.combination.items()})
+        for b in regrouping.base
+    )
+    steps = ((source, target, rounded(c)) for source, target, c in regrouping.steps)
+    return replace(regrouping, base=tuple(base), steps=tuple(steps))
 
 
 def size(x: Tree) -> int:

@@ -2,6 +2,8 @@
 prints.
 """
 
+from pathlib import Path
+
 import pytest
 from campaign import some
 from typer.testing import CliRunner
@@ -115,6 +117,22 @@ def test_decimals_for_round_angles_are_told(tmp_path, angle, meant):
             result.stderr.startswith("note: frame 1: alpha has")
             and f", not {meant}: another robot" in result.stderr
         )
+
+
+BOX = """<robot name="m"><link name="base"/>
+<link name="a"><inertial><mass value="1"/>
+<inertia ixx="0.02" iyy="0.006" izz="0.006" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="j" type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/></joint>
+</robot>"""
+
+
+@pytest.mark.parametrize("words", [["show"], ["check"], ["convert", "out.yaml"]], ids=str)
+def test_an_inertia_that_no_body_can_have_is_told_once(tmp_path, monkeypatch, words):
+    monkeypatch.chdir(tmp_path)
+    Path("m.urdf").write_text(BOX)
+    result = CliRunner().invoke(app, [words[0], "m.urdf", *words[1:]])
+    assert result.exit_code == 0
+    assert result.stderr.count("ixx 0.02 > iyy + izz 0.012; it enters ZZ1R.") == 1
 
 
 @pytest.mark.parametrize(

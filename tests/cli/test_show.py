@@ -189,3 +189,37 @@ def test_show_emits_and_certifies_nothing(monkeypatch):
     model = run("planar_2r", "--model", "inertia_matrix", "--format", "latex")
     assert model.exit_code == 0
     assert not [n for n in sys.modules if n.startswith("symgen.certify")]
+
+
+DECIMAL_ANGLES = """\
+symgen: 1
+name: arm
+gravity: [0, 0, -g]
+constants: {g: 9.81, D3: 0.4, R3: 0.12, A1: 0.02, A2: 1.571, A3: -1.5712}
+frames:
+  1: {ant: 0, sigma: 0, alpha: A1, d: 0,  theta: q1, r: 0}
+  2: {ant: 1, sigma: 0, alpha: A2, d: 0.1,  theta: q2, r: 0}
+  3: {ant: 2, sigma: 0, alpha: A3, d: D3, theta: q3, r: R3}
+"""
+
+
+@pytest.mark.parametrize("form", [[], ["--recursive"], ["--format", "latex"], ["--json"]], ids=str)
+def test_at_values_prints_coefficients_as_decimals(tmp_path, form):
+    (tmp_path / "arm.yaml").write_text(DECIMAL_ANGLES)
+    out = run(tmp_path / "arm.yaml", "--at-values", *form).stdout
+    assert "cos" not in out and "sin" not in out
+    assert max(len(digits) for digits in re.findall(r"\.0*([1-9]\d*)", out)) == 15
+
+
+def test_decimals_are_the_values_of_the_exact_coefficients(tmp_path):
+    (tmp_path / "arm.yaml").write_text(DECIMAL_ANGLES)
+    robot = load_robot(tmp_path / "arm.yaml")
+    shown = json.loads(run(tmp_path / "arm.yaml", "--at-values", "--json").stdout)
+    exact = regroup(robot).base
+    for parameter, printed in zip(exact, shown["base_parameters"], strict=True):
+        values = {t["parameter"]: parse(t["coefficient"], ()) for t in printed["terms"]}
+        assert values.keys() == parameter.combination.keys()
+        for name, c in parameter.combination.items():
+            assert float(values[name]) == pytest.approx(
+                c.value(robot.constants), rel=1e-11
+            )  # cos(1.571) of floats has 12 digits

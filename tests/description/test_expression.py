@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from symgen.description.expression import Expression
+from symgen.description.expression import Expression, simplified
 from symgen.description.grammar import MAX_LENGTH, parse
 from symgen.errors import ExpressionError
 
@@ -166,3 +166,11 @@ def test_any_text_of_the_alphabet_is_read_or_refused(text):
 )
 def test_squares_of_cosine_and_sine_are_one(text: str, simple: str) -> None:
     assert str(parse(text, ("L",))) == simple
+
+
+def test_an_identity_of_a_thousand_terms_is_seen():
+    """One replacement after the other: each was a call inside the last, and a look at every term."""
+    ones, names = Expression.number(1), [f"a{k}" for k in range(10)]
+    for name in names:
+        ones = ones * (parse(f"cos({name})", names) ** 2 + parse(f"sin({name})", names) ** 2)
+    assert len(ones.terms) == 2**10 and str(simplified(ones)) == "1"

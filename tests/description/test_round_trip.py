@@ -15,7 +15,12 @@ from symgen.description.parts import Drives, Frame, Loop
 from symgen.description.robot import Robot
 from symgen.description.yaml import write_yaml
 
-READ_FROM_OTHERS = ("angles", "file", "sha256")  # of the file that was read, no keys of it
+READ_FROM_OTHERS = (
+    "angles",
+    "impossible",
+    "file",
+    "sha256",
+)  # of the file that was read, no keys of it
 EVERY_KEY = b"""\
 symgen: 1
 name: every_key
