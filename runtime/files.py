@@ -47,7 +47,7 @@ def report(
     *,
     study: Study | None = None,
 ) -> list[Path]:
-    """Write the page and the files of a result into a folder: all of them, or none.
+    """Write the report and the files of a result into a folder: all of them, or none.
 
     Parameters
     ----------

@@ -134,7 +134,7 @@ def study_schema() -> dict[str, Any]:
 
 
 def load_study(path: str | Path) -> Study:
-    """The Study of a study file; raises SettingsError with file, line and key."""
+    """Read a study file; SettingsError with file, line and key for an invalid one."""
     require_kind(path, (str, Path), "study", "the name of a study file")
     return study_from_text(text_of(path), file=Path(path).name)
 
@@ -174,7 +174,7 @@ def read_record(
     folder: str | Path = ".",
     missing: bool = False,
 ) -> Record:
-    """One measured record, joint side, SI.
+    """Read one measured record, converted to the joint side and SI.
 
     Parameters
     ----------

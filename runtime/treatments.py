@@ -144,7 +144,7 @@ class Ranking:
 def compare(
     problems: Mapping[str, Problem], extras: Sequence[Extra], of_the_best: Sequence[Extra] = ()
 ) -> Ranking:
-    """Identify with each of several treatments, and order them by what they predict.
+    """Identify with several studies and order these by their error on unseen data.
 
     Parameters
     ----------

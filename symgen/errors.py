@@ -13,7 +13,7 @@ LONGEST = 2000  # characters of a message: a file may hold names of any length
 
 
 class SymgenError(Exception):
-    """Root of all errors raised on bad input or on a derivation that cannot be completed."""
+    """Base of all errors for bad input and for a derivation that cannot be completed."""
 
     def __init__(self, message: str = "") -> None:
         super().__init__(printable(message))

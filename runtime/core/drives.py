@@ -24,7 +24,7 @@ Coupling = Literal["both", "position", "torque", "none"]
 
 @dataclass(frozen=True, eq=False)
 class Drives:
-    """Transmission of n joints.
+    """Drives of n joints: gear ratios with couplings, offsets and torque constants.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class Drives:
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> Drives:
-        """Drives of the DRIVES constant of an emitted module."""
+        """Read drives from the DRIVES constant of an emitted module."""
         constant = mapping.get("torque_constant")
         return cls(
             mapping["ratio"],
@@ -92,9 +92,7 @@ class Drives:
         return len(self.ratio)
 
     def decoupled(self, coupling: Coupling) -> Drives:
-        """The same drives with the coupling in `both` directions, in the `position` or the `torque`
-        alone, or in `none`.
-        """
+        """The same drives with the coupling applied in `both` directions, in `position` or `torque` only, or in `none`."""
         return replace(self, coupling=coupling)
 
     def joint_position(self, qm: Array) -> Array:
@@ -119,9 +117,7 @@ class Drives:
 
     @property
     def motion(self) -> Array:
-        """Turns of the motors by turns of the joints, shape (n, n): R, or its diagonal where
-        positions are taken as decoupled.
-        """
+        """Motor turns per joint turn, shape (n, n): R, or its diagonal if positions are decoupled."""
         return self._matrix("position")
 
     def _matrix(self, quantity: str) -> Array:
@@ -138,7 +134,7 @@ class Drives:
 
 
 def encoder_drives(side: str, drives: Drives | None, section: str = "signals") -> Drives | None:
-    """The drives between the joints and encoders on that side; None where these are at the joints.
+    """Drives between the joints and the encoders; None if the encoders are at the joints.
 
     section : of the study, which names the side.
     """

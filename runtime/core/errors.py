@@ -15,9 +15,7 @@ LONGEST = 2000  # characters of a message: a file may hold names of any length
 
 
 def printable(text: str) -> str:
-    """`text` as a terminal may show it: control characters spelled out, the middle of a long text
-    left out.
-    """
+    """`text` for a terminal: control characters as escapes, a long text without its middle."""
     for _ in range(2):  # spelled out, a text may be too long again
         if len(text) > LONGEST:
             text = f"{text[: LONGEST - 400]} ... {text[-300:]}"
@@ -27,14 +25,12 @@ def printable(text: str) -> str:
 
 
 def encodable(text: str) -> str:
-    """`text` with the bytes of file names that are no UTF-8 (lone surrogates) as escapes of
-    JSON.
-    """
+    """`text` with bytes that are not UTF-8 (lone surrogates of file names) as JSON escapes."""
     return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def first_line(error: BaseException) -> str:
-    """The first line of the message of another library's error."""
+    """First line of the message of an error of another library."""
     return str(error).partition("\n")[0] or type(error).__name__
 
 
@@ -106,12 +102,13 @@ class SettingsError(InputError):
 
 
 class ModelError(InputError):
-    """A module that is not an emitted model, or not the one a function needs."""
+    """A module that is not an emitted model, or lacks what a function needs."""
 
 
 class DataUnavailableError(InputError):
-    """A dataset that is neither on this machine nor at its source; `tried` lists the places and
-    what went wrong in each.
+    """A dataset that is neither on this machine nor at its source.
+
+    `tried` lists the places and the error of each.
     """
 
     def __init__(self, message: str, *, tried: tuple[str, ...] = ()) -> None:
@@ -120,7 +117,5 @@ class DataUnavailableError(InputError):
 
 
 def instant(t: float) -> str:
-    """A time, s, for messages: six digits; to the millisecond where it counts from an epoch, or two
-    instants of a record would read alike.
-    """
+    """A time, s, for messages: six digits, or to the millisecond if it counts from an epoch."""
     return f"{t:g}" if abs(t) < 1e5 else f"{t:.3f}"

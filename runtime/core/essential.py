@@ -30,7 +30,7 @@ THRESHOLDS = (1.02, 1.03, 1.04, 1.05, 1.06, 1.07, 1.08, 1.09, 1.10)
 
 @dataclass(frozen=True)
 class Removal:
-    """One step of the trail.
+    """Test of one parameter during the elimination.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Removal:
 
 @dataclass(frozen=True, eq=False)
 class Essential(Result):
-    """The essential parameters, and the trail that leads to them.
+    """The essential parameters, and the elimination that found them.
 
     Attributes
     ----------
@@ -82,11 +82,11 @@ class Essential(Result):
 
     @property
     def removed(self) -> tuple[str, ...]:
-        """Names removed, in order."""
+        """Names of the removed parameters, in the order of their removal."""
         return tuple(step.name for step in self.trail if step.removed)
 
     def to_table(self) -> str:
-        """The trail, then the counts by threshold."""
+        """Table of the removals, then the number of parameters for each threshold."""
         first = len(self.all_parameters.names)
         lines: list[Sequence[str]] = [("removed", "left", "%sigma", "sigma_rho ratio")]
         for k, step in enumerate(self.trail):
@@ -106,7 +106,7 @@ class Essential(Result):
         )
 
     def summary(self) -> dict[str, Any]:
-        """What `to_json` writes, as a mapping."""
+        """The content of `to_json` as a mapping."""
         return {
             "schema": 1,
             "names": self.names,
@@ -125,7 +125,7 @@ def essential_of(
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Essential:
-    """Essential parameters of an observation.
+    """Find the essential parameters of an observation (section 4.1.1).
 
     Parameters
     ----------

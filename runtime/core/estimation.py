@@ -27,7 +27,7 @@ Array = np.ndarray
 
 
 def observe_rows(problem: Problem) -> Observation:
-    """Rows of the fitted records, as the method of the settings needs them.
+    """Rows of the fitted records, in the form that the method of the settings needs.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def observe_rows(problem: Problem) -> Observation:
 
 
 def observed_unseen(problem: Problem, k: int) -> Observation:
-    """The same of the k-th record that is predicted, k from 0."""
+    """Rows of the k-th record outside the fit, k from 0."""
     alone = problem.changed(records=(problem.unseen[k],), unseen=())
     if "prepared_unseen" in vars(problem):
         alone.prepared[0].take_states(problem.prepared_unseen[k])
@@ -66,18 +66,21 @@ def estimated(
     settings: EstimateSettings | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Estimate:
-    """Parameters of rows of a problem by `settings`, by default those of the problem."""
+    """Estimate the parameters from rows of a problem by `settings`; default: those of the problem."""
     settings = settings or problem.settings.estimate
     return estimate_of(rows, settings, problem.methods, model=problem.model, provenance=provenance)
 
 
 def estimate(problem: Problem) -> Estimate:
-    """All parameters of a prepared problem by the method of its settings."""
+    """Estimate all parameters of a prepared problem by the method of its settings."""
     return estimated(problem, observe_rows(problem), provenance=problem.provenance)
 
 
 def essential(problem: Problem) -> Essential:
-    """Essential parameters of a prepared problem, by its method or the linear companion of that method."""
+    """Find the essential parameters of a prepared problem.
+
+    The method is that of the problem, or its linear companion.
+    """
     settings = problem.settings
     return essential_of(
         observe_rows(problem),
@@ -96,7 +99,7 @@ def estimate_of(
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Estimate:
-    """Parameters of Y = W X + rho by the method that `settings` names.
+    """Estimate X of Y = W X + rho by the method that `settings` names.
 
     Parameters
     ----------
@@ -140,6 +143,6 @@ def method_of(settings: EstimateSettings, methods: Mapping[str, Method]) -> Meth
 
 
 def point_estimate(settings: EstimateSettings, methods: Mapping[str, Method]) -> EstimateSettings:
-    """The settings of an estimate whose deviations and explanations nobody reads."""
+    """Settings for values only: deviations and explanations are not computed."""
     brief = method_of(settings, methods).brief
     return replace(settings, options={**settings.options, **brief}) if brief else settings

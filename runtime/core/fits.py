@@ -32,7 +32,7 @@ from runtime.core.validation import CrossValidation, cross_validation, split_val
 
 @dataclass(frozen=True)
 class Fits:
-    """Fits of all rows.
+    """Estimates from all rows.
 
     Attributes
     ----------
@@ -52,13 +52,13 @@ class Fits:
     settings: Mapping[Any, EstimateSettings]
 
     def best(self, validation: Sequence[CrossValidation], study: Study) -> Estimate:
-        """The estimate that stands for the robot."""
+        """The estimate of the set that predicts best."""
         errors = validation[-1].errors() if validation and self.sets else {}
         return self.sets.get(best_set(errors, study.essential.first), self.estimate)
 
 
 def fit_problem(problem: Problem, observation: Observation, provenance: Mapping[str, Any]) -> Fits:
-    """All parameters and the essential ones."""
+    """Fit all parameters, then the essential ones."""
     study, model = problem.settings, problem.model
     at("least squares, essential parameters")
     reduced = essential_of(
@@ -87,10 +87,11 @@ def validated(
     unseen: Mapping[str, Observation],
     name: str,
 ) -> tuple[Fits, tuple[CrossValidation, ...], tuple[str, ...]]:
-    """Windows of the records of that `name` against each other, or fifths of them where halves
-    prefer all parameters to physical ones, then further records, `unseen`; the fits, with the
-    feasible set where it may stand for the robot; and what could not be done. Nothing is validated
-    where the method did not end well, since each validation would simulate a wrong loop once more.
+    """Predict data outside the fit: windows or fifths of the records, then further records.
+
+    Fifths are used if halves prefer all parameters to the physical ones. Returns the fits (with the
+    physical set if it may be used), the predictions, and sentences on what failed. Nothing is
+    predicted if the method did not converge, because each prediction would simulate a wrong loop.
     """
     study = problem.settings
     method, status = study.estimate.method, fits.estimate.status

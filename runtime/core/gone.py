@@ -25,7 +25,7 @@ numbers: "record.resample".
 
 
 def gone(path: tuple[str | int, ...], value: Any) -> str | None:
-    """The sentence on a setting that is not read; None for any other.
+    """Sentence about a setting of former versions that is no longer read; None for any other setting.
 
     Parameters
     ----------

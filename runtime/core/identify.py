@@ -27,7 +27,7 @@ Extra: TypeAlias = Callable[[Identification], Part | None]
 
 @dataclass(frozen=True)
 class OnRequest:
-    """An Extra that is made where it is asked for.
+    """An analysis that is made only on request.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ def identify(
     provenance: Mapping[str, Any] | None = None,
     progress: Callable[[str], None] = lambda label: None,
 ) -> Identification:
-    """Parameters of a robot from a prepared problem, and how far to trust them.
+    """Identify the parameters of a prepared problem and judge how far they can be trusted.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def with_parts(
     extras: Sequence[Extra],
     progress: Callable[[str], None] = lambda label: None,
 ) -> Identification:
-    """The identification with the parts of further extras; every extra sees it without them."""
+    """Add the parts of further analyses; each analysis sees the identification without the new parts."""
     parts = list(result.parts)
     missing = list(result.missing)
     for extra in extras:

@@ -21,7 +21,7 @@ T = TypeVar("T")
 
 
 class Numbers:
-    """Annotation of an ndarray of floats: in JSON nested lists of numbers, null for nan.
+    """Annotation of an array of floats: nested lists of numbers in JSON, with null for nan.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class Numbers:
         )
 
     def array(self, rows: list[Any]) -> np.ndarray:
-        """The numbers of nested lists; shape (0, 0) for a matrix without rows."""
+        """Array of nested lists; shape (0, 0) for a matrix without rows."""
         return (
             np.array(rows, dtype=float) if rows or self.kind == list[Number] else np.empty((0, 0))
         )
@@ -61,7 +61,7 @@ Whole = Annotated[
 
 
 def from_text(kind: type[T], text: str, schema: str, file: str) -> T:
-    """The result in a JSON text.
+    """Read a result from JSON text.
 
     Parameters
     ----------

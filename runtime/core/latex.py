@@ -29,16 +29,14 @@ NAME = re.compile(r"([A-Za-z]+)(\d[0-9_]*R?)")
 
 
 def escaped(text: str) -> str:
-    """Any text as one line that LaTeX prints as it is; characters that cannot be printed become
-    ?.
-    """
+    """Any text as one line of LaTeX that prints it; unprintable characters become ?."""
     return "".join(
         SPECIAL.get(c, c if c.isprintable() else " " if c.isspace() else "?") for c in text
     )
 
 
 def name_cell(name: str) -> str:
-    """ZZ1R as ZZ with the subscript 1R; any other text as it is."""
+    """ZZ1R as ZZ with the subscript 1R; any other text unchanged."""
     parts = NAME.fullmatch(name)
     return (
         escaped(name)
@@ -48,7 +46,7 @@ def name_cell(name: str) -> str:
 
 
 def unit_cell(unit: str) -> str:
-    """(kg m^2) behind a name; nothing for no unit."""
+    """Unit in brackets, (kg m^2), to follow a name; empty for no unit."""
     if not unit:
         return ""
     if not UNIT.fullmatch(unit):
@@ -58,7 +56,7 @@ def unit_cell(unit: str) -> str:
 
 
 def number_cell(value: float, form: str = ".4g") -> str:
-    """A number in mathematics, powers of ten as such; -- where there is none."""
+    """A number in LaTeX mathematics, with powers of ten; -- for no number."""
     if not math.isfinite(value):
         return "--"
     digits, _, power = format(value, form).partition("e")
@@ -73,7 +71,7 @@ def parameter_table(
     *,
     blocks: int = 1,
 ) -> str:
-    """Table 2: name (unit), value, %sigma.
+    """Table 2 of the chapter: name (unit), value, %sigma.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ ENTRIES: dict[str, dict[str, Any]] = {
 
 
 class LimitValues:
-    """The values of ENTRIES by their names."""
+    """Values of the thresholds in ENTRIES, by name."""
 
     def __init__(self) -> None:
         self.__dict__.update({name: limit["value"] for name, limit in ENTRIES.items()})

@@ -26,9 +26,7 @@ UNTRUSTED = "is code that this installation has not emitted and certified; pass 
 
 
 def cache_folder(of: str) -> Path:
-    """The folder `of` ("modules", "compiled") in SYMGEN_CACHE, or in that of the platform for files
-    that can be made again.
-    """
+    """Cache folder `of` ("modules", "compiled") in SYMGEN_CACHE, or in the cache folder of the platform."""
     if given := os.environ.get("SYMGEN_CACHE"):
         return Path(given) / of
     if sys.platform == "win32":
@@ -41,9 +39,7 @@ def cache_folder(of: str) -> Path:
 
 
 def is_writable_by_others(folder: Path) -> bool:
-    """Whether somebody else may put files into the folder, or another folder in its place: what
-    lies there proves nothing.
-    """
+    """Whether another user can change the folder or replace it, so that its content proves nothing."""
     if os.name != "posix":
         return False
     for place in (folder, *folder.absolute().parents):
@@ -81,9 +77,7 @@ class _Text(importlib.abc.InspectLoader):
 
 
 def module_of(path: Path, *, trust: bool = False) -> ModuleType:
-    """The module of an emitted file; ModelError for one that was not emitted here, unless
-    `trust`.
-    """
+    """Load the module of an emitted file; ModelError if this installation has not emitted it, unless `trust`."""
     try:
         data = path.read_bytes()
         text = data.decode("utf-8")
@@ -95,7 +89,7 @@ def module_of(path: Path, *, trust: bool = False) -> ModuleType:
 
 
 def run(text: str, path: Path) -> ModuleType:
-    """The module of a text; `path` is where it stands."""
+    """Run the text of a module; `path` is the name of its file."""
     name = f"generated_{path.stem}"
     loader = _Text(text)
     module = importlib.util.module_from_spec(ModuleSpec(name, loader, origin=str(path)))

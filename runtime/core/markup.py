@@ -26,7 +26,7 @@ UPRIGHT = {"sin", "cos", "tan", "sqrt", "pi"}
 
 
 class Markup(str):
-    """HTML that is complete and escaped; templates leave it as it is."""
+    """Complete, escaped HTML; templates do not escape it again."""
 
     __slots__ = ()
 
@@ -35,8 +35,9 @@ class Markup(str):
 
 
 def element(tag: str, *children: str, **attributes: str) -> Markup:
-    """<tag attributes>children</tag>; text children and attribute values are escaped; `class_` is
-    written class, `aria_label` aria-label.
+    """<tag attributes>children</tag> with escaped texts and attribute values.
+
+    `class_` becomes class, `aria_label` becomes aria-label.
     """
     inside = "".join(child if isinstance(child, Markup) else escape(child) for child in children)
     given = "".join(
@@ -47,7 +48,7 @@ def element(tag: str, *children: str, **attributes: str) -> Markup:
 
 
 def split(name: str) -> tuple[str, str]:
-    """(letter, subscript) of a parameter or constant; the subscript may be empty."""
+    """Letter and subscript of a parameter or constant; the subscript may be empty."""
     match = re.fullmatch(r"(.*?[^\d_])_?(\d*(?:_\d+)*)(R?)", name)
     if match is None or not (match[2] or match[1] in FAMILIES):
         return name, ""
@@ -56,15 +57,13 @@ def split(name: str) -> tuple[str, str]:
 
 
 def symbol(name: str) -> Markup:
-    """A parameter with its subscript; its text is still read as one word."""
+    """A parameter with its subscript, in HTML that copies as one word."""
     letter, subscript = split(name)
     return element("var", letter, *([element("sub", subscript)] if subscript else []))
 
 
 def formula(text: str) -> Markup:
-    """A flat formula over + - * ** ( ) and functions: subscripts, exponents, thin spaces for
-    products.
-    """
+    """A flat formula with + - * ** ( ) and functions in HTML: subscripts, exponents, thin spaces for products."""
     pieces: list[str] = []
     for token in TOKEN.finditer(text):
         kind, piece = token.lastgroup, token[0]
@@ -82,10 +81,10 @@ def formula(text: str) -> Markup:
 
 
 def unit(text: str) -> str:
-    """kg*m**2 as kg m², N*m*s/rad as N m s/rad."""
+    """A unit for people: kg*m**2 becomes kg m², N*m*s/rad becomes N m s/rad."""
     return text.replace("**2", "²").replace("*", "\u00a0")
 
 
 def number(value: float, form: str = ".4g") -> str:
-    """A number, or - where there is none."""
+    """A number for people; - for no number."""
     return format(value, form) if math.isfinite(value) else "-"

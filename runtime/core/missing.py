@@ -21,7 +21,7 @@ COUNTS = (
 
 @dataclass(frozen=True, eq=False)
 class Missing:
-    """Samples of a record without a position, by the columns that were recorded.
+    """Samples of a record without a position, for each recorded column.
 
     Attributes
     ----------
@@ -37,24 +37,21 @@ class Missing:
     follows: Array | None = None
 
     def at_joints(self) -> Array:
-        """Joints whose position is not known, bool, shape (N, n)."""
+        """Joints with unknown position, bool, shape (N, n)."""
         return self.samples if self.follows is None else self.samples @ self.follows.T
 
     def at_encoders(self, drives: Drives | None) -> Array:
-        """Encoders without a count, bool, shape (N, n), at the joints (None) or at the motors of
-        `drives`.
+        """Encoders without a count, bool, shape (N, n), at the joints (None) or at the motors of `drives`.
 
-        A motor that turns with two joints has none where either joint has none; where motors were
-        recorded each stands for itself.
+        A motor that turns with two joints has no count if either joint has none. If motors were
+        recorded, each motor has its own.
         """
         if drives is None:
             return self.at_joints()
         return self.samples if self.follows is not None else self.samples @ (drives.motion != 0).T
 
     def near_gaps(self, longest: int, reach: int) -> Array:
-        """Samples in gaps of any joint of more than `longest` samples and within `reach` samples of
-        these, bool, shape (N,).
-        """
+        """Samples in or within `reach` samples of gaps of more than `longest` samples, bool, shape (N,)."""
         ends = np.flatnonzero(
             np.diff(self.at_joints().any(axis=1), prepend=False, append=False)
         ).reshape(-1, 2)
@@ -65,11 +62,11 @@ class Missing:
 
 
 def held_samples(q: Array) -> Array:
-    """Samples at which a controller repeated the positions of the sample before, bool, shape (N,).
+    """Samples at which a controller repeated the positions of the previous sample, bool, shape (N,).
 
-    All joints hold, while one of them moves before and after, and the step that follows makes up
-    for it: it is that of the neighbours times the samples that it spans, to 0.4. A joint between
-    two counts of a coarse encoder, or at rest, makes up for nothing.
+    All joints repeat their positions although one of them moves before and after. The next step
+    makes up for the repetition: it is the neighbouring step times the number of samples, within 0.4.
+    A joint between two counts of a coarse encoder, or at rest, makes up for nothing.
     """
     steps = np.abs(np.diff(q, axis=0))
     same = ~steps.any(axis=1)
@@ -88,9 +85,7 @@ def held_samples(q: Array) -> Array:
 
 
 def bridged(q: Array, missing: Array) -> Array:
-    """q, shape (N, n), with straight lines where samples are missing: between their neighbours, and
-    held at the ends.
-    """
+    """q, shape (N, n), with straight lines over missing samples, and constant values at the ends."""
     q, at = np.array(q), np.arange(len(q))
     for j in np.flatnonzero(missing.any(axis=0)):
         known = np.flatnonzero(~missing[:, j])
@@ -102,9 +97,7 @@ def bridged(q: Array, missing: Array) -> Array:
 
 
 def require_positions(missing: Missing | None, who: str, file: str, hint: str = "") -> None:
-    """Raise InputError where positions are missing, which `who` needs; hint : what else may be
-    done.
-    """
+    """Raise InputError if positions are missing that `who` needs; hint : another remedy."""
     if missing is not None and missing.samples.any():
         i, j = np.argwhere(missing.samples)[0]
         raise InputError(

@@ -49,8 +49,9 @@ FUNCTIONS = (
 
 
 class GeneratedModel(Protocol):
-    """What `runtime` uses of an emitted module: n joints, b base parameters, q, qd, qdd of shape
-    (N, n); `require` checks the dynamics before use.
+    """Interface of an emitted module with n joints and b base parameters, as `runtime` uses it.
+
+    q, qd, qdd have shape (N, n). `require` checks the dynamics before use.
     """
 
     NAME: str
@@ -69,7 +70,7 @@ class GeneratedModel(Protocol):
     casadi: Callable[..., Any]  # casadi.Function of a function of the module, by name
 
     def store(self, N: int) -> Array:
-        """Workspace of shape (b, n, N) for `out`, structural zeros written."""
+        """Workspace of shape (b, n, N) for `out`, with zeros in the entries that are always zero."""
 
     def regressor(
         self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float
@@ -85,8 +86,7 @@ class GeneratedModel(Protocol):
 def load_model(
     model: str | Path | ModuleType, *, folder: str | Path | None = None, trust: bool = False
 ) -> GeneratedModel:
-    """The emitted model of a name (generated/NAME.py), of a path to a .py file, or of an imported
-    module, checked before use.
+    """Load and check an emitted model: a name (generated/NAME.py), a path to a .py file, or an imported module.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def load_model(
 
 
 def require_emitted(model: Any) -> None:
-    """InputError unless `model` is an emitted model, or behaves as one."""
+    """Raise InputError unless `model` is an emitted model or has its interface."""
     if not all(hasattr(model, name) for name in ("NAME", "JOINTS", "DRIVES")):
         raise InputError(
             f"model is {kind_of(model)}; expected an emitted model, such as symgen.model('arm.urdf') "
@@ -151,9 +151,7 @@ copyreg.pickle(ModuleType, _reduced)
 
 
 def checked_model(module: ModuleType) -> GeneratedModel:
-    """The module itself if it is an emitted model with n, b and shapes that agree; ModelError
-    otherwise.
-    """
+    """Return the module if it is an emitted model with consistent n, b and shapes; raise ModelError otherwise."""
     label = module.__name__
     missing = [name for name in (*CONSTANTS, *FUNCTIONS) if not hasattr(module, name)]
     if missing:
@@ -189,7 +187,7 @@ def checked_model(module: ModuleType) -> GeneratedModel:
 
 
 def require(model: GeneratedModel, *functions: str) -> None:
-    """Raise ModelError unless the model offers all the named functions."""
+    """Raise ModelError unless the model has all the named functions."""
     missing = [name for name in functions if not callable(getattr(model, name, None))]
     if "forward_dynamics" in missing and any(c.startswith(TRANSMITTED) for c in channels_of(model)):
         raise ModelError(
@@ -210,12 +208,13 @@ def require(model: GeneratedModel, *functions: str) -> None:
 
 
 def drives_of(model: GeneratedModel) -> Drives | None:
-    """The drives of a model; None where it has none."""
+    """Drives of a model; None if it has none."""
     return None if model.DRIVES is None else Drives.from_mapping(model.DRIVES)
 
 
 def constants_of(model: GeneratedModel, constants: Mapping[str, float]) -> dict[str, float]:
-    """Geometry and gravity in the order of CONSTANTS, `constants` in place of the robot file's;
+    """Values of geometry and gravity in the order of CONSTANTS; `constants` replaces those of the robot file.
+
     InputError for names that the model does not have.
     """
     if unknown := sorted(constants.keys() - model.CONSTANTS.keys()):
@@ -227,14 +226,12 @@ def constants_of(model: GeneratedModel, constants: Mapping[str, float]) -> dict[
 
 
 def channels_of(model: GeneratedModel) -> Mapping[str, tuple[str, ...]]:
-    """{constant that is a function of time: base parameters whose columns read it}."""
+    """Base parameters whose columns read each channel (a constant that is a function of time), by channel."""
     return cast(Mapping[str, tuple[str, ...]], getattr(model, "CHANNELS", {}))
 
 
 def require_no_channels(model: GeneratedModel, what: str) -> None:
-    """InputError, in one sentence, where laws of the model read functions of time, which `what`
-    does not have.
-    """
+    """Raise InputError if laws of the model read channels, which `what` does not have."""
     if channels := channels_of(model):
         names = sorted({name for own in channels.values() for name in own})
         raise InputError(
@@ -244,8 +241,9 @@ def require_no_channels(model: GeneratedModel, what: str) -> None:
 
 
 def joint_labels(model: GeneratedModel) -> tuple[str, ...]:
-    """What results call the joints: the number of each, and its name where the robot file has one
-    that says more ("2 elbow", but "2" of "joint_2").
+    """Labels of the joints in results: the number, and the name of the robot file if it says more.
+
+    "2 elbow", but "2" if the name is "joint_2".
     """
     names = getattr(model, "LABELS", {})
     more = {
@@ -257,15 +255,14 @@ def joint_labels(model: GeneratedModel) -> tuple[str, ...]:
 
 
 def is_axis(joint: int | str) -> bool:
-    """Whether an entry of JOINTS is an axis of a force sensor (`runtime.wrench`), no joint."""
+    """Whether an entry of JOINTS is an axis of a force sensor (`runtime.wrench`), not a joint."""
     return isinstance(joint, str)
 
 
 def elements_of(
     model: GeneratedModel, constants: Mapping[str, float] | None = None
 ) -> Mapping[str, Any]:
-    """Elements of a model (friction, inertia, springs): kind, direction of motion, and row or form
-    by joint, of each parameter.
+    """Elements of a model (friction, inertia, springs): kind and direction of motion of each parameter, by joint.
 
     Parameters
     ----------
@@ -294,8 +291,9 @@ def elements_of(
 def base_columns(
     model: GeneratedModel, names: str | Sequence[str], essential: Sequence[str], *path: str
 ) -> tuple[str, ...]:
-    """Columns of the setting at `path`: the `essential` ones, "all", or names; SettingsError for a
-    name that is no base parameter.
+    """Columns of the setting at `path`: the `essential` ones, "all", or names.
+
+    SettingsError for a name that is no base parameter.
     """
     wanted = (
         {"essential": essential, "all": model.BASE_PARAMETERS}[names]
@@ -316,10 +314,9 @@ def base_columns(
 def joint_units(model: GeneratedModel) -> tuple[str, ...]:
     """Unit of each joint position, "rad" or "m", in the order of JOINTS.
 
-    A joint slides where an element along it alone (friction, spring, motor inertia) has the unit of
-    one that slides; without such elements, where no moment of inertia acts on it, since a force
-    depends on masses and first moments alone. The unit of a column of the user's own says nothing:
-    that of its law is his.
+    A joint is prismatic if an element along it alone (friction, spring, motor inertia) has the unit
+    of a prismatic joint. Without such elements it is prismatic if no moment of inertia acts on it,
+    since a force depends on masses and first moments only. Units of user-defined columns are not used.
     """
     units, elements = getattr(model, "UNITS", {}), getattr(model, "ELEMENTS", {})
     result = []
@@ -386,9 +383,7 @@ def _check_store(model: GeneratedModel, b: int, n: int, label: str) -> None:
 
 
 def check_states(model: GeneratedModel, **states: Array) -> None:
-    """Raise ValueError unless the states, by name, are real arrays of one shape (N, n) or (n,), n
-    the joints of the model.
-    """
+    """Raise ValueError unless all states are real arrays of one shape, (N, n) or (n,), with n the joints of the model."""
     n = len(model.JOINTS)
     first, shape = next((name, np.shape(x)) for name, x in states.items())
     for name, x in states.items():

@@ -47,14 +47,14 @@ ORDER: tuple[SetName, ...] = ("essential", "feasible", "all")
 def least_squares_sets(
     settings: EstimateSettings, reduced: Essential
 ) -> tuple[dict[SetName, Estimate], dict[SetName, EstimateSettings]]:
-    """The essential parameters and all, of a linear method, and the settings that give each."""
+    """The essential parameters and all parameters by a linear method, and the settings of each."""
     essential = EstimateSettings(settings.method, settings.weights, reduced.names, settings.options)
     sets: dict[SetName, Estimate] = {"essential": reduced.estimate, "all": reduced.all_parameters}
     return sets, {"essential": essential, "all": settings}
 
 
 def physical_asked(errors: Mapping[Any, float], first: bool) -> bool:
-    """Whether the feasible set may stand for the robot.
+    """Whether the physical set may be the one that is used.
 
     Parameters
     ----------
@@ -69,14 +69,15 @@ def physical_asked(errors: Mapping[Any, float], first: bool) -> bool:
 
 
 def physical_possible(observation: Observation, settings: EstimateSettings, fit: Estimate) -> bool:
-    """Whether there is a feasible set beside `fit`, all parameters by a linear method."""
+    """Whether a physical set can be fitted besides `fit`, all parameters by a linear method."""
     whole = settings.columns == "all" and fit.status == "ok"
     return whole and settings.weights != "covariance"
 
 
 def physical_set(problem: Problem, observation: Observation) -> tuple[Estimate, EstimateSettings]:
-    """The feasible parameters of all rows, and the settings that give those of parts of them: with
-    the prior, its weight and the bounds by reach that all rows asked for.
+    """The physical parameters from all rows, and the settings for fits of parts of the rows.
+
+    These settings have the prior, its weight and the bounds by reach from all rows.
     """
     at("physical parameters")
     settings = problem.settings.estimate
@@ -95,7 +96,7 @@ def physical_set(problem: Problem, observation: Observation) -> tuple[Estimate, 
 def held_out_validation(
     problem: Problem, observation: Observation, choices: Mapping[Any, EstimateSettings]
 ) -> CrossValidation:
-    """`cross_validation` of each of LIMIT.HELD_OUT_PARTS parts of the span by all the others."""
+    """`cross_validation` of each of LIMIT.HELD_OUT_PARTS parts of the record from the other parts."""
     number, folds = observation.equal_parts(LIMIT.HELD_OUT_PARTS), []
     for p in np.unique(number):
         part = observation.where(number == p)
@@ -108,8 +109,9 @@ def held_out_validation(
 
 
 def best_set(errors: Mapping[Any, float], essential: bool = False) -> SetName:
-    """The set that stands for the robot, by the error of each on unseen data, %; all, or essential
-    where it may stand, if no error is known.
+    """Name of the set with the smallest error on unseen data, %.
+
+    Without known errors: all parameters, or the essential ones if they may be used.
     """
     candidates = ORDER if essential else ORDER[1:]
     known = {name: errors[name] for name in candidates if np.isfinite(errors.get(name, np.nan))}
@@ -120,8 +122,9 @@ def best_set(errors: Mapping[Any, float], essential: bool = False) -> SetName:
 
 
 def whole_set(names: Collection[SetName], model_columns: SetName) -> SetName:
-    """The set with all base parameters that a file or a program is given: `model_columns`, or where
-    that is the essential one, the feasible set if it is among `names`.
+    """Name of the set with all base parameters, for a robot file or a program.
+
+    It is `model_columns`; if that is the essential set, the physical set if `names` has it.
     """
     if model_columns != "essential":
         return model_columns
@@ -129,7 +132,7 @@ def whole_set(names: Collection[SetName], model_columns: SetName) -> SetName:
 
 
 def ranking_text(errors: Mapping[SetName, float], counts: Mapping[SetName, int], where: str) -> str:
-    """The sets in the order of their errors on unseen data, in words."""
+    """The sets in the order of their errors on unseen data, in one sentence."""
     ranked = sorted((error, name) for name, error in errors.items() if np.isfinite(error))
     parts = [f"{name} ({counts[name]}) {error:.1f} %" for error, name in ranked]
     return (

@@ -29,7 +29,7 @@ DOTTED: Any = (0, (1, 2))
 
 @dataclass(frozen=True, eq=False)
 class Figure:
-    """A figure of one panel or several, which a report draws.
+    """Description of a figure with one or more panels, which a report draws.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Figure:
 
 
 class Part:
-    """A finding with everything that is shown of it. A part says what it has; the rest stays empty.
+    """Result of one analysis with its texts, tables, figures and checks; a subclass overrides what it has.
 
     Attributes
     ----------
@@ -86,58 +86,58 @@ class Part:
 
     @property
     def expected_error(self) -> float:
-        """Expected error of predictions of other motions, %, by which a verdict is milder or harder; nan where the part does not tell."""
+        """Expected error of predictions of other motions, %, for the verdict; nan if the part has none."""
         return float("nan")
 
     @property
     def records_differ(self) -> bool:
-        """Whether the records are those of different robots."""
+        """Whether the records seem to come from different robots."""
         return False
 
     def text(self) -> str:
-        """Paragraphs, one a line."""
+        """Paragraphs of text, one a line."""
         return ""
 
     def brief(self) -> str:
-        """What is printed where few lines are."""
+        """Short text for a short print."""
         return ""
 
     def warnings(self) -> Sequence[str]:
-        """What to look at before the values are used, in sentences."""
+        """Sentences to read before the values are used."""
         return ()
 
     def tables(self) -> Sequence[Table]:
-        """Tables, after the text."""
+        """Tables, printed after the text."""
         return ()
 
     def figures(self) -> Sequence[Figure]:
-        """Figures of a report."""
+        """Figures for a report."""
         return ()
 
     def checks(self) -> Sequence[Check]:
-        """Questions of the verdict."""
+        """Checks for the verdict."""
         return ()
 
     def summary(self) -> Any:
-        """For JSON."""
+        """The part as a mapping for JSON."""
         return None
 
     def entries(self) -> Mapping[str, Any]:
-        """What estimate.json holds of it, by key: its summary, where it has one."""
+        """Entries of estimate.json by key: the summary, if there is one."""
         summary = self.summary()
         return {} if summary is None else {self.name: summary}
 
     def files(self) -> Mapping[str, str]:
-        """Texts that are written beside the page, by file name."""
+        """Texts of further files, by file name."""
         return {}
 
     def arrays(self) -> Mapping[str, Mapping[str, np.ndarray]]:
-        """Named arrays that are written as NPZ and MAT, by file name without its ending."""
+        """Arrays of NPZ and MAT files, by file name without its ending."""
         return {}
 
 
 def printed(part: Part) -> str:
-    """Title, text and tables of a part; "" where there is neither text nor table."""
+    """Title, text and tables of a part; "" if it has neither text nor table."""
     tables = [table.to_text() for table in part.tables()]
     shown = "\n\n".join(text for text in (part.text(), *tables) if text)
     return f"{part.title}\n{shown}" if shown else ""

@@ -31,7 +31,7 @@ SIGNALS = "signals"
 
 @dataclass(frozen=True)
 class Note:
-    """What a step has to say of a problem.
+    """Message of a step about a problem.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Note:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What is identified.
+    """Everything that an analysis needs: model, records and settings.
 
     Attributes
     ----------
@@ -93,16 +93,16 @@ class Problem:
 
     @cached_property
     def prepared(self) -> tuple[Prepared, ...]:
-        """The fitted records as the settings read them; states are made once."""
+        """The fitted records with their filtered states, which are computed once."""
         return tuple(self.reading(record) for record in self.records)
 
     @cached_property
     def prepared_unseen(self) -> tuple[Prepared, ...]:
-        """The same of the records that are predicted."""
+        """The same for the records outside the fit."""
         return tuple(self.reading(record) for record in self.unseen)
 
     def reading(self, record: Record) -> Prepared:
-        """A record as the settings read it."""
+        """Prepare one record by the settings."""
         drives = drives_of(self.model)
         if record.origin.drives is None and drives is not None:
             record = replace(record, origin=replace(record.origin, drives=drives))
@@ -110,11 +110,11 @@ class Problem:
 
     @property
     def method(self) -> Method:
-        """The method of settings.estimate."""
+        """Method of settings.estimate."""
         return self.methods[self.settings.estimate.method]
 
     def noted(self, kind: str) -> Note | None:
-        """The note of that kind; None where there is none."""
+        """The note with this kind; None without one."""
         return next((note for note in self.notes if note.kind == kind), None)
 
     @property
@@ -127,7 +127,10 @@ class Problem:
         return entries
 
     def changed(self, *notes: Note, **changes: Any) -> Problem:
-        """The problem with other fields and further notes. States that were made go with records whose positions and signals stay."""
+        """Copy of the problem with other fields and further notes.
+
+        Computed states are kept for records whose positions and signals do not change.
+        """
         other = replace(self, **changes, notes=(*self.notes, *notes))
         for made in ("prepared", "prepared_unseen"):
             if made in vars(self):
@@ -141,7 +144,7 @@ Step: TypeAlias = Callable[[Problem], Problem]
 
 
 def prepared(problem: Problem, steps: Iterable[Step]) -> Problem:
-    """The problem after all steps."""
+    """Apply all steps to the problem."""
     for step in steps:
         problem = step(problem)
     return problem

@@ -14,5 +14,5 @@ LOGGER = logging.getLogger("runtime.core.progress")
 
 
 def at(part: str) -> None:
-    """Say what begins now; nothing where nobody listens."""
+    """Report the start of a phase to the progress callback, if one is set."""
     LOGGER.info("%s", part)

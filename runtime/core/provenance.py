@@ -13,7 +13,7 @@ from runtime.core.record import Record
 
 
 def record_names(records: Sequence[Record]) -> tuple[str, ...]:
-    """The name of each record, each name once: of equal ones the second is called "name (2)"."""
+    """A unique name for each record; of two equal names the second becomes "name (2)"."""
     names: list[str] = []
     for record in records:
         name, k = record.name, 1
@@ -25,9 +25,7 @@ def record_names(records: Sequence[Record]) -> tuple[str, ...]:
 
 
 def origin(records: Sequence[Record]) -> dict[str, Any]:
-    """Provenance of a result on `records`: their names, whether one of them was simulated, and
-    their time stamps in words.
-    """
+    """Provenance of a result: names of its records, whether one was simulated, and their time stamps in words."""
     names = record_names(records)
     simulated = any(record.origin.simulated for record in records)
     note = {"note": "SIMULATED record: nothing was measured"} if simulated else {}
@@ -45,15 +43,13 @@ def origin(records: Sequence[Record]) -> dict[str, Any]:
 
 
 def processor() -> str:
-    """Machine and name of the processor, as far as the system tells: what results depend on in
-    their last bits.
-    """
+    """Machine and processor name, if the system gives them; the last bits of results depend on them."""
     name = cpuinfo("model name").partition(":")[2].strip() or platform.processor()
     return f"{platform.machine()} {name}".strip()
 
 
 def cpuinfo(*starts: str) -> str:
-    """First line about the processor that starts so; empty where the system has none."""
+    """First line of the processor information with one of these starts; "" if there is none."""
     info = Path("/proc/cpuinfo")
     text = info.read_text(errors="replace") if info.is_file() else platform.processor()
     return next((line for line in text.splitlines() if line.startswith(starts)), "")

@@ -35,7 +35,7 @@ FINITE = float(np.finfo(float).max)
 
 @dataclass(frozen=True, eq=False)
 class Origin:
-    """How a record was read.
+    """Source of a record: files, clock and drives.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class Origin:
 
 @dataclass(frozen=True, eq=False, init=False)
 class Record:
-    """What was measured, joint side, SI, uniformly sampled. The arrays are read-only copies.
+    """A measured record: joint side, SI, uniform sampling. The arrays are read-only copies.
 
     Parameters
     ----------
@@ -195,34 +195,32 @@ class Record:
 
     @property
     def measured(self) -> frozenset[str]:
-        """Names of the channels."""
+        """Names of the recorded channels."""
         return frozenset(self.channels)
 
     @property
     def q_r(self) -> Array | None:
-        """What the controller followed, shape (N, n), rad or m; None where it is not recorded."""
+        """Reference positions of the controller, shape (N, n), rad or m; None if not recorded."""
         return self.channels.get("q_r")
 
     @property
     def tau_ff(self) -> Array | None:
-        """Feed-forward torques that the controller added, shape (N, n), N m or N, or None."""
+        """Feed-forward torques of the controller, shape (N, n), N m or N; None if not recorded."""
         return self.channels.get("tau_ff")
 
     @cached_property
     def torque(self) -> Array:
-        """What the model has to explain of tau, shape (N, n), N m or N: without known torques."""
+        """Torques for the model, shape (N, n), N m or N: tau without the known torques."""
         return self.tau if self.tau_known is None else self.tau - self.tau_known
 
     def moved(self, q: Array, **changes: Any) -> Record:
-        """The record with other positions, hence without recorded velocities; changes : of other
-        fields.
-        """
+        """The record with other positions, hence without recorded velocities; changes : other fields."""
         others = {key: x for key, x in self.channels.items() if key != "qd"}
         return replace(self, q=q, channels=others, **changes)
 
     @property
     def subtracted(self) -> str:
-        """What known torques take from tau, a sentence; "" where there are none."""
+        """Sentence about the known torques that are subtracted from tau; "" without known torques."""
         known = self.tau_known
         return known_text(None if known is None else np.abs(known).max(axis=0), self.origin.joints)
 
@@ -233,7 +231,7 @@ class Record:
 
     @property
     def file(self) -> str:
-        """What messages call it: its files, or its name where it was made of arrays."""
+        """Name for messages: its files, or the name of the record if it was made of arrays."""
         return ", ".join(self.files) or self.name
 
     @property
@@ -295,7 +293,7 @@ def _marks(missing: Any, file: str) -> Array:
 
 
 def known_text(largest: Array | None, joints: Sequence[str]) -> str:
-    """What known torques of that size, shape (n,), take from a record, a sentence; "" for None."""
+    """Sentence about subtracted known torques of this size, shape (n,); "" for None."""
     if largest is None:
         return ""
     names = joints or range(1, len(largest) + 1)
@@ -312,8 +310,9 @@ def require_finite(
     hint: str = "",
     largest: float = FINITE,
 ) -> Array:
-    """The columns x, shape (N, k), if there is neither nan nor infinity nor a number above `largest`
-    among them; row : place of a sample in words; hint : what else may be done about nan.
+    """Raise InputError if x, shape (N, k), has nan, infinity or a number above `largest`.
+
+    row : function from a sample number to its place. hint : another remedy for nan.
     """
     if not (np.abs(x) <= largest).all():
         bad = np.argwhere(~(np.abs(x) <= largest))

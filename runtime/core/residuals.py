@@ -34,7 +34,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Whiteness:
-    """Residuals of one joint.
+    """Whiteness of the residuals of one joint.
 
     Attributes
     ----------
@@ -71,17 +71,17 @@ class Whiteness:
 
     @property
     def white(self) -> bool:
-        """Ljung-Box does not reject independence at 5 %."""
+        """Whether the Ljung-Box test accepts independence at 5 %."""
         return bool(self.p >= LIMIT.SIGNIFICANT)
 
 
 def whiteness(comparison: Sequence[JointComparison], rate: float) -> tuple[Whiteness, ...]:
-    """Whiteness of every joint; rate : rows per second of one joint, Hz."""
+    """Test the residuals of every joint; rate : rows per second of one joint, Hz."""
     return tuple(joint_whiteness(joint, rate) for joint in comparison if len(joint.t))
 
 
 def joint_whiteness(joint: JointComparison, rate: float, lags: int = LIMIT.LAGS) -> Whiteness:
-    """Correlation, Ljung-Box and spectrum of one joint's residuals."""
+    """Correlation, Ljung-Box test and spectrum of the residuals of one joint."""
     N = len(joint.t)
     m = max(1, min(lags, N // 5))
     error = joint.error - joint.error.mean()
@@ -119,7 +119,7 @@ def joint_whiteness(joint: JointComparison, rate: float, lags: int = LIMIT.LAGS)
 
 
 def residual_correlation(residual: Array) -> Array:
-    """rho_k, k = 1 ... N - 1, of residuals, shape (N,), at even distances."""
+    """rho_k, k = 1 ... N - 1, of residuals, shape (N,), with equal distances."""
     return correlation(
         *_lagged_sums(
             residual - residual.mean(), np.arange(len(residual)), np.empty(0, dtype=np.intp)
@@ -128,8 +128,9 @@ def residual_correlation(residual: Array) -> Array:
 
 
 def correlation(products: Array, pairs: Array) -> Array:
-    """rho_k, k = 1, 2 ..., from sums of products at distances k = 0, 1 ... and the numbers of their
-    pairs; 0 where there is no pair.
+    """rho_k, k = 1, 2 ..., from sums of products at the distances k = 0, 1 ... and their numbers of pairs.
+
+    0 for a distance without pairs.
     """
     if not products[0] > 0:
         return np.zeros(len(products) - 1)
@@ -137,23 +138,22 @@ def correlation(products: Array, pairs: Array) -> Array:
 
 
 def correlation_time(rho: Array) -> float:
-    """1 + 2 sum of rho_k, k = 1, 2 ..., before the first that is not positive, in rows: at
-    least 1.
-    """
+    """1 + 2 sum of rho_k, k = 1, 2 ..., up to the first that is not positive, in rows; at least 1."""
     end = np.flatnonzero(rho <= 0)
     return float(1 + 2 * rho[: end[0] if len(end) else len(rho)].sum())
 
 
 def effective_share(joints: Sequence[Whiteness]) -> float:
-    """Rows that count over rows, all joints together, at most 1."""
+    """Effective number of rows over the number of rows, all joints together; at most 1."""
     return min(1.0, sum(w.effective_rows for w in joints) / max(sum(w.rows for w in joints), 1))
 
 
 def unseen_by_blocks(observation: Observation, fit: Estimate) -> float:
-    """Variance of a parameter over the corrected one, which takes blocks of L seconds as independent.
+    """Ratio of the variance of a parameter to the corrected one, which takes blocks of L seconds as independent.
 
-    c = 1/(1 - (tau/L) (1 - exp(-L/tau))) for residuals that forget by exp(-t/tau) and remember for
-    m = 2 tau, that of the middle joint.
+        c = 1/(1 - (tau/L) (1 - exp(-L/tau)))
+
+    The residuals are correlated as exp(-t/tau); m = 2 tau is the correlation time of the middle joint.
     """
     predicted = observation.columns(fit.names).W @ fit.X
     joints = [
@@ -186,7 +186,10 @@ def _lagged_sums(x: Array, place: Array, starts: Array) -> tuple[Array, Array]:
 def p_value(
     squares_first: float, squares: float, terms_first: int, terms: int, count: float
 ) -> float:
-    """Of the F-test of a model of more terms against the first one, from their squared residuals, numbers of terms, and independent samples."""
+    """Probability of the F-test of a model with more terms against the first one.
+
+    It uses their squared residuals, numbers of terms, and the number of independent samples.
+    """
     if terms == terms_first or squares <= 0 or count <= terms:
         return 1.0
     F = max(squares_first / squares - 1, 0.0) * (count - terms) / (terms - terms_first)

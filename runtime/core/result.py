@@ -52,7 +52,7 @@ from runtime.core.validation import (
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """Parameters of one robot from one record or several.
+    """Parameters of one robot from one or several records, with everything that was computed.
 
     Attributes
     ----------
@@ -99,27 +99,27 @@ class Identification:
     missing: tuple[str, ...] = ()
 
     def part(self, name: str) -> Any:
-        """The part of that name; None where there is none."""
+        """The part with this name; None without one."""
         return next((part for part in self.parts if part.name == name), None)
 
     def with_part(self, part: Part) -> Identification:
-        """The identification with this part in the place of another of its name."""
+        """The identification with this part, which replaces another one with its name."""
         others = [other for other in self.parts if other.name != part.name]
         return replace(self, parts=(*others, part))
 
     @property
     def model(self) -> GeneratedModel:
-        """The model, with scalars of laws as fitted and with the axes of force sensors."""
+        """The model with fitted scalars of laws and with axes of force sensors."""
         return self.problem.model
 
     @property
     def study(self) -> Study:
-        """Settings, complete; files relative to the current folder."""
+        """All settings; file names are relative to the current folder."""
         return self.problem.settings
 
     @property
     def prepared(self) -> tuple[Prepared, ...]:
-        """The records as the settings read them."""
+        """The records with their filtered states."""
         return self.problem.prepared
 
     @property
@@ -143,7 +143,7 @@ class Identification:
 
     @property
     def source(self) -> Literal["measured", "simulated"]:
-        """Where the data come from, as the provenance says."""
+        """Source of the data, from the provenance."""
         return "simulated" if self.estimate.provenance.get("simulated") else "measured"
 
     @property
@@ -153,22 +153,18 @@ class Identification:
 
     @property
     def usable(self) -> bool:
-        """Whether the estimator ended well: status ok."""
+        """Whether the estimator has status ok."""
         return self.estimate.status == "ok"
 
     @property
     def set_errors(self) -> dict[SetName, float]:
-        """Largest error on unseen data, %, by set of parameters; empty where nothing was
-        predicted.
-        """
+        """Largest error on unseen data, %, of each set of parameters; empty if nothing was predicted."""
         judged = self.validation[-1].errors() if self.validation else {}
         return {name: judged[name] for name in ORDER if name in judged}
 
     @property
     def unseen(self) -> str:
-        """The data that the sets are judged by, in words: the validation records of the study where
-        it has some, else a part of the records.
-        """
+        """Name of the data that compare the sets: validation records of the study, or a part of the records."""
         parts = dict.fromkeys(
             p.part for part in self.validation[-1:] for p in part.predictions if not p.fitted
         )
@@ -176,13 +172,14 @@ class Identification:
 
     @property
     def by_records(self) -> bool:
-        """Whether the sets are judged by records of their own, not by a part of the records."""
+        """Whether separate records compare the sets, not a part of the fitted records."""
         return bool(self.validation) and self.validation[-1].further
 
     @property
     def model_columns(self) -> SetName:
-        """Which parameters stand for the robot (`runtime.core.parameter_sets`); all where
-        the method of the study is not linear.
+        """Name of the set of parameters that is used (`runtime.core.parameter_sets`).
+
+        "all" if the method of the study is not linear.
         """
         if self.study.estimate.method not in LINEAR:
             return "all"
@@ -190,15 +187,14 @@ class Identification:
 
     @property
     def model_estimate(self) -> Estimate:
-        """The estimate that stands for the robot: that of `model_columns`, or `estimate` where the
-        method of the study is not linear.
-        """
+        """Estimate of the set that is used, `model_columns`; `estimate` if the method is not linear."""
         return self.sets.get(self.model_columns, self.estimate)
 
     @property
     def whole_estimate(self) -> Estimate:
-        """All base parameters, for a robot file or a program: `model_estimate`, or the physical
-        ones where the essential ones stand for the robot.
+        """Estimate of all base parameters, for a robot file or a program.
+
+        It is `model_estimate`, or the physical set if that is the essential one.
         """
         return self.written_sets.get(
             whole_set(self.written_sets, self.model_columns), self.estimate
@@ -206,7 +202,10 @@ class Identification:
 
     @cached_property
     def written_sets(self) -> Mapping[SetName, Estimate]:
-        """`sets`, and the physical set where the essential one stands for the robot: a robot file or a program is given all parameters."""
+        """`sets`, with the physical set added if the essential set is used.
+
+        A robot file or a program needs all parameters.
+        """
         linear = self.study.estimate.method in LINEAR
         if self.model_columns != "essential" or "feasible" in self.sets or not linear:
             return self.sets
@@ -220,23 +219,19 @@ class Identification:
 
     @property
     def torque_unit(self) -> str:
-        """N of a robot whose joints are all prismatic by the units of its parameters, else N m."""
+        """N if all joints are prismatic by the units of the parameters, else N m."""
         units = set(dict(getattr(self.model, "UNITS", {})).values())
         return "N" if "N" in units and "N*m" not in units else "N m"
 
     @cached_property
     def record_errors(self) -> tuple[RecordError, ...]:
-        """Error of each record with the parameters that stand for the robot; empty where there is
-        one record.
-        """
+        """Error of each record with the used parameters; empty for one record."""
         names = record_names(self.records)
         return record_errors(self.observation, self.model_estimate, names) if len(names) > 1 else ()
 
     @cached_property
     def time_stamps(self) -> tuple[str, ...]:
-        """Remarks on the records: time stamps (once a file), known torques that were subtracted,
-        the low-pass filter, and findings of readers and steps.
-        """
+        """Remarks on the records: time stamps, subtracted known torques, low-pass filter, findings of readers and steps."""
         texts = {
             (record.origin.whole or record.name, record.origin.time): None
             for record in self.records
@@ -252,8 +247,9 @@ class Identification:
 
     @property
     def prediction_error(self) -> float:
-        """Largest relative error, %, of `model_estimate` on the validation records, or else on
-        parts of the records that did not give it; nan: on none.
+        """Largest relative error, %, of `model_estimate` on data outside the fit.
+
+        These are the validation records, or else parts of the records; nan without such data.
         """
         return self.set_errors.get(self.model_columns, float("nan"))
 
@@ -264,7 +260,10 @@ class Identification:
 
     @property
     def expected_error(self) -> float:
-        """Expected error of predictions of other motions, %, as a part tells; nan where none does, LIMIT.LARGEST_EXPECTED where the records do not determine the parameters."""
+        """Expected error of predictions of other motions, %, from a part.
+
+        nan if no part gives it; LIMIT.LARGEST_EXPECTED if the records do not determine the parameters.
+        """
         if not self.determined:
             return float(LIMIT.LARGEST_EXPECTED)
         told = (part.expected_error for part in self.parts)
@@ -272,7 +271,7 @@ class Identification:
 
     @cached_property
     def checklist(self) -> Checklist:
-        """Whether the values can be used, question by question."""
+        """The verdict with its checks."""
         drawn = self.uncertainty.bootstrap
         return checklist_of(
             self.estimate,
@@ -291,7 +290,7 @@ class Identification:
 
     @property
     def verdict(self) -> str:
-        """One sentence."""
+        """The verdict in one sentence."""
         if not self.determined:
             names = "; ".join(", ".join(group) for group in self.estimate.groups)
             return (
@@ -326,16 +325,12 @@ class Identification:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to look at before the values are used, in sentences: `own_warnings`, then parameters
-        that trade.
-        """
+        """Sentences to read before the values are used: `own_warnings`, then correlated parameters."""
         return (*self.own_warnings, *self.correlations.warnings)
 
     @property
     def own_warnings(self) -> tuple[str, ...]:
-        """Warnings: joints without rows, negative friction or motor inertia, joints that lost
-        their parameters, and those of the parts.
-        """
+        """Warnings: joints without rows, negative friction or motor inertia, joints that lost all parameters, and those of the parts."""
         by_law = any(record.origin.by_law for record in self.records)
         signs = (
             f"{', '.join(self.negative)} below zero, which no friction and no motor inertia is: "
@@ -358,10 +353,10 @@ class Identification:
         return self.brief()
 
     def brief(self, others: int = 0) -> str:
-        """The verdict with its largest doubt and the next step, values with their 95 % intervals, errors by joint, what to look at, the parts in brief.
+        """Short text: verdict, largest doubt, next step, values with 95 % intervals, errors by joint, warnings and parts.
 
-        Values and notes without room in LIMIT.LINES_PRINTED lines are left to `to_text`; others : so
-        many lines are printed beside these.
+        It has at most LIMIT.LINES_PRINTED lines; `to_text` has everything.
+        others : number of lines that are printed in addition to these.
         """
         first = [f"{check.finding}." for check in self.checklist.checks if check.ahead]
         notes = [*self.observation.findings, *self.own_warnings, *self.missing]
@@ -422,7 +417,7 @@ class Identification:
         return notebook([self.verdict, *self.warnings], parameters, joints)
 
     def to_text(self) -> str:
-        """Parameters, trail, validation, parameters that trade, uncertainty, the parts, then the verdict: all that `brief` leaves out."""
+        """Long text: parameters, removals, validation, correlated parameters, uncertainty, parts, verdict."""
         fit = self.model_estimate if self.determined else self.estimate
         trade = [f"warning: {sentence}" for sentence in self.warnings] or [
             f"no two parameters trade: no |correlation| above {self.correlations.threshold:g}"
@@ -454,7 +449,7 @@ class Identification:
 
     @property
     def ranking(self) -> str:
-        """Which set of parameters predicts best, a sentence; "" where there is one set."""
+        """Sentence on the set of parameters that predicts best; "" for one set."""
         return (
             ranking_text(
                 self.set_errors,
@@ -466,9 +461,7 @@ class Identification:
         )
 
     def motion_table(self) -> Table:
-        """Simulated minus measured motion, joint by joint, of a method that simulates the loop;
-        else without rows.
-        """
+        """Simulated minus measured motion of each joint, for a method that simulates the loop; else empty."""
         rows = [
             (
                 m["joint"],
@@ -487,13 +480,11 @@ class Identification:
         return Table("Simulated minus measured motion", header, rows)
 
     def to_json(self) -> str:
-        """estimate.json: the Estimate of all parameters, and beside it everything else that was
-        computed.
-        """
+        """Text of estimate.json: the Estimate of all parameters and all other results."""
         return json_text({**json.loads(self.estimate.to_json()), **self.summary()})
 
     def summary(self) -> dict[str, Any]:
-        """What estimate.json holds beside the Estimate of all parameters."""
+        """Entries of estimate.json besides those of the Estimate of all parameters."""
         fit = self.essential.estimate
         summary: dict[str, Any] = {
             "essential": {

@@ -54,8 +54,7 @@ LIMITS = {
 
 
 class Written:
-    """Annotation of a type that a file may write in a further way: what the JSON Schema of the type
-    says in its place.
+    """Annotation of a type that a file may write in another form, for its JSON Schema.
 
     Parameters
     ----------
@@ -129,8 +128,9 @@ Many = Annotated[
 
 
 def require(ok: bool, message: str, *path: str | int) -> None:
-    """SettingsError about the key at `path` unless `ok`; from __post_init__, `path` starts at the
-    settings that call this function.
+    """Raise SettingsError about the key at `path` unless `ok`.
+
+    In __post_init__, `path` starts at the settings that call this function.
     """
     if not ok:
         raise SettingsError(message, path=path)
@@ -153,9 +153,7 @@ Interval = Annotated[tuple[Real | None, Real | None], AfterValidator(_in_order)]
 
 
 class SettingsType(type):
-    """Type of settings: values that pydantic refuses become a SettingsError, which names the key
-    and what it expects.
-    """
+    """Metaclass of settings: an invalid value raises a SettingsError that names the key and the expected value."""
 
     def __call__(cls, *args: Any, **kwargs: Any) -> Any:
         try:
@@ -172,9 +170,7 @@ class SettingsType(type):
 @dataclass_transform(frozen_default=True, field_specifiers=(field,))
 @dataclass(frozen=True, config=CONFIG)
 class Settings(metaclass=SettingsType):
-    """Base of all settings. A subclass is a frozen dataclass of which only instances with valid
-    values can be made.
-    """
+    """Base of all settings; a subclass is a frozen dataclass with valid values only."""
 
     def __init_subclass__(cls) -> None:
         dataclass(frozen=True, config=CONFIG)(cls)
@@ -230,7 +226,7 @@ _adapter = cache(TypeAdapter)  # what checks mappings against a class of setting
 
 
 def structure(cls: type[T], value: Any, path: Path = ()) -> T:
-    """The settings of a mapping.
+    """Make settings from a mapping.
 
     Parameters
     ----------
@@ -269,7 +265,8 @@ def _value_at(path: Path, value: Any) -> Any:
 
 
 def to_mapping(settings: Any) -> dict[str, Any]:
-    """Complete plain mapping (dicts, lists, numbers, texts) of a Study or of one of its sections;
-    study_from_mapping(to_mapping(s)) == s.
+    """Complete plain mapping (dicts, lists, numbers, texts) of a Study or a section of it.
+
+    study_from_mapping(to_mapping(s)) == s
     """
     return plain(settings)  # type: ignore[no-any-return]

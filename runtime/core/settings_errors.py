@@ -34,14 +34,15 @@ EXPECTED = {  # by the type of an error of pydantic
 
 
 def shown(value: Any) -> str:
-    """The first 80 characters of a value as Python writes it, on one line."""
+    """The first 80 characters of the Python text of a value, on one line."""
     return " ".join(repr(value).split())[:80]
 
 
 def settings_error(error: ValidationError, given: Any, path: Path = ()) -> SettingsError:
-    """The first problem of a validation of the value `given`, to which the keys `path` lead.
+    """SettingsError for the first problem in the validation of `given`, whose keys are `path`.
 
-    Every member of a union has its own error. The member that took most of the value knows best; members that took equally much are named together.
+    Every member of a union has its own error. The member that accepts most of the value gives the
+    message; members that accept equally much are named together.
     """
     problems = [_problem(details, given) for details in error.errors(include_url=False)]
     first = problems[0][0]

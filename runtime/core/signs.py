@@ -16,16 +16,12 @@ SIGNED = ("inertia", "viscous", "coulomb", "dissipative")
 
 
 def is_form(acts: Mapping[Any, float]) -> bool:
-    """Whether an element of ELEMENTS is given as a form q'Bq (its keys are pairs of joints), not
-    along s = G q.
-    """
+    """Whether an element of ELEMENTS is a form q'Bq (its keys are pairs of joints), not an element along s = G q."""
     return any(isinstance(key, tuple) for key in acts)
 
 
 def negative_elements(model: GeneratedModel, fit: Estimate) -> tuple[str, ...]:
-    """Motor inertias and frictions of their own column that are negative by more than
-    LIMIT.CERTAIN_SIGN corrected deviations: no drive has them.
-    """
+    """Motor inertias and frictions with a column of their own that are below zero by LIMIT.CERTAIN_SIGN corrected deviations."""
     elements: Mapping[str, Any] = getattr(model, "ELEMENTS", {})
     signed = {
         name for name, (kind, _, acts) in elements.items() if kind in SIGNED and not is_form(acts)

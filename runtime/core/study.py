@@ -78,7 +78,7 @@ class Lowpass(Settings):
 
     @property
     def hertz(self) -> float:
-        """The cut-off as a number; that of the chapter where auto has no record to follow."""
+        """The cut-off as a number; that of the chapter if "auto" has no record."""
         return CHAPTER_CUTOFF if self.cutoff == "auto" else float(self.cutoff)
 
 
@@ -102,7 +102,7 @@ class Decimate(Settings):
 
 
 class Signals(Settings):
-    """From measured positions to q, qd, qdd.
+    """Filters from measured positions to q, qd, qdd.
 
     Attributes
     ----------
@@ -164,17 +164,17 @@ class Signals(Settings):
 
     @property
     def window_of_torques(self) -> int:
-        """Window of the median on torques; that on positions where auto has no record to follow."""
+        """Window of the median filter on torques; that of positions if "auto" has no record."""
         return self.median if isinstance(self.torque_median, str) else self.torque_median
 
     @property
     def admits_missing(self) -> bool:
-        """Whether positions of a record may be missing: the reader of counts fills them."""
+        """Whether positions of a record may be missing; the counts reader bridges them."""
         return self.reader == "counts"
 
 
 class Rows(Settings):
-    """Rows of W and Y that are used.
+    """Selection of the rows of W and Y.
 
     Attributes
     ----------
@@ -194,7 +194,7 @@ class Rows(Settings):
 
 
 class EstimateSettings(Settings):
-    """The estimator and its columns.
+    """Estimator and columns.
 
     Attributes
     ----------
@@ -215,7 +215,7 @@ class EstimateSettings(Settings):
 
 
 class EssentialSettings(Settings):
-    """Parameters are removed while sigma_rho stays below a threshold (chapter, section 4.1.1).
+    """Elimination of parameters while sigma_rho stays below a threshold (section 4.1.1 of the chapter).
 
     Attributes
     ----------
@@ -231,7 +231,7 @@ class EssentialSettings(Settings):
 
 
 class ValidateSettings(Settings):
-    """Data that the parameters are fitted on, and data that they predict.
+    """Split of the data into a fitted part and predicted parts.
 
     Attributes
     ----------
@@ -327,7 +327,7 @@ class CestacSettings(Settings):
 
 
 class Study(Settings):
-    """Settings of what the chapter does; features add sections of their own (`runtime.study`).
+    """Settings of the chapter's methods; features add sections (`runtime.study`).
 
     Attributes
     ----------

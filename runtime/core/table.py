@@ -18,7 +18,7 @@ LINE = 80  # characters of a line
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of text or Markup under a header.
+    """A table of text or Markup for terminal, page and notebook.
 
     Attributes
     ----------
@@ -56,11 +56,11 @@ class Table:
             )
 
     def to_text(self) -> str:
-        """Columns of text under the header, without the caption."""
+        """Plain text: columns under the header, without the caption."""
         return aligned([self.header, *self.rows])
 
     def to_html(self) -> Markup:
-        """A table element that needs no style sheet."""
+        """HTML table element that needs no style sheet."""
         written = [
             symbol if k == 0 and self.symbols else unit if name == "unit" else str
             for k, name in enumerate(self.header)
@@ -87,7 +87,7 @@ class Table:
 
 
 def aligned(lines: Sequence[Sequence[str]]) -> str:
-    """Columns of text under a header: the first column to the left, numbers to the right."""
+    """Columns of text under a header: the first column aligned left, numbers right."""
     widths = [max(len(cell) for cell in column) for column in zip(*lines, strict=True)]
     text = []
     for line in lines:
@@ -100,7 +100,7 @@ def aligned(lines: Sequence[Sequence[str]]) -> str:
 
 
 def in_lines(cells: Sequence[str]) -> list[str]:
-    """Cells of one width, as many to a line as LINE characters hold."""
+    """Cells of equal width, with as many in a line as LINE characters allow."""
     width = max(map(len, cells), default=0) + 2
     many = max((LINE + 2) // width, 1)
     rows = [cells[k : k + many] for k in range(0, len(cells), many)]
@@ -113,8 +113,7 @@ def with_intervals(
     sigma: Iterable[float],
     units: Sequence[str] = (),
 ) -> list[str]:
-    """Cells of one layout: name, value, half of its 95 % interval, unit; digits up to the second
-    one of the interval.
+    """Aligned cells: name, value, half of its 95 % interval, unit, with digits up to the second one of the interval.
 
     >>> with_intervals(["ZZ1R", "FV1"], [1.79263, 8.0], [0.0104, 0.2], ["kg*m**2", "N*m*s/rad"])
     ['ZZ1R  1.793 +- 0.020  kg*m**2', 'FV1   8.00  +- 0.39   N*m*s/rad']
@@ -133,7 +132,7 @@ def with_intervals(
 
 
 def interval(value: float, half: float) -> tuple[str, str]:
-    """A value and half of its interval, both up to the second digit of the latter."""
+    """A value and half of its interval as text, both up to the second digit of the interval."""
     if not (isfinite(half) and half > 0 and isfinite(value)):
         return f"{value:.4g}", f"{half:.2g}"
     place = floor(log10(half)) - 1
@@ -144,16 +143,14 @@ def interval(value: float, half: float) -> tuple[str, str]:
 
 
 def csv_text(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    """Comma separated values under a header; a number as Python reads it back, None empty."""
+    """Comma-separated values under a header; numbers with every bit, empty for None."""
     stream = StringIO()
     csv.writer(stream, lineterminator="\n").writerows([header, *rows])
     return stream.getvalue()
 
 
 def notebook(paragraphs: Sequence[str], *tables: Table) -> Markup:
-    """Paragraphs, the first table, and further ones behind a fold with their captions: a result in
-    a notebook. Every text is escaped.
-    """
+    """HTML of a result for a notebook: paragraphs, the first table, and further tables folded. Every text is escaped."""
     folds = [
         element("details", element("summary", table.caption), table.to_html())
         for table in tables[1:]

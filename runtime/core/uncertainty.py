@@ -44,7 +44,7 @@ SEED = 1
 
 @dataclass(frozen=True, eq=False)
 class BlockBootstrap:
-    """Deviations of the essential parameters three ways.
+    """Standard deviations of the essential parameters by three methods.
 
     Attributes
     ----------
@@ -75,14 +75,14 @@ class BlockBootstrap:
 
     @property
     def ratio(self) -> Array:
-        """Drawn over eq. (10), shape (b,)."""
+        """Deviation of the drawn blocks over that of eq. (10), shape (b,)."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(self.drawn / self.sigma)
 
 
 @dataclass(frozen=True)
 class FTest:
-    """One step of the trail, tested.
+    """F-test of one removed parameter.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class FTest:
 
     @property
     def significant(self) -> bool:
-        """p below 5 %: the parameters removed so far carry something."""
+        """Whether p is below 5 %: at least one of the removed parameters has an effect."""
         return bool(self.p < LIMIT.SIGNIFICANT)
 
 
@@ -142,7 +142,7 @@ class Uncertainty(Result):
 
     @property
     def kept_by_f_test(self) -> int:
-        """Parameters left before the first significant removal."""
+        """Parameters that remain before the first significant removal."""
         return self.all_count - next(
             (k for k, test in enumerate(self.f_tests) if test.significant), len(self.f_tests)
         )
@@ -180,7 +180,7 @@ class Uncertainty(Result):
 
     @property
     def too_short(self) -> str:
-        """That blocks do not see how long the residuals remember, a sentence."""
+        """Sentence if the residuals are correlated for longer than a block; else ""."""
         return (
             f"The residuals remember {self.memory:.2g} s, the blocks last "
             f"{self.bootstrap.length:.2g} s: the corrected deviations may be too small. Find what "
@@ -189,15 +189,15 @@ class Uncertainty(Result):
         )
 
     def to_table(self) -> str:
-        """Sentences, then every table."""
+        """The verdict, then every table."""
         return "\n\n".join(["\n".join(self.verdict), *(own.to_text() for own in self.tables())])
 
     def to_text(self) -> str:
-        """The verdict, the table of deviations and the table of residuals, as text."""
+        """Text of the verdict, the deviations and the residuals."""
         return "\n\n".join(["\n".join(self.verdict), *(own.to_text() for own in self.tables()[:2])])
 
     def tables(self) -> tuple[Table, ...]:
-        """Deviations, residuals by joint, F-tests along the trail, sets by threshold."""
+        """Tables: deviations, residuals by joint, F-tests of the removals, sets for each threshold."""
         drawn = self.bootstrap
         deviations = (drawn.sigma, drawn.corrected, drawn.drawn)
         columns = [[f"{x:.3g}" for x in own] for own in deviations]
@@ -247,7 +247,7 @@ class Uncertainty(Result):
         )
 
     def summary(self) -> dict[str, Any]:
-        """For JSON."""
+        """The checks as a mapping for JSON."""
         return {
             "verdict": self.verdict,
             "scatter": {**vars(self.bootstrap), "ratio": self.bootstrap.ratio},
@@ -300,7 +300,7 @@ def block_bootstrap(
     runs: int = LIMIT.BOOTSTRAP_RUNS,
     seed: int = SEED,
 ) -> BlockBootstrap:
-    """Deviations of `fit` by `runs` draws of its blocks of residuals; weights stay."""
+    """Deviations of `fit` from `runs` draws of its blocks of residuals; the weights do not change."""
     system = linear_system(observation, linear_companion(settings)).select(fit.names)
     blocks, drawn = list(system.block_rows()), np.full(len(fit.names), np.nan)
     if len(blocks) > 1 and fit.status == "ok":
@@ -312,8 +312,9 @@ def block_bootstrap(
 
 
 def f_tests(essential: Essential, share: float = 1.0) -> tuple[FTest, ...]:
-    """Tests along the trail, none where there are no more rows than parameters; share : rows that
-    count over rows.
+    """F-tests of the removed parameters; none without more rows than parameters.
+
+    share : effective number of rows over the number of rows.
     """
     r, b = essential.all_parameters.rows, len(essential.all_parameters.names)
     if r <= b:
@@ -340,7 +341,7 @@ def f_tests(essential: Essential, share: float = 1.0) -> tuple[FTest, ...]:
 
 
 def sets(essential: Essential) -> tuple[tuple[float, int, tuple[str, ...]], ...]:
-    """By threshold: number of parameters, and what differs from the set used."""
+    """For each threshold: number of parameters, and the differences from the used set."""
     steps = [*essential.trail, *essential.further]
     names = essential.all_parameters.names
     by_threshold = []

@@ -37,7 +37,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class JointComparison:
-    """Torques of one joint.
+    """Measured and predicted torque of one joint.
 
     Attributes
     ----------
@@ -66,9 +66,7 @@ class JointComparison:
 
 
 def direct_comparison(observation: Observation, fit: Estimate) -> tuple[JointComparison, ...]:
-    """Measured torques beside W X, with the columns of the Estimate, joint by joint, at the
-    instants of the observation.
-    """
+    """Measured torques and W X of the Estimate, joint by joint, at the instants of the observation."""
     missing = [name for name in fit.names if name not in observation.names]
     if missing:
         raise InputError(
@@ -117,8 +115,9 @@ class Prediction:
 
 @dataclass(frozen=True)
 class CrossValidation(Result):
-    """Predictions for every part and set of columns; `missing`: sets that could not be fitted;
-    `further`: the parts that are predicted are records of their own.
+    """Errors of every set of columns on every part of the data.
+
+    missing : sets that could not be fitted. further : whether the predicted parts are separate records.
     """
 
     joints: tuple[str, ...]
@@ -127,7 +126,7 @@ class CrossValidation(Result):
     further: bool = False
 
     def errors(self) -> dict[str, float]:
-        """Largest relative error on unseen data, %, by set of columns."""
+        """Largest relative error on unseen data, %, of each set of columns."""
         unseen = [p for p in self.predictions if not p.fitted]
         return {
             columns: max(p.relative_error for p in unseen if p.columns == columns)
@@ -135,14 +134,14 @@ class CrossValidation(Result):
         }
 
     def beside(self, other: CrossValidation) -> CrossValidation:
-        """The predictions of both, of the same parts of the data."""
+        """Combine the predictions of both, which are for the same parts of the data."""
         predictions = (*self.predictions, *other.predictions)
         joints = self.joints or other.joints
         missing = (*self.missing, *other.missing)
         return CrossValidation(joints, predictions, missing, self.further)
 
     def table(self, form: str = ".3f") -> Table:
-        """One line per part and set of columns, errors in %."""
+        """Table of errors in %, one line for each part and set of columns."""
         return Table(
             "Relative error, %",
             ("part", "parameters", "use", "total", *(f"joint {j}" for j in self.joints)),
@@ -156,11 +155,11 @@ class CrossValidation(Result):
         )
 
     def to_table(self) -> str:
-        """The table, and what could not be fitted."""
+        """The table, then the sets that could not be fitted."""
         return "\n".join([self.table().caption, self.table().to_text(), *self.missing])
 
     def summary(self) -> dict[str, Any]:
-        """What `to_json` writes, as a mapping."""
+        """The content of `to_json` as a mapping."""
         return {
             "schema": 1,
             "joints": self.joints,
@@ -179,7 +178,7 @@ def prediction_errors(observation: Observation, fit: Estimate) -> tuple[float, t
 
 @dataclass(frozen=True)
 class RecordError:
-    """Fit of one record.
+    """Error of one record in the common fit.
 
     Attributes
     ----------
@@ -202,9 +201,7 @@ class RecordError:
 def record_errors(
     observation: Observation, fit: Estimate, names: Sequence[str]
 ) -> tuple[RecordError, ...]:
-    """Errors of the records called `names`, in the order in which `observation` holds them, with
-    the parameters of `fit`.
-    """
+    """Error of each record with the parameters of `fit`; `names` has the order of `observation`."""
     parts = [observation.of_record(k) for k in range(len(names))]
     return tuple(
         RecordError(name, sum(part.rows), *prediction_errors(part, fit))
@@ -222,8 +219,7 @@ def cross_validation(
     fitted: Mapping[Any, Estimate] | None = None,
     further: bool = False,
 ) -> CrossValidation:
-    """Fit every set of columns on one observation, predict others; a set whose fit fails is left
-    out and told.
+    """Fit every set of columns on one observation and predict others; a set whose fit fails is left out and named.
 
     Parameters
     ----------
@@ -269,9 +265,7 @@ def split_validation(
     windows: Sequence[Window],
     choices: Mapping[Any, EstimateSettings],
 ) -> CrossValidation:
-    """`cross_validation` between windows in s of one record: the first is fitted, the others are
-    predicted.
-    """
+    """`cross_validation` between windows, s, of one record: the first is fitted, the others are predicted."""
     if len(windows) < 2:
         raise InputError(
             f"{len(windows)} window; expected at least two, the first to fit, the others to "
@@ -315,9 +309,7 @@ class Direction:
 
 @dataclass(frozen=True)
 class WeakDirections(Result, keys="threshold pairs groups directions", schema=1):
-    """What the record separates badly: correlated pairs, the groups they form, the smallest
-    singular directions.
-    """
+    """Parameters that the record separates badly: correlated pairs, their groups, the smallest singular directions."""
 
     pairs: tuple[Pair, ...]
     groups: tuple[tuple[str, ...], ...]
@@ -326,7 +318,7 @@ class WeakDirections(Result, keys="threshold pairs groups directions", schema=1)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """One sentence per group: which parameters trade, how strongly, and what to do."""
+        """One sentence for each group: the correlated parameters, how strongly, and what to do."""
         sentences = []
         for group in self.groups:
             pairs = [p for p in self.pairs if p.first in group]
@@ -341,7 +333,7 @@ class WeakDirections(Result, keys="threshold pairs groups directions", schema=1)
         return tuple(sentences)
 
     def tables(self, name: Callable[[str], str] = str) -> list[Table]:
-        """Pairs, where there are any, and directions; name : how a parameter is written."""
+        """Tables of pairs (if any) and of directions; name : function that writes a parameter."""
         pairs = Table(
             f"Pairs with |correlation| above {self.threshold:g}, all parameters fitted",
             ("first", "second", "correlation"),
@@ -359,7 +351,7 @@ class WeakDirections(Result, keys="threshold pairs groups directions", schema=1)
         return [pairs, directions] if self.pairs else [directions]
 
     def to_table(self) -> str:
-        """Groups, then the tables, each under its caption."""
+        """The groups, then the tables with their captions."""
         groups = f"groups: {'; '.join(', '.join(group) for group in self.groups) or 'none'}"
         tables = (f"{own.caption}\n{own.to_text()}" for own in self.tables())
         return "\n\n".join([groups, *tables])
@@ -371,8 +363,9 @@ def weak_directions(
     *,
     threshold: float = LIMIT.CORRELATION,
 ) -> WeakDirections:
-    """Parameters that trade, and the three directions that W sees least.   threshold : smallest
-    |correlation| reported.
+    """Correlated parameters, and the three directions that change W X least.
+
+    threshold : smallest |correlation| that is reported.
     """
     system = linear_system(observation, linear_companion(settings or EstimateSettings()))
     names = system.names

@@ -91,8 +91,9 @@ class StaticPoses(Result, keys="poses condition sigma compared s taken_in"):
 
 
 def static_poses(problem: Problem) -> StaticPoses:
-    """study.excitation.poses poses, default 20, within the limits of q that tell the parameters of
-    gravity best.
+    """Search poses at rest that determine the gravity parameters best, within the limits of q.
+
+    study.excitation.poses is their number, default 20.
 
     Parameters
     ----------

@@ -44,8 +44,9 @@ def excite(
     map: Callable[..., Iterable[Any]] = map,
     progress: Callable[[int, int], None] | None = None,
 ) -> Excitation:
-    """The motion of smallest criterion over all starts of study.excitation, within the limits at
-    the controller rate.
+    """Search the motion with the smallest criterion over all starts of study.excitation.
+
+    It keeps the limits at the controller rate.
 
     Parameters
     ----------

@@ -300,7 +300,7 @@ def simulate(
     ideal: bool = False,
     name: str | None = None,
 ) -> Simulation:
-    """The closed loop of a controller along its reference.
+    """Simulate the closed loop of a controller along its reference.
 
     records : those that the reference may come from.   folder : where a file of it starts.
     ideal, name : as of `runtime.simulate`.

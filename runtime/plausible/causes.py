@@ -137,7 +137,7 @@ def unchanged_study(n: int, **changed: Any) -> Cause:
 
 
 class Robot:
-    """What causes are made of: joints, drives and table of frames of a study of n joints.
+    """Joints, drives and frame table of a study of n joints, from which causes are made.
 
     Parameters
     ----------
@@ -173,32 +173,30 @@ class Robot:
         self.constant = np.eye(n) if drives is None else np.diag(drives.torque_constant)
 
     def one(self, j: int, value: float, others: float = 1.0) -> Array:
-        """value at joint j, shape (n,)."""
+        """`value` at joint j and 0 elsewhere, shape (n,)."""
         return np.where(np.arange(self.n) == j, value, others)
 
     def positions(self, E: Array) -> Maps:
-        """The map E of the columns of positions, on the side of the files: of motors
-        q' = R^-1 E R (q - offset) + offset.
-        """
+        """Map of position columns by E, on the side of the files; for motors q' = R^-1 E R (q - offset) + offset."""
         if self.sides[0] == "motor":
             E = np.linalg.inv(self.R) @ E @ self.R
             return {"P": E, "p": self.offset - E @ self.offset}
         return {"P": E}
 
     def torques(self, E: Array) -> Maps:
-        """The map E of the columns of torques, on the side of the files."""
+        """Map of torque columns by E, on the side of the files."""
         if self.sides[1] == "motor":
             E = self.R.T @ E @ np.linalg.inv(self.R.T)
         return {"T": E}
 
     @property
     def gravity(self) -> Array:
-        """Gravity of the robot file in frame 0, shape (3,), m/s^2; zeros without variants."""
+        """Gravity of the robot file in frame 0, shape (3,), m/s^2; zeros without `variants`."""
         return np.array([self.free.get(key, 0.0) for key in GRAVITY])
 
     @property
     def frames(self) -> list[int]:
-        """Frames whose entries are free: those that constraints tie keep theirs."""
+        """Frames with free entries; frames of constrained joints keep theirs."""
         entries = (ENTRY.fullmatch(key) for key in self.free)
         return sorted(int(entry[2]) for entry in entries if entry and entry[1] == "alpha")
 

@@ -80,7 +80,7 @@ class Delay(Result):
 
 
 def delay(problem: Problem, *, longest: float = LIMIT.LONGEST_DELAY) -> Delay:
-    """The time shift between positions and torques of the first record of a prepared problem, by joint.
+    """Estimate the time shift between positions and torques of the first record, joint by joint.
 
     Parameters
     ----------

@@ -182,7 +182,7 @@ def plausibility_of(result: Identification, variants: GeneratedModel | None = No
 
 
 def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) -> Plausibility:
-    """Whether record, study and robot file suit each other, and what explains the record better where they do not.
+    """Check whether record, study and robot file agree, and search single changes that explain the record better.
 
     Parameters
     ----------

@@ -56,15 +56,14 @@ def resample(
     method: Literal["cubic", "linear"] = "cubic",
     longest: float = GAP,
 ) -> tuple[Array, Array]:
-    """Signals brought from irregular stamps to a uniform rate, between two samples by a cubic
-    spline or a straight line.
+    """Interpolate signals with irregular time stamps at a uniform rate, by a cubic spline or straight lines.
 
         t_k = t[0] + k / rate,   k = 0 ... floor((t[-1] - t[0]) rate)
 
     Parameters
     ----------
     t : array_like, shape (N,), s
-        Stamps of the samples, increasing; a repeated stamp keeps its first sample.
+        Time stamps, increasing; of a repeated stamp the first sample is kept.
     x : array_like, shape (N,) or (N, n)
         Samples.
     rate : float, Hz, optional
@@ -77,9 +76,9 @@ def resample(
     Returns
     -------
     t : ndarray, shape (K,), s
-        Uniform.
+        Uniform times.
     x : ndarray, shape (K,) or (K, n)
-        Signals there.
+        Signals at these times.
 
     Raises
     ------

@@ -70,7 +70,7 @@ CLEAR = 1e9
 
 @dataclass(frozen=True)
 class Certificate:
-    """Results of the checks of a regrouping, and of the module emitted from it.
+    """Results of the checks of base parameters, and of the texts emitted from them.
 
     Attributes
     ----------
@@ -122,14 +122,14 @@ class Certificate:
 
     @property
     def valid(self) -> bool:
-        """Whether every check holds: the verdict of `symgen check`."""
+        """Whether every check holds."""
         return (
             not self.failures and self.numeric_valid and all(t.valid for t in self.texts.values())
         )
 
     @property
     def formulas(self) -> str:
-        """How far the formulas are proved."""
+        """Kind of proof of the formulas, in words."""
         if not self.primes:
             return "checked in floats"
         sure = f", a false one passes with probability below {self.error_probability:.0e}"
@@ -139,7 +139,7 @@ class Certificate:
 
     @property
     def errors(self) -> dict[str, float]:
-        """Error of every function and table of every text, as of `TextCheck.errors`."""
+        """Error of every function and table of every text, as in `TextCheck.errors`."""
         return {
             f"{name} of {file}": error
             for file, text in self.texts.items()
@@ -148,7 +148,7 @@ class Certificate:
 
     @property
     def checks(self) -> list[tuple[bool, str]]:
-        """Every check: whether it holds, and what it is."""
+        """Every check: whether it holds, and its description."""
         where = "in floats" if self.rank_in_floats or not self.primes else "modulo the primes"
         columns = any(text.startswith("column") for text in self.failures)
         checks = [
@@ -171,12 +171,12 @@ class Certificate:
         return checks + [check for file, text in self.texts.items() for check in text.checks(file)]
 
     def mapping(self) -> dict[str, Any]:
-        """The certificate as plain values for JSON; null stands for a number that is not finite."""
+        """The certificate as plain values for JSON; null for nan and infinity."""
         values = {"valid": self.valid, "numeric_valid": self.numeric_valid, **asdict(self)}
         return dict(_plain(values))
 
     def brief(self) -> str:
-        """The verdict, then what does not hold, a line each."""
+        """The verdict, then one line for each failed check."""
         verdict = "valid" if self.valid else "FALSE"
         head = (
             f"{self.name}: certificate {verdict}, {self.count} base parameters of "

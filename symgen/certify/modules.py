@@ -104,8 +104,7 @@ def require_valid(certificate: Certificate) -> None:
 
 
 def model(robot: str | Path | Robot, *, options: Sequence[str] = ()) -> ModuleType:
-    """The module of a robot: derived, regrouped, emitted, certified, imported from a cache by
-    content.
+    """Derive, certify and import the module of a robot; a cache keeps it by content.
 
     Parameters
     ----------

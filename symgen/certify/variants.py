@@ -33,8 +33,7 @@ FREE = "free_"
 
 
 def variants(robot: str | Path | Robot) -> ModuleType:
-    """The emitted module of a robot with its table of frames and its gravity as constants, columns
-    all standard parameters.
+    """Module of a robot whose frame table and gravity are constants, with all standard parameters as columns.
 
     Parameters
     ----------

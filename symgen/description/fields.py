@@ -100,7 +100,7 @@ class Written:
 
 
 def problem(error: SymgenError) -> PydanticCustomError:
-    """An error of ours among those that pydantic collects."""
+    """A pydantic error with our own message."""
     return PydanticCustomError("described", "{error}", {"error": error})
 
 

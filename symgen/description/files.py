@@ -27,7 +27,7 @@ UNREAD = {
 
 
 def packaged_robots() -> tuple[str, ...]:
-    """Names that `load_robot` knows without a path."""
+    """Names of the packaged robots, which `load_robot` reads without a path."""
     folder = resources.files("symgen.description") / "robots"
     return tuple(
         sorted(
@@ -39,7 +39,7 @@ def packaged_robots() -> tuple[str, ...]:
 
 
 def load_robot(source: str | Path, *, keep_fixed: bool = False, exact: bool = False) -> Robot:
-    """The robot of a file, or a packaged one by its name.
+    """Read a robot file, or a packaged robot by its name.
 
     Parameters
     ----------

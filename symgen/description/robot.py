@@ -273,14 +273,15 @@ class Robot:
 
     @cached_property
     def start(self) -> dict[int, float]:
-        """Positions that the loops name, near which they close; rad or m."""
+        """Start positions of the loops, rad or m, which select the assembly mode."""
         return {j: x for loop in self.loops for j, x in loop.start.items()}
 
     @cached_property
     def longest(self) -> float:
-        """The longest length of the frames at the constants of the file, m; of those around the
-        loops where there are some, which may be far smaller than the arm that carries them. 1
-        where all are zero.
+        """Longest length of the frames at the constants of the file, m; 1 if all are zero.
+
+        For a robot with loops, only frames around the loops count, because the arm that carries them
+        may be far larger.
         """
         around = {j for l in self.loops for j in {*self.path(l.cut)} ^ {*self.path(l.twin)}}
         frames = [f for f in self.frames if not around or f.j in around]
@@ -299,9 +300,7 @@ class Robot:
 
     @cached_property
     def parameters(self) -> tuple[str, ...]:
-        """Names of the standard parameters in the order of eq. (4), link by link, then further
-        families in file order.
-        """
+        """Names of the standard parameters in the order of eq. (4): link by link, then further families in file order."""
         by_family = {e.family: e for e in self.elements}
         names: list[str] = []
         for f in self.frames:
@@ -319,26 +318,24 @@ class Robot:
 
     @cached_property
     def channels(self) -> dict[str, tuple[str, ...]]:
-        """{constant that is a function of time: parameters whose laws read it}."""
+        """Parameters whose laws read each channel (a constant that is a function of time), by channel."""
         read = [(c, parameter(e.family, j)) for e in self.elements for j in e.keys
                 for c in e.channels(j)]  # fmt: skip
         return {c: tuple(name for own, name in read if own == c) for c, _ in read}
 
     @property
     def loaded(self) -> tuple[str, ...]:
-        """Parameters whose laws read the torque that the others transmit: their direct model is
-        implicit, and not given.
-        """
+        """Parameters whose laws read the torque of the rest of the model; such a robot has no forward dynamics."""
         read = (own for c, own in self.channels.items() if c.startswith(TRANSMITTED))
         return tuple(name for own in read for name in own)
 
     def root(self, loop: Loop) -> int:
-        """The last frame that carries both ends of a loop: what is before it turns the whole."""
+        """The last frame that carries both ends of a loop; joints before it turn the whole loop."""
         twin = self.path(loop.twin)
         return max((j for j in self.path(loop.cut) if j in twin), key=twin.index, default=0)
 
     def path(self, j: int) -> tuple[int, ...]:
-        """Frames from the base to j, j included."""
+        """Frames from the base to j, including j."""
         frames: list[int] = []
         while j:
             frames.insert(0, j)

@@ -46,7 +46,7 @@ BY_ROW = ("frames", "elements", "limits", "values", "labels")
 
 
 def parse_robot(content: bytes, file: str) -> Robot:
-    """The robot described by the bytes of a file called `file`."""
+    """Read a robot from the bytes of a file called `file`."""
     if not isinstance(content, bytes):
         raise DescriptionError(
             f"content is of type {type(content).__name__}; expected the bytes of a robot file "

@@ -36,19 +36,19 @@ WITHOUT_EFFECT = ("symgen", "name", "title", "source", "drives", "limits", "valu
 
 @dataclass(frozen=True)
 class Absorption:
-    """Why a standard parameter stands in the formula of a base parameter.
+    """Reason why a standard parameter is part of the formula of a base parameter.
 
     Attributes
     ----------
     name : str
         The standard parameter.
     base : tuple of str
-        Base parameters that take it in.
+        Base parameters whose formulas contain it.
     columns : str
-        Its regressor column by those of the base, such as "the columns of YY2 and XX2R are
+        Its regressor column in terms of base columns, such as "the columns of YY2 and XX2R are
         opposite".
     rule : str
-        The relation that moved it, in words.
+        The physical relation, in words.
     """
 
     name: str
@@ -59,16 +59,16 @@ class Absorption:
 
 @dataclass(frozen=True)
 class BaseDifference:
-    """What an edit of a robot does to its base parameters.
+    """Effect of an edit of a robot on its base parameters.
 
     Attributes
     ----------
     edits : tuple of str
         Keys of the robot file with their values before and after.
     appeared, gone : tuple of str
-        Base parameters of one robot alone, by the standard parameter that they are called after.
+        Base parameters of one of the robots only, by their own standard parameter.
     changed : tuple of (str, str)
-        Formulas before and after of those of both, `XX2R = XX2 - YY2`.
+        Formulas before and after of common base parameters, such as `XX2R = XX2 - YY2`.
     """
 
     edits: tuple[str, ...]
@@ -90,9 +90,7 @@ class BaseDifference:
 
 
 def absorptions(regrouping: Regrouping) -> tuple[Absorption, ...]:
-    """Of every standard parameter that a base parameter takes in, where and why, in the order of
-    eq. (4).
-    """
+    """Reasons for all standard parameters that are part of another parameter's formula, in the order of eq. (4)."""
     own, particular = set(regrouping.own), set(Transfer(regrouping.robot).remaining)
     into = {
         name: {b.name: b.combination[name] for b in regrouping.base if name in b.combination}
@@ -135,7 +133,7 @@ def _rule(robot: Robot, name: str) -> str:
 
 
 def base_difference(before: Regrouping, after: Regrouping) -> BaseDifference:
-    """What leads from one robot to another, and what becomes of the base parameters by it.
+    """Compare two robots: the edits between their files, and the effect on the base parameters.
 
     `str` of it is one line: alpha of frame 2: 0 -> pi/2: MX1R appears; ...
     """

@@ -46,14 +46,14 @@ LAST_CHOICE = ("MZ", "M", "YY")
 
 @dataclass(frozen=True)
 class BaseParameter:
-    """X = own + sum_k coefficient_k chi_k.
+    """One base parameter: X = own + sum_k coefficient_k chi_k.
 
     Attributes
     ----------
     name : str
-        Name of the standard parameter it is called after, with R where it takes in others.
+        Name of its own standard parameter, with R if the sum has further terms.
     own : str
-        The standard parameter it is called after.
+        Its own standard parameter, which has the coefficient 1.
     combination : mapping
         Coefficient of each standard parameter, `own` first.
     """
@@ -101,8 +101,10 @@ class Regrouping:
 
     @property
     def constants(self) -> Mapping[str, float]:
-        """Constants of the robot that may have other values: channels alone where coefficients are
-        numbers, which hold for the constants of the file.
+        """Constants of the robot that may have other values.
+
+        These are only channels if coefficients are numbers, because such numbers hold for the constants
+        of the file.
         """
         every, channels = self.robot.constants, self.robot.channels
         return every if self.method == EXACT else {c: every[c] for c in every if c in channels}

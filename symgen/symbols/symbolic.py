@@ -28,8 +28,7 @@ def symbolic(
     passive: str | None = None,
     limit: int = LARGEST,
 ) -> SymbolicRobot:
-    """The models of a robot as exact SymPy objects: closed forms by method, recursions by
-    `equations`.
+    """Models of a robot as exact SymPy objects: closed forms by method, recursions by `equations`.
 
     Parameters
     ----------
@@ -64,7 +63,7 @@ def symbolic(
 
 @dataclass(frozen=True)
 class SymbolicRobot:
-    """The models of a robot, each a method of its name: `arm.inertia_matrix()` is a SymPy Matrix.
+    """Models of a robot; each model is a method with its name: `arm.inertia_matrix()` is a SymPy Matrix.
 
     Frames are numbered as in the robot file, 0 is the base. Twists (velocity, acceleration, rows of
     the Jacobian) are those of the origin of frame `of` (default: the last frame), then angular, in
@@ -77,7 +76,7 @@ class SymbolicRobot:
     def model(
         self, name: str, *, of: int | None = None, frame: int = 0, rows: Sequence[int] | None = None
     ) -> SymbolicModel:
-        """A model in both its forms.
+        """A model in closed and in recursive form.
 
         Raises
         ------
@@ -116,8 +115,9 @@ class SymbolicRobot:
     def equations(
         self, name: str, *, of: int | None = None, frame: int = 0
     ) -> tuple[list[tuple[Any, Any]], Any]:
-        """The recursion of a model: [(symbol, expression)] in order, under the names of SYMORO, and
-        the model in these symbols (as `sympy.cse`).
+        """Recursion of a model as from `sympy.cse`: a list [(symbol, expression)], and the model in these symbols.
+
+        The symbols have the names of SYMORO.
         """
         return of_listing(self.model(name, of=of, frame=frame))
 
@@ -131,7 +131,7 @@ class SymbolicRobot:
         frame: int = 0,
         rows: Sequence[int] | None = None,
     ) -> str:
-        """A model as `symgen show --model` prints it.
+        """Text of a model, as `symgen show --model` prints it.
 
         form : closed or recursive. format : text, latex (a document that compiles), latex-fragment
         (its formulas alone), sympy (Python), json.
@@ -147,7 +147,7 @@ class SymbolicRobot:
         frame: int = 0,
         rows: Sequence[int] | None = None,
     ) -> Formulas:
-        """A model as formulas: typeset in a notebook, text where it is printed."""
+        """Formulas of a model, typeset in a notebook and plain in print."""
         return Formulas(self.model(name, of=of, frame=frame, rows=rows), form)
 
     # --- symbols ---
@@ -203,5 +203,5 @@ class SymbolicRobot:
         return of_model(self.model(name, of=of, frame=frame, rows=rows))
 
     def base_parameters(self) -> dict[Any, Any]:
-        """What each parameter is made of: {ZZ1R: ZZ1 + Ia1 + ...}."""
+        """Formula of each base parameter: {ZZ1R: ZZ1 + Ia1 + ...}."""
         return dict(zip(self.parameters, self._sympy("base_parameters"), strict=True))

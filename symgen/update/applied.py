@@ -46,33 +46,33 @@ class Change:
 
 @dataclass(frozen=True)
 class Applied:
-    """A URDF or MJCF text with identified values.
+    """Text of a URDF or MJCF file with identified values.
 
     Attributes
     ----------
     file, format : str
         Name of the file, and URDF or MJCF.
     before, content : bytes
-        The text as it was read, and the new one.
+        The text before and after.
     changes : tuple of Change
         Numbers that changed.
     added : tuple of str
         Attributes and elements that the file did not have.
     placeless : mapping, SI
-        Parameters that the format has no place for, by name.
+        Parameters for which the format has no place, by name.
     placeless_sigma : mapping, SI
         Their deviations.
     joints : mapping
         Names of their joints.
     spread : tuple of str
-        Links on fixed joints that changed too, since no physical link was left otherwise.
+        Links on fixed joints that also changed, because no physical link was possible otherwise.
     undetermined : tuple of str
-        Numbers of links on which no torque of a motion depends, and which are the file's; others
-        that no torque tells stand in `changes`, told by "file".
+        Numbers of links on which no torque depends, and which keep the value of the file. If such a
+        number had to change, `changes` has it with `told_by` "file".
     strange : tuple of str
         Links whose mass or centre is far from that of the file.
     lost : tuple of str
-        Base parameters that the estimate does not hold or the record does not show; the file's.
+        Base parameters that are not in the estimate or not determined; they keep the values of the file.
     """
 
     file: str
@@ -90,17 +90,17 @@ class Applied:
     lost: tuple[str, ...]
 
     def write(self, output: str | Path) -> Path:
-        """Write the new text, whole or not at all; the path. A file of that name is replaced."""
+        """Write the new text completely or not at all, and return the path. An existing file is replaced."""
         path = Path(output).resolve()
         return write_all(path.parent, {path.name: self.content})[0]
 
     @property
     def names_files(self) -> bool:
-        """Whether the text names other files, meshes for example, relative to its own folder."""
+        """Whether the text has relative names of other files, such as meshes."""
         return b"filename=" in self.content or b"file=" in self.content
 
     def diff(self) -> str:
-        """Lines that differ, as `diff -u` shows them."""
+        """Changed lines, in the format of `diff -u`."""
         old, new = (
             text.decode("utf-8", "replace").splitlines(keepends=True)
             for text in (self.before, self.content)
@@ -108,7 +108,7 @@ class Applied:
         return "".join(difflib.unified_diff(old, new, self.file, f"{self.file} (identified)", n=0))
 
     def table(self) -> Table:
-        """What changed, number by number."""
+        """Table of the changed numbers."""
         rows = [
             (
                 c.place,
@@ -130,7 +130,7 @@ class Applied:
         )
 
     def notes(self) -> list[str]:
-        """What a reader should know besides."""
+        """Remarks for the user."""
         notes = [f"added: {'; '.join(self.added)}"] if self.added else []
         if self.placeless:
             listed = ", ".join(
@@ -183,7 +183,7 @@ class Applied:
         )
 
     def to_json(self) -> str:
-        """JSON text: file, format, changes, and what the notes say."""
+        """JSON text: file, format, changes and remarks."""
         return json_text(
             {
                 "schema": "symgen-apply/1",

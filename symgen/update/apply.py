@@ -48,8 +48,7 @@ def apply(
     chain: tuple[str, str] | None = None,
     exact: bool = False,
 ) -> Applied:
-    """The text of a URDF or MJCF file with identified values in it, and what changed; nothing is
-    written yet.
+    """Insert identified values into the text of a URDF or MJCF file; nothing is written yet.
 
     Parameters
     ----------

@@ -31,8 +31,9 @@ from runtime.core.rows.factor import Array
 
 
 def block_covariance(blocks: Iterable[Array], X: Array, T: Array) -> Array:
-    """C_b, shape (b, b); nan for parameters that one block alone determines, and for fewer than two
-    blocks.
+    """Jackknife covariance over blocks of time, shape (b, b).
+
+    nan for fewer than two blocks, and for a parameter that only one block determines.
 
     Parameters
     ----------
@@ -48,8 +49,9 @@ def block_covariance(blocks: Iterable[Array], X: Array, T: Array) -> Array:
 
 
 def deletions(blocks: Iterable[Array], X: Array, T: Array, into: Array) -> Array:
-    """sqrt((K - 1)/K) into (1 - G_k)^-1 T'g_k of every block, shape (K, b); into, shape (b, rank):
-    T for least squares.
+    """sqrt((K - 1)/K) into (1 - G_k)^-1 T'g_k for every block, shape (K, b): the effect of its deletion.
+
+    into : ndarray, shape (b, rank): T for least squares.
     """
     size = np.linalg.norm(into, axis=1, keepdims=True)
     changes = []
@@ -84,7 +86,7 @@ def _without_its_own(G: Array, g: Array, into: Array, size: Array) -> Array:
 def drawn_again(
     blocks: Iterable[Array], estimator: Callable[[Array], Array], runs: int, seed: int
 ) -> Array:
-    """Estimates, shape (runs, b), of records made of blocks drawn with replacement.
+    """Estimates, shape (runs, b), from records made of blocks drawn with replacement.
 
     Parameters
     ----------
@@ -109,13 +111,14 @@ def drawn_again(
 def scatter(
     blocks: Iterable[Array], estimator: Callable[[Array], Array], runs: int, seed: int
 ) -> Array:
-    """Deviation of X, shape (b,), over the records of `drawn_again`."""
+    """Standard deviation of X, shape (b,), over the records of `drawn_again`."""
     return np.asarray(np.std(drawn_again(blocks, estimator, runs, seed), axis=0, ddof=1))
 
 
 def gram_root(gram: Array) -> Array:
-    """Upper triangular R, R'R = gram, shape (c, c); of any positive semidefinite matrix, columns
-    scaled to 1 first.
+    """Upper triangular R with R'R = gram, shape (c, c), for any positive semidefinite matrix.
+
+    Columns are first scaled to 1.
     """
     size = np.sqrt(np.where(np.diag(gram) > 0, np.diag(gram), 1.0))
     values, vectors = np.linalg.eigh(gram / np.outer(size, size))
@@ -125,7 +128,7 @@ def gram_root(gram: Array) -> Array:
 
 
 def gram_solution(gram: Array) -> Array:
-    """X of least squares from the Gram matrix of [W Y], shape (b,), columns scaled to 1 first."""
+    """Least-squares X, shape (b,), from the Gram matrix of [W Y]; columns are first scaled to 1."""
     A, y = gram[:-1, :-1], gram[:-1, -1]
     D = 1 / np.sqrt(np.where(np.diag(A) > 0, np.diag(A), 1.0))
     return np.asarray(D * np.linalg.lstsq(A * np.outer(D, D), D * y, rcond=None)[0])

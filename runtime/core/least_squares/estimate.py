@@ -74,12 +74,12 @@ class JointFit:
 
     @property
     def has_motor(self) -> bool:
-        """Whether a torque was measured that is not zero throughout."""
+        """Whether the measured torque of the joint is not always zero."""
         return self.rows > 0 and not np.isnan(self.relative_error)
 
     @property
     def is_axis(self) -> bool:
-        """Whether it is an axis of a force sensor (`runtime.wrench`), no joint."""
+        """Whether this is an axis of a force sensor (`runtime.wrench`), not a joint."""
         return not self.joint[:1].isdigit()
 
 
@@ -183,8 +183,9 @@ class Estimate:
 
     @property
     def worst_joint(self) -> JointFit:
-        """The joint with the largest relative error, of those that have rows and a motor; an axis of a
-        force sensor, which may measure its noise alone, where there are no joints.
+        """The joint with the largest relative error, among those with rows and a motor.
+
+        Without joints, an axis of a force sensor; it may measure only its noise.
         """
         return max(
             self.per_joint, key=lambda fit: (fit.has_motor, not fit.is_axis, fit.relative_error)
@@ -204,28 +205,27 @@ class Estimate:
         return self.to_latex()
 
     def to_json(self) -> str:
-        """JSON text of every field (design: estimate.json); numbers that do not exist are null."""
+        """JSON text of every field (estimate.json); null for nan and infinity."""
         computed = {"relative_sigma": self.relative_sigma, "rows": self.rows}
         return json_text({"schema": SCHEMA, **vars(self), **computed})
 
     @classmethod
     def from_json(cls, text: str, *, file: str = "estimate.json") -> Estimate:
-        """The Estimate that `to_json` wrote, every number to the bit; what stands beside it
-        (estimate.json of `symgen identify`) is left out.
+        """Read the Estimate that `to_json` wrote, with every bit.
 
-        Raises InputError where the text is no JSON, of another schema or incomplete; `file` is the
-        name it gives.
+        Other keys of estimate.json are ignored. Raises InputError if the text is not JSON, has another
+        schema or is incomplete; `file` is the name in its message.
         """
         return from_text(cls, text, SCHEMA, file)
 
     def to_table(self) -> str:
-        """Plain text: one line per parameter, one per joint."""
+        """Plain text with one line for each parameter and each joint."""
         parameters, joints = self.tables()
         note = ["", self.message] if self.message else []
         return "\n".join([*self._head(), "", parameters.to_text(), "", joints.to_text(), *note])
 
     def tables(self) -> tuple[Table, Table]:
-        """Parameters, then joints, line by line."""
+        """Tables of the parameters and of the joints."""
         parameters = [
             (
                 name,
@@ -274,8 +274,9 @@ class Estimate:
         )
 
     def to_latex(self, names: Sequence[str] | None = None, *, blocks: int = 1) -> str:
-        """LaTeX tabular (booktabs) as the chapter's Table 2; `names` restricts and orders its
-        lines, `blocks` stand side by side.
+        """LaTeX tabular (booktabs) like Table 2 of the chapter.
+
+        names : parameters and their order. blocks : number of blocks side by side.
         """
         shown = self.names if names is None else tuple(names)
         place = [self.names.index(name) for name in shown]

@@ -28,7 +28,7 @@ from runtime.core.study import EstimateSettings
 
 
 class LinearOptions(Settings):
-    """estimate.options of methods ols and wls, and of those that start from them.
+    """estimate.options of ols and wls, and of the methods that start from them.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class LinearOptions(Settings):
 
 @dataclass(frozen=True)
 class System:
-    """The factored rows of one observation.
+    """The factored rows of one observation, before and after weighting.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class System:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Columns still in play."""
+        """Names of the remaining columns."""
         return self.raw.names
 
     def select(self, names: Sequence[str]) -> System:
@@ -95,7 +95,7 @@ class System:
         return self._changed(lambda factor: factor.select(names))
 
     def drop(self, name: str) -> System:
-        """The system without one column, by down-dating its triangular factor."""
+        """The system without one column, from its triangular factor."""
         return self._changed(lambda factor: factor.drop(name))
 
     def _changed(self, change: Callable[[Factor], Factor]) -> System:
@@ -144,9 +144,7 @@ def ordinary(
 
 
 def standard_deviations(system: System, fit: Solution) -> tuple[float, Array]:
-    """sigma_rho of eq. (9), and C of eq. (10) with shape (b, b); nan where the record says
-    nothing.
-    """
+    """sigma_rho of eq. (9) and C of eq. (10), shape (b, b); nan for undetermined parameters."""
     freedom = system.weighted.rows - fit.rank
     sigma_rho = fit.residual_norm / np.sqrt(freedom) if freedom > 0 else np.nan
     C = fit.T @ fit.T.T * (1.0 if system.known_variance else sigma_rho**2)
@@ -162,9 +160,7 @@ def assemble(
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Estimate:
-    """The Estimate of a solved system; `model` gives units, joint numbers and the hash of the
-    robot.
-    """
+    """Make the Estimate of a solved system; `model` gives units, joint numbers and the hash of the robot."""
     observation, names = system.observation, system.names
     sigma_rho, C = standard_deviations(system, fit)
     corrected = np.full(len(names), np.nan)  # as without redundancy
@@ -221,18 +217,18 @@ def assemble(
 
 
 def labels_of(model: GeneratedModel | None, n: int) -> tuple[str, ...]:
-    """Names of the joints, their numbers where there is no model."""
+    """Names of the joints; their numbers without a model."""
     return tuple(map(str, range(1, n + 1))) if model is None else joint_labels(model)
 
 
 def condition(factor: Factor, rank: int) -> float:
-    """Condition number of W; inf where its rank is not full."""
+    """Condition number of W; inf if W is rank-deficient."""
     b = len(factor.names)
     return (float(np.linalg.cond(factor.R11)) if b else 1.0) if rank == b else np.inf
 
 
 def outcome(system: System, fit: Solution) -> tuple[Status, str]:
-    """Status and the paragraph that explains it."""
+    """Status of a solution, and the text that explains it."""
     b = len(system.names)
     if fit.rank < b:
         silent = [group[0] for group in fit.groups if len(group) == 1]
@@ -267,7 +263,7 @@ def outcome(system: System, fit: Solution) -> tuple[Status, str]:
 
 
 def describe(observation: Observation, model: GeneratedModel | None = None) -> dict[str, Any]:
-    """Provenance: hashes of the robot file and of the measured files, versions that computed."""
+    """Provenance: hashes of robot file and measured files, and versions of the packages."""
     try:
         own = version("symgen")
     except PackageNotFoundError:
@@ -289,6 +285,6 @@ def _undetermined(system: System, fit: Solution) -> list[int]:
 
 
 def percent(error: Array | float, of: Array | float) -> float:
-    """100 ||error|| / ||of||, %; nan where `of` is zero."""
+    """100 ||error|| / ||of||, %; nan if `of` is zero."""
     norm = float(np.linalg.norm(of))
     return 100 * float(np.linalg.norm(error)) / norm if norm > 0 else float("nan")

@@ -29,7 +29,7 @@ WEIGHTINGS = ("none", "joint", "iterated", "covariance")
 
 @dataclass(frozen=True, eq=False)
 class Beginning:
-    """What a method is given.
+    """Input of a method: rows, settings, and the least-squares solution to start from.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Beginning:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """What a method gives.
+    """Output of a method.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class Method:
     any_rank: bool = False
 
     def checked(self, settings: EstimateSettings) -> Any:
-        """The options of the settings; SettingsError where they or the weights do not suit."""
+        """Options of the settings; raise SettingsError if these or the weights do not suit the method."""
         message = (
             f"{settings.weights!r} with method {settings.method}; expected "
             f"{' or '.join(self.weights)}: it has its own weights or none, others belong to "
@@ -122,7 +122,7 @@ class Method:
         return structure(self.options, settings.options, OPTIONS)
 
     def system(self, observation: Observation, settings: EstimateSettings) -> System:
-        """The rows of the least squares that the method starts from."""
+        """Rows of the least squares that the method starts from."""
         options = self.checked(settings)
         if not isinstance(options, LinearOptions):
             given = getattr(options, "linear", {})
@@ -138,8 +138,9 @@ LINEAR: Mapping[str, Method] = {
 
 
 def linear_system(observation: Observation, settings: EstimateSettings) -> System:
-    """The factored rows as the method of `settings` weighs them; SettingsError for a method that is
-    not one linear system.
+    """Factored and weighted rows for the method of `settings`.
+
+    Raises SettingsError for a method that is not one linear system.
     """
     if settings.method not in LINEAR:
         message = f"{settings.method!r} is not one linear system; expected {' or '.join(LINEAR)}"
@@ -148,8 +149,7 @@ def linear_system(observation: Observation, settings: EstimateSettings) -> Syste
 
 
 def linear_companion(settings: EstimateSettings) -> EstimateSettings:
-    """The settings themselves where their method is one linear system; else least squares with the
-    same weights and columns.
+    """Settings of a linear method: `settings` itself if its method is linear, else least squares with the same weights and columns.
 
     Essential parameters and weak directions of such a method are those of its companion.
     """
@@ -167,7 +167,7 @@ def linear_estimate(
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Estimate:
-    """Parameters of Y = W X + rho by one linear system; SettingsError for another method.
+    """Estimate X of Y = W X + rho by one linear system; SettingsError for another method.
 
     Parameters
     ----------

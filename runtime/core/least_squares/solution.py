@@ -58,16 +58,14 @@ class Solution:
 
 
 def unit_columns(R11: Array) -> tuple[Array, Array]:
-    """R_11 with columns of norm 1 (zero columns stay zero), and the norms (1 for zero columns)."""
+    """R_11 with columns of norm 1, and the norms; a zero column stays zero, with norm 1."""
     norms = np.linalg.norm(R11, axis=0)
     norms = np.where(norms > 0, norms, 1.0)
     return R11 / norms, norms
 
 
 def rank_tolerance(factor: Factor) -> float:
-    """Default tolerance on s_i / s_1 with unit columns: r times the unit round-off, r the number of
-    rows.
-    """
+    """Default tolerance on s_i / s_1 with unit columns: number of rows times the unit round-off."""
     return float(max(factor.rows, len(factor.names)) * np.finfo(float).eps)
 
 
@@ -95,9 +93,10 @@ def solve(factor: Factor, tolerance: float | None = None) -> Solution:
 
 
 def null_groups(V2t: Array, names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
-    """Names that trade against each other along the null directions V2t, shape (b - rank, b),
-    orthonormal rows: entries of P = V_2 V_2' (diagonal: its square root) above
-    LIMIT.NULL_PARTICIPATION.
+    """Groups of names that the record cannot separate.
+
+    V2t, shape (b - rank, b), has the null directions as orthonormal rows. A group contains names
+    whose entries of P = V_2 V_2' (diagonal: its square root) exceed LIMIT.NULL_PARTICIPATION.
     """
     P = V2t.T @ V2t
     part = np.flatnonzero(np.sqrt(np.diag(P)) > LIMIT.NULL_PARTICIPATION)
@@ -108,11 +107,12 @@ def null_groups(V2t: Array, names: Sequence[str]) -> tuple[tuple[str, ...], ...]
 
 
 def joint_scatter(factor: Factor, tolerance: float | None = None) -> Array:
-    """s_j of each joint from its own least squares, shape (n,): s_j^2 = ||Y_j - W_j X_j||^2 / (N_j
-    - b_j).
+    """Standard deviation s_j of the residuals of each joint from its own least squares, shape (n,).
 
-    X_j is fitted to the rows of joint j alone and b_j = rank(W_j) with unit columns. nan where a
-    joint has no more rows than b_j.
+        s_j^2 = ||Y_j - W_j X_j||^2 / (N_j - b_j)
+
+    X_j is fitted to the rows of joint j only, and b_j = rank(W_j) with unit columns.
+    nan if a joint has no more rows than b_j.
     """
     scatter = []
     for joint in factor.joints:

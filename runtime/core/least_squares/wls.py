@@ -36,11 +36,10 @@ from runtime.core.study import EstimateSettings
 def weighted(
     observation: Observation, settings: EstimateSettings, options: LinearOptions
 ) -> System:
-    """The rows weighted as `settings.weights` asks; "none" means "joint", as the method has been
-    named.
+    """Weight the rows as `settings.weights` asks; "none" means "joint", because of the name of the method.
 
-    s_j comes from joint j alone; from the common ordinary least squares where joint j has too few
-    rows. Never zero.
+    s_j comes from joint j alone, or from the common least squares if joint j has too few rows.
+    It is never zero.
     """
     system = ordinary(observation, settings, options)
     raw, fit = system.raw, system.solve()
@@ -57,14 +56,15 @@ def weighted(
 def by_weights(
     observation: Observation, settings: EstimateSettings, options: LinearOptions
 ) -> System:
-    """The rows as `settings.weights` asks, as they are for "none"."""
+    """Weight the rows as `settings.weights` asks; "none" leaves them unchanged."""
     rows = ordinary if settings.weights == "none" else weighted
     return rows(observation, settings, options)
 
 
 def common_scales(raw: Factor, X: np.ndarray, rank: int) -> np.ndarray:
-    """s_j, shape (n,), of the residuals of X: each joint carries its share b N_j/r of the lost
-    degrees of freedom.
+    """s_j, shape (n,), from the residuals of the common X.
+
+    Each joint loses its share b N_j/r of the degrees of freedom.
     """
     share = max(1 - rank / raw.rows, 1 / raw.rows)
     return np.array(
@@ -73,8 +73,9 @@ def common_scales(raw: Factor, X: np.ndarray, rank: int) -> np.ndarray:
 
 
 def floored(raw: Factor, scales: np.ndarray) -> np.ndarray:
-    """Scales not below LIMIT.EXACT_FIT times the rms of Y_j: an exact fit of a joint must not weigh
-    infinitely.
+    """Raise scales to at least LIMIT.EXACT_FIT times the rms of Y_j.
+
+    An exact fit of a joint would otherwise get infinite weight.
     """
     rounding = [
         LIMIT.EXACT_FIT * joint.measured_norm / np.sqrt(max(joint.rows, 1)) for joint in raw.joints

@@ -30,9 +30,7 @@ Array = np.ndarray
 
 
 def triangularise(A: Array) -> Array:
-    """R factor of A, shape (m, n) -> (n, n), upper triangular with A'A = R'R; rows of zeros are
-    added when m < n.
-    """
+    """Upper triangular R, shape (n, n), of A, shape (m, n), with A'A = R'R; m < n is allowed."""
     m, n = A.shape
     R = np.zeros((n, n))
     if m:
@@ -42,7 +40,7 @@ def triangularise(A: Array) -> Array:
 
 @dataclass(frozen=True)
 class JointFactor:
-    """What the rows of one joint say: `R` has the Gram matrix of [W_j[:, columns] Y_j].
+    """Triangular factor of the rows of one joint: `R` has the Gram matrix of [W_j[:, columns] Y_j].
 
     columns : ndarray of int, shape (c,), positions in the names of the Factor.
     R : ndarray, shape (k, c + 1), k <= c + 1 after factoring; not triangular once columns were
@@ -55,13 +53,13 @@ class JointFactor:
     rows: int
 
     def spread(self, b: int) -> Array:
-        """R with a column for each of b parameters and for Y, shape (k, b + 1)."""
+        """R with columns for all b parameters and for Y, shape (k, b + 1)."""
         block = np.zeros((len(self.R), b + 1))
         block[:, [*self.columns, b]] = self.R
         return block
 
     def residual_norm(self, X: Array) -> float:
-        """||Y_j - W_j X|| for X, shape (b,)."""
+        """||Y_j - W_j X|| of X, shape (b,)."""
         return float(np.linalg.norm(self.R[:, :-1] @ X[self.columns] - self.R[:, -1]))
 
     @property
@@ -85,7 +83,7 @@ class Factor:
 
     @classmethod
     def of(cls, names: Sequence[str], joints: Sequence[JointFactor]) -> Factor:
-        """The factor of the stacked factors of all joints."""
+        """Factor of all joints from the factors of the joints."""
         b = len(names)
         R = (
             triangularise(np.vstack([joint.spread(b) for joint in joints]))
@@ -106,23 +104,23 @@ class Factor:
 
     @property
     def r12(self) -> Array:
-        """Q'Y on the range of W, shape (b,)."""
+        """Component of Y in the range of W, Q'Y, shape (b,)."""
         return self.R[:-1, -1]
 
     @property
     def r22(self) -> float:
-        """Norm of the part of Y that no X explains."""
+        """Norm of the component of Y outside the range of W."""
         return float(abs(self.R[-1, -1]))
 
     def weighted(self, weights: Sequence[float] | Array) -> Factor:
-        """The factor after multiplying the rows of joint j by weights[j]."""
+        """The factor after the rows of joint j are multiplied by weights[j]."""
         return Factor.of(
             self.names,
             [replace(joint, R=joint.R * w) for joint, w in zip(self.joints, weights, strict=True)],
         )
 
     def select(self, names: Sequence[str]) -> Factor:
-        """The factor of the columns `names` (in that order) and Y, from the small factors alone."""
+        """The factor of the columns `names`, in this order, and of Y."""
         unknown = [name for name in names if name not in self.names]
         if unknown:
             raise ValueError(
@@ -133,8 +131,7 @@ class Factor:
         return Factor(tuple(names), R, tuple(selected(joint, kept) for joint in self.joints))
 
     def drop(self, name: str) -> Factor:
-        """The factor without one parameter, by down-dating: deleting column k leaves R triangular
-        above row k.
+        """The factor without one parameter: without column k, R stays triangular above row k.
 
         Only the trailing block, an upper Hessenberg matrix of order b - k, is made triangular
         again.
@@ -153,7 +150,7 @@ class Factor:
 
 
 def selected(joint: JointFactor, kept: Sequence[int]) -> JointFactor:
-    """The columns at the positions `kept` of the Factor, numbered in that order."""
+    """The columns at the positions `kept` of the Factor, renumbered in this order."""
     place = {int(column): position for position, column in enumerate(joint.columns)}
     places = [(new, place[old]) for new, old in enumerate(kept) if old in place]
     columns = np.array([new for new, _ in places], dtype=np.intp)
@@ -186,7 +183,7 @@ def factor(W: Array, Y: Array, rows: Sequence[int], names: Sequence[str]) -> Fac
 def joint_factors(
     W: Array, Y: Array, rows: Sequence[int], parts: Array
 ) -> list[tuple[JointFactor, ...]]:
-    """Factors by joint of each part of the rows; of W one part of a joint is copied at a time.
+    """Factors by joint for each part of the rows, with a copy of W for one part of one joint only.
 
     Parameters
     ----------

@@ -35,9 +35,7 @@ filter, at the rate of eq. (13).
 
 @dataclass(frozen=True, eq=False)
 class LoopRows:
-    """The closed loop that made the records (`runtime.loop.closed_loop`), and which of its
-    rows an observation holds, shape (r,).
-    """
+    """Closed loop that made the records (`runtime.loop.closed_loop`), and its rows in an observation, shape (r,)."""
 
     loop: Any
     rows: Array
@@ -45,7 +43,7 @@ class LoopRows:
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """The decimated system Y = W X + rho with its row bookkeeping.
+    """The decimated system Y = W X + rho, with joint, record and time of each row.
 
     Attributes
     ----------
@@ -122,42 +120,43 @@ class Observation:
         return float(self.t.min()), float(self.t.max())
 
     def joint(self, j: int) -> slice:
-        """Rows of the j-th joint, j from 0."""
+        """The rows of the j-th joint, j from 0."""
         start = sum(self.rows[:j])
         return slice(start, start + self.rows[j])
 
     @cached_property
     def factor(self) -> Factor:
-        """Triangular factor of [W Y], joint by joint; made once."""
+        """Triangular factor of [W Y], joint by joint; computed once."""
         if self.block_factors is None:
             return factor(self.W, self.Y, self.rows, self.names)
         return Factor.of(self.names, merged(self.block_factors))
 
     @cached_property
     def block_factors(self) -> list[tuple[JointFactor, ...]] | None:
-        """Triangular factors, joint by joint, of every block of residuals, made once; None where
-        such a block of one joint has hardly more rows than columns.
+        """Triangular factors of every block of residuals, joint by joint; computed once.
+
+        None if such a block of one joint has hardly more rows than columns.
         """
         if max(self.rows) < 2 * BLOCKS * (len(self.names) + 1):
             return None
         return joint_factors(self.W, self.Y, self.rows, self.blocks())
 
     def columns(self, names: Sequence[str]) -> Observation:
-        """The same rows with the named columns alone, in the order given."""
+        """The same rows with the named columns only, in the given order."""
         if tuple(names) == self.names:
             return self
         kept = column_numbers(names, self.names)
         return replace(self, W=np.asfortranarray(self.W[:, kept]), names=tuple(names))
 
     def equal_parts(self, count: int) -> Array:
-        """Of `count` parts of the span, of equal length, that of each row, from 0, shape (r,)."""
+        """Number, from 0, of the part of each row, shape (r,): `count` parts of equal duration."""
         start, end = self.span  # the same of rows of one instant
         return np.asarray(
             (count * (self.t - start) / ((end - start) or 1.0)).astype(int).clip(max=count - 1)
         )
 
     def where(self, mask: Array) -> Observation:
-        """The rows where `mask`, bool of shape (r,), is true."""
+        """The rows for which `mask`, bool of shape (r,), is true."""
         if mask.shape != self.Y.shape or mask.dtype != np.bool_:
             raise InputError(f"mask {mask.dtype} {mask.shape}; expected bool {self.Y.shape}")
         rows = tuple(int(np.count_nonzero(mask[self.joint(j)])) for j in range(self.n))
@@ -194,9 +193,7 @@ class Observation:
         return replace(self.where(self.record == number), rate=rate, rates=())
 
     def norms(self, names: Sequence[str], X: Array) -> tuple[Array, Array]:
-        """||Y_j - W_j X|| with the columns `names`, and ||Y_j||, of every joint, N m or N, shape
-        (n,) each.
-        """
+        """||Y_j - W_j X|| with the columns `names`, and ||Y_j||, for every joint, N m or N, shape (n,) each."""
         whole = np.zeros(len(self.names))
         whole[column_numbers(names, self.names)] = X
         residual = self.Y - self.W @ whole
@@ -207,14 +204,13 @@ class Observation:
 
     @property
     def residual_block(self) -> float:
-        """Length of a block of residuals, s, where none is given: a 50th of the record, at least
-        five rows.
-        """
+        """Default length of a block of residuals, s: a 50th of the record, at least five rows."""
         return float(max(max(self.rows) / BLOCKS, SHORTEST) / self.rate)
 
     def blocks(self, length: float | None = None) -> Array:
-        """Number of the block of residuals (from 0) of every row, shape (r,): same record, same
-        interval of `length` seconds.
+        """Number, from 0, of the block of residuals of every row, shape (r,).
+
+        A block is an interval of `length` seconds of one record.
         """
         _, record = np.unique(self.record, return_inverse=True)
         first = np.full(record.max() + 1, np.inf)
@@ -229,8 +225,9 @@ class Observation:
     def block_rows(
         self, names: Sequence[str], weights: Array, length: float, whitener: Array | None = None
     ) -> Iterator[Array]:
-        """Weighted rows [W Y] of every block of residuals, shape (rows, b + 1); of `block_factors`,
-        rows with the same Gram matrix.
+        """Weighted rows [W Y] of every block of residuals, shape (rows, b + 1).
+
+        Rows from `block_factors` have the same Gram matrix.
 
         Parameters
         ----------
@@ -264,22 +261,18 @@ class Observation:
 
 
 def split_rows(A: Array, blocks: Array) -> Iterator[Array]:
-    """Rows of A, shape (r, c), of every block; blocks : number of the block of each row, shape
-    (r,).
-    """
+    """Rows of A, shape (r, c), of every block; blocks : number of the block of each row, shape (r,)."""
     return (A[rows] for rows in rows_by_block(blocks))
 
 
 def rows_by_block(blocks: Array) -> list[Array]:
-    """Numbers of the rows of every block; blocks : number of the block of each row, shape (r,)."""
+    """Row numbers of every block; blocks : number of the block of each row, shape (r,)."""
     order = np.argsort(blocks, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(blocks[order])) + 1)
 
 
 def whitened(A: Array, whitener: Array) -> Array:
-    """A, shape (n*N, c) joint-major, with the n rows of each instant multiplied by `whitener`,
-    shape (n, n).
-    """
+    """A, shape (n*N, c), joint-major, with the n rows of each instant multiplied by `whitener`, shape (n, n)."""
     n = len(whitener)
     return np.asarray(
         np.einsum("ij,jNc->iNc", whitener, A.reshape(n, -1, A.shape[1])).reshape(A.shape)
@@ -287,13 +280,13 @@ def whitened(A: Array, whitener: Array) -> Array:
 
 
 def halves(t0: float, t1: float) -> tuple[Window, Window]:
-    """The two halves of [t0, t1], s; no instant belongs to both."""
+    """The two halves of [t0, t1], s, without a common instant."""
     middle = (t0 + t1) / 2
     return (t0, middle), (float(np.nextafter(middle, t1)), t1)
 
 
 def stack(observations: Sequence[Observation]) -> Observation:
-    """Several records of one robot as one system, joint-major; `record` tells the rows apart."""
+    """Stack several records of one robot into one system, joint-major; `record` has the record of each row."""
     if not observations:
         raise InputError("no observation to stack")
     first = observations[0]
@@ -333,13 +326,14 @@ def stack(observations: Sequence[Observation]) -> Observation:
 
 
 def same_settings(settings: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
-    """Settings of all records, one by one where they differ."""
+    """Settings of all records; one by one if they differ."""
     return settings[0] if all(s == settings[0] for s in settings) else {"records": list(settings)}
 
 
 def all_files(hashes: Sequence[Mapping[str, str]]) -> dict[str, str]:
-    """Hashes by file name; a name that stands for another file in a later record gets the number of
-    that record.
+    """Hashes by file name.
+
+    If a later record has another file with the same name, the name gets the number of that record.
     """
     files: dict[str, str] = {}
     for k, of_record in enumerate(hashes, start=1):

@@ -24,7 +24,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """Scales of the rows and columns of W_w.
+    """Scales of the rows and columns of the weighted observation matrix W_w.
 
     Attributes
     ----------
@@ -47,14 +47,14 @@ class Weights:
         )
 
     def condition(self, observation: Observation) -> float:
-        """Condition number of W_w; inf where it is singular."""
+        """Condition number of W_w; inf if singular."""
         values = np.linalg.svd(np.linalg.qr(self.matrix(observation), mode="r"), compute_uv=False)
         return float(values[0] / values[-1]) if values[-1] > 0 else float("inf")
 
     def relative_sigma(
         self, observation: Observation, correlation: Sequence[float] | Array = (1.0,)
     ) -> Array:
-        """Predicted %sigma of the parameters, shape (c,), of their size.
+        """Predicted %sigma of the parameters, shape (c,), relative to their size.
 
         correlation : of the torque noise of a joint between rows 0, 1, 2 ... sampling periods apart
         (`kept_correlation`).
@@ -84,9 +84,7 @@ class Weights:
 
 
 def kept_correlation(signals: Signals, rate: float) -> Array:
-    """Correlation that the decimation leaves between rows 0, 1, 2 ... kept samples apart where the
-    torque noise is white at `rate`, Hz.
-    """
+    """Correlation between rows 0, 1, 2 ... kept samples apart, for torque noise that is white at `rate`, Hz."""
     factor = decimation_factor(signals, rate)
     kept = (
         bandwidth(replace(signals, median=1), rate).decimation[::factor]

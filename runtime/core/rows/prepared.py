@@ -37,7 +37,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A record, and what the settings of a study make of it; each is made when first asked for.
+    """A record with its filtered states, torques and rows; each is computed at first use.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Prepared:
 
     @property
     def drives(self) -> Drives | None:
-        """Motor side: the drives by which the record was read."""
+        """Drives of a record on the motor side."""
         return self.record.origin.drives
 
     @cached_property
@@ -69,29 +69,29 @@ class Prepared:
 
     @property
     def channels(self) -> dict[str, Array]:
-        """Channels of one column that are no joint's, shape (N,)."""
+        """Channels with one column, shape (N,), such as temperatures."""
         given = self.record.channels.items()
         return {c: x[:, 0] for c, x in given if c not in JOINT_CHANNELS and x.shape[1] == 1}
 
     @cached_property
     def selection(self) -> Selection:
-        """Window, decimated instants, and the rows left out by trim, low speed and `keep`."""
+        """Window, decimated instants, and the rows after trim, low speed and `keep`."""
         signals, rows = self.study.signals, self.study.rows
         return select_rows(self.record, self.states.qd, signals, rows, keep=self.keep)
 
     @cached_property
     def torque(self) -> Array:
-        """Y before rows are left out, shape (n, K), N m or N."""
+        """Y before the selection of rows, shape (n, K), N m or N."""
         return decimated_torque(self.record.torque, self.selection)
 
     def certain(self, model: GeneratedModel) -> Selection:
-        """The selection without rows of unknown state or of uncertain direction of friction."""
+        """The selection without rows of unknown state or uncertain direction of friction."""
         return certain(model, self.states, self.selection)
 
     def observation(
         self, model: GeneratedModel, columns: Sequence[str] | None = None
     ) -> Observation:
-        """Y = W X + rho of the rows that are used."""
+        """Y = W X + rho of the selected rows."""
         return observation_from_states(
             model,
             self.states,
@@ -102,7 +102,7 @@ class Prepared:
         )
 
     def by(self, study: Study) -> Prepared:
-        """The same record by another study; what both make alike is shared."""
+        """The same record with another study; common results are shared."""
         if study.signals == self.study.signals and study.rows == self.study.rows:
             return self
         other = replace(self, study=study)
@@ -111,7 +111,7 @@ class Prepared:
         return other
 
     def take_states(self, other: Prepared) -> None:
-        """Take the states that another reading of the same positions has made, if it has."""
+        """Reuse the states of another preparation with the same positions."""
         same = self.record.q is other.record.q and self.record.missing is other.record.missing
         same &= self.record.channels.get("qd") is other.record.channels.get("qd")
         same &= self.reader is other.reader and self.study.signals == other.study.signals
@@ -124,8 +124,9 @@ class Prepared:
 
 
 def common_drives(model: GeneratedModel, records: Sequence[Prepared]) -> Drives | None:
-    """Drives of all records; InputError where these were read with different couplings. Without
-    records those of the model.
+    """Drives of all records, or of the model without records.
+
+    InputError if the records were read with different couplings.
     """
     coupled = {own.drives.coupling for own in records if own.drives is not None}
     if len(coupled) > 1:
@@ -134,9 +135,7 @@ def common_drives(model: GeneratedModel, records: Sequence[Prepared]) -> Drives 
 
 
 def decimated_torque(tau: Array, selection: Selection) -> Array:
-    """Y before rows are left out, shape (n, K), of measured joint torques tau, shape (N, n): median
-    filter, window, decimation.
-    """
+    """Y before the selection of rows, shape (n, K), from joint torques tau, shape (N, n): median, window, decimation."""
     tau = median_filtered(tau, selection.signals.window_of_torques)
     windowed = np.ascontiguousarray(tau[selection.samples].T)
     return windowed if selection.plan is None else decimate(windowed, selection.plan)
@@ -151,8 +150,7 @@ def observation_from_states(
     files: Mapping[str, str] | None = None,
     columns: Sequence[str] | None = None,
 ) -> Observation:
-    """W of the given states, shape (N, n) each, beside Y = torque, shape (n, K), as decimated
-    before.
+    """Observation with W from the given states, shape (N, n) each, and decimated torques Y, shape (n, K).
 
     columns : names of the columns wanted; the others are neither filtered nor stored. Default: all.
     """
@@ -168,7 +166,7 @@ def observation_of(
     *,
     files: Mapping[str, str] | None = None,
 ) -> Observation:
-    """The same by columns that many records share.
+    """Observation with columns that many records share.
 
     Where errors of the velocities are known, rows in which missing positions leave the state
     unknown ("missing") or the direction of dry friction is uncertain ("direction") are left out as
@@ -212,9 +210,11 @@ def certain(
     states: States,
     selection: Selection,
 ) -> Selection:
-    """The selection without rows in which missing positions leave the state unknown ("missing") or
-    the direction of dry friction is uncertain
-    ("direction"); the same where errors of the velocities are not known."""
+    """The selection without rows of unknown state or uncertain direction of dry friction.
+
+    Missing positions make a state unknown ("missing"); a direction is uncertain ("direction") near
+    zero speed. Without known errors of the velocities, the selection does not change.
+    """
     if states.errors is None:
         return selection
     known = selection.mask & states.errors[selection.samples][selection.kept].known
@@ -239,7 +239,7 @@ def stacked(
 def with_torques(
     observation: Observation, records: Sequence[Prepared], torques: Sequence[Array]
 ) -> Observation:
-    """The same rows of W beside other torques, shape (N, n), of the records observed."""
+    """The same rows of W with other torques, shape (N, n), of the same records."""
     Y = np.empty_like(observation.Y)
     for number, (own, tau) in enumerate(zip(records, torques, strict=True)):
         rows = observation.record == number

@@ -30,8 +30,9 @@ PROBES = 64  # random states that tell signals apart
 
 @dataclass(frozen=True, eq=False)
 class Entries:
-    """Where the signals stand: model store[k[m], j[m]] = sign[m] * signal[which[m]]; signal s is
-    first met at entry source[s].
+    """Places of the distinct signals: model store[k[m], j[m]] = sign[m] * signal[which[m]].
+
+    Signal s first occurs at entry source[s].
 
     row : row of each entry in the wanted store; row = k where every column is wanted.
     place : row of each signal in the store, shape (b n, N).
@@ -47,7 +48,7 @@ class Entries:
 
 
 class Columns:
-    """Columns of W of one model; what does not change from record to record is made once.
+    """Columns of W of one model, with everything that does not change from record to record.
 
     Parameters
     ----------
@@ -69,19 +70,18 @@ class Columns:
 
     @cached_property
     def entries(self) -> Entries:
-        """Where the distinct signals of these columns stand."""
+        """Places of the distinct signals of these columns."""
         numbers = np.array(column_numbers(self.names, self.model.BASE_PARAMETERS), dtype=int)
         return distinct_entries(self.model, numbers)
 
     @cached_property
     def tape(self) -> Tape | None:
-        """The operations of the distinct signals; None where the module has to be called."""
+        """Operations that compute the distinct signals; None if the module must be called."""
         n = len(self.model.JOINTS)
         return recorded(self.model, [divmod(int(place), n) for place in self.entries.place])
 
     def decimated(self, states: States, plan: Plan | None, instants: slice = slice(None)) -> Array:
-        """Store of decimated columns, shape (b, n, K): column k of joint j, of the states (N, n) of
-        the window.
+        """Decimated columns, shape (b, n, K), from the states (N, n) of the window: column k of joint j.
 
         plan : of the decimation; None keeps every sample.
         instants : those of the K that are stored.
@@ -99,8 +99,9 @@ class Columns:
         return store
 
     def signals(self, states: States, plan: Plan | None) -> Iterator[tuple[slice, Array]]:
-        """Consecutive instants of the window, and the distinct signals of its states (N, n) there,
-        decimated, shape (S, instants), until the next are asked for.
+        """Iterate over consecutive instants of the window and the decimated distinct signals there, shape (S, instants).
+
+        Arrays are valid until the next ones are requested.
 
         plan : None keeps every sample.
         """
@@ -137,9 +138,7 @@ class Columns:
 
 
 def in_time(model: GeneratedModel, states: States) -> dict[str, Any]:
-    """The channels that laws of the model read, shape (N,); InputError where the states have
-    none.
-    """
+    """Channels that laws of the model read, shape (N,); InputError if the states lack them."""
     channels = channels_of(model)
     if missing := [c for c in channels if c not in states.channels]:
         read = ", ".join(channels[missing[0]])
@@ -151,8 +150,7 @@ def in_time(model: GeneratedModel, states: States) -> dict[str, Any]:
 
 
 def distinct_entries(model: GeneratedModel, columns: Array | None = None) -> Entries:
-    """Entries of STRUCTURE in the columns (default: all) grouped by equal values, up to the sign,
-    at random states.
+    """Group the entries of STRUCTURE in the columns (default: all) by equal values, up to the sign, at random states.
 
     The emitted text copies equal rows, so equal signals agree in every bit; different ones do not
     agree at 64 random states. Where the random states are out of reach (loops that do not close),

@@ -47,8 +47,7 @@ Chosen on simulated records (docs/theory/counts.md).
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """Which samples are evaluated and which decimated rows are kept; shared by every run of a
-    study.
+    """Samples that are evaluated and decimated rows that are kept; the same in every run of a study.
 
     samples : the window, in raw samples.
     kept : shape (K,), kept instants, from the start of the window.
@@ -67,20 +66,20 @@ class Selection:
 
     @cached_property
     def settings(self) -> dict[str, Any]:
-        """Signals and rows, complete, with the factor that "auto" became."""
+        """All settings of signals and rows, with the factor that "auto" has chosen."""
         signals, rows = to_mapping(self.signals), to_mapping(self.rows)
         return {"signals": signals, "rows": rows, "factor": self.factor}
 
     @property
     def plan(self) -> Plan | None:
-        """The decimation of the window; None where every sample is kept."""
+        """Decimation of the window; None if every sample is kept."""
         window, settings = self.samples, self.signals.decimate
         return decimation_plan(window.stop - window.start, self.factor, settings, int(self.kept[0]))
 
 
 @dataclass(frozen=True)
 class Instants:
-    """Which samples of a record are kept.
+    """Window and decimated instants of a record.
 
     Attributes
     ----------
@@ -159,8 +158,9 @@ def instants_of(t: Array, rate: float, signals: Signals, rows: Rows, file: str) 
 def select_rows(
     record: Record, qd: Array, signals: Signals, rows: Rows, *, keep: Array | None = None
 ) -> Selection:
-    """Window, decimated instants, and the rows left out by trim, low speed and `keep`; qd, shape
-    (N, n), are the filtered velocities.
+    """Select window, decimated instants and rows by trim, low speed and `keep`.
+
+    qd : ndarray, shape (N, n), filtered velocities.
     """
     at = instants_of(record.t, record.rate, signals, rows, record.file)
     usable = None if keep is None else _keep(keep, record)
@@ -193,9 +193,7 @@ def select_rows(
 
 
 def nothing_left(dropped: Mapping[str, Sequence[int]], K: int) -> str:
-    """Why none of the K rows of every joint is used, in words. dropped : rows left out by reason
-    and joint.
-    """
+    """Reason, in words, why none of the K rows of every joint is used; dropped : rows left out by reason and joint."""
     left_out = ", ".join(
         f"{LEAVES_OUT.get(reason, reason)} leaves out {max(counts)}"
         for reason, counts in dropped.items()
@@ -210,8 +208,7 @@ def nothing_left(dropped: Mapping[str, Sequence[int]], K: int) -> str:
 def unused_joints(
     rows: Sequence[int], dropped: Mapping[str, Sequence[int]], joints: Sequence[str]
 ) -> str:
-    """The joints of which no row is used, and what leaves most of them out, a sentence; "" where
-    every joint has rows.
+    """Sentence on joints without used rows, with the main reason; "" if every joint has rows.
 
     Parameters
     ----------
@@ -246,7 +243,7 @@ def _keep(keep: Array, record: Record) -> Array:
 
 
 def per_joint(value: float | tuple[float, ...], n: int, name: str) -> Array:
-    """A setting that is one number or one per joint, shape (n,)."""
+    """Expand a setting that is one number, or one for each joint, to shape (n,)."""
     values = np.atleast_1d(np.asarray(value, dtype=float))
     if values.shape not in {(1,), (n,)}:
         raise InputError(f"{name} has {len(values)} values; expected one or {n}, one per joint")
@@ -257,8 +254,7 @@ def certain_rows(
     model: GeneratedModel,
     states: States,
 ) -> Array:
-    """Rows of every joint in which the state and each direction of dry friction are known, bool,
-    shape (n, K), of states (K, n) with known errors.
+    """Rows with known state and known direction of dry friction, bool, shape (n, K), from states (K, n) with known errors.
 
     A row of joint j is uncertain where |s| is below UNCERTAIN deviations of s, s = G qd the speed of a
     column that switches and acts on j.

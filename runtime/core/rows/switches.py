@@ -28,8 +28,7 @@ SHAPES = {
 
 @dataclass(frozen=True, eq=False)
 class Switch:
-    """One column f(s), s = G qd, that enters joint j as G_j f(s), f(s) = linear s + jump sign(s) +
-    kink |s| + a constant.
+    """One column f(s), s = G qd, that acts on joint j as G_j f(s), f(s) = linear s + jump sign(s) + kink |s| + constant.
 
     column : its number.   G : ndarray, shape (n,).
     """
@@ -42,7 +41,7 @@ class Switch:
 
     @property
     def joints(self) -> tuple[int, ...]:
-        """Joints (from 0) on whose rows it acts."""
+        """Joints, from 0, whose rows contain it."""
         return tuple(int(j) for j in np.flatnonzero(self.G))
 
 
@@ -51,8 +50,7 @@ def switches(
     names: Sequence[str],
     passive: Literal["refused", "left out"] = "refused",
 ) -> tuple[Switch, ...]:
-    """Columns of `names` that jump with the sign of a velocity; ModelError if the model describes no
-    elements.
+    """Columns of `names` that jump with the sign of a velocity; ModelError if the model describes no elements.
 
     passive : whether such a column along a passive joint is refused or left out.
     """

@@ -29,7 +29,7 @@ POWERS = {2: np.square, 0.5: np.sqrt, -1: np.reciprocal}
 
 
 class NotRecordedError(Exception):
-    """The module does more than operations on rows."""
+    """The module does more than operations on rows, so it cannot be recorded."""
 
 
 @dataclass(eq=False)
@@ -81,7 +81,7 @@ class Row:
 
 
 class Functions:
-    """Functions of NumPy, of rows and of numbers."""
+    """NumPy functions for rows and numbers."""
 
     def __getattr__(self, name: str) -> Any:
         function = getattr(np, name)
@@ -98,7 +98,7 @@ class Functions:
 
 
 class Tape:
-    """Wanted entries of D, and the operations that they need.
+    """Operations that compute selected entries of D.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class Tape:
         self._rooms: dict[int, tuple[Array, list[Any], list[Any]]] = {}
 
     def evaluate(self, q: Array, qd: Array, qdd: Array, out: Array) -> Array:
-        """The entries, shape (S, B), of states of shape (B, n), written to `out`."""
+        """Compute the entries, shape (S, B), at states of shape (B, n), into `out`."""
         B = len(q)
         if B not in self._rooms:
             self._rooms[B] = self._bound(B)
@@ -154,7 +154,7 @@ class Tape:
 
 
 def in_order(entries: Sequence[Row | float]) -> list[Row]:
-    """The operations that the entries need, each after those that it needs."""
+    """Operations that the entries need, each after its arguments."""
     order: list[Row] = []
     done: set[int] = set()
     stack = _operations(entries)
@@ -176,7 +176,10 @@ def _operations(values: Sequence[Any]) -> list[Row]:
 
 
 def recorded(model: GeneratedModel, places: Sequence[tuple[int, int]]) -> Tape | None:
-    """The entries (k, j) of D of an emitted module; None of one that does more than operations on rows, or reads functions of time."""
+    """Record the entries (k, j) of D of an emitted module.
+
+    None if the module does more than operations on rows, or reads functions of time.
+    """
     block = getattr(model, "_regressor_block", None)
     n = len(model.JOINTS)
     states = {name: [Row(None, (i, j)) for j in range(n)] for i, name in enumerate(STATES)}

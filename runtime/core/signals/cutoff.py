@@ -38,7 +38,7 @@ def cutoff(
     signals: Signals,
     crossing: float | tuple[float, ...] = np.inf,
 ) -> tuple[float, str]:
-    """The cut-off, Hz, to two digits, of records that are fitted together, and why, in words.
+    """Cut-off, Hz, to two digits, for records that are fitted together, and the reason in words.
 
     positions : q, shape (N, n), rad or m, and rate, Hz, of each record.
     crossing : Hz, from which on recorded velocities stand for differences of q
@@ -80,8 +80,9 @@ def cutoff(
 
 
 def stands(q: Array, rate: float, median: int = 1) -> Array:
-    """Whether each joint stands still in the whole record, bool (n,): its range is below LIMIT.STILL, or its
-    deviation below LIMIT.STILL_NOISE times that of its white noise.
+    """Whether each joint rests in the whole record, bool (n,).
+
+    Its range is below LIMIT.STILL, or its deviation below LIMIT.STILL_NOISE times its white noise.
     """
     noise = np.sqrt(white_noise(q, rate, median))
     return np.asarray(
@@ -90,7 +91,7 @@ def stands(q: Array, rate: float, median: int = 1) -> Array:
 
 
 def noise_share(q: Array, rate: float, low: Lowpass, median: int = 1) -> Array:
-    """Share of the power of a filtered acceleration that is noise of the positions, shape (n,).
+    """Share of position noise in the power of a filtered acceleration, shape (n,).
 
     q : shape (N, n), rad or m. rate : Hz. low : with its cut-off as a number.
     """
@@ -107,8 +108,9 @@ def _gain(f: Array, rate: float, low: Lowpass, cutoffs: Array) -> Array:
 
 
 def spectra(q: Array, rate: float, median: int = 1) -> tuple[Array, Array, Array]:
-    """Frequencies, shape (m,), Hz, and power of the acceleration there, shape (m, n): of the motion
-    and of the noise. median : window that finds spikes, 1 for none.
+    """Frequencies, shape (m,), Hz, and power of the acceleration, shape (m, n), of motion and of noise.
+
+    median : window of the median filter that finds spikes, 1 for none.
     """
     f, power, gain, level = _spectrum(q, rate, median)
     noise = gain * level
@@ -121,7 +123,7 @@ def spectra(q: Array, rate: float, median: int = 1) -> tuple[Array, Array, Array
 
 
 def white_noise(x: Array, rate: float, median: int = 1) -> Array:
-    """Variance of a sample of the white noise of each column of x, shape (n,)."""
+    """Variance of the white noise of each column of x, shape (n,)."""
     return _spectrum(x, rate, median)[3]
 
 
@@ -144,7 +146,6 @@ def _spectrum(x: Array, rate: float, median: int) -> tuple[Array, Array, Array, 
 
 
 def step(x: Array) -> float:
-    """Smallest step between the values of x, shape (N,), above rounding; small where x has no
-    steps."""
+    """Smallest step between the values of x, shape (N,), above rounding; small if x has no steps."""
     steps = np.diff(np.unique(x))
     return float(min(steps[steps > 1e-6 * np.ptp(x)], default=0.0))

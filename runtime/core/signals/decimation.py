@@ -62,7 +62,7 @@ TRUNCATION = 1e-20
 
 @dataclass(frozen=True, eq=False)
 class Operator:
-    """Modal form of the filter for one factor n_d; m = 4 modes.
+    """Modal form of the decimation filter for one factor n_d; m = 4 modes.
 
     D : real.   c, lam : complex, shape (m,).
     """
@@ -73,20 +73,20 @@ class Operator:
     lam: Array
 
     def impulse(self, length: int) -> Array:
-        """h_0 ... h_(length-1)."""
+        """Impulse response h_0 ... h_(length-1)."""
         return np.concatenate(
             [[self.D], 2 * (self.lam ** np.arange(length - 1)[:, None] @ self.c).real]
         )
 
     @property
     def reach(self) -> int:
-        """Samples in which the slowest mode decays to TRUNCATION."""
+        """Samples until the slowest mode decays to TRUNCATION."""
         return ceil(log(TRUNCATION) / log(np.abs(self.lam).max()))
 
 
 @lru_cache(maxsize=32)
 def operator(factor: int) -> Operator:
-    """The operator of a decimation factor of at least 2."""
+    """Operator of a decimation factor of at least 2."""
     zeros, poles, D = cheby1(ORDER, RIPPLE, CUTOFF / factor, output="zpk")
     lam = poles[poles.imag > 0]
     others = np.array([[p for p in poles if p != pole] for pole in lam])
@@ -96,8 +96,9 @@ def operator(factor: int) -> Operator:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What does not depend on the signals, for N samples of which K are kept. Complex numbers are
-    pairs Re, Im, 2 m of them.
+    """Data of a decimation that do not depend on the signals, for N samples of which K are kept.
+
+    Complex numbers are pairs Re, Im, 2 m of them.
 
     factor, phase, pad : n_d, phi, p.
     L, G, blocks : samples of a block, its kept samples, number of blocks.
@@ -127,9 +128,7 @@ class Plan:
     Ax: Array
 
     def pieces(self) -> list[tuple[int, int]]:
-        """How signals are cut: pieces [t0, t1) of about PIECE samples, of whole blocks but for the
-        first and the last.
-        """
+        """Pieces [t0, t1) of about PIECE samples, made of whole blocks except the first and the last piece."""
         length = max(1, PIECE // self.L) * self.L
         cuts = [0, *range(self.phase + length, self.N, length), self.N]
         return list(pairwise(cuts))
@@ -137,9 +136,7 @@ class Plan:
 
 @lru_cache(maxsize=32)
 def plan(N: int, factor: int, phase: int, pad: int) -> Plan:
-    """The plan for N > pad samples; factor from 2 on, phase : first kept sample, 0 to factor - 1,
-    pad : p.
-    """
+    """Plan for N > pad samples; factor from 2 on, phase : first kept sample, 0 to factor - 1, pad : p."""
     op = operator(factor)
     K = len(range(phase, N, factor))
     G = max(1, min(MOST_KEPT, LONGEST // factor))
@@ -169,16 +166,16 @@ def plan(N: int, factor: int, phase: int, pad: int) -> Plan:
 
 
 def decimate(u: Array, plan: Plan) -> Array:
-    """Kept samples, shape (S, K), of signals u, shape (S, N)."""
+    """Decimate signals u, shape (S, N), to the kept samples, shape (S, K)."""
     return decimated_pieces(lambda t0, t1: u[:, t0:t1], len(u), plan)
 
 
 def decimated_parts(
     read: Callable[[int, int], Array], S: int, whole: Plan, most: int = PART
 ) -> Iterator[tuple[slice, Array]]:
-    """Consecutive kept samples [a, b) of S signals, at most `most` of them at a time, and their
-    values, shape (S, b - a); read : as of `decimated_pieces`, samples that several parts ask for are
-    read again.
+    """Iterate over consecutive kept samples [a, b) of S signals, at most `most` at a time: their values, shape (S, b - a).
+
+    read : as for `decimated_pieces`; samples that several parts need are read again.
     """
     far = operator(whole.factor).reach
     for a in range(0, whole.K, most):
@@ -193,8 +190,9 @@ def decimated_parts(
 
 
 def decimated_pieces(read: Callable[[int, int], Array], S: int, plan: Plan) -> Array:
-    """The same of S signals that are read once, piece by piece: read(t0, t1) gives the samples [t0,
-    t1) of every signal, shape (S, t1 - t0), which need not last.
+    """The same for S signals that are read once, piece by piece.
+
+    read(t0, t1) gives the samples [t0, t1) of every signal, shape (S, t1 - t0); the array may be reused.
     """
     p, m2 = plan, len(plan.Mx)
     products = np.empty((p.blocks, S, p.PQY.shape[1]))
@@ -239,7 +237,7 @@ def recursion(a: Array, x: Array, drive: Array) -> None:
 
 
 def copy_overlap(u: Array, t0: int, window: Array, start: int) -> None:
-    """What u, samples from t0 on, holds of `window`, samples from `start` on."""
+    """Copy the samples of `window` (from `start` on) that u (from t0 on) contains."""
     a, b = max(t0, start), min(t0 + u.shape[1], start + window.shape[1])
     if a < b:
         window[:, a - start : b - start] = u[:, a - t0 : b - t0]

@@ -28,7 +28,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class SpeedErrors:
-    """What is known of errors of the velocities: those of the encoders are independent.
+    """Known errors of the velocities; errors of different encoders are independent.
 
     deviation : ndarray, shape (N, encoders), per s; infinite where counts are missing and the state
         is unknown.
@@ -42,20 +42,19 @@ class SpeedErrors:
         return SpeedErrors(self.deviation[samples], self.root)
 
     def along(self, G: Array) -> Array:
-        """Deviation of s = G qd, shape (N,); G, shape (n,)."""
+        """Standard deviation of s = G qd, shape (N,); G, shape (n,)."""
         finite = np.where(self.known[:, None], self.deviation, 0.0)
         return np.where(self.known, np.sqrt(finite**2 @ (G @ self.root) ** 2), np.inf)
 
     @property
     def known(self) -> Array:
-        """Samples at which the state of every joint is known, bool, shape (N,)."""
+        """Samples with a known state of every joint, bool, shape (N,)."""
         return np.asarray(np.isfinite(self.deviation).all(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
 class States:
-    """Joint positions, velocities and accelerations, each of shape (N, n), rad or m, per s, per
-    s^2.
+    """Joint positions, velocities and accelerations, shape (N, n) each, rad or m, per s, per s^2.
 
     errors : what is known of errors of the velocities; None: they count as exact.
     findings : what the reader says of the encoders.
@@ -80,8 +79,7 @@ class States:
 
 
 def filtered_states(q: Array, rate: float, signals: Signals, v: Array | None = None) -> States:
-    """q, qd, qdd of measured positions: median, low-pass on q, difference, low-pass on qd,
-    difference.
+    """Compute q, qd, qdd from measured positions: median, low-pass on q, difference, low-pass on qd, difference.
 
     q : ndarray, shape (N, n), rad or m.   rate : Hz.   v : recorded velocities, shape (N, n), which
     take over from the differences where signals.velocity says.
@@ -102,8 +100,9 @@ def filtered_states(q: Array, rate: float, signals: Signals, v: Array | None = N
 
 
 def blended(qd: Array, v: Array, rate: float, crossing: float | tuple[float, ...]) -> Array:
-    """v + L (qd - v), shape (N, n), of differences qd and recorded velocities v; L the zero-phase
-    first-order low-pass at `crossing`, Hz (`runtime.speeds`).
+    """v + L (qd - v), shape (N, n), from differences qd and recorded velocities v.
+
+    L is the zero-phase first-order low-pass at `crossing`, Hz (`runtime.speeds`).
     """
     mixed = qd.copy()
     for j, f in enumerate(np.broadcast_to(crossing, qd.shape[1:]).tolist()):
@@ -118,9 +117,7 @@ IN_CACHE = 4096
 
 
 def median_filtered(x: Array, window: int) -> Array:
-    """Running median over `window` samples of each column of x, shape (N, n); the ends repeat the
-    end value, never zeros.
-    """
+    """Running median over `window` samples of each column of x, shape (N, n); the ends repeat the end value."""
     if window == 1:
         return x
     if window not in (3, 5):
@@ -146,17 +143,13 @@ def _inner(a: Array, b: Array, c: Array, d: Array) -> tuple[Array, Array]:
 
 
 def lowpass_filtered(x: Array, rate: float, low: Lowpass) -> Array:
-    """Zero-phase Butterworth along the first axis of x, shape (N, n); each pass is 3 dB down at the
-    cut-off.
-    """
+    """Zero-phase Butterworth filter along the first axis of x, shape (N, n); each pass has -3 dB at the cut-off."""
     return zero_phase(*butterworth(rate, low), x, axis=0)
 
 
 @lru_cache(maxsize=32)
 def butterworth(rate: float, low: Lowpass) -> tuple[Array, int]:
-    """Second-order sections of the low-pass, shape (sections, 6), and the samples by which its ends
-    are extended.
-    """
+    """Second-order sections of the low-pass, shape (sections, 6), and the number of samples that extend each end."""
     if low.hertz >= rate / 2:
         raise InputError(
             f"low-pass at {low.hertz:g} Hz for a record at {rate:g} Hz; expected less than the "
@@ -170,9 +163,7 @@ def butterworth(rate: float, low: Lowpass) -> tuple[Array, int]:
 
 
 def derivative(x: Array, rate: float, ends: str = "one-sided") -> Array:
-    """Central differences (x_(k+1) - x_(k-1)) rate/2 along the first axis; at both ends a one-sided
-    difference.
-    """
+    """Central differences (x_(k+1) - x_(k-1)) rate/2 along the first axis; one-sided differences at both ends."""
     return np.asarray(np.gradient(x, 1 / rate, axis=0, edge_order=1 if ends == "one-sided" else 2))
 
 
@@ -181,9 +172,7 @@ CLOCK = 1e-6
 
 
 def decimation_factor(signals: Signals, rate: float) -> int:
-    """n_d = 0.8 ws/(2 wf), eq. (13), rounded down so that the band up to wf is kept; 1 without
-    decimation.
-    """
+    """n_d = 0.8 ws/(2 wf), eq. (13), rounded down to keep the band up to wf; 1 without decimation."""
     if signals.decimate is None:
         return 1
     if signals.decimate.factor != "auto":
@@ -197,16 +186,15 @@ def decimation_factor(signals: Signals, rate: float) -> int:
 
 
 def kept_samples(N: int, factor: int, phase: str) -> Array:
-    """Indices of the samples that decimation keeps: from the first one on, or such that the last
-    one is kept (MATLAB).
-    """
+    """Indices of the samples that decimation keeps: the first and every factor-th, or such that the last is kept (MATLAB)."""
     first = 0 if phase == "first" else factor - 1 - (factor * -(-N // factor) - N)
     return np.arange(first, N, factor)
 
 
 def decimated(x: Array, factor: int, settings: Decimate | None) -> Array:
-    """Zero-phase Chebyshev I filter along the last axis of x, shape (..., N), then one sample in
-    `factor`; x itself for a factor of 1.
+    """Zero-phase Chebyshev I filter along the last axis of x, shape (..., N), then one sample in `factor`.
+
+    A factor of 1 returns x.
 
     Of even order, the filter has gain 10**(-2*0.05/20) = 0.98855 at zero frequency: Y and every
     column of W need it alike, offsets too.
@@ -220,9 +208,7 @@ def decimated(x: Array, factor: int, settings: Decimate | None) -> Array:
 def decimation_plan(
     N: int, factor: int, settings: Decimate | None, first: int | None = None
 ) -> Plan | None:
-    """The decimation of N samples; None for a factor of 1. first : first sample kept; default: by
-    the settings.
-    """
+    """Decimation of N samples; None for a factor of 1. first : first kept sample; default: by the settings."""
     if factor == 1 or settings is None:
         return None
     pad = 3 * ORDER if settings.padding == "matlab" else 3 * (ORDER + 1)
@@ -233,15 +219,13 @@ def decimation_plan(
 
 
 def zero_phase(sos: Array, pad: int, x: Array, axis: int) -> Array:
-    """Filter forward and backward after odd reflection of `pad` samples at each end, started in the
-    steady state of the first value.
-    """
+    """Filter forward and backward, with `pad` reflected samples at each end and the steady state of the first value."""
     require_longer(x.shape[axis], pad)
     return np.asarray(sosfiltfilt(sos, x, axis=axis, padtype="odd", padlen=pad))
 
 
 def require_longer(samples: int, pad: int) -> None:
-    """Raise InputError unless there are more than `pad` samples to reflect."""
+    """Raise InputError unless x has more than `pad` samples."""
     if samples <= pad:
         raise InputError(
             f"{samples} samples; this zero-phase filter needs more than {pad}, use a longer record "

@@ -44,7 +44,7 @@ MEMORY = 10
 
 @dataclass(frozen=True, eq=False)
 class Bandwidth:
-    """Second moments for raw errors of variance 1.
+    """Covariance of filtered states for raw position errors of variance 1.
 
     before : C_0, ndarray, shape (3, 3), of (dq, dqd, dqdd).
     after : C, the same after decimation.
@@ -62,9 +62,7 @@ class Bandwidth:
 
 
 def bandwidth(signals: Signals, rate: float) -> Bandwidth:
-    """Moments for the filters of `signals` at `rate`, Hz; raises SettingsError where a median
-    filter, which is not linear, stands among them.
-    """
+    """Bandwidth of the filters of `signals` at `rate`, Hz; SettingsError for a median filter, which is not linear."""
     if signals.median != 1:
         raise SettingsError(
             (

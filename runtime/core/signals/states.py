@@ -19,7 +19,7 @@ Reader: TypeAlias = Callable[[Record, Signals], States]
 
 @dataclass(frozen=True)
 class SignalReader:
-    """A reader that a study may name.
+    """A position reader that a study can name.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class SignalReader:
     options: type[Settings] | None = None
 
     def checked(self, signals: Signals) -> dict[str, Any]:
-        """All options of the settings, defaults filled in; SettingsError where they do not suit."""
+        """All options with defaults; SettingsError if the settings do not suit."""
         path = ("signals", "options")
         if self.options is not None:
             return to_mapping(structure(self.options, signals.options, path))
@@ -44,13 +44,13 @@ class SignalReader:
 
 
 def lowpassed(record: Record, signals: Signals) -> States:
-    """Reader `lowpass`: positions as they are, median, low-pass and central differences (`runtime.core.signals.filters`)."""
+    """Reader `lowpass`: median, low-pass and central differences of the positions (`runtime.core.signals.filters`)."""
     require_positions(record.missing, "reader: lowpass", record.name, COUNTS)
     return filtered_states(record.q, record.rate, signals, record.channels.get("qd"))
 
 
 def require_motion(signals: Signals, who: str) -> None:
-    """SettingsError where the records are poses at rest; who : what needs a motion."""
+    """Raise SettingsError if the records are poses at rest; who : the analysis that needs a motion."""
     if signals.reader == "static":
         raise SettingsError(
             f"static, poses at rest; {who} needs records of a motion", path=("signals", "reader")

@@ -19,7 +19,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class SpeedAgreement:
-    """Recorded velocities beside differences of the positions, by joint, shape (n,).
+    """Recorded velocities compared with differences of the positions, by joint, shape (n,).
 
     Attributes
     ----------
@@ -40,12 +40,12 @@ class SpeedAgreement:
 
     @property
     def agrees(self) -> Array:
-        """Joints whose recorded velocity is used, bool, shape (n,)."""
+        """Joints with a usable recorded velocity, bool, shape (n,)."""
         return np.asarray(self.share <= LIMIT.SPEED_DISAGREES)
 
 
 def agreement(q: Array, v: Array, rate: float, signals: Signals) -> SpeedAgreement:
-    """Of positions q and velocities v, shape (N, n), with the low-pass of the study."""
+    """Compare recorded velocities v with positions q, shape (N, n), after the low-pass of the study."""
     states = filtered_states(q, rate, signals)
     v_f, low = median_filtered(v, signals.median), signals.lowpass
     if low is not None:
