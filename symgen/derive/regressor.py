@@ -16,7 +16,6 @@ from typing import Any
 from symgen.derive.elements import element_column
 from symgen.derive.newton_euler import LinkMotion, Motion, force, moment
 from symgen.derive.scalar import E3, ZERO3, Scalar, Vector, add, cross, dot, vadd
-from symgen.derive.time_limit import require_time
 from symgen.description.expression import Expression
 from symgen.description.robot import (
     FIXED,
@@ -28,6 +27,7 @@ from symgen.description.robot import (
     Robot,
     parameter,
 )
+from symgen.time_limit import require_time
 
 UNITS_OF_LINKS = {"M": "kg", "MX": "kg*m", "MY": "kg*m", "MZ": "kg*m"}
 

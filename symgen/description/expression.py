@@ -22,6 +22,7 @@ from heapq import heappop, heappush
 from typing import Any, NamedTuple, TypeAlias
 
 from symgen.errors import DescriptionError
+from symgen.time_limit import require_time
 
 LONGEST_SLOPE = 2000  # terms of a derivative
 MOST_PRODUCTS = 50_000  # of terms, where two expressions are multiplied
@@ -126,6 +127,7 @@ class Expression:
         return self + (-Expression.of(other))
 
     def __mul__(self, other: Expression | int | Fraction) -> Expression:
+        require_time()
         terms: dict[Monomial, Fraction] = {}
         other = Expression.of(other)
         if len(self.terms) * len(other.terms) > MOST_PRODUCTS:

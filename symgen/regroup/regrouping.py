@@ -20,7 +20,6 @@ from symgen.derive.exact import Draw
 from symgen.derive.loops import close
 from symgen.derive.numbers import numbered
 from symgen.derive.regressor import element_names, inertial_names
-from symgen.derive.time_limit import limited
 from symgen.description.angles import InertiaWarning
 from symgen.description.expression import (
     ONE,
@@ -37,6 +36,7 @@ from symgen.regroup.formula import Formula
 from symgen.regroup.residues import draw_states, sample, states_for
 from symgen.regroup.rules import Combination, Step, Transfer
 from symgen.regroup.solve import coefficients
+from symgen.time_limit import limited
 
 FIRST_CHOICE = ("ZZ", "XX", "XY", "XZ", "YZ", "MX", "MY")
 EXACT = "exact over F_p"

@@ -2,9 +2,9 @@
 
 import pytest
 
-from symgen import load_robot, regrouping
+from symgen import load_robot, regrouping, time_limit
 from symgen.cli.main import main
-from symgen.derive import time_limit
+from symgen.description.expression import Expression
 from symgen.errors import SymgenError
 from symgen.regroup.regrouping import _regrouped
 
@@ -27,3 +27,11 @@ def test_check_ends_with_one_sentence(monkeypatch, capsys):
     assert end.value.code == 2 and "takes more than 0 s" in " ".join(
         capsys.readouterr().err.split()
     )
+
+
+def test_products_of_long_coefficients_end(monkeypatch):
+    """A table of many decimals: its rules multiply polynomials and look at no clock of their own."""
+    monkeypatch.setattr(time_limit, "SECONDS", 0.0)
+    a = Expression.symbol("a")
+    with time_limit.limited("the derivation"), pytest.raises(SymgenError, match="the derivation"):
+        a * a
