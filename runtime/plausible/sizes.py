@@ -168,6 +168,7 @@ def torques(case: Case) -> Answer:
         return Answer("no", text, limit="torques that change")
     if limits is None:
         return Answer("good", "They change on every joint; the robot file gives no limits.tau", "")
+    limits = np.where(limits > 0, limits, np.inf)  # a joint without a motor reaches none
     largest = np.abs(case.samples.tau).max(axis=0)
     if (out := largest > 1.5 * limits).any():
         units = np.where(case.turning, "N m", "N").tolist()

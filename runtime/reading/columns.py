@@ -14,7 +14,7 @@ import numpy as np
 from runtime.core.drives import Drives
 from runtime.core.errors import InputError
 from runtime.reading.likely_columns import likely_columns
-from runtime.reading.settings import BY_NAME, Columns, RecordSettings
+from runtime.reading.settings import BY_NAME, NONE, Columns, RecordSettings
 from runtime.reading.table import Array, Table
 from runtime.reading.units import COMMANDS, position_unit, torque_unit
 
@@ -26,7 +26,11 @@ WORDS = {
 
 
 def column_names(
-    settings: RecordSettings, first: Table, last: Table, joints: Sequence[str] = ()
+    settings: RecordSettings,
+    first: Table,
+    last: Table,
+    joints: Sequence[str] = (),
+    motors: Sequence[bool] = (),
 ) -> Columns:
     """The names in the settings, or t, q1 ... qn, tau1 ... taun where they are left out; of a bag: the joints of its messages.
 
@@ -36,6 +40,8 @@ def column_names(
         Files of the positions and of the torques.
     joints : sequence of str
         Names of the joints of the robot, in its order: what `names` means in the settings, and what of a bag is read where they are left out.
+    motors : sequence of bool
+        Whether each joint of the robot has a motor; none: they all have.
     """
     given = settings.columns
     t = given.t
@@ -71,7 +77,17 @@ def column_names(
         raise InputError(
             f"{first.file} holds the torques and {last.file} the positions; `files` are the positions, then the torques"
         )
-    return replace(given, t=t, q=q, tau=tau, q_ref=q_ref)
+    return replace(given, t=t, q=q, tau=_of_motors(tau, motors), q_ref=q_ref)
+
+
+def _of_motors(names: tuple[str, ...], motors: Sequence[bool]) -> tuple[str, ...]:
+    """Columns of the torques, of all joints or of those with a motor: NONE of a joint without one."""
+    if len(names) == len(motors):
+        names = tuple(name for name, motor in zip(names, motors, strict=True) if motor)
+    if len(names) != sum(motors):
+        return names
+    given = iter(names)
+    return tuple(next(given) if motor else NONE for motor in motors)
 
 
 def _meant(

@@ -74,7 +74,8 @@ def _pieces(
     ]
     hashes = {name: table.digest for name, table in zip(label.files, tables, strict=True)}
     first, last, other = _places(settings, tables)
-    columns = column_names(settings, first, last, _names_of(model))
+    motors = [bool(x) for x in getattr(model, "LIMITS", {}).get("tau", ())]
+    columns = column_names(settings, first, last, _names_of(model), motors)
     signals = _signals(columns, first, last, other, missing)
     n = signals["q"].values.shape[1]
     _require_shapes(columns, signals, first, last)

@@ -365,10 +365,10 @@ def _check_limits(robot: Any) -> None:
             )
         for i, entry in enumerate(row):
             low, high = entry if isinstance(entry, tuple) else (0.0, entry)
-            if not low < high:
+            if not low < high and (name, entry) != ("tau", 0.0):
                 raise DescriptionError(
                     f"limits: {name} of joint {robot.joints[i]} is {entry}; expected lower < "
-                    "upper, or a positive number",
+                    "upper, or a positive number; tau of a joint without a motor is 0",
                     path=("limits", name, i),
                 )
 

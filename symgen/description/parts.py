@@ -257,7 +257,12 @@ class LimitsTable:
     qdd: Annotated[
         list[Numeric] | None, Field(description="largest accelerations, rad/s^2 or m/s^2")
     ] = None
-    tau: Annotated[list[Numeric] | None, Field(description="largest torques, N m or N")] = None
+    tau: Annotated[
+        list[Numeric] | None,
+        Field(
+            description="largest torques, N m or N; 0: a joint without a motor, whose torque is zero"
+        ),
+    ] = None
 
 
 def parameter(family: str, j: int) -> str:
