@@ -177,7 +177,7 @@ def listed(records: Records) -> tuple[Record, ...]:
 
 
 def known(study: Study) -> Study:
-    """The study with all options of its reader; SettingsError where its method or reader is not in the lists."""
+    """The study with all options of its reader; SettingsError if its method or reader is not in the lists."""
     signals = study.signals
     for path, name, names in (
         (("estimate", "method"), study.estimate.method, METHODS),

@@ -181,7 +181,7 @@ def read_record(
     path : str, Path or RecordSettings
         A measured file whose columns are called t, q1 ..., tau1 ... (SI, joint side), a study file, a dataset, or settings.
     model : module, optional
-        Emitted model of the robot; needed where a side is "motor", which its drives convert, and checked for its number of joints.
+        Emitted model of the robot; needed if a side is "motor", which its drives convert, and checked for its number of joints.
     folder : str or Path
         Where relative file names start; of a study file, those in it start where it is.
     missing : bool
@@ -260,7 +260,7 @@ def _starts_anew(settings: RecordSettings, model: GeneratedModel, missing: bool)
 
 
 def draft(study: Study, model: GeneratedModel) -> str:
-    """What the names of the columns of the first record tell, as the text of a study to complete; "" where that is nothing."""
+    """What the names of the columns of the first record tell, as the text of a study to complete; "" if that is nothing."""
     record = study.record[0]
     joints = tuple(getattr(model, "LABELS", {}).values())
     return drafts.draft(record, Path(record.files[0]), joints) if record.files else ""

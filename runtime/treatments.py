@@ -200,7 +200,7 @@ def treatments(
 ) -> dict[str, Problem]:
     """A problem as stated, without the rows of joints that stand, and with its known torques left out, as far as these differ; each after all steps.
 
-    speed_of_rest : rows.low_speed of a prepared problem that leaves out the rows of joints that stand; None where few do.
+    speed_of_rest : rows.low_speed of a prepared problem that leaves out the rows of joints that stand; None if few do.
     """
     stated = prepared(problem, steps)
     found = {STATED: stated}

@@ -1,5 +1,5 @@
 """The main job of the chapter end to end, on top of what the verbs do: the Staubli TX40 identified
-from its public record, or from a simulated one where that cannot be had, and the resolution of its
+from its public record, or from a simulated one if that cannot be had, and the resolution of its
 encoders, beside the published Tables 2, 3, 4 and Figure 4.
 
     prepared = prepare(quick=False)             # model, study, record

@@ -129,7 +129,7 @@ def advise(
     problem : Problem
         Prepared.
     columns : sequence of str, optional
-        Essential names where they are known; default: by study.cestac.columns.
+        Essential names if they are known; default: by study.cestac.columns.
     asked : sequence of float, rad or m
         Further steps whose change is predicted.
     encoders : sequence of str, optional

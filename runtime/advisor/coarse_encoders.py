@@ -143,7 +143,7 @@ class CoarseEncoders:
         return float(LIMIT.EXACT_FROM * max(steps, default=0.0))
 
     def asked(self, delta: float) -> Array:
-        """Mean change with all encoders that move of this step, shape (b,), %; nan where the
+        """Mean change with all encoders that move of this step, shape (b,), %; nan if the
         records do not tell.
         """
         moving = [i for i, most in enumerate(self.coarsest) if np.isfinite(most)]

@@ -35,7 +35,7 @@ class Checklist(Result):
     use : str
         What the parameters explain, in one sentence.
     grade : float, %
-        Expected error of predictions of other motions; nan where it is not known.
+        Expected error of predictions of other motions; nan if it is not known.
     """
 
     checks: tuple[Check, ...]
@@ -150,9 +150,9 @@ def checklist_of(
         Deviations by name from blocks of time drawn again; parameters that it lacks have the
         corrected deviation.
     prediction_error : float, %
-        Largest relative error of `fit` on data that did not give it; nan where there are none.
+        Largest relative error of `fit` on data that did not give it; nan if there are none.
     expected_error : float, %
-        Expected error of predictions of other motions; nan where it is not known.
+        Expected error of predictions of other motions; nan if it is not known.
     negative : sequence of str
         Frictions and motor inertias certainly below zero.
     parts : sequence of Part

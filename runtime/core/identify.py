@@ -37,7 +37,7 @@ class OnRequest:
         The same in words.
     make : function of Identification and options
     otherwise : Extra or None
-        What stands for it where it is not asked for, or cannot be made: the question that stays open.
+        What stands for it if it is not asked for, or cannot be made: the question that stays open.
     options : mapping
         What it is asked for with.
     attempted : bool

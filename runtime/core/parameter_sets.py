@@ -2,7 +2,7 @@
 seen best?
 
     essential    fewest columns, the others zero
-    feasible     all columns, among physical robots, pulled to the values of the robot file where
+    feasible     all columns, among physical robots, pulled to the values of the robot file if
                  there are any
     all          least squares
 
@@ -59,7 +59,7 @@ def physical_asked(errors: Mapping[Any, float], first: bool) -> bool:
     Parameters
     ----------
     errors : mapping of float, %
-        Of the essential parameters and of all on unseen data; empty where nothing was predicted.
+        Of the essential parameters and of all on unseen data; empty if nothing was predicted.
     first : bool
         essential.first of the study.
     """

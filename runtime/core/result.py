@@ -76,7 +76,7 @@ class Identification:
         Deviations without independence, whiteness of the residuals, F-tests, sets by threshold.
     sets : mapping of str to Estimate
         The essential, the feasible and all parameters (`runtime.core.parameter_sets`);
-        empty where the method of the study is not linear.
+        empty if the method of the study is not linear.
     unseen_rows : mapping of str to Observation
         Rows of the records that the parameters predict, by name.
     parts : tuple of Part
@@ -375,7 +375,7 @@ class Identification:
         return "\n\n".join(text for text in (head, *rest) if text)
 
     def _values(self, room: int, *, known: bool) -> str:
-        """Values in at most `room` lines, the essential ones where there is no room for all, and the
+        """Values in at most `room` lines, the essential ones if there is no room for all, and the
         error of each joint. known : only those that are larger than their intervals.
         """
         fit, names = self.model_estimate, list(self.model_estimate.names)

@@ -251,7 +251,7 @@ def structure(cls: type[T], value: Any, path: Path = ()) -> T:
 
 
 def _value_at(path: Path, value: Any) -> Any:
-    """What these keys lead to in a mapping as read from a file; None where it has no such keys."""
+    """What these keys lead to in a mapping as read from a file; None if it has no such keys."""
     for key in path:
         if isinstance(value, Mapping):
             value = (

@@ -42,7 +42,7 @@ SCHEMA = 1
 
 
 def version(number: int) -> int:
-    """The version of a study file; SettingsError where it is not SCHEMA."""
+    """The version of a study file; SettingsError if it is not SCHEMA."""
     require(number == SCHEMA, f"schema {number}; this version reads {SCHEMA}")
     return number
 
@@ -129,7 +129,7 @@ class Signals(Settings):
         stand for differences of q; auto: where the noise of both is alike, and not where they
         disagree with the positions; differences: they are not used. For reader lowpass.
     torque_median : int or str
-        Window of the median filter on torques; auto: as on positions, but none where it would take
+        Window of the median filter on torques; auto: as on positions, but none if it would take
         torque that goes with the motion, as from a controller that answers every count
         (`runtime.median`).
     options : mapping

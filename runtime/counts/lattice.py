@@ -65,7 +65,7 @@ class Lattice:
     rounded: bool = False
 
     def counts(self, position: Array) -> Array:
-        """Counts, shape (N, n), as floats; nan where the position is missing."""
+        """Counts, shape (N, n), as floats; nan if the position is missing."""
         return np.asarray(np.round((position - self.phase) / self.step))
 
     def position(self, counts: Array) -> Array:
@@ -83,7 +83,7 @@ def lattice(
 
     step : rad or m, one or one for each encoder; default: from the record.
 
-    Raises InputError where a step is not positive, is larger than the motion, or positions do not
+    Raises InputError if a step is not positive, is larger than the motion, or positions do not
     lie on its lattice.
     """
     n = position.shape[1]
@@ -149,7 +149,7 @@ def lattice(
 
 
 def smallest_step(x: Array) -> float:
-    """The step of the lattice that distinct positions x, shape (N,), suggest; 0 where they never
+    """The step of the lattice that distinct positions x, shape (N,), suggest; 0 if they never
     change.
     """
     values = np.unique(x)
@@ -189,7 +189,7 @@ def unwrapped_counts(
     name: str = "record",
 ) -> tuple[Lattice, Array, tuple[str, ...]]:
     """The lattice of positions (see `lattice`), their counts without wraps of counters of WRAPS
-    bits, shape (N, n), and what wrapped, a sentence for each encoder. InputError where counts jump
+    bits, shape (N, n), and what wrapped, a sentence for each encoder. InputError if counts jump
     otherwise.
     """
     lattice_of_all = lattice(position, step, name=name)

@@ -84,7 +84,7 @@ class Reading:
 
     @property
     def motion(self) -> tuple[Array, Array]:
-        """q, and s_qd, infinite where the state is unknown."""
+        """q, and s_qd, infinite if the state is unknown."""
         return self.q, np.where(self.unknown, np.inf, self.s_qd)
 
     @property
@@ -219,7 +219,7 @@ def read_stretch(
     rest: Array,
     starts: Mapping[int, SearchStart] | None = None,
 ) -> tuple[Part | None, list[Array], Array]:
-    """Posterior of counts, shape (N, n), None where nothing moves; q, qd, qdd, s_q, s_qd, s_qdd in
+    """Posterior of counts, shape (N, n), None if nothing moves; q, qd, qdd, s_q, s_qd, s_qdd in
     steps, and where the state is unknown, (N, n) each.
 
     An encoder whose count never changes rests in the middle of its interval, one without a count at

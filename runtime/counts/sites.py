@@ -124,7 +124,7 @@ def smoothed(
     uneven : deviation of the lines in steps, less than which is not taken; None: it is detected.
     start : what the same motion told at another phase; default: all is sought.
 
-    InputError where no motion goes with the counts.
+    InputError if no motion goes with the counts.
     """
     known = np.flatnonzero(np.isfinite(counts))
     origin = float(np.round(counts[known].mean()))
@@ -333,7 +333,7 @@ class Counts:
 
 
 def _told(errors: Errors, least: float, sites: int) -> list[str]:
-    """Sentences about errors beside the rounding; none where they are the least that is taken, or
+    """Sentences about errors beside the rounding; none if they are the least that is taken, or
     sites too few to tell.
     """
     said = []

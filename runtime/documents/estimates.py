@@ -76,7 +76,7 @@ class SetDocument:
     relative_error : float, %
         100 ||Y - W X|| / ||Y||.
     unseen : float, %
-        Error on data that the set was not fitted to; null where nothing was predicted.
+        Error on data that the set was not fitted to; null if nothing was predicted.
     names : tuple of str
         Names in column order.
     X : ndarray, shape (b,), SI
@@ -104,7 +104,7 @@ class SetsDocument(Estimate):
     Attributes
     ----------
     sets : tuple of SetDocument
-        Empty where the method is not linear.
+        Empty if the method is not linear.
     model_columns : str
         Name of the set that stands for the robot.
     """
@@ -121,7 +121,7 @@ class IdentificationDocument(SetsDocument):
     Attributes
     ----------
     sets : tuple of SetDocument
-        The essential, the feasible and all parameters; empty where the method is not linear.
+        The essential, the feasible and all parameters; empty if the method is not linear.
     model_columns : str
         Name of the set that stands for the robot.
     essential : EssentialDocument
@@ -177,7 +177,7 @@ class LevelDocument(LevelResult):
     Attributes
     ----------
     runs : tuple of Run or None
-        The runs; null where there are more than a thousand.
+        The runs; null if there are more than a thousand.
     run_count : int
         Number of runs.
     """

@@ -44,7 +44,7 @@ class ExcitationSettings(Settings):
         So many poses at rest are sought in place of a motion, for `signals.reader: static`
         (`runtime.excitation.poses`); null: a motion.
     criterion : str
-        record, cond, logdet or sigma; auto: record where there is one, else cond. record is the
+        record, cond, logdet or sigma; auto: record if there is one, else cond. record is the
         largest predicted %sigma over that of the motion of the record: below 1, every parameter is
         told better than by it.
     columns : str or tuple of str

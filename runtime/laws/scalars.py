@@ -53,7 +53,7 @@ class FittedScalar:
     minima : tuple of float
         Other local minima, the best first.
     doubt : str
-        Why it is not determined; empty where it is.
+        Why it is not determined; empty if it is.
     """
 
     name: str
@@ -158,7 +158,7 @@ class FittedLaws(Part):
 
 
 def fitted_scalars(problem: Problem) -> Problem:
-    """The step: the model with the scalars of its laws fitted to the records (`fit:` of the robot file); the problem itself where there are none.
+    """The step: the model with the scalars of its laws fitted to the records (`fit:` of the robot file); the problem itself if there are none.
 
     Raises
     ------

@@ -131,7 +131,7 @@ class LoopPart:
 
 @dataclass(frozen=True, eq=False)
 class ClosedLoop:
-    """The records with their loop. `assumption`: what was assumed about the reference; empty where
+    """The records with their loop. `assumption`: what was assumed about the reference; empty if
     it is known. `law`: what the control law explains of them.
     """
 
@@ -380,7 +380,7 @@ def _usable(simulator: Simulator, record: Record, keep: Array | None) -> Array |
 
 
 def loop_of(observation: Observation, method: str) -> ClosedLoop:
-    """The loop of an observation; raises SettingsError where `method` was asked for and there is
+    """The loop of an observation; raises SettingsError if `method` was asked for and there is
     none.
     """
     if observation.closed_loop is None:

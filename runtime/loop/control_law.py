@@ -110,7 +110,7 @@ class ControlLaw:
 
 
 def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
-    """The numbers of the settings for the joints of a model; SettingsError where they do
+    """The numbers of the settings for the joints of a model; SettingsError if they do
     not fit.
     """
     n, law = len(model.JOINTS), controller.law

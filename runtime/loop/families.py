@@ -63,7 +63,7 @@ class Family:
         raise NotImplementedError
 
     def bounds(self) -> tuple[Array, Array]:
-        """Smallest and largest p, shape (P,) each; infinite where only the motion is limited."""
+        """Smallest and largest p, shape (P,) each; infinite if only the motion is limited."""
         return np.full(len(self.names), -np.inf), np.full(len(self.names), np.inf)
 
 

@@ -136,7 +136,7 @@ class Torque(Settings):
     Attributes
     ----------
     saturation : float or tuple of float or str or None, N m or N
-        Largest torque; limits: that of the robot file, where it has one; null: none.
+        Largest torque; limits: that of the robot file, if it has one; null: none.
     step : float or tuple of float or None, N m or N
         Step of the converter, after the saturation.
     noise : float or tuple of float, N m or N

@@ -53,7 +53,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class DriveGains(Result, keys="joints constant together sigma alone sigma_alone refused"):
-    """Factors g on the torque constants of the records, one per motor; nan where a method has none.
+    """Factors g on the torque constants of the records, one per motor; nan if a method has none.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class DriveGains(Result, keys="joints constant together sigma alone sigma_alone 
 
     @property
     def factors(self) -> Array:
-        """g, shape (n,), 1 where no load tells it."""
+        """g, shape (n,), 1 if no load tells it."""
         return np.where(np.isfinite(self.together), self.together, 1.0)
 
     @property
@@ -218,7 +218,7 @@ def _with_load(
     model: GeneratedModel, observation: Observation, settings: PayloadSettings, mounted: float
 ) -> Observation:
     """Columns W, W_Lu, the torque of the known part of the load, motors; those of the load zero
-    where it is not mounted.
+    if it is not mounted.
     """
     load = load_columns(model, physical_model(model), settings)
     b = len(model.BASE_PARAMETERS)

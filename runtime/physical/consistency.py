@@ -31,7 +31,7 @@ class Consistency(Part):
     fit : Estimate
         The parameters that stand for the robot.
     judged : Feasibility or None
-        Of `estimate`; None where it was not asked for.
+        Of `estimate`; None if it was not asked for.
     """
 
     estimate: Estimate
@@ -52,7 +52,7 @@ class Consistency(Part):
         return "\n".join([*fitted, self.brief()]).strip()
 
     def brief(self) -> str:
-        """One sentence; "" where it was not asked for."""
+        """One sentence; "" if it was not asked for."""
         return "" if self.judged is None else f"The parameters are {self.judged.text}."
 
     def tables(self) -> list[Table]:

@@ -79,7 +79,7 @@ class Cause:
     constants : mapping of str to float
         Entries of the table of frames, SI.
     change : mapping of str to value
-        The remedy as a change of the study, as of a Check; {} where it is none.
+        The remedy as a change of the study, as of a Check; {} if it is none.
     """
 
     kind: str
@@ -428,7 +428,7 @@ def alphas(robot: Robot) -> Iterator[Item]:
 
 
 def _angle(x: float) -> str:
-    """An angle in multiples of pi/2 where it is one."""
+    """An angle in multiples of pi/2 if it is one."""
     quarter = x / (np.pi / 2)
     if not np.isclose(quarter, round(quarter)):
         return f"{x:.4g} rad"
@@ -496,7 +496,7 @@ def conventions(robot: Robot) -> Iterator[Item]:
 
 
 def entries(robot: Robot, names: str) -> Iterator[Item]:
-    """Entries of the table of these names, lengths where they are not zero."""
+    """Entries of the table of these names, lengths if they are not zero."""
     for key, value in robot.free.items():
         entry = ENTRY.fullmatch(key)
         if entry and entry[1] in names.split() and (value or entry[1] == "alpha"):

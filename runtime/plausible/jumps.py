@@ -161,7 +161,7 @@ def _wrap(q: Array, high: Array, usual: Array, median: int) -> bool:
 )
 def cut_torques(case: Case) -> Answer | None:
     """Torques that stay at their largest or smallest value, and what the model fitted to the other
-    samples gives there; None where there are none.
+    samples gives there; None if there are none.
     """
     if case.silent:
         return None

@@ -22,7 +22,7 @@ Array = np.ndarray
     "Does physics agree?", "", "record a longer motion, or give a higher signals.lowpass.cutoff"
 )
 def not_asked(case: Case) -> Answer | None:
-    """Why no cause is tried; None where they are. Too few samples are a doubt: a wrong sign or unit
+    """Why no cause is tried; None if they are. Too few samples are a doubt: a wrong sign or unit
     would not be told.
     """
     if not case.silent:
@@ -102,7 +102,7 @@ def measured(case: Case) -> Answer | None:
     "drives.ratio, torque_constant)",
 )
 def size(case: Case) -> Answer | None:
-    """Mass that the torques ask for, against the reach of the robot; None where that is not
+    """Mass that the torques ask for, against the reach of the robot; None if that is not
     known.
     """
     if case.alone is None or not case.alone.physical.links or not case.turning.all():
@@ -144,7 +144,7 @@ def values(case: Case) -> Answer | None:
     f"shift below {1e3 * LIMIT.LATE:g} ms, or not beyond what the record tells",
 )
 def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
-    """Time shift between positions and torques; None where the record does not tell. What an
+    """Time shift between positions and torques; None if the record does not tell. What an
     alternative explains better is no delay.
     """
     late = None if case.baseline is None else case.late
@@ -183,7 +183,7 @@ def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
 
 
 def _from_to(text: str, before: float, after: float) -> str:
-    """The text and how an error goes, %; "" where it stays."""
+    """The text and how an error goes, %; "" if it stays."""
     a, b = f"{before:.1f}", f"{after:.1f}"
     return "" if a == b else f"; {text} from {a} to {b} %"
 
@@ -217,14 +217,14 @@ def explained(case: Case, trial: Trial) -> float:
 
 
 def late_gain(case: Case) -> float:
-    """What certain delays gain, nats; 0 where there are none."""
+    """What certain delays gain, nats; 0 if there are none."""
     if case.baseline is None or case.late is None:
         return 0.0
     return gained(case, case.late) if certain_joints(case).any() else 0.0
 
 
 def certain_joints(case: Case) -> Array:
-    """Joints whose torques are certainly late, bool (n,): none where that gains less than
+    """Joints whose torques are certainly late, bool (n,): none if that gains less than
     LIMIT.LATE_GAIN.
     """
     assert case.late is not None

@@ -2,7 +2,7 @@
 for each question.
 
     CHECKS       of the record and the robot file, then of the fit: a family of slips a file
-    EXPLAINED    of the causes (`runtime.plausible.causes`), which are tried where
+    EXPLAINED    of the causes (`runtime.plausible.causes`), which are tried if
                  `variants`
                  is given, or where something else is doubtful
 
@@ -92,7 +92,7 @@ class Plausibility(
     ----------
     answers : tuple of Check
     trials : tuple of Trial
-        Alternatives, the best first; empty where none were tried.
+        Alternatives, the best first; empty if none were tried.
     named : tuple of Trial
         Those that explain the record decisively better.
     equivalent : tuple of str
@@ -132,7 +132,7 @@ class Plausibility(
 
     @property
     def line(self) -> str:
-        """The worst finding in one line; "" where there is none."""
+        """The worst finding in one line; "" if there is none."""
         return "" if self.worst is None else self.worst.sentence
 
     def checks(self) -> tuple[Check, ...]:
@@ -241,7 +241,7 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
 
 
 def _case(problem: Problem, variants: GeneratedModel | None) -> Case | Check:
-    """What the checks read; the finding where there is nothing to read."""
+    """What the checks read; the finding if there is nothing to read."""
     model, study = problem.model, problem.settings
     own = [part for reading in problem.prepared for part in excerpts(reading)]
     try:

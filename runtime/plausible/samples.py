@@ -2,7 +2,7 @@
 
 Filters are linear: a sign, a scale or an exchange of columns acts on the filtered signals as on the
 measured ones, and a wrong rate scales velocities and accelerations. So a cause costs the regressor
-at these instants and nothing else, and none where it leaves the positions as they are.
+at these instants and nothing else, and none if it leaves the positions as they are.
 """
 
 from __future__ import annotations

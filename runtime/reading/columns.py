@@ -244,7 +244,7 @@ def conversion(
 def require_alike(
     names: Columns, first: Table, last: Table, q: tuple[int, ...], tau: tuple[int, ...]
 ) -> None:
-    """Raise InputError where positions and torques, of these shapes, are not of one record."""
+    """Raise InputError if positions and torques, of these shapes, are not of one record."""
     if (
         first is not last
         and not set(names.q) & set(names.tau)
@@ -302,7 +302,7 @@ def _position_units(settings: RecordSettings, n: int) -> tuple[Array, Array]:
 def _torque_constant(
     settings: RecordSettings, drives: Drives | None, n: int
 ) -> tuple[Array, Array | None]:
-    """Factors from the unit of tau to SI, shape (n,), and torque constants, 1 where the unit is one of torques; None where all are."""
+    """Factors from the unit of tau to SI, shape (n,), and torque constants, 1 if the unit is one of torques; None if all are."""
     names = _units(settings.units.tau, n, "units.tau")
     units = [torque_unit(name) for name in names]
     factors = np.array([factor for _, factor in units])

@@ -30,7 +30,7 @@ def is_file(path: Path) -> bool:
 
 
 def require_size(unpacked: int, size: int, file: str) -> None:
-    """Raise InputError where a file of `size` bytes would hold `unpacked` ones, more than a measured record ever does."""
+    """Raise InputError if a file of `size` bytes would hold `unpacked` ones, more than a measured record ever does."""
     if unpacked > max(ALWAYS, RATIO * size):
         raise InputError(
             f"unpacks to {unpacked / 2**20:.0f} MiB or more from {size / 2**20:.3g} MiB; a record may be {ALWAYS // 2**20} MiB or {RATIO} times the size of its file: store it without compression if it is genuine",

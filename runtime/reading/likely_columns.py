@@ -104,7 +104,7 @@ class Family:
 
 def likely_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str, Any]:
     """Settings of a record: columns t, q, tau, and units that names tell (currents are in A unless
-    they say mA); {} where names do not tell positions and as many torques. joints : their names in
+    they say mA); {} if names do not tell positions and as many torques. joints : their names in
     the robot file.
     """
     found = known_columns(names, joints)
@@ -187,7 +187,7 @@ def _target(stem: str) -> int:
 
 
 def _unit(name: str, read: Any) -> str:
-    """The unit that a name states in brackets or as a word; "" where it states none."""
+    """The unit that a name states in brackets or as a word; "" if it states none."""
     words = re.split(r"[\W\d_]+", name.lower())
     stated = [*re.findall(r"[\[(]([^\])#]+)[\])]", name)]
     for unit in (*stated, *(unit for unit in NAMED_UNITS if unit.lower() in words)):

@@ -169,7 +169,7 @@ class Scale(Settings):
     tau : float or tuple of float or str
         On the torques; gtau where the file holds force = gtau*vir.
     wrench : float
-        On wrenches, which are those by which the sensor moves the links ahead of it: -1 where it
+        On wrenches, which are those by which the sensor moves the links ahead of it: -1 if it
         reports what they do to it.
     """
 
@@ -222,13 +222,13 @@ class RecordSettings(Settings):
     torque_side : str or None
         The same for tau alone: motor for joint angles recorded with motor currents. Default: side.
     rate : float or None, Hz
-        Sampling rate; may be left out where a time column gives it.
+        Sampling rate; may be left out if a time column gives it.
     units : Units
         Units of the columns.
     scale : Scale
         Factors on the columns.
     counts_per_revolution : float or tuple of float or None
-        Counts in one turn of the encoder, on the side of q; needed where the unit of q is counts.
+        Counts in one turn of the encoder, on the side of q; needed if the unit of q is counts.
     torque_constant : float or tuple of float or None, N*m/A or N*m/V
         For tau in A, mA, V; default: that of the robot's drives. On the side of tau: of the motor,
         or with the gear in it for the joint.

@@ -50,7 +50,7 @@ def cache_folder() -> Path:
 
 
 def cached_path(file: str, text: str) -> Path | None:
-    """Path of the cache entry of a file that holds the certified `text`; None where there is none,
+    """Path of the cache entry of a file that holds the certified `text`; None if there is none,
     or another text.
     """
     path = _entry(text)
@@ -68,7 +68,7 @@ def stored_path(file: str, text: str) -> Path:
     """Path of a file that holds `text`, in the cache, by what its certificate vouches
     for and by the whole, or, where that cannot be written, in a folder of this process.
 
-    Raises SymgenError where no file can be written at all.
+    Raises SymgenError if no file can be written at all.
     """
     folder, whole = _entry(without_certificate(text)), _entry(text)
     if folder is not None and whole is not None:
@@ -144,7 +144,7 @@ def _key(text: str) -> str:
 def _entry(text: str) -> Path | None:
     """Folder of a text in the cache; None without a home folder, or where others may write.
 
-    Raises SymgenError where SYMGEN_CACHE names such a folder.
+    Raises SymgenError if SYMGEN_CACHE names such a folder.
     """
     try:
         folder = cache_folder().absolute()

@@ -57,7 +57,7 @@ class TextCheck:
     sha256 : str
         Hash of the text below its header.
     errors : mapping
-        Largest difference of each function from the witness, of the largest entry; infinite where
+        Largest difference of each function from the witness, of the largest entry; infinite if
         it does not run, has another shape, or other values than the file's where no constants are
         given.
     constants : str
@@ -67,7 +67,7 @@ class TextCheck:
     uses : tuple of str
         The ways in which a module ran.
     not_run : str
-        Why nothing ran; empty where it did.
+        Why nothing ran; empty if it did.
     raised : mapping
         What functions of a module raised in place of a result.
     """
@@ -212,7 +212,7 @@ def largest(
     call: Use,
     witness: Witness,
 ) -> tuple[float, str]:
-    """Largest error of a function in all its checks, and what it raised; infinite where it has other
+    """Largest error of a function in all its checks, and what it raised; infinite if it has other
     constants than the file by itself.
     """
     try:
@@ -391,7 +391,7 @@ def _flat(a: Array) -> list[float]:
 
 
 def _run(command: list[str], given: str = "") -> str:
-    """What a command prints. Raises SubprocessError where it fails, or takes too long."""
+    """What a command prints. Raises SubprocessError if it fails, or takes too long."""
     return subprocess.run(
         command, input=given, capture_output=True, text=True, timeout=LONGEST_RUN, check=True
     ).stdout

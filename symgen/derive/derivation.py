@@ -79,7 +79,7 @@ class Derivation:
 
 @lru_cache(maxsize=8)
 def derive(robot: Robot) -> Derivation:
-    """The derivation of `robot`, made once. Raises DescriptionError where its loops cannot
+    """The derivation of `robot`, made once. Raises DescriptionError if its loops cannot
     close.
     """
     return derived(robot, close)

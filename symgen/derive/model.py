@@ -102,7 +102,7 @@ class Model:
     denominator : str
         What its entries are still to be divided by, where the closed form says that apart.
     result : str
-        What emitted text calls the array; empty where no target has the function.
+        What emitted text calls the array; empty if no target has the function.
     symbolic : bool
         Whether it can be had as symbols.
     of_frames : bool
@@ -116,11 +116,11 @@ class Model:
     up_to_a_constant : bool
         Whether a constant may be added to it.
     page : int
-        Its place on the page of a robot, from 1; 0 where it is not shown there.
+        Its place on the page of a robot, from 1; 0 if it is not shown there.
     case_of : str
         The model that it is where the arguments that it has not are zero: Python modules call that.
     option : str
-        What asks targets for it (`symgen generate --with`); empty where they always have it.
+        What asks targets for it (`symgen generate --with`); empty if they always have it.
     latex : str
         The letter in LaTeX; where left out, `letter` in bold.
     """

@@ -193,7 +193,7 @@ class Rewrite:
         return same if image.sign > 0 else -same
 
     def _first_of(self, node: Node) -> Scalar | int:
-        """0, 1 or -1 where that is the value of the node, else the first node of its value."""
+        """0, 1 or -1 if that is the value of the node, else the first node of its value."""
         p = self.draw.p
         (value,) = interpret([self.graph.scalar(node.index, 1)], self.draw, self._value)
         residues = self.draw.residues(value).tolist()

@@ -1,5 +1,5 @@
 """What a message adds when a novice's mistake is recognised: the thing to write instead. Each
-returns "" where it has nothing to say.
+returns "" if it has nothing to say.
 """
 
 from __future__ import annotations

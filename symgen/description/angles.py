@@ -39,7 +39,7 @@ class Angles:
     near: list[tuple[str, float, int]] = field(default_factory=list)
 
     def twelfths(self, angle: float, name: str) -> int | None:
-        """k of the multiple k pi/12 that `angle` is taken as; None where it stays."""
+        """k of the multiple k pi/12 that `angle` is taken as; None if it stays."""
         k = twelfths(angle, SNAP)
         if k is None or abs(k * (math.pi / 12) - angle) <= ALL_DIGITS:
             return k

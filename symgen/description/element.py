@@ -172,7 +172,7 @@ class Element:
         return sorted(name.removeprefix(CHANNEL) for name in names if name.startswith(CHANNEL))
 
     def law(self, j: int) -> Expression:
-        """Torque along s of key j for parameter 1; zero where it is that of an energy."""
+        """Torque along s of key j for parameter 1; zero if it is that of an energy."""
         return self._of_key(self.torque or KINDS[self.kind].torque, j)
 
     def potential(self, j: int) -> Expression:

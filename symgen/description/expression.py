@@ -311,7 +311,7 @@ ZERO, ONE, PI = Expression(), Expression.number(1), Expression.symbol("pi")
 
 
 def decimal(c: Fraction, *, fractions: bool = True) -> str:
-    """A rational as an exact decimal where it is one of reasonable length, else as p/q; halves,
+    """A rational as an exact decimal if it is one of reasonable length, else as p/q; halves,
     quarters and eighths are p/q too where `fractions` is true.
     """
     if c.denominator == 1:
@@ -492,7 +492,7 @@ class Function(NamedTuple):
     number : callable
         Its value at a number.
     numpy, casadi, c, sympy : str
-        Its name there; empty where it is written otherwise.
+        Its name there; empty if it is written otherwise.
     """
 
     at_zero: int | None
@@ -570,7 +570,7 @@ def ratio(x: float) -> Fraction:
 
 
 def twelfths(angle: float, within: float) -> int | None:
-    """k of the multiple k pi/12 that lies within `within` rad of a decimal angle; None where none
+    """k of the multiple k pi/12 that lies within `within` rad of a decimal angle; None if none
     does. Drawings have such angles.
     """
     k = round(angle * 12 / math.pi)

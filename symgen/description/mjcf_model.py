@@ -241,7 +241,7 @@ def _take_out_meshes(
     body: Any, lines: Sequence[int], *, moves: bool, from_geoms: bool, all_weighed: bool
 ) -> None:
     """The geoms of a body, and of those on it, that are meshes weigh nothing; DescriptionError
-    where their mass matters.
+    if their mass matters.
     """
     moves = moves or bool(body.joints)
     weighed = (moves or all_weighed) and (from_geoms or not body.explicitinertial)

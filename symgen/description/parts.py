@@ -204,7 +204,7 @@ def _of_motors(value: list[float] | float | None, declared: Declared) -> tuple[f
 
 
 def _of_motors_if_given(value: Any, declared: Declared) -> tuple[float, ...] | None:
-    """One number for each actuated joint; None where none is given: currents are then refused."""
+    """One number for each actuated joint; None if none is given: currents are then refused."""
     return None if value is None else _of_motors(value, declared)
 
 

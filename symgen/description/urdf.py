@@ -183,7 +183,7 @@ def _inertial(link: XmlElement, angles: Angles) -> Inertial | None:
 
 
 def no_body(M: float, tensor: Array) -> str:
-    """Why no body has this mass and this tensor about its centre of mass; "" where one has."""
+    """Why no body has this mass and this tensor about its centre of mass; "" if one has."""
     if not M and tensor.any():
         return "mass 0 with an inertia"
     small, middle, large = np.linalg.eigvalsh(tensor)

@@ -153,7 +153,7 @@ class Pool:
         return total
 
     def vector(self, name: str, k: int, P: Products, Q: Products) -> dict[int, int] | None:
-        """{place among [*Q, *P]: residue} of the first relation with a denominator, or None where
+        """{place among [*Q, *P]: residue} of the first relation with a denominator, or None if
         there is none; cos(a) and cos(3a) make others.
         """
         count = len(P) + len(Q) + 4
@@ -256,7 +256,7 @@ class Recognition:
         return result
 
     def _power(self, reference: int, scaled: Sequence[int]) -> int:
-        """n where scaling a variable by SCALES scales a coefficient by their n-th powers, 0 where
+        """n where scaling a variable by SCALES scales a coefficient by their n-th powers, 0 if
         it does not.
         """
         p = self.pools[0].p

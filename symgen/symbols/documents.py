@@ -87,7 +87,7 @@ EXPANDED = 2000  # terms that are multiplied out to see
 
 
 def printed(model: SymbolicModel, form: str, language: str) -> str:
-    """A model as text, latex, sympy or json, in closed or recursive form. Raises SymgenError where
+    """A model as text, latex, sympy or json, in closed or recursive form. Raises SymgenError if
     the form has too many terms or is none.
     """
     for what, given, known in (("form", form, FORMS), ("format", language, FORMATS)):
@@ -486,7 +486,7 @@ def shown_models(regrouping: Regrouping) -> tuple[list[ShownModel], list[str]]:
 
 
 def _shown(model: SymbolicModel) -> ShownModel | None:
-    """None where the robot has neither form of the model."""
+    """None if the robot has neither form of the model."""
     title = model.model.name.replace("_", " ")
     try:
         closed = model.closed

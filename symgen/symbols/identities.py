@@ -101,7 +101,7 @@ class Identities:
 
 
 def number(c: Fraction) -> Fraction | int:
-    """An integer where it is one."""
+    """An integer if it is one."""
     return c.numerator if c.denominator == 1 else c
 
 

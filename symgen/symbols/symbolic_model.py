@@ -29,7 +29,7 @@ LARGEST = 10_000  # terms of a model, multiplied out
 
 @dataclass(frozen=True)
 class ClosedModel:
-    """Entries that differ from zero, each over `denominator` where there is one, and the angles
+    """Entries that differ from zero, each over `denominator` if there is one, and the angles
     that their C and S stand for.
     """
 
@@ -109,7 +109,7 @@ class SymbolicModel:
 
     @cached_property
     def closed(self) -> ClosedModel:
-        """The closed form. Raises SymgenError where it has too many terms, or where the model has
+        """The closed form. Raises SymgenError if it has too many terms, or where the model has
         none; the message names the form that works.
         """
         try:
@@ -263,7 +263,7 @@ class SymbolicModel:
     @cached_property
     def listing(self) -> Listing:
         """The recursion as equations in the order in which they are computed. Raises SymgenError
-        where the model has none.
+        if the model has none.
         """
         if self.model.cases is None:
             raise SymgenError(

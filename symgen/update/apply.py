@@ -54,12 +54,12 @@ def apply(
     ----------
     estimate : Estimate, Identification, str or Path
         Result, its estimate.json, or the folder that `symgen identify -o` wrote. Of a whole
-        identification the parameters that stand for the robot are taken, or the physical ones where
+        identification the parameters that stand for the robot are taken, or the physical ones if
         the essential ones do (`Identification.whole_estimate`).
     model : str or Path
         The file: .urdf, or .xml and .mjcf (MJCF).
     robot : str or Path, optional
-        Robot file that was identified, where it is not `model` itself: converted from it, perhaps
+        Robot file that was identified, if it is not `model` itself: converted from it, perhaps
         with other elements or drives.
     lock, chain, exact
         As of `read_robot`, and as when the robot was identified or converted.
@@ -153,7 +153,7 @@ def _estimate(given: Any) -> Estimate:
 
 
 def _require_same_joints(result: Estimate, robot: Robot, of: str) -> None:
-    """Raise DescriptionError where the estimate tells names of joints, and they are not those of
+    """Raise DescriptionError if the estimate tells names of joints, and they are not those of
     the robot.
     """
     theirs = result.provenance.get("labels")
@@ -203,7 +203,7 @@ def _determined(
 
 def _root(result: Estimate, names: Sequence[str]) -> Array:
     """A root of the covariance of the known base parameters, (b, b), deviations corrected where
-    they are; zero where there is none.
+    they are; zero if there is none.
     """
     at = [result.names.index(name) for name in names]
     C = np.nan_to_num(result.covariance[np.ix_(at, at)])

@@ -57,7 +57,7 @@ class XmlEdits:
         values: Sequence[float],
         default: Sequence[float] | None = None,
     ) -> None:
-        """The numbers of an attribute, the first ones where it has more; those that stay are not
+        """The numbers of an attribute, the first ones if it has more; those that stay are not
         touched.
 
         Parameters

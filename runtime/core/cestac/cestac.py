@@ -78,9 +78,9 @@ def cestac(
     own_encoder : callable
         From a record to the encoder that made it, where the law of rounding asks for it.
     loop_of : callable
-        From a problem to the closed loop that it simulates; None where it simulates none.
+        From a problem to the closed loop that it simulates; None if it simulates none.
     columns : sequence of str, optional
-        Essential names where they are known; default: those of the problem. Unused where settings.cestac.columns is "all".
+        Essential names if they are known; default: those of the problem. Unused where settings.cestac.columns is "all".
     map : callable, optional
         As the built-in one; computes the runs, in processes (`runtime.parallel.processes.processes`) or by a
         Dask cluster (`runtime.parallel.cluster.cluster`). The results do not depend on it in any bit.
@@ -183,7 +183,7 @@ def cestac(
 
 
 def _refuse(reference: Estimate) -> None:
-    """InputError where the method finds no estimate that runs could be compared with."""
+    """InputError if the method finds no estimate that runs could be compared with."""
     if reference.status not in (*USABLE, "rank-deficient", "no-redundancy", "singular-weights"):
         raise InputError(
             f"{reference.method}: no estimate of the record as measured to compare with: "
