@@ -570,7 +570,7 @@ def static_poses(
 
 
 def extras(asked: Mapping[str, Mapping[str, Any]], attempted: bool = False) -> list[Extra]:
-    """EXTRAS with those on request that are asked for, by keyword, each with its options; what stands for the others."""
+    """EXTRAS with options for those that are requested by keyword, and substitutes for the others."""
     chosen: list[Extra] = []
     for extra in EXTRAS:
         if not isinstance(extra, OnRequest):

@@ -92,7 +92,7 @@ def expected_off(likely: Expected) -> Answer | None:
 
 @dataclass(frozen=True, eq=False)
 class ExpectedError(Part):
-    """How far off predictions by the parameters that stand for the robot are likely to be, computed when it is first asked for."""
+    """Expected error of predictions by the used parameters, computed at first use."""
 
     result: Identification
 
@@ -102,7 +102,7 @@ class ExpectedError(Part):
 
     @property
     def expected_error(self) -> float:
-        """Of motions over the range of the robot at up to half of its speed, %."""
+        """Expected error of motions over the range of the robot at up to half of its speed, %."""
         return self.expected.error
 
     @cached_property
@@ -138,8 +138,9 @@ def expected_error(
     records: Sequence[Prepared],
     steps: float = 0.0,
 ) -> Expected:
-    """Expected error of predictions, at most LIMIT.LARGEST_EXPECTED; nan if neither the robot
-    file nor records tell a range, or a loop does not close in it.
+    """Expected error of predictions, at most LIMIT.LARGEST_EXPECTED.
+
+    nan if neither the robot file nor the records give a range, or a loop does not close in it.
 
     Parameters
     ----------

@@ -75,7 +75,7 @@ class PayloadSettings(load.PayloadSettings):
 
 
 class Recorded(Settings):
-    """What stands first in a study file.
+    """First part of a study file.
 
     Attributes
     ----------
@@ -260,7 +260,7 @@ def _starts_anew(settings: RecordSettings, model: GeneratedModel, missing: bool)
 
 
 def draft(study: Study, model: GeneratedModel) -> str:
-    """What the names of the columns of the first record tell, as the text of a study to complete; "" if that is nothing."""
+    """Text of a study to complete, from the column names of the first record; "" if they give nothing."""
     record = study.record[0]
     joints = tuple(getattr(model, "LABELS", {}).values())
     return drafts.draft(record, Path(record.files[0]), joints) if record.files else ""

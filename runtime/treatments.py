@@ -115,7 +115,7 @@ class Ranking:
         )
 
     def summary(self) -> dict[str, Any]:
-        """For JSON."""
+        """The ranking as a mapping for JSON."""
         treatments = [
             {
                 "name": name,
@@ -198,7 +198,9 @@ def treatments(
     steps: Sequence[Step],
     speed_of_rest: Callable[[Problem], float | tuple[float, ...] | None],
 ) -> dict[str, Problem]:
-    """A problem as stated, without the rows of joints that stand, and with its known torques left out, as far as these differ; each after all steps.
+    """Variants of a problem that differ: as stated, without the rows of resting joints, without known torques.
+
+    All steps are applied to each.
 
     speed_of_rest : rows.low_speed of a prepared problem that leaves out the rows of joints that stand; None if few do.
     """

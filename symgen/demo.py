@@ -117,7 +117,7 @@ COLOURED = ("ZZ1R", "MX2R", "FV1", "FS1", "Ia3", "FS5")
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """What a demonstration starts from.
+    """Start of a demonstration: robot, record and study.
 
     Attributes
     ----------

@@ -552,7 +552,7 @@ def resolved(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answ
 
 @dataclass(frozen=True, eq=False)
 class NoAdvice(Part):
-    """What the positions alone show where no advice was asked for."""
+    """Effect of the encoder steps that the positions show, if no advice was requested."""
 
     result: Identification
 

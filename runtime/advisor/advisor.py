@@ -319,7 +319,7 @@ def assumptions(
     *,
     real: bool = False,
 ) -> tuple[str, ...]:
-    """What the prediction stands on, in words. real : real encoders were judged too."""
+    """Assumptions of the prediction, in words. real : real encoders were judged too."""
     cestac, low = study.cestac, study.signals.lowpass
     law = {
         "two-point": "+-Delta, variance Delta^2",

@@ -406,7 +406,7 @@ class Identification:
         return "\n".join([head, *lines[:room], f"Unexplained by joint: {by_joint}"])
 
     def _lines(self, names: Sequence[str]) -> list[str]:
-        """Values of some parameters that stand for the robot, with intervals and units."""
+        """Values of some of the used parameters, with intervals and units."""
         fit = self.model_estimate
         k = [fit.names.index(name) for name in names]
         units = [fit.units.get(name, "") for name in names]

@@ -251,7 +251,7 @@ def structure(cls: type[T], value: Any, path: Path = ()) -> T:
 
 
 def _value_at(path: Path, value: Any) -> Any:
-    """What these keys lead to in a mapping as read from a file; None if it has no such keys."""
+    """Value at these keys of a mapping from a file; None if it has no such keys."""
     for key in path:
         if isinstance(value, Mapping):
             value = (

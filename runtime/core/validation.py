@@ -392,7 +392,7 @@ def weak_directions(
 
 
 def _named(v: Array, names: Sequence[str]) -> dict[str, float]:
-    """Entries of a singular vector worth a name, largest first, the largest positive."""
+    """Largest entries of a singular vector by name, in descending order; the largest is positive."""
     order = np.argsort(-np.abs(v), kind="stable")
     v = v * np.sign(v[order[0]])
     return {

@@ -272,7 +272,7 @@ def _distance(x: Array, step: float, phase: float) -> float:
 
 
 def _off(x: Array, off: float, step: float, own: bool) -> str:
-    """What is wrong with positions that are `off` steps (rms) off their lattice, and what to do."""
+    """Message for positions that are `off` steps (rms) off their lattice, with a remedy."""
     text = f"positions lie {off:.2g} steps (rms) off the lattice of step {step:.6g}"
     suggested = 0.0 if own else smallest_step(x)
     if suggested and _distance(x, suggested, _phase(x, suggested)) < OFF / 5:

@@ -49,8 +49,7 @@ STANDS, LONG = 0.1, 2.0
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """What counts say of a motion; arrays of shape (N, n) at the encoder side, rad or m, per s, per
-    s^2.
+    """Motion that counts show; arrays of shape (N, n) at the encoder side, rad or m, per s, per s^2.
 
     Attributes
     ----------
@@ -89,7 +88,7 @@ class Reading:
 
     @property
     def starts(self) -> Starts:
-        """From where the same motion is sought at other phases of its encoders."""
+        """Start of the search for the same motion with other phases of its encoders."""
         return {
             (part.begin, j): SearchStart(each.read.errors, each.basis.m, each.read.density)
             for part in self.parts

@@ -72,7 +72,7 @@ SPACING = 0.3
 
 
 class SearchStart(NamedTuple):
-    """From where a motion is sought that was read before, at another phase of its encoder.
+    """Start of the search for a known motion with another phase of its encoder.
 
     errors : of the counts.
     m : samples from knot to knot.
@@ -154,7 +154,7 @@ def smoothed(
 
 @dataclass(frozen=True, eq=False)
 class Counts:
-    """Of one encoder: y, shape (N,), at the samples `measured`; precision `rest` of the others."""
+    """Counts of one encoder: y, shape (N,), at the samples `measured`, and the precision `rest` of the other samples."""
 
     y: Array
     measured: Array
@@ -333,9 +333,7 @@ class Counts:
 
 
 def _told(errors: Errors, least: float, sites: int) -> list[str]:
-    """Sentences about errors beside the rounding; none if they are the least that is taken, or
-    sites too few to tell.
-    """
+    """Sentences about errors besides rounding; none if these are the smallest, or sites are too few."""
     said = []
     if errors.count > least and sites > FEWEST:
         said.append(

@@ -99,7 +99,7 @@ class SetDocument:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SetsDocument(Estimate):
-    """All parameters by the method of the study, and the nested sets beside them.
+    """All parameters by the method of the study, and the nested sets.
 
     Attributes
     ----------
@@ -262,7 +262,7 @@ def load_whole_estimate(path: Path | str) -> Estimate:
 
 
 class ResultSchema(GenerateJsonSchema):
-    """JSON Schema of results, in which null stands for a number that does not exist."""
+    """JSON Schema of results, in which null means nan or infinity."""
 
     def float_schema(self, schema: core_schema.FloatSchema) -> dict[str, Any]:
         """A number or null."""

@@ -36,7 +36,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """What every start needs; travels once to each process.
+    """Data that every start needs; sent once to each process.
 
     Attributes
     ----------

@@ -38,7 +38,7 @@ LARGEST_CONDITION = 1e4  # of W; beyond, poses do not determine the parameters
 
 @dataclass(frozen=True, eq=False)
 class StaticPoses(Result, keys="poses condition sigma compared s taken_in"):
-    """Poses at rest, compared with those of the record alone, or with as many random ones.
+    """Poses at rest, compared with the recorded poses, or with the same number of random ones.
 
     Attributes
     ----------

@@ -108,7 +108,7 @@ class FittedLaws(Part):
         return {s.name: s.value for s in self.scalars}
 
     def tables(self) -> list[Table]:
-        """Scalars, and what the laws are worth on unseen data."""
+        """Tables of the scalars, and of the errors of the laws on unseen data."""
         said = [
             (s.name, s.parameter, s.doubt, "")
             if s.doubt
@@ -153,7 +153,7 @@ class FittedLaws(Part):
         return f"Scalars of laws (± 95 %): {', '.join(said)}{worth}"
 
     def summary(self) -> dict[str, Any]:
-        """For JSON."""
+        """The laws as a mapping for JSON."""
         return {"scalars": self.scalars, "tests": self.tests}
 
 

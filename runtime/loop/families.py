@@ -191,9 +191,7 @@ class Sinusoids(Family, Settings):
 
 
 class Polyline(Family):
-    """Positions p0, p1 ... at constant velocities between them, corners rounded; `ramps` tells when
-    each velocity begins and ends.
-    """
+    """Positions p0, p1 ... with constant velocities between them and rounded corners; `ramps` has the times of the velocities."""
 
     points: int
     blend: float

@@ -77,9 +77,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Fixed:
-    """Where the iteration ended: the last step, the trail, whether it stood still, ratio of its
-    last two changes.
-    """
+    """End of an iteration: last step, all steps, whether it converged, ratio of the last two changes."""
 
     step: Step
     trail: tuple[dict[str, Any], ...]

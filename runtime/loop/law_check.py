@@ -33,7 +33,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class LawFit:
-    """The law beside the record, one joint.
+    """Comparison of the law with the record, for one joint.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ def _integral(steps: Array, first: float, bound: float) -> Array:
 
 
 def law_text(fits: Sequence[LawFit]) -> str:
-    """What the law explains, joint by joint, in words; with the cause where it explains little."""
+    """Share of the torque that the law explains, joint by joint, in words, with the cause if it is small."""
     shares = ", ".join(f"{max(one.share, 0.0):.0f} % of joint {one.joint}" for one in fits)
     poor = [one for one in fits if one.share < LIMIT.LAW_POOR]
     if not poor:

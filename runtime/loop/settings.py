@@ -131,7 +131,7 @@ class Encoder(Settings):
 
 
 class Torque(Settings):
-    """From the command to the arm and to the record, N m or N of the joint.
+    """Path from the command to the arm and to the record, N m or N of the joint.
 
     Attributes
     ----------

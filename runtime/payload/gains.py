@@ -82,14 +82,12 @@ class DriveGains(Result, keys="joints constant together sigma alone sigma_alone 
 
     @property
     def factors(self) -> Array:
-        """g, shape (n,), 1 if no load tells it."""
+        """Factors g, shape (n,); 1 if no load determines them."""
         return np.where(np.isfinite(self.together), self.together, 1.0)
 
     @property
     def refused(self) -> tuple[str, ...]:
-        """Motors whose torque does not tell: %sigma of the joint solution is LIMIT.GAIN_REFUSED or
-        more.
-        """
+        """Motors with an undetermined factor: %sigma of the joint solution is LIMIT.GAIN_REFUSED or more."""
         return tuple(
             j
             for j, g, s in zip(self.joints, self.together, self.sigma, strict=True)

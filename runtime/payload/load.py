@@ -103,7 +103,7 @@ class Payload(Result):
         return self.table().to_text()
 
     def summary(self) -> dict[str, Any]:
-        """For JSON."""
+        """The payload as a mapping for JSON."""
         parameters = {
             n: {"value": x, "sigma": s}
             for n, x, s in zip(self.names, self.value, self.sigma, strict=True)

@@ -58,7 +58,7 @@ class PayloadStudy(Result, Part, keys="payload drive_gains:gains"):
         return [self.payload.table(), *gains]
 
     def entries(self) -> dict[str, Any]:
-        """The load, and the torque constants beside it."""
+        """Entries of estimate.json: the load and the torque constants."""
         return self.summary()
 
     def brief(self) -> str:

@@ -47,7 +47,7 @@ class Consistency(Part):
         return "standard" in self.fit.details
 
     def text(self) -> str:
-        """What was asked of the parameters, and whether they have it."""
+        """The conditions of a physical robot, and whether the parameters meet them."""
         fitted = [self.fit.message, CONDITIONS] if self.fitted else []
         return "\n".join([*fitted, self.brief()]).strip()
 
@@ -76,7 +76,7 @@ class Consistency(Part):
         return (physical(self),)
 
     def summary(self) -> dict[str, Any] | None:
-        """Of `judged`."""
+        """The test of `judged` as a mapping for JSON."""
         if self.judged is None:
             return None
         blocking = [{"condition": name, "margin": margin} for name, margin in self.judged.blocking]

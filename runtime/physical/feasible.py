@@ -197,7 +197,7 @@ def fit(start: Beginning) -> Fitted:
 
 
 def conditions_of(judged: Feasibility | None) -> dict[str, Any]:
-    """What least squares does to the conditions of a physical robot; nothing if it was not asked."""
+    """Conditions of a physical robot that least squares breaks, for JSON; {} if not requested."""
     if judged is None:
         return {}
     blocking = [{"condition": name, "margin": t} for name, t in judged.blocking]
@@ -373,7 +373,7 @@ def contradicted(
 
 
 def prior_text(physical: PhysicalModel, options: FeasibleOptions, weight: float) -> str:
-    """What the values of the robot file did, in words."""
+    """Effect of the values of the robot file, in words."""
     if options.prior == "none":
         return ""
     missing = len(physical.links) * 10 - len(known_inertia(physical))

@@ -376,7 +376,7 @@ def _solved(*data: Any) -> Any:
 
 
 def _solution(solve: Callable[[], Any]) -> Any:
-    """What Clarabel gives; None if it stops by an error of its own."""
+    """Solution of Clarabel; None if it stops with an error of its own."""
     try:
         return solve()
     except BaseException as e:  # a panic of Rust is no Exception

@@ -67,7 +67,7 @@ class Grams:
         return cls(np.array(grams), mask.sum(axis=0), measured)
 
     def mapped(self, K: Array) -> Grams:
-        """With the columns W K, K of shape (b, p)."""
+        """The normal equations with the columns W K, K of shape (b, p)."""
         M = np.zeros((K.shape[0] + 1, K.shape[1] + 1))
         M[:-1, :-1], M[-1, -1] = K, 1.0
         return Grams(M.T @ self.of_joints @ M, self.rows, self.measured)
@@ -260,7 +260,7 @@ class Bodies:
         return bool(self.known_links.any())
 
     def distance(self, chi: Array) -> float:
-        """From the values of the robot file, nats."""
+        """Distance from the values of the robot file, nats."""
         return float(0.5 * chi @ self.H @ chi - self.h @ chi + self.constant)
 
     def penalty(self, chi: Array) -> float:

@@ -68,7 +68,7 @@ class Case:
 
     @cached_property
     def labels(self) -> tuple[str, ...]:
-        """What results call the joints."""
+        """Labels of the joints in results."""
         return joint_labels(self.model)
 
     @cached_property

@@ -113,7 +113,7 @@ class Cause:
         return np.asarray(samples.tau @ self.T.T - self.subtracted(samples))
 
     def subtracted(self, samples: Samples) -> Array:
-        """Torques known beside the model, shape (K, n)."""
+        """Known torques outside the model, shape (K, n)."""
         known = np.asarray(self.known_factor * samples.tau_known)
         if np.ndim(self.unmodelled) == 0:
             return known
@@ -121,8 +121,9 @@ class Cause:
 
 
 def unmodelled_torques(samples: Samples) -> Array:
-    """What the model may lack, shape (K, n, 2): 1, and sign(qd) exp(-(qd/v)^2), dry friction at low
-    speed, v the share LIMIT.SLOW of the largest speed.
+    """Torques that the model may lack, shape (K, n, 2): 1, and sign(qd) exp(-(qd/v)^2), dry friction at low speed.
+
+    v is the share LIMIT.SLOW of the largest speed.
     """
     qd = samples.qd
     v = np.maximum(LIMIT.SLOW * np.abs(qd).max(axis=0), 1e-12)
@@ -131,7 +132,7 @@ def unmodelled_torques(samples: Samples) -> Array:
 
 
 def unchanged(n: int, **changed: Any) -> Cause:
-    """The study of n joints as it is, but for what is given."""
+    """The study of n joints with only the given changes."""
     plain = {"kind": "", "says": "", "remedy": "", "subject": ""}
     return Cause(**plain | {"P": np.eye(n), "p": np.zeros(n), "T": np.eye(n)} | changed)
 
@@ -539,7 +540,7 @@ def turned(*quantities: str) -> Callable[[Robot, Item], Mapping[str, Any]]:
 
 
 def transmitted(robot: Robot, *, positions: bool, torques: bool, to_joints: bool) -> Maps:
-    """What was recorded at the motors taken to the joints, or the reverse."""
+    """Signals of the motors converted to the joints, or the reverse."""
     inverse = np.linalg.inv(robot.R)
     P, p, T = (
         (inverse, robot.offset, robot.R.T)

@@ -44,7 +44,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class KnownValues(Result):
-    """Torque of the values of the robot file beside that of the record.
+    """Comparison of the torque of the values of the robot file with that of the record.
 
     Attributes
     ----------

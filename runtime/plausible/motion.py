@@ -40,7 +40,7 @@ Array = np.ndarray
     f"standing at most {100 * LIMIT.REST_SHARE:g} % of the rows that are used",
 )
 def rest(case: Case) -> Answer:
-    """Share of the instants at which a joint stands, and what leaving them out changes."""
+    """Share of the instants at which a joint rests, and the change of the fit without them."""
     model, study = case.model, case.study
     share = standing_share(case.samples, study)
     worst = int(np.argmax(share))
@@ -72,7 +72,7 @@ def rest(case: Case) -> Answer:
 
 
 def standing_share(samples: Samples, study: Study) -> Array:
-    """Share of the rows of each joint at which it stands, shape (n,)."""
+    """Share of the rows of each joint at which it rests, shape (n,)."""
     speed = np.where(
         samples.still, np.inf, np.abs(samples.qd)
     )  # a joint that never moves is told as such
@@ -114,16 +114,14 @@ def _rounded_up(x: float) -> float:
     "a motion), or leave them out (estimate.columns)",
 )
 def motion_excites(case: Case) -> Answer | None:
-    """Parameters that the motion cannot tell; None if the study has no rows, or a joint stands."""
+    """Parameters that the motion does not determine; None if the study has no rows, or a joint rests."""
     if case.observation is None or case.samples.still.any():
         return None
     return excited(case.observation, case.given[0].study.signals, case.records[0].rate)
 
 
 def excited(observation: Observation, signals: Signals, rate: float) -> Answer | None:
-    """Parameters that the motion cannot tell; None if W has no full rank, which the fit itself
-    says by name.
-    """
+    """Parameters that the motion does not determine; None if W is rank-deficient, which the fit itself reports."""
     try:
         shares = unexcited_shares(observation, signals, rate)
     except (InputError, np.linalg.LinAlgError):

@@ -22,8 +22,9 @@ Array = np.ndarray
     "Does physics agree?", "", "record a longer motion, or give a higher signals.lowpass.cutoff"
 )
 def not_asked(case: Case) -> Answer | None:
-    """Why no cause is tried; None if they are. Too few samples are a doubt: a wrong sign or unit
-    would not be told.
+    """Reason why no cause is tried; None if causes are tried.
+
+    Too few samples are a doubt, because a wrong sign or unit would not be detected.
     """
     if not case.silent:
         return None
@@ -39,7 +40,7 @@ def not_asked(case: Case) -> Answer | None:
     "alternatives below",
 )
 def physics(case: Case) -> Answer | None:
-    """Errors by joint of the best physical robot beside those of free parameters."""
+    """Errors by joint of the best physical robot and of free parameters."""
     if case.alone is None:
         return None
     free, given = case.alone.free, case.alone.given
@@ -144,9 +145,7 @@ def values(case: Case) -> Answer | None:
     f"shift below {1e3 * LIMIT.LATE:g} ms, or not beyond what the record tells",
 )
 def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
-    """Time shift between positions and torques; None if the record does not tell. What an
-    alternative explains better is no delay.
-    """
+    """Time shift between positions and torques; None if the record does not determine it, or an alternative explains it better."""
     late = None if case.baseline is None else case.late
     if late is None or not np.isfinite(late.sigma).any():
         return None
@@ -205,19 +204,19 @@ def late_joints(late: Delay) -> Array:
 
 
 def gained(case: Case, late: Delay) -> float:
-    """What delays gain, nats."""
+    """Gain of the delays, nats."""
     N = 0.0 if case.baseline is None else case.baseline.N
     return N * float(np.log(late.before / np.maximum(late.after, 0.1)).sum())
 
 
 def explained(case: Case, trial: Trial) -> float:
-    """What an alternative gains, nats, rows counted as for a delay."""
+    """Gain of an alternative, nats, with rows counted as for a delay."""
     assert case.baseline is not None and trial.fit is not None
     return case.baseline.given.score - trial.fit.score
 
 
 def late_gain(case: Case) -> float:
-    """What certain delays gain, nats; 0 if there are none."""
+    """Gain of the certain delays, nats; 0 if there are none."""
     if case.baseline is None or case.late is None:
         return 0.0
     return gained(case, case.late) if certain_joints(case).any() else 0.0

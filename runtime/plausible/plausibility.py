@@ -140,11 +140,11 @@ class Plausibility(
         return self.answers
 
     def text(self) -> str:
-        """What stands beside the checks: what no record can tell."""
+        """Text besides the checks: changes that no record can reveal."""
         return "\n".join(f"No record can tell: {change}." for change in self.equivalent)
 
     def to_text(self) -> str:
-        """Findings that are not good, then what no record can tell."""
+        """Findings that are not good, then changes that no record can reveal."""
         lines = [f"{c.state}: {c.sentence}" for c in self.answers if c.state in WORST[:2]]
         told = "\n".join(filter(None, [*lines, self.text()]))
         return told or "Record, study and robot file suit each other, as far as judged."
@@ -241,7 +241,7 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
 
 
 def _case(problem: Problem, variants: GeneratedModel | None) -> Case | Check:
-    """What the checks read; the finding if there is nothing to read."""
+    """Data for the checks; a finding if there are no data."""
     model, study = problem.model, problem.settings
     own = [part for reading in problem.prepared for part in excerpts(reading)]
     try:

@@ -74,7 +74,7 @@ class Samples:
         return len(self.t)
 
     def standing(self) -> Array:
-        """Speed below which each joint is taken to stand, shape (n,), rad/s or m/s."""
+        """Speed below which each joint counts as resting, shape (n,), rad/s or m/s."""
         return np.asarray(LIMIT.STANDING * np.abs(self.qd).max(axis=0))
 
     def moving(self) -> Array:
@@ -91,7 +91,7 @@ class Samples:
         return np.asarray((np.ptp(self.tau, axis=0) <= 1e-9 * size) & ~self.without_motor())
 
     def thinned(self, most: int) -> Samples:
-        """At most `most` instants, evenly drawn."""
+        """At most `most` instants at equal distances."""
         kept = np.arange(0, len(self), -(-len(self) // most))
         return replace(self, **{name: getattr(self, name)[kept] for name in SIGNALS})
 
@@ -194,7 +194,7 @@ def motion_cutoff(record: Record, study: Study) -> float:
 
 
 def usable(record: Record, study: Study, before: int, after: int) -> Array:
-    """Samples in the window, and at least so many before and after a gap, bool (N,)."""
+    """Samples in the window that are far enough from a gap, bool (N,)."""
     t0, t1 = study.rows.window
     inside = (record.t >= (-np.inf if t0 is None else t0)) & (
         record.t <= (np.inf if t1 is None else t1)

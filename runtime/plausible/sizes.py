@@ -40,7 +40,7 @@ def times(records: Sequence[Record]) -> Answer:
     ahead=True,
 )
 def standing(case: Case) -> Answer | None:
-    """Joints that stand still in every record; None if all move."""
+    """Joints that rest in every record; None if all move."""
     still = case.samples.still
     if not still.any():
         return None

@@ -228,8 +228,9 @@ class Baseline:
         return float((left / np.where(size > 0, size, 1.0)).max(initial=0.0))
 
     def hides(self, cause: Cause) -> bool:
-        """Whether no fit can tell a cause from the study: its rows lie in the span of W, and physics
-        asks the same of both.
+        """Whether no fit can distinguish a cause from the study.
+
+        Its rows lie in the span of W, and physics has the same conditions for both.
 
         The columns are tested on random combinations of them, beside the difference of the known
         torques.
@@ -569,7 +570,7 @@ def decisive(
 
 
 def takes_away(given: Fit, fit: Fit) -> Array:
-    """Of which joints a fit takes away a good part of the error, (n,)."""
+    """Joints whose error a fit reduces by a good part, (n,)."""
     ratio = given.errors / fit.errors.clip(0.1)
     return np.asarray((ratio > LIMIT.VISIBLE) & (given.errors - fit.errors > 0.2))
 

@@ -106,7 +106,7 @@ def _numbered(quantity: str, table: Table, joints: Sequence[str]) -> tuple[str, 
 
 
 def _numbered_joints(table: Table) -> tuple[str, ...]:
-    """Joints of a bag that are called alike but for a number, 1, 2 ... or 0, 1 ..., in this order."""
+    """Joints of a bag whose names differ in a number only, 1, 2 ... or 0, 1 ..., in this order."""
     joints = table.joints or ()
     matches = [re.fullmatch(r"(.*?)(\d{1,3})", joint) for joint in joints]
     numbers = sorted((match[1], int(match[2]), match[0]) for match in matches if match)
@@ -121,7 +121,7 @@ def _numbered_joints(table: Table) -> tuple[str, ...]:
 
 
 def _of_joint(table: Table, key: str, joint: str) -> str:
-    """The column of a joint by its name, alone or beside a word for the quantity: q_elbow, elbow.pos, effort/elbow."""
+    """Column of a joint by its name, alone or with a word for the quantity: q_elbow, elbow.pos, effort/elbow."""
     forms = {
         form
         for word in WORDS[key]
@@ -144,7 +144,7 @@ def _of_joint(table: Table, key: str, joint: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Conversion:
-    """From the columns of a record to the joint side, SI.
+    """Conversion of the columns of a record to the joint side and SI.
 
     Attributes
     ----------

@@ -56,7 +56,7 @@ def opened(path: Path) -> Iterator[BinaryIO]:
 
 
 def unpacked(path: Path) -> Path | BytesIO:
-    """What libraries are given that take a path or a file: the path, or the bytes where they were compressed."""
+    """Path for libraries that read paths or files, or the uncompressed bytes of a compressed file."""
     with opened(path) as stream:
         packed = isinstance(stream, gzip.GzipFile)
     return BytesIO(read_bytes(path)) if packed else path

@@ -116,7 +116,10 @@ def _by_fields(
     refused: dict[str, InputError],
     empty: dict[str, str],
 ) -> Array:
-    """The numbers of the lines, shape (N, k), nan if a field is none; what stands there is put among the `refused` and the `empty` columns."""
+    """Numbers of the lines, shape (N, k), with nan if a field is no number.
+
+    Columns with other texts are added to `refused`, columns with empty fields to `empty`.
+    """
     numbers = array("d")
     for count, (number, line) in enumerate(lines):
         row = f"line {number}"

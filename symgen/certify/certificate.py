@@ -323,7 +323,7 @@ def _too_small(W: Array) -> str:
 
 
 def hair_off(robot: Robot, what: str) -> str:
-    """Where a geometry is so near to a special one that floats do not tell them apart."""
+    """Message about a geometry so near to a special one that floats do not distinguish them."""
     angles = "; ".join(nearly_round(robot, WITHIN)) or "round the numbers that are meant round"
     return (
         f"the file is a hair off a special geometry: {what} of it act by less than 1e-9 of the "

@@ -87,7 +87,7 @@ def stored_path(file: str, text: str) -> Path:
 
 
 def without_certificate(text: str) -> str:
-    """What the certificate of a text vouches for: all but the lines that it consists of."""
+    """Text that the certificate covers: all lines except its own."""
     return CERTIFICATE.sub("", text, count=1)
 
 
@@ -103,9 +103,7 @@ def imported(path: Path) -> ModuleType:
 
 
 class _TextLoader(SourceFileLoader):
-    """Loader of the text alone, which it keeps: bytecode of an earlier text that lies beside is
-    neither read nor written.
-    """
+    """Loader that reads the text only: bytecode of an earlier text is neither read nor written."""
 
     text = ""
 

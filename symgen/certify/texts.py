@@ -48,7 +48,7 @@ TILES = 71  # samples of the functions in C: some tiles, the last not full
 
 @dataclass(frozen=True)
 class TextCheck:
-    """What ran of a text.
+    """Results of the run of a text.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class TextCheck:
 
     @property
     def wrong(self) -> list[str]:
-        """What disagrees; NaN does."""
+        """Functions that disagree; NaN counts as disagreement."""
         return [name for name, error in self.errors.items() if not error < TOLERANCE]
 
     @property
@@ -109,7 +109,7 @@ class TextCheck:
 
     @property
     def sentence(self) -> str:
-        """What ran."""
+        """Sentence on what ran."""
         if self.not_run:
             return f"not run: {self.not_run}"
         uses = ", ".join(self.uses)
@@ -231,7 +231,7 @@ def largest(
 def outcome(
     call: Use, module: ModuleType, name: str, check: Check, constants: Mapping[str, float]
 ) -> bytes | str:
-    """What a function gives, as bytes, or what it raises, as text."""
+    """Result of a function as bytes, or its exception as text."""
     try:
         return call(module, name, check, constants).tobytes()
     except Exception as error:  # a text may fail in any way
@@ -391,7 +391,7 @@ def _flat(a: Array) -> list[float]:
 
 
 def _run(command: list[str], given: str = "") -> str:
-    """What a command prints. Raises SubprocessError if it fails, or takes too long."""
+    """Output of a command; SubprocessError if it fails or takes too long."""
     return subprocess.run(
         command, input=given, capture_output=True, text=True, timeout=LONGEST_RUN, check=True
     ).stdout

@@ -348,7 +348,7 @@ def stopped(checkpoint: Checkpoint | None) -> NoReturn:
 
 @contextmanager
 def progress_lines(after: float = 2.0) -> Iterator[None]:
-    """What long work is at, one line each on the error stream, from `after` seconds on."""
+    """Report long work on the error stream, one line for each stage, after `after` seconds."""
     import logging
     from time import monotonic
 

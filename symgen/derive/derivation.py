@@ -34,7 +34,7 @@ ABSORBED = ("YY", "MZ", "M")
 
 @dataclass(frozen=True)
 class Derivation:
-    """What `derive` found. Later models may add nodes to its graph, and change none.
+    """Result of `derive`. Later models may add nodes to its graph, but change none.
 
     Attributes
     ----------

@@ -160,7 +160,7 @@ class Lagrange:
         return _floats(self._functions[name], *arguments, self._values)
 
     def vary(self, rng: np.random.Generator, states: int) -> None:
-        """Draw channels, functions of time, at each of so many states."""
+        """Draw channels (functions of time) at each of `states` states."""
         self._values = np.tile(self._values, (states, 1))
         for name in self.robot.channels:
             self._values[:, [*self.constants].index(name)] = rng.uniform(0.5, 2, states)

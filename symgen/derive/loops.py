@@ -277,7 +277,7 @@ def _offset(
 
 
 def _beside(robot: Robot, row: Mapping[int, Expression]) -> Expression:
-    """sum n_i c_i, c_i the constant beside q_i in theta or in r."""
+    """sum n_i c_i, with c_i the constant added to q_i in theta or r."""
     frames = {i: robot.frame(i) for i in row}
     terms = ((f.theta0 if f.sigma == REVOLUTE else f.r0) * row[i] for i, f in frames.items())
     return sum(terms, ZERO)

@@ -24,7 +24,7 @@ TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")  # of an origin, and the angular ve
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked of a model.
+    """Parameters, frames and substitutions for a model.
 
     Attributes
     ----------
@@ -150,7 +150,7 @@ class Model:
 
     @property
     def summary(self) -> str:
-        """What it is, as a sentence; a symbol at its start stays as it is."""
+        """Description of the model in one sentence; a symbol at its start keeps its case."""
         word = self.meaning.partition(" ")[0]
         first = (
             self.meaning[0] if word in self.arguments + (self.result,) else self.meaning[0].upper()

@@ -15,7 +15,7 @@ ALL_DIGITS = 1e-12  # rad: closer to a multiple of pi/12 is that multiple in eve
 
 
 class RobotFileWarning(UserWarning):
-    """What a foreign robot file says that its author probably did not mean."""
+    """Statement of a foreign robot file that its author probably did not intend."""
 
 
 class AngleWarning(RobotFileWarning):
@@ -47,7 +47,7 @@ class Angles:
         return None if self.exact else k
 
     def report(self, file: str) -> tuple[str, tuple[str, ...]]:
-        """How the angles were read, for headers and as a note; an AngleWarning tells it too."""
+        """How angles were read, for headers and as a note, with an AngleWarning."""
         if not self.near:
             return "", ()
         near = f"{len(self.near)} angle{'s' * (len(self.near) > 1)} near multiples of pi/12"

@@ -286,7 +286,7 @@ def _positions(robot: Any, row: Any) -> tuple[float, float]:
 
 
 def check_channels(robot: Any) -> None:
-    """What a record gives as a function of time is no constant of anything else."""
+    """Check that a channel is used in laws only, not as a constant elsewhere."""
     of_frames = [
         getattr(f, name)
         for f in robot.frames

@@ -162,7 +162,7 @@ class Expression:
         return isinstance(other, Expression) and self.terms == other.terms
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """By its terms: the hash of a text is another in another process."""
+        """Pickle by the terms, because hashes of texts differ between processes."""
         return Expression, (self.terms,)
 
     def __hash__(self) -> int:

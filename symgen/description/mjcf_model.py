@@ -42,7 +42,7 @@ TEXTS = re.compile(r"\w*(name|class|joint\d?|tendon\d?|body\d?|model|mesh|materi
 
 @dataclass(frozen=True)
 class Mjcf:
-    """What an MJCF file says of its mechanism.
+    """Mechanism of an MJCF file.
 
     Attributes
     ----------
@@ -213,9 +213,7 @@ def _spec(root: XmlElement) -> tuple[Any, list[int]]:
 
 
 def _told(act: Callable[[], Any], lines: Sequence[int]) -> Any:
-    """What MuJoCo makes; its errors with the line of the file, and without its remarks on its own
-    simulation, which would go to the screen and to a file of the working folder.
-    """
+    """Model that MuJoCo compiles; its errors get the line of the file, its remarks on simulation are dropped."""
     import mujoco
 
     before = mujoco.get_mju_user_warning()

@@ -247,7 +247,7 @@ class Drives:
 
 @dataclass(frozen=True, config=CONFIG)
 class LimitsTable:
-    """For exciting trajectories, one entry per actuated joint."""
+    """Limits for exciting trajectories, one entry for each actuated joint."""
 
     q: Annotated[
         list[Interval] | None,

@@ -164,7 +164,7 @@ def transform(row: Sequence[float]) -> Array:
 
 @dataclass(frozen=True)
 class TreePart:
-    """What of a tree is kept.
+    """Part of a tree that is kept.
 
     Attributes
     ----------
@@ -182,7 +182,7 @@ WHOLE_TREE = TreePart()
 
 
 def part_of(tree: Tree, part: TreePart) -> Tree:
-    """The tree with the joints of `part.lock` held, and those beside `part.chain`; notes tell which.
+    """Tree in which the joints of `part.lock` and those outside `part.chain` are held; notes name them.
 
     Raises
     ------

@@ -129,7 +129,7 @@ class Pool:
         }
 
     def grow(self, count: int) -> None:
-        """At least `count` geometries."""
+        """Draw until there are at least `count` geometries."""
         if count <= self.count:
             return
         more = max(count - self.count, self.count, FEWEST_GEOMETRIES)
@@ -178,7 +178,7 @@ class Pool:
 
 @dataclass(frozen=True)
 class Dependence:
-    """What a coefficient depends on: `free` variables, and others as factors with a power."""
+    """Variables of a coefficient: `free` ones, and others as factors with a power."""
 
     free: tuple[Variable, ...]
     powers: Mapping[str | Number | Call, int]

@@ -22,7 +22,7 @@ Coefficient = Any  # of the ring of cosines, sines, constants and rates
 
 
 class Identities:
-    """What is known of cosines and sines.
+    """Known relations between cosines and sines.
 
     Parameters
     ----------

@@ -153,9 +153,7 @@ def _estimate(given: Any) -> Estimate:
 
 
 def _require_same_joints(result: Estimate, robot: Robot, of: str) -> None:
-    """Raise DescriptionError if the estimate tells names of joints, and they are not those of
-    the robot.
-    """
+    """Raise DescriptionError if the estimate names joints and the robot has others."""
     theirs = result.provenance.get("labels")
     if not isinstance(theirs, Mapping):
         return
@@ -184,7 +182,7 @@ def _inertial(physical: PhysicalModel) -> set[str]:
 def _determined(
     result: Estimate, physical: PhysicalModel, of: str
 ) -> tuple[list[str], Array, list[str]]:
-    """Names and values of the base parameters that the record tells, and names of the others."""
+    """Names and values of the base parameters that the record determines, and names of the others."""
     if unknown := [name for name in result.names if name not in physical.base]:
         raise DescriptionError(
             f"{', '.join(unknown[:8])} of the estimate are no base parameters of {of}; name the "

@@ -273,7 +273,7 @@ def _sizes_of(x: Array) -> Array:
 
 
 def _spare(physical: PhysicalModel, own: Sequence[str], absent: Sequence[str]) -> list[str]:
-    """Absent parameters that the own ones can stand in for."""
+    """Absent parameters whose columns are combinations of those of the other parameters."""
     spare: list[str] = []
 
     def rank(names: Sequence[str]) -> int:

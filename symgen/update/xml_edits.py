@@ -118,7 +118,7 @@ class XmlEdits:
         self.added.append(f"line {e.line}: {name} of <{e.tag}>")
 
     def _value(self, e: XmlElement, name: str) -> tuple[int, int] | None:
-        """Where the value of an attribute stands, without its quotes."""
+        """Place of the value of an attribute, without its quotes."""
         match = self._attributes(e).get(name.encode())
         return None if match is None else (match.start("quoted") + 1, match.end("quoted") - 1)
 

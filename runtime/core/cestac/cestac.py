@@ -233,9 +233,7 @@ def _all_runs(
     progress: Progress | None,
     checkpoint: Checkpoint | None,
 ) -> Runs:
-    """Every run, by level and number, in whatever order they finished. identity : gives what tells
-    this study from others on disk.
-    """
+    """All runs, sorted by level and number; identity : function that identifies this study on disk."""
     runs, levels, b = task.settings.runs, range(len(task.levels)), len(task.names)
     finished = checkpoint.resume(identity(), b) if checkpoint else Runs.of((), b)
     parts = [finished.where((finished.level < len(levels)) & (finished.run < runs))]
@@ -265,9 +263,7 @@ def _measured(record: PreparedRecord) -> Iterator[memoryview]:
 def _identity(
     task: Task, described: Mapping[str, Any], provenance: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """What decides every bit of every run: JSON values that tell studies apart, the number of runs
-    aside.
-    """
+    """Data that determine every bit of every run, as JSON values that identify a study; without the number of runs."""
     drives = task.drives
     return {
         **{key: value for key, value in described.items() if key != "cestac"},
