@@ -151,7 +151,7 @@ def expected_error(
         Method of the study; deviations are those of its linear companion, weighted by joint where
         that has no weights: a slide of large forces says nothing of the noise of a wrist.
     fit : Estimate
-        The parameters that stand for the robot.
+        The parameters that are used.
     records : sequence of Prepared
     steps : float
         Share of the accelerations that is an error of the encoder's steps.

@@ -121,7 +121,7 @@ def study_from_mapping(mapping: Mapping[str, Any]) -> Study:
     """The Study of a mapping as read from a study file; raises SettingsError with the path of the
     offending key.
 
-    Numbers may be texts such as "2*pi/10000"; one value stands for a list of one (files, delta,
+    Numbers may be texts such as "2*pi/10000"; one value means a list of one (files, delta,
     record).
     """
     require_kind(mapping, Mapping, "study", "a mapping, as read from a study file")

@@ -50,7 +50,7 @@ class Ranking:
     errors : mapping of str to mapping of str to float, %
         e_ck, by candidate, then by the treatment that it is judged in.
     standing : mapping of str to (str, Estimate)
-        The set of parameters that stands for each candidate, and its name.
+        The set of parameters that is used for each candidate, and its name.
     missing : tuple of str
         Candidates that could not be identified, each with its reason.
     """
@@ -202,7 +202,7 @@ def treatments(
 
     All steps are applied to each.
 
-    speed_of_rest : rows.low_speed of a prepared problem that leaves out the rows of joints that stand; None if few do.
+    speed_of_rest : rows.low_speed of a prepared problem that leaves out the rows of joints that rest; None if few do.
     """
     stated = prepared(problem, steps)
     found = {STATED: stated}

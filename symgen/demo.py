@@ -152,7 +152,7 @@ def simulated_record(
     """The record of a motion, written as a .csv.gz file q1..qn,tau1..taun of the motor side and
     read from it like any other.
 
-    study : settings but for the record. encoder : rad on the motor. noise : standard deviation, of
+    study : settings except for the record. encoder : rad on the motor. noise : standard deviation, of
     the largest torque of each motor.
     """
     n = len(model.JOINTS)

@@ -141,7 +141,7 @@ class ReaderAdvice:
         All together first, then one at a time.
     notes : tuple of str
     steps : ndarray, shape (len(asked), b), %
-        Change at the steps asked for, of all encoders; nan if the records do not tell.
+        Change at the steps asked for, of all encoders; nan if the records do not show it.
     """
 
     reader: str
@@ -166,7 +166,7 @@ class Advice(Result, Part):
         Further steps, of all encoders.
     steps : ndarray, shape (len(asked), b), %
         Change predicted there by the chapter's law; under law phase, of real encoders read as the
-        study reads them, nan if the records do not tell.
+        study reads them, nan if the records do not show it.
     torque_sigma : ndarray, shape (b,)
         Deviation of the parameters per N m (N) of deviation of the motor torques.
     real : tuple of ReaderAdvice

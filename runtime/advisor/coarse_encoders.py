@@ -158,7 +158,7 @@ class CoarseEncoders:
 
         Harmonic h of the error of a count has the frequency h |qd|/Delta and a power as 1/h^2;
         sampled, it is as slow as its distance from a multiple of the rate. Where a joint keeps a
-        speed that is a simple fraction of a step per sample, the error stands still.
+        speed that is a simple fraction of a step per sample, the error is constant.
         """
         h = np.arange(1, LIMIT.SAWTOOTH_HARMONICS + 1)
         weight, most = 1 / h**2 / np.sum(1 / h**2), np.zeros(len(delta))

@@ -1,4 +1,4 @@
-"""What is to be found of the law whose torque stands for a measured one: `controller.law` with
+"""What is to be found of the law whose torque replaces a measured one: `controller.law` with
 kd: fit, delay: fit.
 
     W X = tau(t - delay),      tau = sat(tau_0 + kd v),      v = qd_ref - qd, tau_0 the law without kd
@@ -44,8 +44,8 @@ class LawEstimate(Result):
     ----------
     joints : tuple of str
     kd, sigma : ndarray, shape (n,), N m s/rad or N s/m
-        Gains and their deviations, jointly with all parameters; nan if kd and FV cannot be told
-        apart, or kd was given.
+        Gains and their deviations, jointly with all parameters; nan if kd and FV cannot be
+        separated, or kd was given.
     delay, sigma_delay : float, s
         From the logged signals to the torque; nan if it was given.
     text : str

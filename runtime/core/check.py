@@ -3,7 +3,7 @@
 good       within the limit
 doubtful   usable with the care that the remedy names
 no         not usable
-open       not asked, or only the user can tell: does not count
+open       not asked, or only the user knows: does not count
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Can the values of an identification be used? One question after another, each with its answer,
 the limit, and what to do.
 
-The verdict is the worst of the answers. Limits stand in runtime/core/limits.toml: they are
+The verdict is the worst of the answers. Limits are in runtime/core/limits.toml: they are
 conventions of practice, not theorems. Errors are relative, in %: 100 ||Y - W X|| / ||Y||;
 deviations are the larger of the corrected one and the one of the block bootstrap
 (`runtime.core.uncertainty`), never eq. (10) alone.
@@ -143,7 +143,7 @@ def checklist_of(
     estimate : Estimate
         All parameters.
     fit : Estimate
-        The parameters that stand for the robot.
+        The parameters that are used.
     use : str
         What they explain, in one sentence.
     bootstrap : mapping of str to float

@@ -63,10 +63,10 @@ class Identification:
     estimate : Estimate
         All parameters, by the method of the study.
     essential : Essential
-        The essential parameters and the trail from all parameters to them; by the linear companion
+        The essential parameters and the elimination; by the linear companion
         of a method that is not linear.
     comparison : tuple of JointComparison
-        Torques by joint beside W X of `model_estimate`.
+        Measured torques and W X by joint, of `model_estimate`.
     validation : tuple of CrossValidation
         One part of the data predicts the others: windows of the records first, or each fifth by
         the other four (`parameter_sets`), then further records.

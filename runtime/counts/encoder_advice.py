@@ -3,7 +3,7 @@ for identify and report.
 
 Positions taken as they are carry an error of variance step^2/12. Through the filters of the study
 it becomes an error of qdd of variance v; the columns of W are attenuated by about v over the mean
-square of qdd. Above HELPS that is a bias worth another reader.
+square of qdd. Above HELPS that is a bias that justifies another reader.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 or refused.
 
 The step comes from a data sheet or from the record, the phase from the record alone. Floor against
-round in a driver, and an offset of up to half a step of the zero of the joint, cannot be told from
+round in a driver, and an offset of up to half a step of the zero of the joint, cannot be distinguished from
 counts.
 """
 

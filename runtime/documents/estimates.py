@@ -106,7 +106,7 @@ class SetsDocument(Estimate):
     sets : tuple of SetDocument
         Empty if the method is not linear.
     model_columns : str
-        Name of the set that stands for the robot.
+        Name of the set that is used.
     """
 
     sets: tuple[SetDocument, ...]
@@ -123,7 +123,7 @@ class IdentificationDocument(SetsDocument):
     sets : tuple of SetDocument
         The essential, the feasible and all parameters; empty if the method is not linear.
     model_columns : str
-        Name of the set that stands for the robot.
+        Name of the set that is used.
     essential : EssentialDocument
         Essential parameters, fitted alone.
     validation : tuple of mapping
@@ -135,7 +135,7 @@ class IdentificationDocument(SetsDocument):
     trust : mapping
         Deviations by blocks, whiteness, F-tests.
     by_record : tuple of RecordError
-        Of several records, the error of each, with the parameters that stand for the robot.
+        Of several records, the error of each, with the parameters that are used.
     verdict : str
         One sentence.
     checklist : mapping
@@ -149,7 +149,7 @@ class IdentificationDocument(SetsDocument):
     friction : tuple of mapping
         Friction against velocity, one curve per joint.
     laws : mapping
-        Scalars of the laws of columns, and what these are worth on unseen data.
+        Scalars of the laws of columns, and their errors on unseen data.
     plausibility : mapping
         Whether record, study and robot file suit each other.
     """
@@ -232,7 +232,7 @@ def load_estimate(path: Path | str) -> Estimate:
 
 def load_whole_estimate(path: Path | str) -> Estimate:
     """The estimate of all base parameters in estimate.json that a robot file or a program is given:
-    of the set that stands for the robot, or where that is the essential one, of the physical
+    of the set that is used, or where that is the essential one, of the physical
     parameters (`whole_set`). Of its fields, names, X, sigma_corrected, relative_error and
     details.standard are those of that set; the others, the covariance among them, those of
     least squares. InputError as `load_estimate`.

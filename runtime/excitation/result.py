@@ -93,7 +93,7 @@ class Excitation(Result):
     settings : ExcitationSettings
     limits : MotionLimits
     known : Known
-        Parameters that the search stands on.
+        Parameters that the search uses.
     """
 
     model: GeneratedModel

@@ -72,7 +72,7 @@ class ExcitationSettings(Settings):
     gap : float, m
         Smallest distance between the surfaces of such a pair.
     smooth : float, rad/s or m/s
-        v0 of tanh(qd/v0), which stands for sign(qd) inside the optimiser only.
+        v0 of tanh(qd/v0), which replaces sign(qd) inside the optimiser only.
     torque_sigma : tuple of float or None, N m or N
         Deviation s_j of each torque; null: those of an estimate, else 1 for every joint.
     starts : int

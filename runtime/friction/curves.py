@@ -12,7 +12,7 @@
     stribeck+load     both
 
 Every term is built at the rate of the record and decimated like Y, so that the filter rounds
-sign(v) on both sides alike. Every law contains the first and is linear but for VS, which is
+sign(v) on both sides alike. Every law contains the first and is linear except for VS, which is
 searched (its F-test is approximate: VS means nothing if FST = 0). Residuals are correlated:
 deviations take blocks of time as independent, and the F-test and Akaike's criterion count N/T
 samples, T the correlation time of the residual in rows. The law is chosen on blocks of time that

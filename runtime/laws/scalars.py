@@ -1,6 +1,6 @@
 """Scalars inside the laws of columns, as a record gives them (`runtime.laws.projection`).
 
-Minima that differ are told. Deviations are joint ones: those of the linear problem with the columns
+Different minima are reported. Deviations are joint ones: those of the linear problem with the columns
 [W, (dW/da) X], by blocks of time. Whether a law earns its scalars is asked of blocks of time that
 did not fit it.
 """

@@ -1,4 +1,4 @@
-"""Does the simulation follow the record? What IV and DIDIM stand on, joint by joint.
+"""Does the simulation follow the record? What IV and DIDIM assume, joint by joint.
 
     position    100 rms(q_s - q)/std(q)
             of the simulation with the parameters found, g = 1

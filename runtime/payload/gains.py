@@ -16,7 +16,7 @@ without coupling), a without the load, b with it:
 The load is that of the torques times g; its deviations hold those of g.
 
 A motor whose torque does not change with the load says nothing: its gain is refused by its own
-deviation. Without a weighed load no record can tell g from X.
+deviation. Without a weighed load no record separates g from X.
 
 Reference: Gautier and Briot (2011), global identification of drive gains and dynamic parameters;
 identification.md 5.8.

@@ -29,7 +29,7 @@ class Consistency(Part):
     estimate : Estimate
         All parameters.
     fit : Estimate
-        The parameters that stand for the robot.
+        The parameters that are used.
     judged : Feasibility or None
         Of `estimate`; None if it was not asked for.
     """

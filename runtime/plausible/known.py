@@ -5,7 +5,7 @@ joint, ratio and sign.
     offset,
 
 least squares joint by joint: a_j = b_j = 1 if values, gear and sign are right. A part is left
-out if it is small or cannot be told apart.
+out if it is small or cannot be separated.
 
 Are the measured torques torques at all? Beside those of the values, currents have the same course
 and another size.

@@ -82,7 +82,7 @@ def standing_share(samples: Samples, study: Study) -> Array:
 
 
 def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ...] | None:
-    """rows.low_speed that leaves out the rows of joints that stand, rad/s or m/s; None if at
+    """rows.low_speed that leaves out the rows of joints that rest, rad/s or m/s; None if at
     most LIMIT.REST_SHARE of them stand.
     """
     if standing_share(samples, study).max() <= LIMIT.REST_SHARE:

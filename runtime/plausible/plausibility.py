@@ -96,7 +96,7 @@ class Plausibility(
     named : tuple of Trial
         Those that explain the record decisively better.
     equivalent : tuple of str
-        Changes that no fit of this record can tell from the study as given.
+        Changes that no fit of this record can distinguish from the study as given.
     delay : Delay or None
     robot_values : KnownValues or None
     """

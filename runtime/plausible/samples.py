@@ -51,7 +51,7 @@ class Samples:
     cutoff : float, Hz
         Of the low-pass.
     still : ndarray of bool, shape (n,)
-        Whether the joint stands still in the whole record.
+        Whether the joint rests in the whole record.
     """
 
     t: Array

@@ -5,7 +5,7 @@ Every cause gets weighted least squares, which bounds from below what a physical
 reach; only those whose bound beats the best so far are fitted under the conditions of a physical
 robot, near the values of the robot file if there are any.
 
-A number xi is tried if its first step is worth it. Around the fit chi of a physical robot, with A
+A number xi is tried if its first step gains enough. Around the fit chi of a physical robot, with A
 the weighted normal matrix, B the stiffness of bodies and values, J = d(W chi)/d xi its effect,
 
     [A + B   W'J] [d chi]   [ 0  ]
@@ -429,7 +429,7 @@ def _of_causes(baseline: Baseline, which: Sequence[Cause]) -> list[Trial]:
 
 
 def _of_numbers(baseline: Baseline, robot: Robot) -> list[Trial]:
-    """Trials of the numbers whose first step is worth it, each at its best value, and those that no
+    """Trials of the numbers whose first step gains enough, each at its best value, and those that no
     fit can tell.
     """
     trials: list[Trial] = []

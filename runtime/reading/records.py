@@ -306,7 +306,7 @@ def _uniform(
 def _places(settings: RecordSettings, tables: Sequence[Table]) -> tuple[Table, Table, Table]:
     """The files of the positions, of the torques and of the known torques.
 
-    Of two files the second holds the torques, but for known torques that it has and the first has not, beside torques of the first.
+    Of two files the second holds the torques, except for known torques that it has and the first has not, beside torques of the first.
     """
     first = tables[0]
     last = tables[-1]

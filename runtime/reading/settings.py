@@ -66,9 +66,9 @@ class Columns(Settings):
     """Names of the columns of a record file, one per joint.
 
     A name may be the number of the column (from 1) in a file without header, or an (N, n) array of
-    a .npz or .mat file, which stands for its n columns. `names` stands for the labels of the joints
+    a .npz or .mat file, which has n columns. `names` means the labels of the joints
     in the robot file: a column is called as the joint, or q_ and the joint, joint.position,
-    tau_joint, joint/effort ...; of q it stands for tau too, where tau is left out.
+    tau_joint, joint/effort ...; of q it is also that of tau, where tau is left out.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class Columns(Settings):
     qr : tuple of str
         Earlier name of q_ref.
     qd : tuple of str
-        Velocities that were recorded beside the positions, in the same file; unit and side of q,
+        Velocities that were recorded with the positions, in the same file; unit and side of q,
         per s. They give the velocity of the rows where they say more than differences of q do.
     qd_ref : tuple of str
         Reference velocities, in the same file, units as qd; for the law of a controller.

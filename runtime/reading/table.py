@@ -41,7 +41,7 @@ class Table:
     file : str
         Name of the file in messages.
     columns : mapping of str to ndarray
-        Numbers by name: a vector of N samples, or a matrix (N, k) or (k, N) that stands for k columns. Samples run along the longer side: a record has more samples than joints.
+        Numbers by name: a vector of N samples, or a matrix (N, k) or (k, N) that has k columns. Samples run along the longer side: a record has more samples than joints.
     refused : mapping of str to InputError
         What else the file holds under a name.
     empty : mapping of str to str

@@ -54,7 +54,7 @@ class Check:
     scale : ndarray or float
         What a difference is divided by.
     keywords : mapping
-        Keyword arguments beside the constants.
+        Keyword arguments besides the constants.
     compared : callable
         Makes of the result what is compared with `expected`.
     """

@@ -305,7 +305,7 @@ def interpret(
 ) -> list[Any]:
     """The values of graph scalars over a domain; 0, 1 and -1 stay whole numbers.
 
-    known : values of nodes by their index; those that are needed beside them are added.
+    known : values of nodes by their index; those that are needed besides them are added.
     """
     value: dict[int, Any] = {} if known is None else known
 

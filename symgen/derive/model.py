@@ -33,7 +33,7 @@ class Request:
     of, frame : int
         Which frame's model, in components of which frame.
     inputs : mapping
-        What stands in the place of inputs.
+        Values that replace inputs.
     """
 
     parameters: Mapping[str, str]

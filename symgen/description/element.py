@@ -3,7 +3,7 @@
     along {j: G}:  s = G q,  Gamma += G' c law(s, sd, sdd)
     form  {j: B}:  Gamma += c B qdd | c B qd | c B q
 
-The laws are the expressions of KINDS, in which q, qd, qdd stand for s, sd, sdd; a column of the
+The laws are the expressions of KINDS, in which q, qd, qdd mean s, sd, sdd; a column of the
 user's has its own, over s, sd, q1, qd1 ... of any joints, constants and scalars, as a torque or as
 an energy, Gamma += c dU/dq. Forms are for laws that are qdd, qd or q. With `when`, viscous and
 coulomb elements act in motion along s in this direction only. Parameter c is called family + key.

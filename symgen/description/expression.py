@@ -562,7 +562,7 @@ def quarter_turns(angle: Expression) -> tuple[int, Expression]:
 
 
 def ratio(x: float) -> Fraction:
-    """The fraction of a denominator up to LARGEST_RATIO that x is but for rounding, such as 1/3 of
+    """The fraction of a denominator up to LARGEST_RATIO that x is except for rounding, such as 1/3 of
     0.3333333333333333, else its shortest decimal.
     """
     near = Fraction(x).limit_denominator(LARGEST_RATIO)

@@ -3,7 +3,7 @@ that it names is opened, nothing is multiplied, nothing is drawn.
 
 Assets, sensors, contacts, cameras and the rest are left out. A geom that is a mesh becomes one
 without mass where its body has an <inertial>, or never moves; a mass that only a mesh would tell is
-refused, and so are elements that stand for many others (replicate, composite, flexcomp, attach,
+refused, and so are elements that replace many others (replicate, composite, flexcomp, attach,
 plugins). Of actuators the names of the joints that they drive are read.
 """
 

@@ -8,7 +8,7 @@
     frame 0, as here
 
 Links are 1 .. NL, cut joints NL+1 .. NJ; frame NJ+k, fixed, coincides with cut joint NL+k, so that
-NF = 2 NJ - NL. Comments may stand anywhere, lists may break over lines, keys are read in any case,
+NF = 2 NJ - NL. Comments may be anywhere, lists may break over lines, keys are read in any case,
 Pi and ^ as in Mathematica. The format has no place for the value of a symbol; comments that SYMORO
 skips carry them: `(* constants: D3 = 0.45, g = 9.81 *)`, likewise `values` and `start 1`.
 

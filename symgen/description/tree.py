@@ -1,4 +1,4 @@
-"""A tree of links and joints with any axes, as URDF and MJCF tell it: what both are read into, and
+"""A tree of links and joints with any axes, as URDF and MJCF describe it: what both are read into, and
 what becomes a table of Khalil frames; and part of one: joints held at positions, of a chain from
 `base` to `tip` all but those between these two links, at zero.
 

@@ -1,7 +1,7 @@
 """URDF to a Robot: the text becomes a tree of links and joints, the tree a table of Khalil frames
 (`tree_frames`) with values (`tree_robot`).
 
-Numbers are read as they stand; meshes, textures and packages are never opened. A URDF library would
+Numbers are read as they are; meshes, textures and packages are never opened. A URDF library would
 load them, and its XML parser expands entities (`xml_text` reads neither). Every error names its
 line.
 """

@@ -28,7 +28,7 @@ class Change:
         In the file, and in the new text.
     sigma : float
         Standard deviation that the record leaves, of the part that it tells; conditions of a
-        physical robot aside; nan if the record tells nothing of it.
+        physical robot aside; nan if the record does not determine it.
     told_by : str
         record: determined; sum: only together with other numbers, this is the value nearest to the
         file; file: no torque depends on it,

@@ -54,7 +54,7 @@ def apply(
     ----------
     estimate : Estimate, Identification, str or Path
         Result, its estimate.json, or the folder that `symgen identify -o` wrote. Of a whole
-        identification the parameters that stand for the robot are taken, or the physical ones if
+        identification the parameters that are used are taken, or the physical ones if
         the essential ones do (`Identification.whole_estimate`).
     model : str or Path
         The file: .urdf, or .xml and .mjcf (MJCF).

@@ -16,7 +16,7 @@ its tensor.
 
 A body may be several links, held together by fixed joints: the record knows their sum. First the
 link that the joint carries changes alone; only if no physical link is left, the others change
-with it. What the torques cannot tell from a motor inertia is one, whether the format has a place
+with it. What the torques cannot separate from a motor inertia is one, whether the format has a place
 for it or not; other elements that the file does not have change only if links cannot take them
 in.
 """

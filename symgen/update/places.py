@@ -357,7 +357,7 @@ class FileLink:
     ten : ndarray, shape (10,)
         XX .. ZZ, MX, MY, MZ, M of the file in frame j.
     place : LinkPlace
-        Where its numbers stand.
+        Places of its numbers.
     """
 
     name: str
@@ -386,7 +386,7 @@ class RobotText:
     robot : Robot
         The robot of `tree`.
     places : Places
-        Where the numbers stand.
+        Places of the numbers.
     """
 
     file: str

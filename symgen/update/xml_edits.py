@@ -1,4 +1,4 @@
-"""Numbers of an XML text replaced where they stand: every other byte stays.
+"""Numbers of an XML text replaced in place: every other byte stays.
 
 `symgen.description.xml_text` reads the text, refuses what is no plain XML, and tells where each
 element starts. Here the start tag is read again, as bytes: an edit is a span of bytes and what

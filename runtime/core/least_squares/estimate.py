@@ -120,7 +120,7 @@ class Estimate:
     message : str
         Explanation of the outcome.
     groups : tuple of tuple of str
-        For rank-deficient: the names that cannot be told apart, group by group.
+        For rank-deficient: the names that cannot be separated, group by group.
     iterations : int
         Number of passes.
     settings : mapping

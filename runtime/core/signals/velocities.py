@@ -1,4 +1,4 @@
-"""Velocities that were recorded beside differences of the positions: how they differ on the motion itself.
+"""Velocities that were recorded, compared with differences of the positions: how they differ on the motion itself.
 
 v = gain (dq/dt - lag d2q/dt2) + rest
 """
