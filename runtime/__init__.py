@@ -10,7 +10,7 @@
 
 Names are loaded when they are first used, so that `import runtime` is light. NumPy, SciPy and
 pydantic serve Record, resample, observe, estimate, essential and cestac. Other packages are loaded
-where they are used:
+when they are used:
 
     ruamel.yaml           study files                     clarabel   identify, method feasible
     casadi                simulate, excite, iv, didim     pint       units that no table holds

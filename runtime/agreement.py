@@ -165,7 +165,7 @@ def agreeing(found: Homogeneity) -> Answer:
 
 
 def agreement(result: Identification) -> Homogeneity | None:
-    """Whether several records agree, those that are predicted too: in all parameters, or in the essential ones where one of the records does not determine all. None for one record."""
+    """Whether several records agree, those that are predicted too: in all parameters, or in the essential ones if one of the records does not determine all. None for one record."""
     records = [*result.records, *result.problem.unseen]
     if len(records) < 2:
         return None

@@ -30,9 +30,9 @@ class Assumption:
     ----------
     name : str
     value, sigma : float
-        What the record says instead; nan where it says nothing.
+        What the record says instead; nan if it says nothing.
     p_value : float
-        Of the assumption; nan where nothing shows it.
+        Of the assumption; nan if nothing shows it.
     """
 
     name: str

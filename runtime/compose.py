@@ -177,7 +177,7 @@ def list_records(records: Records) -> tuple[Record, ...]:
 
 
 def complete_study(study: Study) -> Study:
-    """The study with all options of its reader; SettingsError where its method or reader is not in the lists."""
+    """The study with all options of its reader; SettingsError if its method or reader is not in the lists."""
     signals = study.signals
     for path, name, names in (
         (("estimate", "method"), study.estimate.method, METHODS),
@@ -575,7 +575,7 @@ def static_poses(
 
 
 def extras(asked: Mapping[str, Mapping[str, Any]], attempted: bool = False) -> list[Extra]:
-    """EXTRAS with those on request that are asked for, by keyword, each with its options; what stands for the others."""
+    """EXTRAS with options for those that are requested by keyword, and substitutes for the others."""
     chosen: list[Extra] = []
     for extra in EXTRAS:
         if not isinstance(extra, OnRequest):

@@ -7,7 +7,7 @@ holds what they are apart in time, lag qd; so least squares of the difference, j
 
     q - q_l = tau/K - (D/K) d/dt(q - q_l) - (Ia/K) qdd + (lag - FV/K) qd - (FS/K) sign(qd) + offset
 
-with Ia of the robot file where it has one. Deviations are those of blocks of time. A rigid model
+with Ia of the robot file if it has one. Deviations are those of blocks of time. A rigid model
 takes qdd for qdd_l: at f it errs by (f/f_j)^2 of the inertia torque, f_j = sqrt(K/A_jj)/(2 pi) with
 A_jj the inertia that the fit has at the middle of the motion, the rotor in it.
 """
@@ -39,7 +39,7 @@ class Elasticity(Result, Part):
     ----------
     joints : tuple of str
     K, sigma_K : ndarray, N m/rad or N/m
-        Stiffness and its deviation; nan where the record does not determine it.
+        Stiffness and its deviation; nan if the record does not determine it.
     D, sigma_D : ndarray, N m s/rad or N s/m
         Damping.
     lag : ndarray, s
@@ -99,14 +99,14 @@ class Elasticity(Result, Part):
 
 
 def elastic_gears(result: Identification) -> Elasticity | None:
-    """Stiffness of the transmissions whose motor and link are both measured; None where there is none, for poses at rest, or without all parameters."""
+    """Stiffness of the transmissions whose motor and link are both measured; None if there is none, for poses at rest, or without all parameters."""
     if not result.determined or result.study.signals.reader == "static":
         return None
     return elasticity(result.problem, result.estimate.names, result.estimate.X)
 
 
 def elasticity(problem: Problem, names: Sequence[str], X: Array) -> Elasticity | None:
-    """Stiffness of the joints with two encoders, all records of a prepared problem together; None where there is none.
+    """Stiffness of the joints with two encoders, all records of a prepared problem together; None if there is none.
 
     names, X : parameters of the rigid fit, for the inertia about each joint.
     """

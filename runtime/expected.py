@@ -74,7 +74,7 @@ class Expected(NamedTuple):
     "positions (symgen excite; signals: {reader: counts})",
 )
 def expected_off(likely: Expected) -> Answer | None:
-    """Expected error of predictions, by its interval; None where it is not known."""
+    """Expected error of predictions, by its interval; None if it is not known."""
     if np.isnan(likely.error):
         return None
     limit = LIMIT.EXPECTED_ERROR
@@ -92,7 +92,7 @@ def expected_off(likely: Expected) -> Answer | None:
 
 @dataclass(frozen=True, eq=False)
 class ExpectedError(Part):
-    """How far off predictions by the parameters that stand for the robot are likely to be, computed where it is first asked for."""
+    """Expected error of predictions by the used parameters, computed at first use."""
 
     result: Identification
 
@@ -102,7 +102,7 @@ class ExpectedError(Part):
 
     @property
     def expected_error(self) -> float:
-        """Of motions over the range of the robot at up to half of its speed, %."""
+        """Expected error of motions over the range of the robot at up to half of its speed, %."""
         return self.expected.error
 
     @cached_property
@@ -125,7 +125,7 @@ class ExpectedError(Part):
         )
 
     def checks(self) -> tuple[Check, ...]:
-        """The error by its interval, where it is known."""
+        """The error by its interval, if it is known."""
         check = expected_off(self.expected)
         return () if check is None else (check,)
 
@@ -138,8 +138,9 @@ def expected_error(
     records: Sequence[Prepared],
     steps: float = 0.0,
 ) -> Expected:
-    """Expected error of predictions, at most LIMIT.LARGEST_EXPECTED; nan where neither the robot
-    file nor records tell a range, or a loop does not close in it.
+    """Expected error of predictions, at most LIMIT.LARGEST_EXPECTED.
+
+    nan if neither the robot file nor the records give a range, or a loop does not close in it.
 
     Parameters
     ----------
@@ -150,7 +151,7 @@ def expected_error(
         Method of the study; deviations are those of its linear companion, weighted by joint where
         that has no weights: a slide of large forces says nothing of the noise of a wrist.
     fit : Estimate
-        The parameters that stand for the robot.
+        The parameters that are used.
     records : sequence of Prepared
     steps : float
         Share of the accelerations that is an error of the encoder's steps.
@@ -225,7 +226,7 @@ def with_values(physical: PhysicalModel, K: Array, R: Array, y: Array) -> tuple[
 
 
 def limits_of(model: GeneratedModel) -> tuple[Array, Array] | None:
-    """Ranges, shape (n, 2), and largest speeds, shape (n,), of the robot file; None where one is not finite."""
+    """Ranges, shape (n, 2), and largest speeds, shape (n,), of the robot file; None if one is not finite."""
     limits = dict(getattr(model, "LIMITS", {}) or {})
     n = len(model.JOINTS)
     span, speed = (np.asarray(limits.get(key, ()), dtype=float) for key in ("q", "qd"))
@@ -236,7 +237,7 @@ def limits_of(model: GeneratedModel) -> tuple[Array, Array] | None:
 def reference_states(
     model: GeneratedModel, records: Sequence[Prepared]
 ) -> tuple[Array, Array, Array] | None:
-    """q, qd, qdd of a motion over the range of the robot, shape (K, n) each; None where no range is
+    """q, qd, qdd of a motion over the range of the robot, shape (K, n) each; None if no range is
     known.
     """
     n = len(model.JOINTS)

@@ -191,12 +191,12 @@ def _(result: StaticPoses, folder: Path, study: Study) -> Files:
 
 
 def page_files(page: Page) -> Files:
-    """The page, and its figures beside it."""
+    """Text of the page and its figures."""
     return {"report.html": render(page), **page.files}
 
 
 def part_files(part: Part) -> Files:
-    """What a part writes beside the page."""
+    """Files of a part next to the page."""
     files: Files = dict(part.files())
     for stem, arrays in part.arrays().items():
         files |= array_files(stem, arrays)

@@ -30,7 +30,7 @@ def at_rest(record: Record, signals: Signals) -> States:
 
 
 def poses_at_rest(problem: Problem) -> Problem:
-    """The step: the columns that act in poses at rest; the problem itself where its records are of a motion.
+    """The step: the columns that act in poses at rest; the problem itself if its records are of a motion.
 
     Raises
     ------

@@ -136,7 +136,7 @@ def _scales(observation: Observation, raw: Factor, e: Array) -> Array:
 
 
 def _fit_of_last_pass(start: Beginning, W: Array, fit: Robust) -> Fitted:
-    """What the last pass gives, with the covariance of a robust estimate."""
+    """Result of the last pass, with the covariance of a robust estimate."""
     observation, options = start.observation, start.options
     r, b = W.shape
     loss, tuning = options.loss, _tuning(options, options.loss)

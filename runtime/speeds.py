@@ -1,4 +1,4 @@
-"""Velocities that were recorded beside the positions, with the noise that each of them has.
+"""Velocities that were recorded with the positions, with the noise that each of them has.
 
     qd = v + L (dq/dt - v)          L = 1/(1 + (f/f_c)^2), zero phase
     2 pi f_c = sigma_v/sigma_q      deviations of the white noise of v and of q

@@ -75,7 +75,7 @@ class PayloadSettings(load.PayloadSettings):
 
 
 class Recorded(Settings):
-    """What stands first in a study file.
+    """First part of a study file.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ def study_from_mapping(mapping: Mapping[str, Any]) -> Study:
     """The Study of a mapping as read from a study file; raises SettingsError with the path of the
     offending key.
 
-    Numbers may be texts such as "2*pi/10000"; one value stands for a list of one (files, delta,
+    Numbers may be texts such as "2*pi/10000"; one value means a list of one (files, delta,
     record).
     """
     require_kind(mapping, Mapping, "study", "a mapping, as read from a study file")
@@ -181,7 +181,7 @@ def read_record(
     path : str, Path or RecordSettings
         A measured file whose columns are called t, q1 ..., tau1 ... (SI, joint side), a study file, a dataset, or settings.
     model : module, optional
-        Emitted model of the robot; needed where a side is "motor", which its drives convert, and checked for its number of joints.
+        Emitted model of the robot; needed if a side is "motor", which its drives convert, and checked for its number of joints.
     folder : str or Path
         Where relative file names start; of a study file, those in it start where it is.
     missing : bool
@@ -260,7 +260,7 @@ def _starts_anew(settings: RecordSettings, model: GeneratedModel, missing: bool)
 
 
 def draft(study: Study, model: GeneratedModel) -> str:
-    """What the names of the columns of the first record tell, as the text of a study to complete; "" where that is nothing."""
+    """Text of a study to complete, from the column names of the first record; "" if they give nothing."""
     record = study.record[0]
     joints = tuple(getattr(model, "LABELS", {}).values())
     return drafts.draft(record, Path(record.files[0]), joints) if record.files else ""

@@ -50,7 +50,7 @@ class Ranking:
     errors : mapping of str to mapping of str to float, %
         e_ck, by candidate, then by the treatment that it is judged in.
     standing : mapping of str to (str, Estimate)
-        The set of parameters that stands for each candidate, and its name.
+        The set of parameters that is used for each candidate, and its name.
     missing : tuple of str
         Candidates that could not be identified, each with its reason.
     """
@@ -115,7 +115,7 @@ class Ranking:
         )
 
     def summary(self) -> dict[str, Any]:
-        """For JSON."""
+        """The ranking as a mapping for JSON."""
         treatments = [
             {
                 "name": name,
@@ -198,9 +198,11 @@ def treatments(
     steps: Sequence[Step],
     speed_of_rest: Callable[[Problem], float | tuple[float, ...] | None],
 ) -> dict[str, Problem]:
-    """A problem as stated, without the rows of joints that stand, and with its known torques left out, as far as these differ; each after all steps.
+    """Variants of a problem that differ: as stated, without the rows of resting joints, without known torques.
 
-    speed_of_rest : rows.low_speed of a prepared problem that leaves out the rows of joints that stand; None where few do.
+    All steps are applied to each.
+
+    speed_of_rest : rows.low_speed of a prepared problem that leaves out the rows of joints that rest; None if few do.
     """
     stated = prepared(problem, steps)
     found = {STATED: stated}

@@ -1,4 +1,4 @@
-"""Force sensors as six rows more each, beside the joint torques or in their place.
+"""Force sensors as six rows more each, in addition to the joint torques or instead of them.
 
 A sensor ahead of link j measures the wrench by which it moves link j and those behind it, in the
 axes of frame j about its origin: the torques of six joints between the links that stay at zero, as

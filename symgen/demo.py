@@ -1,5 +1,5 @@
 """The main job of the chapter end to end, on top of what the verbs do: the Staubli TX40 identified
-from its public record, or from a simulated one where that cannot be had, and the resolution of its
+from its public record, or from a simulated one if that cannot be had, and the resolution of its
 encoders, beside the published Tables 2, 3, 4 and Figure 4.
 
     prepared = prepare(quick=False)             # model, study, record
@@ -117,7 +117,7 @@ COLOURED = ("ZZ1R", "MX2R", "FV1", "FS1", "Ia3", "FS5")
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """What a demonstration starts from.
+    """Start of a demonstration: robot, record and study.
 
     Attributes
     ----------
@@ -152,7 +152,7 @@ def simulated_record(
     """The record of a motion, written as a .csv.gz file q1..qn,tau1..taun of the motor side and
     read from it like any other.
 
-    study : settings but for the record. encoder : rad on the motor. noise : standard deviation, of
+    study : settings except for the record. encoder : rad on the motor. noise : standard deviation, of
     the largest torque of each motor.
     """
     n = len(model.JOINTS)

@@ -30,7 +30,7 @@ def limited(what: str) -> Iterator[None]:
 
 
 def require_time() -> None:
-    """Raise SymgenError where the time of what is being done has passed."""
+    """Raise SymgenError if the time of what is being done has passed."""
     end, what = _end.get()
     if time.process_time() > end:
         raise SymgenError(

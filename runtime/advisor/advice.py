@@ -67,9 +67,9 @@ class Limit:
     ----------
     percent : float, %
     delta : float, rad or m
-        inf where no step does.
+        inf if no step does.
     parameter : str
-        "" where no step does.
+        "" if no step does.
     sampled : Sampled or None
         CESTAC at that step; None without runs.
     error, half_width : float, %
@@ -124,7 +124,7 @@ class EncoderAdvice:
 
     def reached(self, percent: float) -> Array:
         """Step at which the |change| of every parameter first reaches `percent`, shape (b,); nan
-        where it does not within the curve.
+        if it does not within the curve.
         """
         return np.array([crossing(self.delta, np.abs(e), percent) for e in self.change.T])
 
@@ -141,7 +141,7 @@ class ReaderAdvice:
         All together first, then one at a time.
     notes : tuple of str
     steps : ndarray, shape (len(asked), b), %
-        Change at the steps asked for, of all encoders; nan where the records do not tell.
+        Change at the steps asked for, of all encoders; nan if the records do not show it.
     """
 
     reader: str
@@ -166,11 +166,11 @@ class Advice(Result, Part):
         Further steps, of all encoders.
     steps : ndarray, shape (len(asked), b), %
         Change predicted there by the chapter's law; under law phase, of real encoders read as the
-        study reads them, nan where the records do not tell.
+        study reads them, nan if the records do not show it.
     torque_sigma : ndarray, shape (b,)
         Deviation of the parameters per N m (N) of deviation of the motor torques.
     real : tuple of ReaderAdvice
-        Real encoders read as positions, and as counts; empty where they were not asked for.
+        Real encoders read as positions, and as counts; empty if they were not asked for.
     assumptions : tuple of str
     settings, provenance : mapping
     """
@@ -510,7 +510,7 @@ def _panel(ax: Any, reader: str, encoder: EncoderAdvice, line: str, points: str,
     f"bias below {LIMIT.NEGLIGIBLE:g} % (usable to {LIMIT.BIASED:g} %)",
 )
 def answer(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer:
-    """The answer of the advisor, and of the step in use where it is given.
+    """The answer of the advisor, and of the step in use if it is given.
 
     steps, share : where no advice was asked for, the steps that the positions show, in words, and the
     share of an acceleration that they make.
@@ -552,7 +552,7 @@ def answer(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer
 
 @dataclass(frozen=True, eq=False)
 class NoAdvice(Part):
-    """What the positions alone show where no advice was asked for."""
+    """Effect of the encoder steps that the positions show, if no advice was requested."""
 
     result: Identification
 
@@ -606,8 +606,8 @@ def confirm_by_runs(
 
 
 def limits_of(delta: Array, change: Array, reference: Estimate) -> tuple[Limit, ...]:
-    """Where the first parameter that matters crosses the limits; nan where the finest step is
-    already beyond or none is judged, inf where no step is.
+    """Where the first parameter that matters crosses the limits; nan if the finest step is
+    already beyond or none is judged, inf if no step is.
     """
     names, limits = deciding_names(reference), []
     e = {name: np.abs(change[:, reference.names.index(name)]) for name in names}
@@ -627,7 +627,7 @@ def limits_of(delta: Array, change: Array, reference: Estimate) -> tuple[Limit, 
 
 def crossing(delta: Array, e: Array, percent: float) -> float:
     """First step at which e reaches `percent`, straight lines between the points of logarithmic
-    axes; nan where it does not.
+    axes; nan if it does not.
     """
     above = np.flatnonzero(e >= percent)
     if not len(above) or (above[0] == 0 and e[0] > percent):

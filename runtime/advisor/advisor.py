@@ -129,7 +129,7 @@ def advise(
     problem : Problem
         Prepared.
     columns : sequence of str, optional
-        Essential names where they are known; default: by study.cestac.columns.
+        Essential names if they are known; default: by study.cestac.columns.
     asked : sequence of float, rad or m
         Further steps whose change is predicted.
     encoders : sequence of str, optional
@@ -319,7 +319,7 @@ def assumptions(
     *,
     real: bool = False,
 ) -> tuple[str, ...]:
-    """What the prediction stands on, in words. real : real encoders were judged too."""
+    """Assumptions of the prediction, in words. real : real encoders were judged too."""
     cestac, low = study.cestac, study.signals.lowpass
     law = {
         "two-point": "+-Delta, variance Delta^2",

@@ -137,15 +137,13 @@ class CoarseEncoders:
 
     @property
     def finest(self) -> float:
-        """Smallest step beside which the positions of the records count as exact, rad or m."""
+        """Smallest step at which the positions of the records are exact in comparison, rad or m."""
         own = (part.record.own for part in self.parts)
         steps = (float(encoder.step.max()) for encoder in own if encoder is not None)
         return float(LIMIT.EXACT_FROM * max(steps, default=0.0))
 
     def asked(self, delta: float) -> Array:
-        """Mean change with all encoders that move of this step, shape (b,), %; nan where the
-        records do not tell.
-        """
+        """Mean change if all moving encoders have this step, shape (b,), %; nan if the records do not allow it."""
         moving = [i for i, most in enumerate(self.coarsest) if np.isfinite(most)]
         if self.finest * (1 - 1e-9) <= delta <= self.coarsest.min():
             try:
@@ -160,7 +158,7 @@ class CoarseEncoders:
 
         Harmonic h of the error of a count has the frequency h |qd|/Delta and a power as 1/h^2;
         sampled, it is as slow as its distance from a multiple of the rate. Where a joint keeps a
-        speed that is a simple fraction of a step per sample, the error stands still.
+        speed that is a simple fraction of a step per sample, the error is constant.
         """
         h = np.arange(1, LIMIT.SAWTOOTH_HARMONICS + 1)
         weight, most = 1 / h**2 / np.sum(1 / h**2), np.zeros(len(delta))

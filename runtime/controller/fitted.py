@@ -1,4 +1,4 @@
-"""What is to be found of the law whose torque stands for a measured one: `controller.law` with
+"""What is to be found of the law whose torque replaces a measured one: `controller.law` with
 kd: fit, delay: fit.
 
     W X = tau(t - delay),      tau = sat(tau_0 + kd v),      v = qd_ref - qd, tau_0 the law without kd
@@ -44,10 +44,10 @@ class LawEstimate(Result):
     ----------
     joints : tuple of str
     kd, sigma : ndarray, shape (n,), N m s/rad or N s/m
-        Gains and their deviations, jointly with all parameters; nan where kd and FV cannot be told
-        apart, or kd was given.
+        Gains and their deviations, jointly with all parameters; nan if kd and FV cannot be
+        separated, or kd was given.
     delay, sigma_delay : float, s
-        From the logged signals to the torque; nan where it was given.
+        From the logged signals to the torque; nan if it was given.
     text : str
         The same in words.
     error : float, %
@@ -67,7 +67,7 @@ KIND = "law"
 
 
 def law_of_controller(problem: Problem) -> Problem:
-    """The step: records with the torque of the completed law, where the settings ask for kd or the delay of a law; the problem itself where they do not."""
+    """The step: records with the torque of the completed law, where the settings ask for kd or the delay of a law; the problem itself if they do not."""
     settings: Any = problem.settings
     controllers = [r.controller for r in settings.record if r.by_law and r.controller is not None]
     asked = [c for c in controllers if "fit" in (c.law.kd, c.law.delay)]
@@ -105,13 +105,13 @@ class GainDoubt(Part):
 
 
 def doubt_of_gains(result: Identification) -> GainDoubt | None:
-    """Whether the stated kd are doubtful; None where they are not, or there are none."""
+    """Whether the stated kd are doubtful; None if they are not, or there are none."""
     sentence = gain_doubt(result.problem, result.estimate.relative_error)
     return GainDoubt(sentence) if sentence else None
 
 
 def gain_doubt(problem: Problem, error: float) -> str:
-    """Whether another kd than the stated one explains the records, a sentence; "" where it does not, or they hold none. error : of the stated one, %."""
+    """Whether another kd than the stated one explains the records, a sentence; "" if it does not, or they hold none. error : of the stated one, %."""
     settings: Any = problem.settings
     by_law = ["law_v" in record.channels for record in problem.records]
     laws = [r.controller.law for r in settings.record if r.controller is not None]
@@ -134,7 +134,7 @@ def law_estimate(problem: Problem, law: Law, saturation: Array) -> LawEstimate:
     """kd of every joint and the delay, as far as `law` asks for them.
 
     saturation : ndarray, shape (n,), N m or N
-        Largest torque of the drives; inf where they do not cut.
+        Largest torque of the drives; inf if they do not cut.
     """
     model = problem.model
     n = problem.records[0].n
@@ -204,7 +204,7 @@ class TorquesOfLaw:
     rows : Observation
         W of these records.
     saturation : ndarray, shape (n,), N m or N
-        Largest torque of the drives; inf where they do not cut.
+        Largest torque of the drives; inf if they do not cut.
     """
 
     model: GeneratedModel

@@ -31,7 +31,7 @@ class TorqueLaw:
     P, Vr, Vm : ndarray, shape (n,)
         Gains of position, reference velocity and velocity.
     saturation : ndarray, shape (n,), N m or N
-        Largest torque; inf where none is given.
+        Largest torque; inf if none is given.
     fit : bool
         Whether kd is to be found.
     delay : float, s
@@ -90,7 +90,7 @@ def late(t: Array, x: Array, delay: float) -> Array:
 
 
 def torque_law(controller: Controller | None, n: int, limits: Mapping[str, Any]) -> TorqueLaw:
-    """The law of a controller for n joints with these LIMITS; SettingsError where it has a memory,
+    """The law of a controller for n joints with these LIMITS; SettingsError if it has a memory,
     or is none.
     """
     law = (controller or Controller()).law

@@ -3,7 +3,7 @@
 good       within the limit
 doubtful   usable with the care that the remedy names
 no         not usable
-open       not asked, or only the user can tell: does not count
+open       not asked, or only the user knows: does not count
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Check:
     ahead : bool
         Whether its finding is printed ahead of the values, most of which mean nothing then.
     change : mapping of str to value
-        The remedy as a change of the study, where it is one: {"record.units.q": "deg"}. What stands
+        The remedy as a change of the study, if it is one: {"record.units.q": "deg"}. What stands
         under record.scale are factors on the scale that is there, one a joint.
     """
 

@@ -1,7 +1,7 @@
 """Can the values of an identification be used? One question after another, each with its answer,
 the limit, and what to do.
 
-The verdict is the worst of the answers. Limits stand in runtime/core/limits.toml: they are
+The verdict is the worst of the answers. Limits are in runtime/core/limits.toml: they are
 conventions of practice, not theorems. Errors are relative, in %: 100 ||Y - W X|| / ||Y||;
 deviations are the larger of the corrected one and the one of the block bootstrap
 (`runtime.core.uncertainty`), never eq. (10) alone.
@@ -44,7 +44,7 @@ class Checklist(Result):
     use : str
         What the parameters explain, in one sentence.
     grade : float, %
-        Expected error of predictions of other motions; nan where it is not known.
+        Expected error of predictions of other motions; nan if it is not known.
     """
 
     checks: tuple[Check, ...]
@@ -152,16 +152,16 @@ def checklist_of(
     estimate : Estimate
         All parameters.
     fit : Estimate
-        The parameters that stand for the robot.
+        The parameters that are used.
     use : str
         What they explain, in one sentence.
     bootstrap : mapping of str to float
         Deviations by name from blocks of time drawn again; parameters that it lacks have the
         corrected deviation.
     prediction_error : float, %
-        Largest relative error of `fit` on data that did not give it; nan where there are none.
+        Largest relative error of `fit` on data that did not give it; nan if there are none.
     expected_error : float, %
-        Expected error of predictions of other motions; nan where it is not known.
+        Expected error of predictions of other motions; nan if it is not known.
     negative : sequence of str
         Frictions and motor inertias certainly below zero.
     parts : sequence of Part

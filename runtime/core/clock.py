@@ -1,6 +1,6 @@
 """The clock of a record: what its time stamps are like, whether they are uniform within the jitter allowed, and at what rate.
 
-Steps are told apart by the period T, the median of the steps that go forward:
+Steps are distinguished by the period T, the median of the steps that go forward:
 
     step < 0              time goes back: the clock was set, or a second record follows
     step = 0              a repeated stamp
@@ -67,7 +67,7 @@ def rate_of(stamps: Stamps, t: Array) -> float:
     Raises
     ------
     InputError
-        Time that goes back or stands, another rate than the stated one, or stamps off the uniform grid; it lists every irregularity and the setting that cures them.
+        Time that goes back or repeats, another rate than the stated one, or stamps off the uniform grid; it lists every irregularity and the setting that cures them.
     """
     N = len(t)
     if N < 2:

@@ -33,7 +33,7 @@ class Drives:
     offset : ndarray, shape (n,), rad or m
         Joint position where the motor reads zero.
     torque_constant : ndarray, shape (n,), N m/A or N m/V
-        Motor torque per unit of u; 1 where u is a torque.
+        Motor torque per unit of u; 1 if u is a torque.
     coupling : "both", "position", "torque" or "none"
         Where the off-diagonal elements of R count.
     declared : bool

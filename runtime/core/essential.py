@@ -187,7 +187,7 @@ def _trail(system: System, threshold: float) -> list[Removal]:
 
 
 def _relative(C: np.ndarray, X: np.ndarray) -> np.ndarray:
-    """%sigma, shape (b,); inf where the record does not determine the parameter, which therefore
+    """%sigma, shape (b,); inf if the record does not determine the parameter, which therefore
     goes first.
     """
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -41,7 +41,7 @@ class Fits:
     reduced : Essential
         By its linear companion.
     sets : mapping of str to Estimate
-        The nested sets, the feasible one where it was asked; empty where the method is not linear.
+        The nested sets, the feasible one if it was asked; empty if the method is not linear.
     settings : mapping of str to EstimateSettings
         Settings that give each set from parts of the rows.
     """

@@ -1,7 +1,7 @@
 """The identification of one robot from the records of a prepared problem.
 
 problem -> Y = W X + rho -> all parameters, eqs. (7)-(11), and the essential ones
-        -> measured beside predicted torques, windows of the records against each other, parameters that trade
+        -> measured and predicted torques, windows of the records against each other, parameters that trade
         -> parts: what else is asked of the records, each by an Extra
 """
 
@@ -37,7 +37,7 @@ class OnRequest:
         The same in words.
     make : function of Identification and options
     otherwise : Extra or None
-        What stands for it where it is not asked for, or cannot be made: the question that stays open.
+        What stands for it if it is not asked for, or cannot be made: the question that stays open.
     options : mapping
         What it is asked for with.
     attempted : bool

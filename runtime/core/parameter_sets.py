@@ -2,22 +2,22 @@
 seen best?
 
     essential    fewest columns, the others zero
-    feasible     all columns, among physical robots, pulled to the values of the robot file where
+    feasible     all columns, among physical robots, pulled to the values of the robot file if
                  there are any
     all          least squares
 
-The feasible set stands for the robot and is printed first, unless all parameters predict unseen
+The feasible set is used and is printed first, unless all parameters predict unseen
 data better by more than LIMIT.PREFERRED_SET: the validation records, else the second half of the
 record and the fifths of `held_out_validation` too. Half a record may leave friction
 open, where a joint moves one way; then both sets fail on the other half, and which fails less
-means nothing. The feasible set takes semidefinite programs: it is fitted where it may stand for the
-robot (`physical_asked`), or is written for a program where the essential ones do, and the weight of its prior and the bounds by reach, which all rows
+means nothing. The feasible set takes semidefinite programs: it is fitted where it may be
+used (`physical_asked`), or is written for a program where the essential ones do, and the weight of its prior and the bounds by reach, which all rows
 decide, hold for fits of parts of them.
 
 The essential set is an aid to reading: which parameters carry the model. Its deviations take the
 parameters that were removed as zero, and what they are in truth moves those that stay: 95 %
 intervals hold 67 to 74 % of the true values (benchmarks/truth.md). With essential: {first: true}, the
-choice of the chapter, it stands for the robot where it predicts as well as all; the feasible set is
+choice of the chapter, it is used if it predicts as well as all; the feasible set is
 then not asked.
 """
 
@@ -59,7 +59,7 @@ def physical_asked(errors: Mapping[Any, float], first: bool) -> bool:
     Parameters
     ----------
     errors : mapping of float, %
-        Of the essential parameters and of all on unseen data; empty where nothing was predicted.
+        Of the essential parameters and of all on unseen data; empty if nothing was predicted.
     first : bool
         essential.first of the study.
     """

@@ -39,9 +39,9 @@ class Figure:
     panels : sequence of functions of Matplotlib Axes
         Each fills one panel.
     name : str
-        Of its files beside the page, PNG and SVG; "": the page alone has it.
+        Of its files next to the page, PNG and SVG; "": the page alone has it.
     columns : int
-        Largest number of panels beside each other.
+        Largest number of panels in a row.
     cell : (float, float), inch
         Width and height of a panel; `extra` is added to the height of all, and the whole is at least `least` wide.
     legend : int
@@ -49,7 +49,7 @@ class Figure:
     logarithmic : bool
         Both axes of every panel.
     x, y : str
-        Labels of all panels together; numbers then stand at the outer panels only.
+        Labels of all panels together; numbers are then at the outer panels only.
     """
 
     caption: str

@@ -38,7 +38,7 @@ class Note:
     kind : str
         What it is about, by which code asks for it; no code reads the text.
     text : str
-        Sentences for people; "" where there are data alone.
+        Sentences for people; "" if there are data alone.
     data : mapping
         Entries of the provenance, JSON values.
     result : object

@@ -42,7 +42,7 @@ class Origin:
     files : mapping of str to str
         SHA-256 of the uncompressed bytes, by file name.
     time : str
-        What the time stamps were like and what was done about them, a sentence; "" where there were
+        What the time stamps were like and what was done about them, a sentence; "" if there were
         none.
     jitter : float
         Largest deviation of the stamps from a uniform grid, sampling periods.
@@ -248,7 +248,7 @@ class Record:
 
 
 def _array(x: ArrayLike | None, label: str, file: str) -> Array:
-    """The numbers of x: a copy, or x itself where it cannot be written."""
+    """The numbers of x: a copy, or x itself if it cannot be written."""
     array = real(x, label, file)
     return array.copy() if array.flags.writeable else array
 
@@ -270,7 +270,7 @@ def _channel(label: str, x: ArrayLike, shape: tuple[int, ...], file: str) -> Arr
 def _missing(
     missing: ArrayLike | Missing | None, shape: tuple[int, ...], file: str
 ) -> Missing | None:
-    """Missing samples of a record of positions of that shape; None where none is."""
+    """Missing samples of a record of positions of that shape; None if none is."""
     if missing is None:
         return None
     if not isinstance(missing, Missing):

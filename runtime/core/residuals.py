@@ -8,8 +8,8 @@ distance of k rows,
     N_eff = N / (1 + 2 sum_k rho_k)
             rows that say as much about a mean; the sum ends before the first rho_k <= 0
 
-Rows left out and other records are gaps: a pair counts only where both its rows exist, in one
-record. The spectrum tells what is left over: a peak at the frequency
+Rows left out and other records are gaps: a pair counts only if both its rows exist, in one
+record. The spectrum shows what is left over: a peak at the frequency
 of the motion is model error, one near the cut-off is filtered noise.
 """
 

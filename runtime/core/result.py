@@ -63,10 +63,10 @@ class Identification:
     estimate : Estimate
         All parameters, by the method of the study.
     essential : Essential
-        The essential parameters and the trail from all parameters to them; by the linear companion
+        The essential parameters and the elimination; by the linear companion
         of a method that is not linear.
     comparison : tuple of JointComparison
-        Torques by joint beside W X of `model_estimate`.
+        Measured torques and W X by joint, of `model_estimate`.
     validation : tuple of CrossValidation
         One part of the data predicts the others: windows of the records first, or each fifth by
         the other four (`parameter_sets`), then further records.
@@ -76,7 +76,7 @@ class Identification:
         Deviations without independence, whiteness of the residuals, F-tests, sets by threshold.
     sets : mapping of str to Estimate
         The essential, the feasible and all parameters (`runtime.core.parameter_sets`);
-        empty where the method of the study is not linear.
+        empty if the method of the study is not linear.
     unseen_rows : mapping of str to Observation
         Rows of the records that the parameters predict, by name.
     parts : tuple of Part
@@ -375,7 +375,7 @@ class Identification:
         return "\n\n".join(text for text in (head, *rest) if text)
 
     def _values(self, room: int, *, known: bool) -> str:
-        """Values in at most `room` lines, the essential ones where there is no room for all, and the
+        """Values in at most `room` lines, the essential ones if there is no room for all, and the
         error of each joint. known : only those that are larger than their intervals.
         """
         fit, names = self.model_estimate, list(self.model_estimate.names)
@@ -406,7 +406,7 @@ class Identification:
         return "\n".join([head, *lines[:room], f"Unexplained by joint: {by_joint}"])
 
     def _lines(self, names: Sequence[str]) -> list[str]:
-        """Values of some parameters that stand for the robot, with intervals and units."""
+        """Values of some of the used parameters, with intervals and units."""
         fit = self.model_estimate
         k = [fit.names.index(name) for name in names]
         units = [fit.units.get(name, "") for name in names]

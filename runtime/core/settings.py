@@ -7,7 +7,7 @@ mappings in and out.
     Lowpass(cutoff=-1)                       # SettingsError: cutoff: -1; expected more than 0
     structure(Lowpass, {"cutoff": "2*50"})   # Lowpass(cutoff=100.0)
 
-A number may be an arithmetic text (`2*pi/10000`), one value stands for a list of one, an integer
+A number may be an arithmetic text (`2*pi/10000`), one value means a list of one, an integer
 stands for its text.
 """
 
@@ -251,7 +251,7 @@ def structure(cls: type[T], value: Any, path: Path = ()) -> T:
 
 
 def _value_at(path: Path, value: Any) -> Any:
-    """What these keys lead to in a mapping as read from a file; None where it has no such keys."""
+    """Value at these keys of a mapping from a file; None if it has no such keys."""
     for key in path:
         if isinstance(value, Mapping):
             value = (

@@ -3,7 +3,7 @@
     Study(signals=Signals(lowpass=Lowpass(cutoff=100)))
     to_mapping(study)                  # complete, defaults filled: written into every result
 
-Defaults are those of the chapter (sections 2.2.2, 2.2.3 and 4.1.1) but for the cut-off, which
+Defaults are those of the chapter (sections 2.2.2, 2.2.3 and 4.1.1) except for the cut-off, which
 follows from the record: Butterworth of order 4 forward and backward on q and qd, central
 differences, parallel decimation by eq. (13), ordinary least squares, essential parameters by the
 threshold 1.04, five CESTAC runs.
@@ -42,7 +42,7 @@ SCHEMA = 1
 
 
 def version(number: int) -> int:
-    """The version of a study file; SettingsError where it is not SCHEMA."""
+    """The version of a study file; SettingsError if it is not SCHEMA."""
     require(number == SCHEMA, f"schema {number}; this version reads {SCHEMA}")
     return number
 
@@ -126,10 +126,10 @@ class Signals(Settings):
         Side of the encoders, for counts: joint, or motor by the drives of the robot.
     velocity : str or float or tuple of float, Hz
         Where record.columns.qd are velocities that were recorded: from which frequency on they
-        stand for differences of q; auto: where the noise of both is alike, and not where they
+        replace differences of q; auto: where the noise of both is alike, and not where they
         disagree with the positions; differences: they are not used. For reader lowpass.
     torque_median : int or str
-        Window of the median filter on torques; auto: as on positions, but none where it would take
+        Window of the median filter on torques; auto: as on positions, but none if it would take
         torque that goes with the motion, as from a controller that answers every count
         (`runtime.median`).
     options : mapping
@@ -222,7 +222,7 @@ class EssentialSettings(Settings):
     threshold : float
         Largest ratio of sigma_rho to its first value.
     first : bool
-        Whether the essential parameters may stand for the robot, as in the chapter; their
+        Whether the essential parameters may be used, as in the chapter; their
         deviations take those that were removed as zero. Default: physical or all parameters.
     """
 
@@ -239,7 +239,7 @@ class ValidateSettings(Settings):
         Windows: the first is fitted, the others are predicted.
     values : bool
         Whether parameters are to be used one by one: the verdict then asks for small deviations and
-        for parameters that can be told apart.
+        for parameters that can be separated.
     """
 
     split: tuple[Interval, ...] = ()

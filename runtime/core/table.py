@@ -25,11 +25,11 @@ class Table:
     caption : str
     header : sequence of str
     rows : sequence of sequences of str
-        The first cell names the row and stands to the left, the others to the right.
+        The first cell names the row and is aligned left, the others right.
     note : str
         Text that follows the table.
     wide : sequence of int
-        Numbers, from 0, of columns of words, which stand to the left.
+        Numbers, from 0, of columns of words, which are aligned left.
     sortable : bool
         By any column, where scripts run.
     stacked : bool

@@ -7,7 +7,7 @@
     F-test        does a parameter that was removed carry something? Removing q of b raises the
                   squared residual norm S from S_0 to S_q:
                   F = (S_q - S_0)/q / (S_0/(r - b)), F(q, r - b) without effect; r counts only the
-                  rows that are worth one (N_eff)
+                  effective number of rows (N_eff)
     sensitivity   which parameters come and go when the threshold on sigma_rho moves
 
 S_q = ratio^2 (r - b + q) S_0/(r - b), with the ratio of sigma_rho that the trail of
@@ -123,7 +123,7 @@ class Uncertainty(Result):
     whiteness : tuple of Whiteness
         Residuals by joint.
     f_tests : tuple of FTest
-        Steps of the trail.
+        Steps of the elimination.
     sets : tuple of (float, int, tuple of str)
         By threshold: count, and names that differ from the set used ("-": removed besides, "+":
         kept besides).
@@ -276,7 +276,7 @@ def uncertainty(
     settings : EstimateSettings
         Method of the study; the checks are those of its linear companion.
     essential : Essential
-        Parameters, and the trail to them.
+        Parameters, and their elimination.
     comparison : sequence of JointComparison
         Residuals whose whiteness is tested.
     """

@@ -1,6 +1,6 @@
 """Does the model predict, and which parameters trade against each other?
 
-    direct comparison    measured Y beside W X, joint by joint (chapter, Fig. 4)
+    direct comparison    measured Y and W X, joint by joint (chapter, Fig. 4)
     cross-validation     fit on one part of the data, predict the others: 100 ||Y_j - W_j X|| /
                          ||Y_j|| for every joint
     weak directions      parameters whose errors are correlated, eq. (10), and the combinations that
@@ -394,7 +394,7 @@ def weak_directions(
 
 
 def _named_entries(v: Array, names: Sequence[str]) -> dict[str, float]:
-    """Entries of a singular vector worth a name, largest first, the largest positive."""
+    """Largest entries of a singular vector by name, in descending order; the largest is positive."""
     order = np.argsort(-np.abs(v), kind="stable")
     v = v * np.sign(v[order[0]])
     return {

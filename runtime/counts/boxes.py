@@ -65,15 +65,13 @@ determined jerks; the least share of a window's density in that of the record.
 
 @dataclass(frozen=True)
 class Errors:
-    """Of the counts of an encoder beside their rounding, steps, and of its time stamps, sampling
-    periods; rms.
-    """
+    """Errors of an encoder besides rounding: of counts, in steps, and of time stamps, in sampling periods; rms."""
 
     count: float
     time: float = 0.0
 
     def variance(self, speed: Array) -> Array:
-        """Of counts at speeds in steps a sample."""
+        """Variance of the errors at speeds in steps per sample."""
         return np.asarray(self.count**2 + (self.time * speed) ** 2)
 
 
@@ -232,7 +230,7 @@ class Boxes:
         return int(self.sites[at[best]]), float(number[best]), float(0.5 * g[best] * number[best])
 
     def later(self, at: int, counts: int, read: Posterior) -> tuple[Boxes, Posterior]:
-        """Bounds and motion if there were so many counts more from a sample on."""
+        """Bounds and motion if all counts from one sample on are larger by a constant."""
         moved = np.where(self.sites >= at, counts, 0)
         boxes = replace(self, low=self.low + moved, high=self.high + moved)
         nu = read.nu + read.tau * moved

@@ -3,7 +3,7 @@ for identify and report.
 
 Positions taken as they are carry an error of variance step^2/12. Through the filters of the study
 it becomes an error of qdd of variance v; the columns of W are attenuated by about v over the mean
-square of qdd. Above HELPS that is a bias worth another reader.
+square of qdd. Above HELPS that is a bias that justifies another reader.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ LOOKED_AT = 2**16
 
 @dataclass(frozen=True, eq=False)
 class EncoderSteps(Part):
-    """Records whose positions are taken as they are and would be read better as counts, computed where it is first asked for."""
+    """Records whose positions are taken as they are and would be read better as counts, computed when it is first asked for."""
 
     result: Identification
 
@@ -53,7 +53,7 @@ class EncoderSteps(Part):
 
 def visible_steps(result: Identification) -> tuple[str, float]:
     """The steps of the positions that are taken as they are, in words, and the largest share of the mean
-    square of an acceleration that they make; "" where none are seen.
+    square of an acceleration that they make; "" if none are seen.
     """
     said, most = "", -1.0
     for one in result.prepared:
@@ -70,7 +70,7 @@ def encoder_sentences(
 ) -> tuple[str, ...]:
     """Positions being taken as they are, one sentence where reading counts would help.
 
-    states : of the record, through the filters.   drives : motor side; None where there is none.
+    states : of the record, through the filters.   drives : motor side; None if there is none.
     """
     found = _steps(record, states, signals, drives)
     if found is None or (share := found[1].max()) < HELPS:
@@ -87,7 +87,7 @@ def acceleration_error(
     record: Record, states: States, signals: Signals, drives: Drives | None
 ) -> float:
     """Largest share of the mean square of a filtered acceleration that is an error of the steps, of
-    the joints; 0 where positions show no steps.
+    the joints; 0 if positions show no steps.
     """
     found = _steps(record, states, signals, drives)
     return 0.0 if found is None else float(found[1].max())

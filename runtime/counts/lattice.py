@@ -2,7 +2,7 @@
 or refused.
 
 The step comes from a data sheet or from the record, the phase from the record alone. Floor against
-round in a driver, and an offset of up to half a step of the zero of the joint, cannot be told from
+round in a driver, and an offset of up to half a step of the zero of the joint, cannot be distinguished from
 counts.
 """
 
@@ -65,7 +65,7 @@ class Lattice:
     rounded: bool = False
 
     def counts(self, position: Array) -> Array:
-        """Counts, shape (N, n), as floats; nan where the position is missing."""
+        """Counts, shape (N, n), as floats; nan if the position is missing."""
         return np.asarray(np.round((position - self.phase) / self.step))
 
     def position(self, counts: Array) -> Array:
@@ -83,7 +83,7 @@ def lattice(
 
     step : rad or m, one or one for each encoder; default: from the record.
 
-    Raises InputError where a step is not positive, is larger than the motion, or positions do not
+    Raises InputError if a step is not positive, is larger than the motion, or positions do not
     lie on its lattice.
     """
     n = position.shape[1]
@@ -149,7 +149,7 @@ def lattice(
 
 
 def smallest_step(x: Array) -> float:
-    """The step of the lattice that distinct positions x, shape (N,), suggest; 0 where they never
+    """The step of the lattice that distinct positions x, shape (N,), suggest; 0 if they never
     change.
     """
     values = np.unique(x)
@@ -189,7 +189,7 @@ def unwrapped_counts(
     name: str = "record",
 ) -> tuple[Lattice, Array, tuple[str, ...]]:
     """The lattice of positions (see `lattice`), their counts without wraps of counters of WRAPS
-    bits, shape (N, n), and what wrapped, a sentence for each encoder. InputError where counts jump
+    bits, shape (N, n), and what wrapped, a sentence for each encoder. InputError if counts jump
     otherwise.
     """
     lattice_of_all = lattice(position, step, name=name)
@@ -272,7 +272,7 @@ def _distance(x: Array, step: float, phase: float) -> float:
 
 
 def _off(x: Array, off: float, step: float, own: bool) -> str:
-    """What is wrong with positions that are `off` steps (rms) off their lattice, and what to do."""
+    """Message for positions that are `off` steps (rms) off their lattice, with a remedy."""
     text = f"positions lie {off:.2g} steps (rms) off the lattice of step {step:.6g}"
     suggested = 0.0 if own else smallest_step(x)
     if suggested and _distance(x, suggested, _phase(x, suggested)) < OFF / 5:

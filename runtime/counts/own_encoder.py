@@ -39,7 +39,7 @@ class OwnEncoder:
     step : ndarray, shape (n,), rad or m
         Its steps, on the side study.cestac.side.
     reading : Reading or None
-        What its counts say; None where every Delta of the study is coarse beside it.
+        What its counts say; None if every Delta of the study is coarse compared with it.
     drives : Drives or None
         Between the joints and the encoders of `reading`; None: encoders at the joints.
     """

@@ -53,6 +53,6 @@ def unwrapped(record: Record, signals: Signals, drives: Drives | None = None) ->
 
 
 def encoder_position(q: Array, drives: Drives | None, missing: Missing | None = None) -> Array:
-    """Positions at the encoders, shape (N, n), of joint positions q; nan where they are missing."""
+    """Positions at the encoders, shape (N, n), of joint positions q; nan if they are missing."""
     x = q.copy() if drives is None else drives.motor_position(q)
     return x if missing is None else np.where(missing.at_encoders(drives), np.nan, x)

@@ -49,8 +49,7 @@ STANDS, LONG = 0.1, 2.0
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """What counts say of a motion; arrays of shape (N, n) at the encoder side, rad or m, per s, per
-    s^2.
+    """Motion that counts show; arrays of shape (N, n) at the encoder side, rad or m, per s, per s^2.
 
     Attributes
     ----------
@@ -84,12 +83,12 @@ class Reading:
 
     @property
     def motion(self) -> tuple[Array, Array]:
-        """q, and s_qd, infinite where the state is unknown."""
+        """q, and s_qd, infinite if the state is unknown."""
         return self.q, np.where(self.unknown, np.inf, self.s_qd)
 
     @property
     def starts(self) -> Starts:
-        """From where the same motion is sought at other phases of its encoders."""
+        """Start of the search for the same motion with other phases of its encoders."""
         return {
             (part.begin, j): SearchStart(each.read.errors, each.basis.m, each.read.density)
             for part in self.parts
@@ -219,7 +218,7 @@ def read_stretch(
     rest: Array,
     starts: Mapping[int, SearchStart] | None = None,
 ) -> tuple[Part | None, list[Array], Array]:
-    """Posterior of counts, shape (N, n), None where nothing moves; q, qd, qdd, s_q, s_qd, s_qdd in
+    """Posterior of counts, shape (N, n), None if nothing moves; q, qd, qdd, s_q, s_qd, s_qdd in
     steps, and where the state is unknown, (N, n) each.
 
     An encoder whose count never changes rests in the middle of its interval, one without a count at

@@ -72,7 +72,7 @@ SPACING = 0.3
 
 
 class SearchStart(NamedTuple):
-    """From where a motion is sought that was read before, at another phase of its encoder.
+    """Start of the search for a known motion with another phase of its encoder.
 
     errors : of the counts.
     m : samples from knot to knot.
@@ -124,7 +124,7 @@ def smoothed(
     uneven : deviation of the lines in steps, less than which is not taken; None: it is detected.
     start : what the same motion told at another phase; default: all is sought.
 
-    InputError where no motion goes with the counts.
+    InputError if no motion goes with the counts.
     """
     known = np.flatnonzero(np.isfinite(counts))
     origin = float(np.round(counts[known].mean()))
@@ -154,7 +154,7 @@ def smoothed(
 
 @dataclass(frozen=True, eq=False)
 class Counts:
-    """Of one encoder: y, shape (N,), at the samples `measured`; precision `rest` of the others."""
+    """Counts of one encoder: y, shape (N,), at the samples `measured`, and the precision `rest` of the other samples."""
 
     y: Array
     measured: Array
@@ -335,9 +335,7 @@ class Counts:
 
 
 def _error_notes(errors: Errors, least: float, sites: int) -> list[str]:
-    """Sentences about errors beside the rounding; none where they are the least that is taken, or
-    sites too few to tell.
-    """
+    """Sentences about errors besides rounding; none if these are the smallest, or sites are too few."""
     said = []
     if errors.count > least and sites > FEWEST:
         said.append(

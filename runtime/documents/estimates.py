@@ -76,7 +76,7 @@ class SetDocument:
     relative_error : float, %
         100 ||Y - W X|| / ||Y||.
     unseen : float, %
-        Error on data that the set was not fitted to; null where nothing was predicted.
+        Error on data that the set was not fitted to; null if nothing was predicted.
     names : tuple of str
         Names in column order.
     X : ndarray, shape (b,), SI
@@ -99,14 +99,14 @@ class SetDocument:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SetsDocument(Estimate):
-    """All parameters by the method of the study, and the nested sets beside them.
+    """All parameters by the method of the study, and the nested sets.
 
     Attributes
     ----------
     sets : tuple of SetDocument
-        Empty where the method is not linear.
+        Empty if the method is not linear.
     model_columns : str
-        Name of the set that stands for the robot.
+        Name of the set that is used.
     """
 
     sets: tuple[SetDocument, ...]
@@ -121,9 +121,9 @@ class IdentificationDocument(SetsDocument):
     Attributes
     ----------
     sets : tuple of SetDocument
-        The essential, the feasible and all parameters; empty where the method is not linear.
+        The essential, the feasible and all parameters; empty if the method is not linear.
     model_columns : str
-        Name of the set that stands for the robot.
+        Name of the set that is used.
     essential : EssentialDocument
         Essential parameters, fitted alone.
     validation : tuple of mapping
@@ -135,7 +135,7 @@ class IdentificationDocument(SetsDocument):
     trust : mapping
         Deviations by blocks, whiteness, F-tests.
     by_record : tuple of RecordError
-        Of several records, the error of each, with the parameters that stand for the robot.
+        Of several records, the error of each, with the parameters that are used.
     verdict : str
         One sentence.
     checklist : mapping
@@ -149,7 +149,7 @@ class IdentificationDocument(SetsDocument):
     friction : tuple of mapping
         Friction against velocity, one curve per joint.
     laws : mapping
-        Scalars of the laws of columns, and what these are worth on unseen data.
+        Scalars of the laws of columns, and their errors on unseen data.
     plausibility : mapping
         Whether record, study and robot file suit each other.
     """
@@ -177,7 +177,7 @@ class LevelDocument(LevelResult):
     Attributes
     ----------
     runs : tuple of Run or None
-        The runs; null where there are more than a thousand.
+        The runs; null if there are more than a thousand.
     run_count : int
         Number of runs.
     """
@@ -232,7 +232,7 @@ def load_estimate(path: Path | str) -> Estimate:
 
 def load_whole_estimate(path: Path | str) -> Estimate:
     """The estimate of all base parameters in estimate.json that a robot file or a program is given:
-    of the set that stands for the robot, or where that is the essential one, of the physical
+    of the set that is used, or where that is the essential one, of the physical
     parameters (`whole_set`). Of its fields, names, X, sigma_corrected, relative_error and
     details.standard are those of that set; the others, the covariance among them, those of
     least squares. InputError as `load_estimate`.
@@ -262,7 +262,7 @@ def load_whole_estimate(path: Path | str) -> Estimate:
 
 
 class ResultSchema(GenerateJsonSchema):
-    """JSON Schema of results, in which null stands for a number that does not exist."""
+    """JSON Schema of results, in which null means nan or infinity."""
 
     def float_schema(self, schema: core_schema.FloatSchema) -> dict[str, Any]:
         """A number or null."""

@@ -66,7 +66,7 @@ def yaml_text(mapping: Mapping[str, Any]) -> str:
 
 
 def _yaml() -> Any:
-    """Reader and writer of YAML 1.2; the package is loaded where a text is read or written."""
+    """Reader and writer of YAML 1.2; the package is loaded when a text is read or written."""
     from ruamel.yaml import YAML
 
     return YAML(typ="safe", pure=True)

@@ -1,1 +1,1 @@
-"""Which motion tells most about the parameters (chapter, section 2.2.3)."""
+"""Which motion determines the parameters best (chapter, section 2.2.3)."""

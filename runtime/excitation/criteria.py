@@ -98,7 +98,7 @@ class Excess:
 
 
 def limits_of(model: GeneratedModel, given: Mapping[str, Any]) -> MotionLimits:
-    """The limits of the robot file, changed by `given`; raises SettingsError where q, qd or qdd has
+    """The limits of the robot file, changed by `given`; raises SettingsError if q, qd or qdd has
     none.
     """
     n = len(model.JOINTS)
@@ -146,7 +146,7 @@ def weights_of(
     s: Sequence[float] = (),
 ) -> Weights:
     """Columns, deviations and sizes from the parameters X by name; `essential`, `s`: those of an
-    estimate where there is one.
+    estimate if there is one.
     """
     n = len(model.JOINTS)
     names = base_columns(model, settings.columns, essential or model.BASE_PARAMETERS, "columns")

@@ -8,7 +8,7 @@ Condition numbers and largest deviations are followed by the smooth bounds
     cond^2 <= (tr A^8 tr C^8)^(1/8),     max_i C_ii <= (sum_i C_ii^8)^(1/8),
             A = W_w'W_w, C = A^-1.
 
-Limits hold at the points of the grid, with a margin. sign(qd) is tanh(qd/v0), but for the rate of
+Limits hold at the points of the grid, with a margin. sign(qd) is tanh(qd/v0), except for the rate of
 the torque, which leaves dry friction out.
 """
 
@@ -36,7 +36,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """What every start needs; travels once to each process.
+    """Data that every start needs; sent once to each process.
 
     Attributes
     ----------

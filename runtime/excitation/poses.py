@@ -38,7 +38,7 @@ LARGEST_CONDITION = 1e4  # of W; beyond, poses do not determine the parameters
 
 @dataclass(frozen=True, eq=False)
 class StaticPoses(Result, keys="poses condition sigma compared s taken_in"):
-    """Poses at rest, compared with those of the record alone, or with as many random ones.
+    """Poses at rest, compared with the recorded poses, or with the same number of random ones.
 
     Attributes
     ----------
@@ -192,6 +192,6 @@ def _exchanged(A: Array, M: Array, chosen: Array) -> Array:
 
 
 def _quality(M: Array) -> tuple[float, Array]:
-    """Condition of W, and deviations, shape (c,); infinite where it does not determine them."""
+    """Condition of W, and deviations, shape (c,); infinite if it does not determine them."""
     condition, sigma = float(np.sqrt(np.linalg.cond(M))), np.sqrt(np.diag(np.linalg.inv(M)))
     return (condition, sigma) if condition < LARGEST_CONDITION else (np.inf, np.inf * sigma)

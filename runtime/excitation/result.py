@@ -52,7 +52,7 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """Parameters that the search stands on, and how good the motion of the records was.
+    """Parameters that the search uses, and the quality of the recorded motion.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class Excitation(Result):
     settings : ExcitationSettings
     limits : MotionLimits
     known : Known
-        Parameters that the search stands on.
+        Parameters that the search uses.
     """
 
     model: GeneratedModel
@@ -125,9 +125,7 @@ class Excitation(Result):
 
     @property
     def worse(self) -> dict[str, float]:
-        """Parameters that the motion of the record tells better, by name, with the ratio of
-        predicted %sigma to that of the record, largest first.
-        """
+        """Parameters that the recorded motion determines better, by name, with the ratio of %sigma, largest first."""
         before = self.known.relative_sigma
         ratios = {
             name: sigma / before[name]
@@ -143,9 +141,7 @@ class Excitation(Result):
 
     @property
     def comparison(self) -> str:
-        """The motion beside that of the record, parameter by parameter, a sentence; "" without
-        record.
-        """
+        """Comparison with the motion of the record in one sentence; "" without a record."""
         before, worse = self.known.relative_sigma, self.worse
         if not before:
             return ""
@@ -235,9 +231,7 @@ class Excitation(Result):
         }
 
     def sigma_table(self, most: int | None = None) -> Table:
-        """Predicted %sigma, the least certain parameters first, beside that of the motion of the
-        record; the first `most` of them.
-        """
+        """Predicted %sigma, and that of the recorded motion, for the `most` least certain parameters."""
         before = self.known.relative_sigma
         worst = sorted(self.relative_sigma.items(), key=lambda item: -item[1])[:most]
         rows = [

@@ -150,9 +150,7 @@ def _within(
 
 
 def _known_estimate(problem: Problem, settings: ExcitationSettings) -> Known:
-    """From records: estimate, deviations, essential parameters, condition and %sigma. Without: the
-    values of the robot file.
-    """
+    """Estimate, deviations, essential parameters, condition and %sigma of the records, or the values of the robot file."""
     model, records, study = problem.model, problem.records, problem.settings
     if not records:
         X = parameters_of(model)

@@ -44,7 +44,7 @@ class ExcitationSettings(Settings):
         So many poses at rest are sought in place of a motion, for `signals.reader: static`
         (`runtime.excitation.poses`); null: a motion.
     criterion : str
-        record, cond, logdet or sigma; auto: record where there is one, else cond. record is the
+        record, cond, logdet or sigma; auto: record if there is one, else cond. record is the
         largest predicted %sigma over that of the motion of the record: below 1, every parameter is
         told better than by it.
     columns : str or tuple of str
@@ -72,7 +72,7 @@ class ExcitationSettings(Settings):
     gap : float, m
         Smallest distance between the surfaces of such a pair.
     smooth : float, rad/s or m/s
-        v0 of tanh(qd/v0), which stands for sign(qd) inside the optimiser only.
+        v0 of tanh(qd/v0), which replaces sign(qd) inside the optimiser only.
     torque_sigma : tuple of float or None, N m or N
         Deviation s_j of each torque; null: those of an estimate, else 1 for every joint.
     starts : int

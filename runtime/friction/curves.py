@@ -12,8 +12,8 @@
     stribeck+load     both
 
 Every term is built at the rate of the record and decimated like Y, so that the filter rounds
-sign(v) on both sides alike. Every law contains the first and is linear but for VS, which is
-searched (its F-test is approximate: VS means nothing where FST = 0). Residuals are correlated:
+sign(v) on both sides alike. Every law contains the first and is linear except for VS, which is
+searched (its F-test is approximate: VS means nothing if FST = 0). Residuals are correlated:
 deviations take blocks of time as independent, and the F-test and Akaike's criterion count N/T
 samples, T the correlation time of the residual in rows. The law is chosen on blocks of time that
 did not fit it. X is held: this says what form friction has, not what the other parameters would be
@@ -152,7 +152,7 @@ class FrictionCurve:
 
     @property
     def note(self) -> str:
-        """What the sign of FST means; empty for laws without it."""
+        """Meaning of the sign of FST; empty for laws without it."""
         excess = self.law.parameters.get("FST")
         if excess is None:
             return ""
@@ -161,7 +161,7 @@ class FrictionCurve:
         return "FST is negative: friction falls towards standstill, there is no Stribeck peak; the term bends the curve of viscous friction"
 
     def summary(self) -> dict[str, Any]:
-        """For JSON."""
+        """The curve as a mapping for JSON."""
         curve = {"velocity": self.centre, "torque": self.mean, "half_interval": self.half}
         return {
             "joint": self.joint,
@@ -404,9 +404,7 @@ def _curve(joint: str, terms: Terms) -> FrictionCurve:
 
 
 def _predicting(laws: Sequence[FrictionLaw]) -> str:
-    """The smallest held-out error among the laws that are worth their terms; the first where none
-    is.
-    """
+    """The law with the smallest held-out error among those whose terms are significant; the first law if none is."""
     first, *others = laws
     worth = [
         law

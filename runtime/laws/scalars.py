@@ -1,6 +1,6 @@
 """Scalars inside the laws of columns, as a record gives them (`runtime.laws.projection`).
 
-Minima that differ are told. Deviations are joint ones: those of the linear problem with the columns
+Different minima are reported. Deviations are joint ones: those of the linear problem with the columns
 [W, (dW/da) X], by blocks of time. Whether a law earns its scalars is asked of blocks of time that
 did not fit it.
 """
@@ -53,7 +53,7 @@ class FittedScalar:
     minima : tuple of float
         Other local minima, the best first.
     doubt : str
-        Why it is not determined; empty where it is.
+        Why it is not determined; empty if it is.
     """
 
     name: str
@@ -108,7 +108,7 @@ class FittedLaws(Part):
         return {s.name: s.value for s in self.scalars}
 
     def tables(self) -> list[Table]:
-        """Scalars, and what the laws are worth on unseen data."""
+        """Tables of the scalars, and of the errors of the laws on unseen data."""
         said = [
             (s.name, s.parameter, s.doubt, "")
             if s.doubt
@@ -153,12 +153,12 @@ class FittedLaws(Part):
         return f"Scalars of laws (± 95 %): {', '.join(said)}{worth}"
 
     def summary(self) -> dict[str, Any]:
-        """For JSON."""
+        """The laws as a mapping for JSON."""
         return {"scalars": self.scalars, "tests": self.tests}
 
 
 def fitted_scalars(problem: Problem) -> Problem:
-    """The step: the model with the scalars of its laws fitted to the records (`fit:` of the robot file); the problem itself where there are none.
+    """The step: the model with the scalars of its laws fitted to the records (`fit:` of the robot file); the problem itself if there are none.
 
     Raises
     ------

@@ -31,7 +31,7 @@ SAME_TORQUE = 1e-6  # of the rms of tau_m, between two passes
 
 
 def transmitted_torque(problem: Problem) -> Problem:
-    """The step: records with the torque that each joint transmits, where laws of the model read it; the problem itself where none does.
+    """The step: records with the torque that each joint transmits, where laws of the model read it; the problem itself if none does.
 
     Raises
     ------

@@ -65,7 +65,7 @@ class Loop:
     simulator: Simulator
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """For other processes: what makes the simulator, which is not pickled."""
+        """State for other processes, which make the simulator anew."""
         return _loop, (self.problem,)
 
     @property
@@ -89,7 +89,7 @@ class Loop:
 
     @cached_property
     def reference(self) -> Reference:
-        """What the controller follows, of place loop."""
+        """Reference of the controller, for place loop."""
         return reference_of(self.simulator.controller, self.model, records=self.problem.records)
 
     @cached_property
@@ -127,7 +127,7 @@ class Loop:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the reader of a study must know beside its figures."""
+        """Remarks for the user of a study."""
         method = self.study.estimate.method
         notes = [self.closed.assumption] if self.closed.assumption else []
         if self.study.cestac.place == "loop":

@@ -114,7 +114,7 @@ class LoopPart:
 
     @property
     def given(self) -> dict[str, Any]:
-        """What a simulation of this record takes beside parameters and reference."""
+        """Arguments of a simulation of this record, besides parameters and reference."""
         return {
             "start": self.record.q[0],
             "disturbance": self.disturbance,
@@ -131,7 +131,7 @@ class LoopPart:
 
 @dataclass(frozen=True, eq=False)
 class ClosedLoop:
-    """The records with their loop. `assumption`: what was assumed about the reference; empty where
+    """The records with their loop. `assumption`: what was assumed about the reference; empty if
     it is known. `law`: what the control law explains of them.
     """
 
@@ -152,9 +152,7 @@ class ClosedLoop:
         ]
 
     def torques(self, runs: Sequence[Simulation]) -> list[Array]:
-        """Torque of the drives in each run, (N, n), without the known torque of its record: what is
-        beside `Record.torque`.
-        """
+        """Torque of the drives in each run, (N, n), without the known torque of its record, like `Record.torque`."""
         pairs = zip(runs, (part.record.tau_known for part in self.parts), strict=True)
         return [run.tau if known is None else run.tau[: len(known)] - known for run, known in pairs]
 
@@ -322,7 +320,7 @@ def _reference(
     controller: Controller,
     reference: str,
 ) -> Reference:
-    """What the controller followed in record k, at its rate."""
+    """Reference of the controller in record k, at its rate."""
     record = records[k].record
     if reference == "measured":
         states, every = records[k].states, controller.record_every
@@ -380,7 +378,7 @@ def _usable(simulator: Simulator, record: Record, keep: Array | None) -> Array |
 
 
 def loop_of(observation: Observation, method: str) -> ClosedLoop:
-    """The loop of an observation; raises SettingsError where `method` was asked for and there is
+    """The loop of an observation; raises SettingsError if `method` was asked for and there is
     none.
     """
     if observation.closed_loop is None:

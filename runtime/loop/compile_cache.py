@@ -58,7 +58,7 @@ def shared_object(
     folder : Path
         The cache.
     opened : callable
-        Loads and checks an object; raises NotCompiledError or OSError where it is not the one
+        Loads and checks an object; raises NotCompiledError or OSError if it is not the one
         wanted.
     flags : sequence of str
 
@@ -133,7 +133,7 @@ def _compiled(
 
 
 def compiler() -> tuple[tuple[str, ...], str]:
-    """Command of the C compiler and what it says of its version; raises where there is none."""
+    """Command of the C compiler and what it says of its version; raises if there is none."""
     given = shlex.split(os.environ.get("CC", ""))
     program = (
         shutil.which(given[0])

@@ -98,7 +98,7 @@ class ControlLaw:
         )
 
     def shown(self, q: Array) -> Array:
-        """What the encoders show of joint positions q (n,)."""
+        """Positions that the encoders show for joint positions q (n,)."""
         step = np.where(self.encoder_step > 0, self.encoder_step, 1.0)
         qm = self.R @ (q - self.offset)
         return np.asarray(
@@ -110,7 +110,7 @@ class ControlLaw:
 
 
 def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
-    """The numbers of the settings for the joints of a model; SettingsError where they do
+    """The numbers of the settings for the joints of a model; SettingsError if they do
     not fit.
     """
     n, law = len(model.JOINTS), controller.law

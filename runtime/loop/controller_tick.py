@@ -1,4 +1,4 @@
-"""One controller tick of a closed loop as one CasADi function, compiled to C where there is a
+"""One controller tick of a closed loop as one CasADi function, compiled to C if there is a
 compiler.
 
     y     = what the encoder shows of q                   qd_m = its difference

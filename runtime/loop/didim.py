@@ -29,7 +29,7 @@ from runtime.loop.result import Simulation
 
 
 def fit(start: Beginning) -> Fitted:
-    """The fit; `details`: trail of the passes, contraction. SettingsError where no loop is attached
+    """The fit; `details`: list of the passes, contraction. SettingsError if no loop is attached
     to the observation.
     """
     loop, observation = loop_of(start.observation, start.settings.method), start.observation

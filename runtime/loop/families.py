@@ -63,7 +63,7 @@ class Family:
         raise NotImplementedError
 
     def bounds(self) -> tuple[Array, Array]:
-        """Smallest and largest p, shape (P,) each; infinite where only the motion is limited."""
+        """Smallest and largest p, shape (P,) each; infinite if only the motion is limited."""
         return np.full(len(self.names), -np.inf), np.full(len(self.names), np.inf)
 
 
@@ -191,9 +191,7 @@ class Sinusoids(Family, Settings):
 
 
 class Polyline(Family):
-    """Positions p0, p1 ... at constant velocities between them, corners rounded; `ramps` tells when
-    each velocity begins and ends.
-    """
+    """Positions p0, p1 ... with constant velocities between them and rounded corners; `ramps` has the times of the velocities."""
 
     points: int
     blend: float

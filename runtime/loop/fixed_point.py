@@ -1,8 +1,8 @@
 """What IV and DIDIM share: parameters and simulation in turn, gains that follow the inertia, steps
 that stay physical.
 
-    X^(k+1) = estimate from the record and the simulation with X^k and gains g(X^k), until it stands
-    still; then again with g = 1
+    X^(k+1) = estimate from the record and the simulation with X^k and gains g(X^k), until it no longer
+    changes; then again with g = 1
 
 g refers to X_ref, which is not the truth: the last passes need g = 1. A parameter vector whose loop
 cannot be simulated (inertia not positive definite, unstable) is refused: the step towards it is
@@ -77,9 +77,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Fixed:
-    """Where the iteration ended: the last step, the trail, whether it stood still, ratio of its
-    last two changes.
-    """
+    """End of an iteration: last step, all steps, whether it converged, ratio of the last two changes."""
 
     step: Step
     trail: tuple[dict[str, Any], ...]

@@ -13,7 +13,7 @@ scaled alike.
 W); condition of Z'VW with unit columns; the
 Hausman test on d = X_IV - X_WLS, whose covariance C_d is taken from blocks of residuals as for
 sigma_corrected: largest |d_i|/sigma_di with its name,
-and, where there are blocks enough, d'C_d^-1 d, about chi2(b) where least squares is unbiased.
+and, if there are blocks enough, d'C_d^-1 d, about chi2(b) where least squares is unbiased.
 
 References: Janot, Vandanjon and Gautier (2014); Hausman (1978).
 """
@@ -41,7 +41,7 @@ from runtime.loop.result import Simulation
 
 
 def fit(start: Beginning) -> Fitted:
-    """The fit on the rows of the measured positions. SettingsError where no loop is attached to the
+    """The fit on the rows of the measured positions. SettingsError if no loop is attached to the
     observation.
     """
     loop, observation = loop_of(start.observation, start.settings.method), start.observation

@@ -5,7 +5,7 @@ simulated.
             from the recorded reference and positions, e = q_r - q, at the rate of the record
     share     100 (1 - ||tau - tau_law||/||tau||)
             by joint, decimated like Y; tau_law = sat(u), known torques included in tau
-    factor    of tau_law nearest to tau: 1 where gains and units are those of the record
+    factor    of tau_law nearest to tau: 1 if gains and units are those of the record
     delay     of tau against tau_law with the largest share, s
 
 A law that explains little is not that of the record, whatever the simulation with it gives: gains
@@ -33,7 +33,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class LawFit:
-    """The law beside the record, one joint.
+    """Comparison of the law with the record, for one joint.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ def law_torque(law: Any, record: Record, reference: Reference, controller: Contr
     """tau_law at the samples of a record, shape (N, n), N m or N.
 
     The integrator starts where the loop settled before t = 0: at the value that the torques of the
-    first LIMIT.LAW_STEADY seconds ask for; at 0 where the loop did not settle.
+    first LIMIT.LAW_STEADY seconds ask for; at 0 if the loop did not settle.
     """
     N, T = len(record), 1 / record.rate
     q_r, qd_r, qdd_r = (
@@ -120,7 +120,7 @@ def _integral(steps: Array, first: float, bound: float) -> Array:
 
 
 def law_text(fits: Sequence[LawFit]) -> str:
-    """What the law explains, joint by joint, in words; with the cause where it explains little."""
+    """Share of the torque that the law explains, joint by joint, in words, with the cause if it is small."""
     shares = ", ".join(f"{max(one.share, 0.0):.0f} % of joint {one.joint}" for one in fits)
     poor = [one for one in fits if one.share < LIMIT.LAW_POOR]
     if not poor:

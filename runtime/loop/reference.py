@@ -179,7 +179,7 @@ def of_record(record: Record, controller: Controller) -> Reference:
     """The recorded reference at the rate of the controller, by cubic splines where the record is
     slower.
 
-    SettingsError where the record holds none, or its rate is not that of every `record_every`-th
+    SettingsError if the record holds none, or its rate is not that of every `record_every`-th
     tick.
     """
     where, every = ("controller", "reference", "record"), controller.record_every

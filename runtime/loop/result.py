@@ -78,7 +78,7 @@ class Simulation(Result):
     name: str = "simulation"
 
     def record(self) -> Record:
-        """What was measured, with its reference."""
+        """The simulated record, with its reference."""
         return Record(
             self.t,
             self.q_measured,

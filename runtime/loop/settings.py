@@ -5,7 +5,7 @@ encoders and drives.
       law: {kind: pid, kp: [450, ...], kd: [2.5, ...], ki: 0, gain: [35.24, ...]} rate: 5000
       reference: {points: {duration: 10, seed: 1}} encoder: {step: 2*pi/65536, side: motor}
 
-SI, rad, joint side. A number stands for all joints.
+SI, rad, joint side. One number applies to all joints.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Law(Settings):
     gain : float or tuple of float, N m or N
         Torque for one unit of u.
     delay : float or str, s
-        From the logged signals to the torque, of a law that stands for a measured torque; fit:
+        From the logged signals to the torque, of a law that replaces a measured torque; fit:
         found with the parameters. For a simulated loop: controller.delay.
     antiwindup : float or tuple of float or None
         Largest |I|; null: none.
@@ -131,12 +131,12 @@ class Encoder(Settings):
 
 
 class Torque(Settings):
-    """From the command to the arm and to the record, N m or N of the joint.
+    """Path from the command to the arm and to the record, N m or N of the joint.
 
     Attributes
     ----------
     saturation : float or tuple of float or str or None, N m or N
-        Largest torque; limits: that of the robot file, where it has one; null: none.
+        Largest torque; limits: that of the robot file, if it has one; null: none.
     step : float or tuple of float or None, N m or N
         Step of the converter, after the saturation.
     noise : float or tuple of float, N m or N
@@ -216,7 +216,7 @@ class Controller(Settings):
     Attributes
     ----------
     law : Law
-        Control law. Where records name q_ref and no tau, its torque stands for theirs.
+        Control law. Where records name q_ref and no tau, its torque replaces theirs.
     kp, kd : float or tuple of float or str or None
         Short for law: {kp: ..., kd: ...}.
     rate : float, Hz

@@ -1,4 +1,4 @@
-"""Does the simulation follow the record? What IV and DIDIM stand on, joint by joint.
+"""Does the simulation follow the record? What IV and DIDIM assume, joint by joint.
 
     position    100 rms(q_s - q)/std(q)
             of the simulation with the parameters found, g = 1
@@ -45,7 +45,7 @@ class JointMotion:
     position : float, %
         The same, of the deviation of q from its mean.
     tracking : float, %
-        The same, of the deviation of q from the reference; nan where the reference is not known.
+        The same, of the deviation of q from the reference; nan if the reference is not known.
     torque : float, %
         100 ||tau_s - tau||/||tau||.
     """
@@ -58,7 +58,7 @@ class JointMotion:
 
     @property
     def apart(self) -> str:
-        """How the simulation misses the record, in words; "" where it follows."""
+        """How the simulation misses the record, in words; "" if it follows."""
         if not self.position <= LIMIT.MOTION_APART:
             return f"position of joint {self.joint} off by {self.position:.0f} % of its motion"
         if self.tracking > LIMIT.MOTION_TRACKING and self.position > LIMIT.MOTION_SMALL:
@@ -76,7 +76,7 @@ def simulated_motion(
     loop: ClosedLoop, observation: Observation, X: Array
 ) -> tuple[JointMotion, ...]:
     """Each joint of the simulation with all base parameters X, shape (b,), beside the records;
-    InputError where it cannot be made.
+    InputError if it cannot be made.
     """
     runs = loop.run(X)
     gaps = [

@@ -54,7 +54,7 @@ class Simulator:
     constants : mapping, optional
         Geometry and gravity that replace those of the robot file.
     in_c : bool
-        Compile where there is a compiler.
+        Compile if there is a compiler.
     """
 
     def __init__(
@@ -198,7 +198,7 @@ class Simulator:
         )
 
     def substeps(self, X: Array, reference: Reference, g: Array) -> int:
-        """Steps per tick. SimulationError where the inertia is not positive definite or the sampled
+        """Steps per tick. SimulationError if the inertia is not positive definite or the sampled
         loop is unstable on the reference.
         """
         fastest = 0.0

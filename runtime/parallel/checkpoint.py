@@ -3,7 +3,7 @@
     FOLDER/runs.npz     level, run, X, residual_norm of the runs; `study`, JSON of what makes them:
                         settings, hashes of record and model, versions
 
-The file is written whole under another name and then renamed. A study goes on only where `study`
+The file is written whole under another name and then renamed. A study goes on only if `study`
 says the same, number of runs aside. Runs depend on their key alone, so a resumed study has the bits
 of an uninterrupted one.
 """
@@ -69,7 +69,7 @@ class Checkpoint:
             self.flush()
 
     def flush(self) -> None:
-        """Write the runs, where there are new ones."""
+        """Write the runs, if there are new ones."""
         runs = Runs.joined(self._runs, self._runs[0].X.shape[1])
         if len(runs) > self.written:
             unfinished = self.file.with_name(FILE + UNFINISHED)

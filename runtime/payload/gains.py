@@ -16,7 +16,7 @@ without coupling), a without the load, b with it:
 The load is that of the torques times g; its deviations hold those of g.
 
 A motor whose torque does not change with the load says nothing: its gain is refused by its own
-deviation. Without a weighed load no record can tell g from X.
+deviation. Without a weighed load no record separates g from X.
 
 Reference: Gautier and Briot (2011), global identification of drive gains and dynamic parameters;
 identification.md 5.8.
@@ -53,7 +53,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class DriveGains(Result, keys="joints constant together sigma alone sigma_alone refused"):
-    """Factors g on the torque constants of the records, one per motor; nan where a method has none.
+    """Factors g on the torque constants of the records, one per motor; nan if a method has none.
 
     Attributes
     ----------
@@ -82,14 +82,12 @@ class DriveGains(Result, keys="joints constant together sigma alone sigma_alone 
 
     @property
     def factors(self) -> Array:
-        """g, shape (n,), 1 where no load tells it."""
+        """Factors g, shape (n,); 1 if no load determines them."""
         return np.where(np.isfinite(self.together), self.together, 1.0)
 
     @property
     def refused(self) -> tuple[str, ...]:
-        """Motors whose torque does not tell: %sigma of the joint solution is LIMIT.GAIN_REFUSED or
-        more.
-        """
+        """Motors with an undetermined factor: %sigma of the joint solution is LIMIT.GAIN_REFUSED or more."""
         return tuple(
             j
             for j, g, s in zip(self.joints, self.together, self.sigma, strict=True)
@@ -218,7 +216,7 @@ def _with_load(
     model: GeneratedModel, observation: Observation, settings: PayloadSettings, mounted: float
 ) -> Observation:
     """Columns W, W_Lu, the torque of the known part of the load, motors; those of the load zero
-    where it is not mounted.
+    if it is not mounted.
     """
     load = load_columns(model, physical_model(model), settings)
     b = len(model.BASE_PARAMETERS)

@@ -103,7 +103,7 @@ class Payload(Result):
         return self.table().to_text()
 
     def summary(self) -> dict[str, Any]:
-        """For JSON."""
+        """The payload as a mapping for JSON."""
         parameters = {
             n: {"value": x, "sigma": s}
             for n, x, s in zip(self.names, self.value, self.sigma, strict=True)
@@ -152,7 +152,7 @@ def payload(
     )
 
     def extended(rows: Observation, mounted: float) -> Observation:
-        """Columns of the load behind W, zero where it is not mounted; the torque of its known part
+        """Columns of the load behind W, zero if it is not mounted; the torque of its known part
         moved to Y.
         """
         of_load = mounted * np.hstack([rows.W @ load.columns, rows.W[:, friction]])
@@ -216,7 +216,7 @@ class LoadColumns:
 def load_columns(
     model: GeneratedModel, physical: PhysicalModel, settings: PayloadSettings
 ) -> LoadColumns:
-    """Columns of the load of the settings; SettingsError where there is no such link or frame."""
+    """Columns of the load of the settings; SettingsError if there is no such link or frame."""
     try:
         place = mount(model, settings.frame, settings.link)
     except InputError as e:

@@ -38,7 +38,7 @@ class PayloadStudy(Result, Part, keys="payload drive_gains:gains"):
     payload : Payload
         From the records without and with the load, fitted together.
     gains : DriveGains or None
-        Torque constants of the drives; None where study.payload.gains does not ask for them.
+        Torque constants of the drives; None if study.payload.gains does not ask for them.
     """
 
     payload: Payload
@@ -58,7 +58,7 @@ class PayloadStudy(Result, Part, keys="payload drive_gains:gains"):
         return [self.payload.table(), *gains]
 
     def entries(self) -> dict[str, Any]:
-        """The load, and the torque constants beside it."""
+        """Entries of estimate.json: the load and the torque constants."""
         return self.summary()
 
     def brief(self) -> str:
@@ -80,7 +80,7 @@ LOADED = "loaded"
 
 
 def load_of_study(result: Identification) -> PayloadStudy | None:
-    """The load of study.payload; None where the study has none."""
+    """The load of study.payload; None if the study has none."""
     study: Any = result.study
     if study.payload is None:
         return None

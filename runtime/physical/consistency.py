@@ -29,9 +29,9 @@ class Consistency(Part):
     estimate : Estimate
         All parameters.
     fit : Estimate
-        The parameters that stand for the robot.
+        The parameters that are used.
     judged : Feasibility or None
-        Of `estimate`; None where it was not asked for.
+        Of `estimate`; None if it was not asked for.
     """
 
     estimate: Estimate
@@ -47,12 +47,12 @@ class Consistency(Part):
         return "standard" in self.fit.details
 
     def text(self) -> str:
-        """What was asked of the parameters, and whether they have it."""
+        """The conditions of a physical robot, and whether the parameters meet them."""
         fitted = [self.fit.message, CONDITIONS] if self.fitted else []
         return "\n".join([*fitted, self.brief()]).strip()
 
     def brief(self) -> str:
-        """One sentence; "" where it was not asked for."""
+        """One sentence; "" if it was not asked for."""
         return "" if self.judged is None else f"The parameters are {self.judged.text}."
 
     def tables(self) -> list[Table]:
@@ -76,7 +76,7 @@ class Consistency(Part):
         return (physical(self),)
 
     def summary(self) -> dict[str, Any] | None:
-        """Of `judged`."""
+        """The test of `judged` as a mapping for JSON."""
         if self.judged is None:
             return None
         blocking = [{"condition": name, "margin": margin} for name, margin in self.judged.blocking]

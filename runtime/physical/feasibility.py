@@ -92,14 +92,14 @@ class Feasibility:
     Attributes
     ----------
     margin : float
-        t*: a share of the link's second moment and mass in the robot file; SI where it has none,
+        t*: a share of the link's second moment and mass in the robot file; SI if it has none,
         and of friction and actuators.
     feasible : bool
         Whether t* >= 0, or may be for all that the record tells (`within_noise`).
     physical : bool
         Whether some robot has them, whatever the limits that were given or guessed.
     blocking : tuple of (str, float)
-        Conditions that had to be released, in order, each with the t* before; empty where feasible.
+        Conditions that had to be released, in order, each with the t* before; empty if feasible.
     chi : ndarray, shape (p,)
         Standard parameters at t*.
     """
@@ -193,9 +193,9 @@ def standard_parameters(
     physical: PhysicalModel, names: Sequence[str], X: Array, limits: RobotLimits | None = None
 ) -> Array:
     """chi, shape (p,), with K chi = X to rounding and every condition fulfilled; raises InputError
-    where X is infeasible.
+    if X is infeasible.
 
-    Of all such chi the one nearest to the values of the robot file, or to zero where it has none,
+    Of all such chi the one nearest to the values of the robot file, or to zero if it has none,
     in units of their size.
     """
     answer = feasibility(physical, names, X, limits)
@@ -279,7 +279,7 @@ def limit_rows(physical: PhysicalModel, limits: RobotLimits | None) -> LinearBou
 
 
 def scales(physical: PhysicalModel) -> Array:
-    """Sizes of the standard parameters, shape (p,): those of the robot file, typical ones where it
+    """Sizes of the standard parameters, shape (p,): those of the robot file, typical ones if it
     has none or zero.
     """
     sizes = []
@@ -302,7 +302,7 @@ def units(physical: PhysicalModel) -> Array:
 
 
 def pull_to_file(physical: PhysicalModel, kind: Distance, weight: float) -> Prior | None:
-    """The pull to the values of the robot file; InputError where they are missing."""
+    """The pull to the values of the robot file; InputError if they are missing."""
     if kind == "none" or weight == 0:
         return None
     numbers = known_inertia(physical)

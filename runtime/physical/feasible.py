@@ -13,7 +13,7 @@ Where least squares is feasible, it is the solution.
 options (all of `runtime.physical.feasibility.RobotLimits` too):
     margin     smallest eigenvalue of every condition: of a link with values in the robot file as
                share of its second moment and mass there (S_j), of others in SI; 1e-6
-    prior      none | euclidean: distance D of the inertial parameters from the values of the robot file; "auto": euclidean where it has values of links, else none
+    prior      none | euclidean: distance D of the inertial parameters from the values of the robot file; "auto": euclidean if it has values of links, else none
     weight     of D, a number; "held-out": that by which four fifths of the record in time predict
                the fifth that is left out best; "auto": the
                largest, to half a decade, that raises the residual norm by at most 1 %
@@ -197,7 +197,7 @@ def fit(start: Beginning) -> Fitted:
 
 
 def conditions_of(judged: Feasibility | None) -> dict[str, Any]:
-    """What least squares does to the conditions of a physical robot; nothing where it was not asked."""
+    """Conditions of a physical robot that least squares breaks, for JSON; {} if not requested."""
     if judged is None:
         return {}
     blocking = [{"condition": name, "margin": t} for name, t in judged.blocking]
@@ -230,7 +230,7 @@ def solve_with_weight(
 ) -> tuple[Array, float]:
     """chi of a factored system, and the weight of D.
 
-    without_prior : chi of weight 0, shape (p,), where it is known.
+    without_prior : chi of weight 0, shape (p,), if it is known.
     """
     if options.prior == "none":
         if without_prior is None:
@@ -375,7 +375,7 @@ def bounds_contradict(
 
 
 def prior_text(physical: PhysicalModel, options: FeasibleOptions, weight: float) -> str:
-    """What the values of the robot file did, in words."""
+    """Effect of the values of the robot file, in words."""
     if options.prior == "none":
         return ""
     missing = len(physical.links) * 10 - len(known_inertia(physical))

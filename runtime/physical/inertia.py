@@ -101,9 +101,7 @@ class PhysicalModel:
     values: Mapping[str, float]
 
     def link(self, j: int) -> list[int]:
-        """Where the ten parameters of link j stand among the standard ones, in the order of
-        INERTIAL.
-        """
+        """Places of the ten parameters of link j among the standard parameters, in the order of INERTIAL."""
         if j not in self.links:
             raise InputError(
                 f"link {j} has no inertial parameters; links are {', '.join(map(str, self.links))}"

@@ -53,7 +53,7 @@ SOLVED = ("optimal", "optimal_inaccurate")
 
 
 def _clarabel() -> Any:
-    """The solver, loaded where a program is solved."""
+    """The solver, loaded when a program is solved."""
     import clarabel
 
     return clarabel
@@ -61,7 +61,7 @@ def _clarabel() -> Any:
 
 @dataclass(frozen=True, eq=False)
 class LinearBounds:
-    """lower <= A chi <= upper, one name per row; infinite where there is no bound."""
+    """lower <= A chi <= upper, one name per row; infinite if there is no bound."""
 
     names: tuple[str, ...]
     A: Array
@@ -320,7 +320,7 @@ class Quadratic:
     ----------
     conditions : sequence of Condition
     rows : ndarray, shape (k, p)
-        Of sizes near one where chi has its size.
+        Of sizes near one if chi has its size.
     scale : ndarray, shape (p,), SI
         Sizes of the parameters.
     """
@@ -339,7 +339,7 @@ class Quadratic:
         self.solver: Any = None
 
     def minimum(self, A: Array, g: Array) -> Array:
-        """chi, shape (p,); zeros where Clarabel finds none."""
+        """chi, shape (p,); zeros if Clarabel finds none."""
         squares = (A * self.scale * self.scale[:, None])[self.upper]
         linear = -g * self.scale
         if self.solver is None:
@@ -376,7 +376,7 @@ def _solved(*data: Any) -> Any:
 
 
 def _solution(solve: Callable[[], Any]) -> Any:
-    """What Clarabel gives; None where it stops by an error of its own."""
+    """Solution of Clarabel; None if it stops with an error of its own."""
     try:
         return solve()
     except BaseException as e:  # a panic of Rust is no Exception

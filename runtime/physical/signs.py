@@ -26,7 +26,7 @@ def reach_of(model: GeneratedModel) -> float:
     """Size of a robot, m: the largest distance between two of its frames in random poses, and once
     more the longest link, whose end no frame marks.
 
-    Joints move within their limits, without them revolute joints turn anywhere. nan where frames
+    Joints move within their limits, without them revolute joints turn anywhere. nan if frames
     say little: a prismatic joint without limits, or fewer than two links with a length.
     """
     limits = dict(getattr(model, "LIMITS", None) or {}).get("q")

@@ -1,3 +1,3 @@
 """Is the record, the robot file or the study wrong? What is asked before the fit and after it, and
-the causes that are tried where something is.
+the causes that are tried if something is.
 """

@@ -67,7 +67,7 @@ class Grams:
         return cls(np.array(grams), mask.sum(axis=0), measured)
 
     def mapped(self, K: Array) -> Grams:
-        """With the columns W K, K of shape (b, p)."""
+        """The normal equations with the columns W K, K of shape (b, p)."""
         M = np.zeros((K.shape[0] + 1, K.shape[1] + 1))
         M[:-1, :-1], M[-1, -1] = K, 1.0
         return Grams(M.T @ self.of_joints @ M, self.rows, self.measured)
@@ -133,7 +133,7 @@ def solve_scaled(A: Array, g: Array, ridge: float = LIMIT.RIDGE) -> Array:
 
 def least_squares(grams: Grams, N: float, bodies: Bodies | None = None) -> Fit:
     """Weighted least squares, weights by joint from their own residuals; near the values of the
-    robot file where `bodies` is given, over the standard parameters then.
+    robot file if `bodies` is given, over the standard parameters then.
     """
     sigma = grams.sigma(np.zeros(grams.of_joints.shape[1] - 1))
     for _ in range(LIMIT.WEIGHT_PASSES):
@@ -232,7 +232,7 @@ class Bodies:
         self.program = Quadratic(conditions, inside, scale)
 
     def _of_file(self, link: Condition, length: float) -> Array | None:
-        """P0 of the robot file; None where it does not give all ten parameters of a body."""
+        """P0 of the robot file; None if it does not give all ten parameters of a body."""
         known = self.physical.values
         ten = np.array([known.get(self.physical.standard[k], np.nan) for k in link.numbers])
         if not np.isfinite(ten).all() or ten[-1] <= 0:
@@ -260,7 +260,7 @@ class Bodies:
         return bool(self.known_links.any())
 
     def distance(self, chi: Array) -> float:
-        """From the values of the robot file, nats."""
+        """Distance from the values of the robot file, nats."""
         return float(0.5 * chi @ self.H @ chi - self.h @ chi + self.constant)
 
     def penalty(self, chi: Array) -> float:

@@ -68,7 +68,7 @@ class Case:
 
     @cached_property
     def labels(self) -> tuple[str, ...]:
-        """What results call the joints."""
+        """Labels of the joints in results."""
         return joint_labels(self.model)
 
     @cached_property
@@ -87,7 +87,7 @@ class Case:
         return np.array([unit == "rad" for unit in self.units])
 
     def limits(self, key: str, *shape: int) -> Array | None:
-        """Limits of each joint by the robot file, shape (n, *shape); None where it has none."""
+        """Limits of each joint by the robot file, shape (n, *shape); None if it has none."""
         given = np.asarray(dict(getattr(self.model, "LIMITS", {}) or {}).get(key, ()), dtype=float)
         return given if given.shape == (self.samples.n, *shape) else None
 
@@ -103,7 +103,7 @@ class Case:
 
     @cached_property
     def observation(self) -> Observation | None:
-        """Rows of the study; None where none is used, or counts cannot be read."""
+        """Rows of the study; None if none is used, or counts cannot be read."""
         try:
             return stacked(self.model, self.given)
         except (InputError, np.linalg.LinAlgError):
@@ -111,7 +111,7 @@ class Case:
 
     @cached_property
     def physical(self) -> PhysicalModel | None:
-        """Conditions of a physical robot; None where the model has no standard parameters."""
+        """Conditions of a physical robot; None if the model has no standard parameters."""
         try:
             return physical_model(self.model)
         except InputError:
@@ -119,7 +119,7 @@ class Case:
 
     @property
     def silent(self) -> str:
-        """Why no cause is tried; "" where the samples allow it."""
+        """Why no cause is tried; "" if the samples allow it."""
         return self.unfit or self.few
 
     @cached_property
@@ -150,12 +150,12 @@ class Case:
 
     @cached_property
     def baseline(self) -> Baseline | None:
-        """The study as it is, fitted; None where nothing is fitted."""
+        """The study as it is, fitted; None if nothing is fitted."""
         return None if self.silent else self._baseline(values=True)
 
     @cached_property
     def validation(self) -> Baseline | None:
-        """The rows of the validation records, for the fits of `baseline`; None where there are none."""
+        """The rows of the validation records, for the fits of `baseline`; None if there are none."""
         if self.baseline is None or not self.unseen:
             return None
         try:
@@ -186,7 +186,7 @@ class Case:
 
     @cached_property
     def robot_values(self) -> KnownValues | None:
-        """Torque of the values of the robot file, where it has them."""
+        """Torque of the values of the robot file, if it has them."""
         if self.unfit:
             return None
         baseline = self.baseline or self._baseline(values=True)
@@ -204,7 +204,7 @@ class Case:
 
     @cached_property
     def late(self) -> Delay | None:
-        """Delay of the torques of the longest record; None where it is too short."""
+        """Delay of the torques of the longest record; None if it is too short."""
         through = max(self.through, key=lambda one: len(one.record))
         t = through.record.t
         try:

@@ -79,7 +79,7 @@ class Cause:
     constants : mapping of str to float
         Entries of the table of frames, SI.
     change : mapping of str to value
-        The remedy as a change of the study, as of a Check; {} where it is none.
+        The remedy as a change of the study, as of a Check; {} if it is none.
     """
 
     kind: str
@@ -113,7 +113,7 @@ class Cause:
         return np.asarray(samples.tau @ self.T.T - self.subtracted(samples))
 
     def subtracted(self, samples: Samples) -> Array:
-        """Torques known beside the model, shape (K, n)."""
+        """Known torques outside the model, shape (K, n)."""
         known = np.asarray(self.known_factor * samples.tau_known)
         if np.ndim(self.unmodelled) == 0:
             return known
@@ -121,8 +121,9 @@ class Cause:
 
 
 def unmodelled_torques(samples: Samples) -> Array:
-    """What the model may lack, shape (K, n, 2): 1, and sign(qd) exp(-(qd/v)^2), dry friction at low
-    speed, v the share LIMIT.SLOW of the largest speed.
+    """Torques that the model may lack, shape (K, n, 2): 1, and sign(qd) exp(-(qd/v)^2), dry friction at low speed.
+
+    v is the share LIMIT.SLOW of the largest speed.
     """
     qd = samples.qd
     v = np.maximum(LIMIT.SLOW * np.abs(qd).max(axis=0), 1e-12)
@@ -131,7 +132,7 @@ def unmodelled_torques(samples: Samples) -> Array:
 
 
 def unchanged_study(n: int, **changed: Any) -> Cause:
-    """The study of n joints as it is, but for what is given."""
+    """The study of n joints with only the given changes."""
     plain = {"kind": "", "says": "", "remedy": "", "subject": ""}
     return Cause(**plain | {"P": np.eye(n), "p": np.zeros(n), "T": np.eye(n)} | changed)
 
@@ -428,7 +429,7 @@ def alphas(robot: Robot) -> Iterator[Item]:
 
 
 def _angle(x: float) -> str:
-    """An angle in multiples of pi/2 where it is one."""
+    """An angle in multiples of pi/2 if it is one."""
     quarter = x / (np.pi / 2)
     if not np.isclose(quarter, round(quarter)):
         return f"{x:.4g} rad"
@@ -496,7 +497,7 @@ def conventions(robot: Robot) -> Iterator[Item]:
 
 
 def entries(robot: Robot, names: str) -> Iterator[Item]:
-    """Entries of the table of these names, lengths where they are not zero."""
+    """Entries of the table of these names, lengths if they are not zero."""
     for key, value in robot.free.items():
         entry = ENTRY.fullmatch(key)
         if entry and entry[1] in names.split() and (value or entry[1] == "alpha"):
@@ -539,7 +540,7 @@ def turned(*quantities: str) -> Callable[[Robot, Item], Mapping[str, Any]]:
 
 
 def transmitted(robot: Robot, *, positions: bool, torques: bool, to_joints: bool) -> Maps:
-    """What was recorded at the motors taken to the joints, or the reverse."""
+    """Signals of the motors converted to the joints, or the reverse."""
     inverse = np.linalg.inv(robot.R)
     P, p, T = (
         (inverse, robot.offset, robot.R.T)

@@ -5,7 +5,7 @@
 
 Gauss-Newton over X and every delta_j together: torques are shifted by the last delta (cubic
 interpolation of the filtered signal), W stays. The start is the best common shift of a grid. Rows
-near a reversal are left out, where sign(qd) has no derivative and the filter smears its step.
+near a reversal are left out, if sign(qd) has no derivative and the filter smears its step.
 Deviations are the larger of two, that of least squares and that of blocks of time taken as
 independent.
 

@@ -113,7 +113,7 @@ def jumps(case: Case) -> Answer:
 
 
 def _usual(x: Array) -> Array:
-    """What nine in ten of the values of each column other than zero stay below, (n,)."""
+    """90 % quantile of the nonzero values of each column, (n,)."""
     return np.array([np.quantile(own[own > 0], 0.9) if own.any() else np.inf for own in x.T])
 
 
@@ -161,7 +161,7 @@ def _wrap(q: Array, high: Array, usual: Array, median: int) -> bool:
 )
 def cut_torques(case: Case) -> Answer | None:
     """Torques that stay at their largest or smallest value, and what the model fitted to the other
-    samples gives there; None where there are none.
+    samples gives there; None if there are none.
     """
     if case.silent:
         return None

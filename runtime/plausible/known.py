@@ -4,8 +4,8 @@ joint, ratio and sign.
     Y_j = a_j (gravity torque by the values)_j + b_j (the rest of their torque)_j + friction and
     offset,
 
-least squares joint by joint: a_j = b_j = 1 where values, gear and sign are right. A part is left
-out where it is small or cannot be told apart.
+least squares joint by joint: a_j = b_j = 1 if values, gear and sign are right. A part is left
+out if it is small or cannot be separated.
 
 Are the measured torques torques at all? Beside those of the values, currents have the same course
 and another size.
@@ -44,13 +44,13 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class KnownValues(Result):
-    """Torque of the values of the robot file beside that of the record.
+    """Comparison of the torque of the values of the robot file with that of the record.
 
     Attributes
     ----------
     joints : tuple of str
     gravity, inertia : ndarray, shape (n,)
-        Measured over computed; nan where the part is too small.
+        Measured over computed; nan if the part is too small.
     error : ndarray, shape (n,), %
         Of the torque, with friction fitted and both ratios 1.
     complete : bool
@@ -107,7 +107,7 @@ class KnownValues(Result):
 
 
 def known_values(baseline: Baseline) -> KnownValues | None:
-    """The comparison; None where no link has all its values."""
+    """The comparison; None if no link has all its values."""
     physical, s = baseline.physical, baseline.samples
     given = [all(f"{family}{j}" in physical.values for family in INERTIAL) for j in physical.links]
     if not any(given):
@@ -167,14 +167,14 @@ class TorqueUnit(Part):
 
 
 def torque_unit(result: Identification) -> TorqueUnit | None:
-    """Whether the unit of the torques is doubtful; None where it is not."""
+    """Whether the unit of the torques is doubtful; None if it is not."""
     by_law = any(record.origin.by_law for record in result.records)
     doubt = torque_unit_doubt(result.model, result.observation, by_law)
     return TorqueUnit(f"{doubt}.") if doubt else None
 
 
 def torque_unit_doubt(model: GeneratedModel, observation: Observation, by_law: bool) -> str:
-    """The question to the user, a sentence; "" where nothing speaks against the unit, or the file
+    """The question to the user, a sentence; "" if nothing speaks against the unit, or the file
     has no values.
     """
     values, standard = dict(getattr(model, "VALUES", {})), getattr(model, "STANDARD_PARAMETERS", ())

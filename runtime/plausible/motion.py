@@ -40,7 +40,7 @@ Array = np.ndarray
     f"standing at most {100 * LIMIT.REST_SHARE:g} % of the rows that are used",
 )
 def rest(case: Case) -> Answer:
-    """Share of the instants at which a joint stands, and what leaving them out changes."""
+    """Share of the instants at which a joint rests, and the change of the fit without them."""
     model, study = case.model, case.study
     share = standing_share(case.samples, study)
     worst = int(np.argmax(share))
@@ -72,7 +72,7 @@ def rest(case: Case) -> Answer:
 
 
 def standing_share(samples: Samples, study: Study) -> Array:
-    """Share of the rows of each joint at which it stands, shape (n,)."""
+    """Share of the rows of each joint at which it rests, shape (n,)."""
     speed = np.where(
         samples.still, np.inf, np.abs(samples.qd)
     )  # a joint that never moves is told as such
@@ -82,7 +82,7 @@ def standing_share(samples: Samples, study: Study) -> Array:
 
 
 def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ...] | None:
-    """rows.low_speed that leaves out the rows of joints that stand, rad/s or m/s; None where at
+    """rows.low_speed that leaves out the rows of joints that rest, rad/s or m/s; None if at
     most LIMIT.REST_SHARE of them stand.
     """
     if standing_share(samples, study).max() <= LIMIT.REST_SHARE:
@@ -114,16 +114,14 @@ def _rounded_up(x: float) -> float:
     "a motion), or leave them out (estimate.columns)",
 )
 def motion_excites(case: Case) -> Answer | None:
-    """Parameters that the motion cannot tell; None where the study has no rows, or a joint stands."""
+    """Parameters that the motion does not determine; None if the study has no rows, or a joint rests."""
     if case.observation is None or case.samples.still.any():
         return None
     return excited(case.observation, case.given[0].study.signals, case.records[0].rate)
 
 
 def excited(observation: Observation, signals: Signals, rate: float) -> Answer | None:
-    """Parameters that the motion cannot tell; None where W has no full rank, which the fit itself
-    says by name.
-    """
+    """Parameters that the motion does not determine; None if W is rank-deficient, which the fit itself reports."""
     try:
         shares = unexcited_shares(observation, signals, rate)
     except (InputError, np.linalg.LinAlgError):
@@ -140,7 +138,7 @@ def excited(observation: Observation, signals: Signals, rate: float) -> Answer |
 
 
 def unexcited_shares(observation: Observation, signals: Signals, rate: float) -> dict[str, float]:
-    """share_i, %, by name of the parameter; LinAlgError where W has no full rank."""
+    """share_i, %, by name of the parameter; LinAlgError if W has no full rank."""
     s = np.array(
         [
             LIMIT.TORQUE_NOISE
@@ -169,7 +167,7 @@ def unexcited_shares(observation: Observation, signals: Signals, rate: float) ->
     "joints take differences of the positions",
 )
 def recorded_speeds(case: Case) -> Answer | None:
-    """Gain and lag of recorded velocities; None where none are recorded."""
+    """Gain and lag of recorded velocities; None if none are recorded."""
     own = max(case.straight, key=lambda one: len(one.record))
     record, signals = own.record, own.study.signals
     if "qd" not in record.channels or signals.velocity == "differences":

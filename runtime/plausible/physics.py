@@ -22,8 +22,9 @@ Array = np.ndarray
     "Does physics agree?", "", "record a longer motion, or give a higher signals.lowpass.cutoff"
 )
 def not_asked(case: Case) -> Answer | None:
-    """Why no cause is tried; None where they are. Too few samples are a doubt: a wrong sign or unit
-    would not be told.
+    """Reason why no cause is tried; None if causes are tried.
+
+    Too few samples are a doubt, because a wrong sign or unit would not be detected.
     """
     if not case.silent:
         return None
@@ -39,7 +40,7 @@ def not_asked(case: Case) -> Answer | None:
     "alternatives below",
 )
 def physics(case: Case) -> Answer | None:
-    """Errors by joint of the best physical robot beside those of free parameters."""
+    """Errors by joint of the best physical robot and of free parameters."""
     if case.alone is None:
         return None
     free, given = case.alone.free, case.alone.given
@@ -102,7 +103,7 @@ def measured(case: Case) -> Answer | None:
     "drives.ratio, torque_constant)",
 )
 def size(case: Case) -> Answer | None:
-    """Mass that the torques ask for, against the reach of the robot; None where that is not
+    """Mass that the torques ask for, against the reach of the robot; None if that is not
     known.
     """
     if case.alone is None or not case.alone.physical.links or not case.turning.all():
@@ -144,9 +145,7 @@ def values(case: Case) -> Answer | None:
     f"shift below {1e3 * LIMIT.LATE:g} ms, or not beyond what the record tells",
 )
 def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
-    """Time shift between positions and torques; None where the record does not tell. What an
-    alternative explains better is no delay.
-    """
+    """Time shift between positions and torques; None if the record does not determine it, or an alternative explains it better."""
     late = None if case.baseline is None else case.late
     if late is None or not np.isfinite(late.sigma).any():
         return None
@@ -183,7 +182,7 @@ def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
 
 
 def _from_to(text: str, before: float, after: float) -> str:
-    """The text and how an error goes, %; "" where it stays."""
+    """The text and how an error goes, %; "" if it stays."""
     a, b = f"{before:.1f}", f"{after:.1f}"
     return "" if a == b else f"; {text} from {a} to {b} %"
 
@@ -205,26 +204,26 @@ def late_joints(late: Delay) -> Array:
 
 
 def gain_of_delays(case: Case, late: Delay) -> float:
-    """What delays gain, nats."""
+    """Gain of the delays, nats."""
     N = 0.0 if case.baseline is None else case.baseline.N
     return N * float(np.log(late.before / np.maximum(late.after, 0.1)).sum())
 
 
 def gain_of_alternative(case: Case, trial: Trial) -> float:
-    """What an alternative gains, nats, rows counted as for a delay."""
+    """Gain of an alternative, nats, with rows counted as for a delay."""
     assert case.baseline is not None and trial.fit is not None
     return case.baseline.given.score - trial.fit.score
 
 
 def late_gain(case: Case) -> float:
-    """What certain delays gain, nats; 0 where there are none."""
+    """Gain of the certain delays, nats; 0 if there are none."""
     if case.baseline is None or case.late is None:
         return 0.0
     return gain_of_delays(case, case.late) if certain_joints(case).any() else 0.0
 
 
 def certain_joints(case: Case) -> Array:
-    """Joints whose torques are certainly late, bool (n,): none where that gains less than
+    """Joints whose torques are certainly late, bool (n,): none if that gains less than
     LIMIT.LATE_GAIN.
     """
     assert case.late is not None

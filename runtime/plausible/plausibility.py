@@ -2,7 +2,7 @@
 for each question.
 
     CHECKS       of the record and the robot file, then of the fit: a family of slips a file
-    EXPLAINED    of the causes (`runtime.plausible.causes`), which are tried where
+    EXPLAINED    of the causes (`runtime.plausible.causes`), which are tried if
                  `variants`
                  is given, or where something else is doubtful
 
@@ -92,11 +92,11 @@ class Plausibility(
     ----------
     answers : tuple of Check
     trials : tuple of Trial
-        Alternatives, the best first; empty where none were tried.
+        Alternatives, the best first; empty if none were tried.
     named : tuple of Trial
         Those that explain the record decisively better.
     equivalent : tuple of str
-        Changes that no fit of this record can tell from the study as given.
+        Changes that no fit of this record can distinguish from the study as given.
     delay : Delay or None
     robot_values : KnownValues or None
     """
@@ -132,7 +132,7 @@ class Plausibility(
 
     @property
     def line(self) -> str:
-        """The worst finding in one line; "" where there is none."""
+        """The worst finding in one line; "" if there is none."""
         return "" if self.worst is None else self.worst.sentence
 
     def checks(self) -> tuple[Check, ...]:
@@ -140,11 +140,11 @@ class Plausibility(
         return self.answers
 
     def text(self) -> str:
-        """What stands beside the checks: what no record can tell."""
+        """Text besides the checks: changes that no record can reveal."""
         return "\n".join(f"No record can tell: {change}." for change in self.equivalent)
 
     def to_text(self) -> str:
-        """Findings that are not good, then what no record can tell."""
+        """Findings that are not good, then changes that no record can reveal."""
         lines = [f"{c.state}: {c.sentence}" for c in self.answers if c.state in WORST[:2]]
         told = "\n".join(filter(None, [*lines, self.text()]))
         return told or "Record, study and robot file suit each other, as far as judged."
@@ -241,7 +241,7 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
 
 
 def _case(problem: Problem, variants: GeneratedModel | None) -> Case | Check:
-    """What the checks read; the finding where there is nothing to read."""
+    """Data for the checks; a finding if there are no data."""
     model, study = problem.model, problem.settings
     own = [part for reading in problem.prepared for part in excerpts(reading)]
     try:

@@ -2,7 +2,7 @@
 
 Filters are linear: a sign, a scale or an exchange of columns acts on the filtered signals as on the
 measured ones, and a wrong rate scales velocities and accelerations. So a cause costs the regressor
-at these instants and nothing else, and none where it leaves the positions as they are.
+at these instants and nothing else, and none if it leaves the positions as they are.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Samples:
     cutoff : float, Hz
         Of the low-pass.
     still : ndarray of bool, shape (n,)
-        Whether the joint stands still in the whole record.
+        Whether the joint rests in the whole record.
     """
 
     t: Array
@@ -74,7 +74,7 @@ class Samples:
         return len(self.t)
 
     def standing(self) -> Array:
-        """Speed below which each joint is taken to stand, shape (n,), rad/s or m/s."""
+        """Speed below which each joint counts as resting, shape (n,), rad/s or m/s."""
         return np.asarray(LIMIT.STANDING * np.abs(self.qd).max(axis=0))
 
     def moving(self) -> Array:
@@ -91,7 +91,7 @@ class Samples:
         return np.asarray((np.ptp(self.tau, axis=0) <= 1e-9 * size) & ~self.without_motor())
 
     def thinned(self, most: int) -> Samples:
-        """At most `most` instants, evenly drawn."""
+        """At most `most` instants at equal distances."""
         kept = np.arange(0, len(self), -(-len(self) // most))
         return replace(self, **{name: getattr(self, name)[kept] for name in SIGNALS})
 
@@ -194,7 +194,7 @@ def motion_cutoff(record: Record, study: Study) -> float:
 
 
 def usable(record: Record, study: Study, before: int, after: int) -> Array:
-    """Samples in the window, and at least so many before and after a gap, bool (N,)."""
+    """Samples in the window that are far enough from a gap, bool (N,)."""
     t0, t1 = study.rows.window
     inside = (record.t >= (-np.inf if t0 is None else t0)) & (
         record.t <= (np.inf if t1 is None else t1)

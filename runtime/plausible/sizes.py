@@ -1,6 +1,6 @@
 """Before any fit: are positions, speeds, accelerations, torques and lengths those of this robot?
 
-Against `limits` of the robot file where it has them, against sane sizes otherwise. Sane sizes are
+Against `limits` of the robot file if it has them, against sane sizes otherwise. Sane sizes are
 conventions: an industrial joint turns a few rad/s and less than a turn or two.
 """
 
@@ -40,7 +40,7 @@ def times(records: Sequence[Record]) -> Answer:
     ahead=True,
 )
 def standing(case: Case) -> Answer | None:
-    """Joints that stand still in every record; None where all move."""
+    """Joints that rest in every record; None if all move."""
     still = case.samples.still
     if not still.any():
         return None

@@ -3,9 +3,9 @@ record decisively better with as few parameters.
 
 Every cause gets weighted least squares, which bounds from below what a physical robot of it can
 reach; only those whose bound beats the best so far are fitted under the conditions of a physical
-robot, near the values of the robot file where there are any.
+robot, near the values of the robot file if there are any.
 
-A number xi is tried where its first step is worth it. Around the fit chi of a physical robot, with A
+A number xi is tried if its first step gains enough. Around the fit chi of a physical robot, with A
 the weighted normal matrix, B the stiffness of bodies and values, J = d(W chi)/d xi its effect,
 
     [A + B   W'J] [d chi]   [ 0  ]
@@ -62,7 +62,7 @@ class Trial:
     ----------
     cause : Cause
     fit : Fit or None
-        Under the conditions of a physical robot; None where the bound already loses.
+        Under the conditions of a physical robot; None if the bound already loses.
     gain : float, nats
         Score of the study as given minus its own.
     equivalent : bool
@@ -112,7 +112,7 @@ class Baseline:
 
     def regressor(self, cause: Cause) -> Array | None:
         """D of a cause, shape (K, n, b), over the standard parameters where its table changes; None
-        where it cannot be evaluated.
+        if it cannot be evaluated.
         """
         if cause.on_torques:
             return self.D
@@ -161,7 +161,7 @@ class Baseline:
         return np.asarray(Q[:, np.abs(np.diag(R)) > 1e-9])
 
     def grams(self, cause: Cause) -> Grams | None:
-        """Normal equations of a cause; None where it cannot be evaluated."""
+        """Normal equations of a cause; None if it cannot be evaluated."""
         rows = self.rows(cause)
         return None if rows is None else Grams.of(*rows, self.tau)
 
@@ -171,7 +171,7 @@ class Baseline:
         return grams if grams.of_joints.shape[1] == p + 1 else grams.mapped(self.physical.K)
 
     def bound(self, grams: Grams) -> Fit:
-        """Least squares, near the values of the robot file where it has them: what no physical robot
+        """Least squares, near the values of the robot file if it has them: what no physical robot
         explains better.
         """
         if self.bodies.near_values:
@@ -228,8 +228,9 @@ class Baseline:
         return float((left / np.where(size > 0, size, 1.0)).max(initial=0.0))
 
     def hides(self, cause: Cause) -> bool:
-        """Whether no fit can tell a cause from the study: its rows lie in the span of W, and physics
-        asks the same of both.
+        """Whether no fit can distinguish a cause from the study.
+
+        Its rows lie in the span of W, and physics has the same conditions for both.
 
         The columns are tested on random combinations of them, beside the difference of the known
         torques.
@@ -277,7 +278,7 @@ class Baseline:
 
     def first_step(self, J: Array) -> tuple[Array, Array] | None:
         """xi of numbers of effect J, shape (a, K, n), beside the model, and their covariance; None
-        where the samples do not tell them from it.
+        if the samples do not tell them from it.
         """
         W, _, e, H = self.normal
         mask = self.as_given[2]
@@ -364,7 +365,7 @@ def counting_rows(D: Array, Y: Array, mask: Array, X: Array) -> float:
 
 def reach(model: GeneratedModel, q: Array) -> float:
     """Length of the robot, m: largest distance of a frame from the first one in the positions q,
-    shape (K, n); at least 0.1, 1 where not known.
+    shape (K, n); at least 0.1, 1 if not known.
     """
     P = frame_origins(model, q[:: max(1, len(q) // 32)])
     if P is None:
@@ -428,7 +429,7 @@ def _of_causes(baseline: Baseline, which: Sequence[Cause]) -> list[Trial]:
 
 
 def _of_numbers(baseline: Baseline, robot: Robot) -> list[Trial]:
-    """Trials of the numbers whose first step is worth it, each at its best value, and those that no
+    """Trials of the numbers whose first step gains enough, each at its best value, and those that no
     fit can tell.
     """
     trials: list[Trial] = []
@@ -569,7 +570,7 @@ def decisive(
 
 
 def takes_away(given: Fit, fit: Fit) -> Array:
-    """Of which joints a fit takes away a good part of the error, (n,)."""
+    """Joints whose error a fit reduces by a good part, (n,)."""
     ratio = given.errors / fit.errors.clip(0.1)
     return np.asarray((ratio > LIMIT.VISIBLE) & (given.errors - fit.errors > 0.2))
 

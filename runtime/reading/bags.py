@@ -69,7 +69,10 @@ class JointTable(Table):
     messages: tuple[JointState, ...]
 
     def chosen(self, names: Sequence[str]) -> Table:
-        """The table of the messages that hold a joint of these columns; of all messages where none does, so that the first one tells what is missing."""
+        """Table of the messages that hold a joint of these columns.
+
+        If none does, all messages, so that the first one shows what is missing.
+        """
         joints = {name.rpartition(".")[0] for name in names} - {""}
         some = [message for message in self.messages if joints.intersection(message.joints)]
         messages = some or list(self.messages)

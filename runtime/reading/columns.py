@@ -122,7 +122,7 @@ def _numbered(quantity: str, table: Table, joints: Sequence[str]) -> tuple[str, 
 
 
 def _numbered_joints(table: Table) -> tuple[str, ...]:
-    """Joints of a bag that are called alike but for a number, 1, 2 ... or 0, 1 ..., in this order."""
+    """Joints of a bag whose names differ in a number only, 1, 2 ... or 0, 1 ..., in this order."""
     joints = table.joints or ()
     matches = [re.fullmatch(r"(.*?)(\d{1,3})", joint) for joint in joints]
     numbers = sorted((match[1], int(match[2]), match[0]) for match in matches if match)
@@ -137,7 +137,7 @@ def _numbered_joints(table: Table) -> tuple[str, ...]:
 
 
 def _of_joint(table: Table, key: str, joint: str) -> str:
-    """The column of a joint by its name, alone or beside a word for the quantity: q_elbow, elbow.pos, effort/elbow."""
+    """Column of a joint by its name, alone or with a word for the quantity: q_elbow, elbow.pos, effort/elbow."""
     forms = {
         form
         for word in WORDS[key]
@@ -160,7 +160,7 @@ def _of_joint(table: Table, key: str, joint: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Conversion:
-    """From the columns of a record to the joint side, SI.
+    """Conversion of the columns of a record to the joint side and SI.
 
     Attributes
     ----------
@@ -260,7 +260,7 @@ def conversion(
 def require_alike(
     names: Columns, first: Table, last: Table, q: tuple[int, ...], tau: tuple[int, ...]
 ) -> None:
-    """Raise InputError where positions and torques, of these shapes, are not of one record."""
+    """Raise InputError if positions and torques, of these shapes, are not of one record."""
     if (
         first is not last
         and not set(names.q) & set(names.tau)
@@ -318,7 +318,7 @@ def _position_units(settings: RecordSettings, n: int) -> tuple[Array, Array]:
 def _torque_constant(
     settings: RecordSettings, drives: Drives | None, n: int
 ) -> tuple[Array, Array | None]:
-    """Factors from the unit of tau to SI, shape (n,), and torque constants, 1 where the unit is one of torques; None where all are."""
+    """Factors from the unit of tau to SI, shape (n,), and torque constants, 1 if the unit is one of torques; None if all are."""
     names = _units(settings.units.tau, n, "units.tau")
     units = [torque_unit(name) for name in names]
     factors = np.array([factor for _, factor in units])

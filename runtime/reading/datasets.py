@@ -129,7 +129,7 @@ DATASETS: Mapping[str, Dataset] = {"tx40": TX40, "emps": EMPS}
 
 def listing() -> list[dict[str, Any]]:
     """Every dataset as JSON values: name, title, source, licence and files, each with its address,
-    hash and path, null where it is not here.
+    hash and path, null if it is not here.
     """
     rows: list[dict[str, Any]] = []
     for name, dataset in DATASETS.items():
@@ -156,7 +156,7 @@ def locate(name: str, file: str, *, cache: Path | None = None) -> Path | None:
 
 def fetch(name: str, file: str, *, cache: Path | None = None) -> Path:
     """Path of a file of a dataset: from SYMGEN_DATA, the cache, or its source; raises
-    DataUnavailableError where none answers.
+    DataUnavailableError if none answers.
     """
     path, tried = _local(name, file, cache)
     if path is not None:

@@ -1,4 +1,4 @@
-"""A study with what the names of a file tell, for a person to complete."""
+"""A study with what the names of a file show, for a person to complete."""
 
 from __future__ import annotations
 

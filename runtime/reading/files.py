@@ -30,7 +30,7 @@ def is_file(path: Path) -> bool:
 
 
 def require_size(unpacked: int, size: int, file: str) -> None:
-    """Raise InputError where a file of `size` bytes would hold `unpacked` ones, more than a measured record ever does."""
+    """Raise InputError if a file of `size` bytes would hold `unpacked` ones, more than a measured record ever does."""
     if unpacked > max(ALWAYS, RATIO * size):
         raise InputError(
             f"unpacks to {unpacked / 2**20:.0f} MiB or more from {size / 2**20:.3g} MiB; a record may be {ALWAYS // 2**20} MiB or {RATIO} times the size of its file: store it without compression if it is genuine",
@@ -56,7 +56,7 @@ def opened(path: Path) -> Iterator[BinaryIO]:
 
 
 def unpacked(path: Path) -> Path | BytesIO:
-    """What libraries are given that take a path or a file: the path, or the bytes where they were compressed."""
+    """Path for libraries that read paths or files, or the uncompressed bytes of a compressed file."""
     with opened(path) as stream:
         packed = isinstance(stream, gzip.GzipFile)
     return BytesIO(read_bytes(path)) if packed else path

@@ -104,7 +104,7 @@ def is_measured(path: Path) -> bool:
 
 
 def format_of(path: Path) -> Format:
-    """The format that the ending of a file tells; a folder is a bag."""
+    """Format of a file by its ending; a folder is a bag."""
     suffixes = [BAG] if path.is_dir() else [s.lower() for s in path.suffixes if s.lower() != ".gz"]
     kind = suffixes[-1] if suffixes else ""
     for format_ in FORMATS:

@@ -77,7 +77,7 @@ UNITS = {"grad": "deg", "gradi": "deg", "degrés": "deg", "degres": "deg", "sek"
 
 @dataclass(frozen=True)
 class Family:
-    """Columns of one quantity: a stem, and what stands for the joints in it.
+    """Columns of one quantity: a common stem, and the part of the name that varies with the joint.
 
     Attributes
     ----------
@@ -103,16 +103,17 @@ class Family:
 
 
 def likely_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str, Any]:
-    """Settings of a record: columns t, q, tau, and units that names tell (currents are in A unless
-    they say mA); {} where names do not tell positions and as many torques. joints : their names in
-    the robot file.
+    """Settings of a record from the names of its columns: t, q, tau and units.
+
+    Currents are in A unless names say mA. {} if names do not give positions and as many torques.
+    joints : their names in the robot file.
     """
     found = known_columns(names, joints)
     return found if {"q", "tau"} <= {*found.get("columns", ())} else {}
 
 
 def known_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str, Any]:
-    """The same as far as names tell it; without torques where none are as many as the positions."""
+    """The same as far as names allow; without torques if their number differs from that of positions."""
     families = sorted(families_of(names, joints), key=lambda family: family.order)
     of = {key: [f for f in families if f.quantity == key] for key in WORDS}
     whole = [f for f in of["q"] if len(f.names) == len(joints)] or of["q"]
@@ -170,7 +171,7 @@ def families_of(names: Sequence[str], joints: Sequence[str] = ()) -> Iterator[Fa
 
 
 def _quantity(stem: str) -> tuple[str, int]:
-    """What the words of a stem mean, and the place of the word; ("", 0) where they say nothing."""
+    """Quantity that the words of a stem mean, and the place of the word; ("", 0) if they mean none."""
     words = _words(stem)
     for exact in (True, False):
         for key in ("other", "qd", "tau", "q", "t"):
@@ -187,7 +188,7 @@ def _target(stem: str) -> int:
 
 
 def _unit(name: str, read: Any) -> str:
-    """The unit that a name states in brackets or as a word; "" where it states none."""
+    """The unit that a name states in brackets or as a word; "" if it states none."""
     words = re.split(r"[\W\d_]+", name.lower())
     stated = [*re.findall(r"[\[(]([^\])#]+)[\])]", name)]
     for unit in (*stated, *(unit for unit in NAMED_UNITS if unit.lower() in words)):

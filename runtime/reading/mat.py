@@ -102,7 +102,7 @@ def _flatten(
 
 
 def _of_scipy(x: Any) -> Member:
-    """What a member of a file of versions 4 to 7 is."""
+    """Value of a member of a file of versions 4 to 7."""
     if isinstance(x, np.ndarray) and is_numeric(x):
         return x
     if isinstance(x, np.ndarray) and x.dtype.names:
@@ -117,7 +117,11 @@ def _members(group: Any) -> dict[str, tuple[Any, str]]:
 
 
 def _of_hdf5(member: tuple[Any, str]) -> Member:
-    """What a member of a file of version 7.3 is, as MATLAB shows it. Links to other files are not followed; a mark says where an array is empty and its dimensions are stored in its place."""
+    """Value of a member of a file of version 7.3, as MATLAB shows it.
+
+    Links to other files are not followed. A mark shows an empty array, whose dimensions are stored
+    in its place.
+    """
     import h5py
 
     archive, name = member

@@ -179,7 +179,7 @@ def _signals(
 def _require_shapes(
     columns: Columns, signals: Mapping[str, Signal], first: Table, last: Table
 ) -> None:
-    """Raise InputError where the columns are not of one record of n joints."""
+    """Raise InputError if the columns are not of one record of n joints."""
     N, n = signals["q"].values.shape
     rows, width = signals.get("tau", signals["q"]).values.shape
     width += columns.tau.count(NONE) if "tau" in signals else 0
@@ -307,7 +307,7 @@ def _uniform(
 def _places(settings: RecordSettings, tables: Sequence[Table]) -> tuple[Table, Table, Table]:
     """The files of the positions, of the torques and of the known torques.
 
-    Of two files the second holds the torques, but for known torques that it has and the first has not, beside torques of the first.
+    Of two files the second holds the torques, except for known torques that it has and the first has not, beside torques of the first.
     """
     first = tables[0]
     last = tables[-1]
@@ -331,7 +331,7 @@ def record_files(settings: RecordSettings, folder: Path) -> list[Path]:
 
 
 def _names_of(model: Any) -> tuple[str, ...]:
-    """Names of the joints of an emitted model, in the order of JOINTS; none where the robot file does not name every joint."""
+    """Names of the joints of an emitted model, in the order of JOINTS; none if the robot file does not name every joint."""
     names = getattr(model, "LABELS", {})
     if not isinstance(names, Mapping) or not all(
         isinstance(name, str) and name.isprintable() for name in names.values()

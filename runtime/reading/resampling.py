@@ -179,7 +179,10 @@ def resampled(
 
 
 def _counted(t: Array, signals: Sequence[Array], rate: float, file: str) -> Stretch:
-    """The signals as they are, at t[0] + k/rate. Raises InputError where the stamps last longer or shorter than so many samples."""
+    """The signals unchanged, at t[0] + k/rate.
+
+    Raises InputError if the time stamps last longer or shorter than this number of samples.
+    """
     N = len(t)
     last = float(t[-1] - t[0])
     if abs(last * rate - (N - 1)) > 1 + DRIFT * N:

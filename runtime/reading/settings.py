@@ -66,9 +66,9 @@ class Columns(Settings):
     """Names of the columns of a record file, one per joint.
 
     A name may be the number of the column (from 1) in a file without header, or an (N, n) array of
-    a .npz or .mat file, which stands for its n columns. `names` stands for the labels of the joints
+    a .npz or .mat file, which has n columns. `names` means the labels of the joints
     in the robot file: a column is called as the joint, or q_ and the joint, joint.position,
-    tau_joint, joint/effort ...; of q it stands for tau too, where tau is left out.
+    tau_joint, joint/effort ...; of q it is also that of tau, where tau is left out.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class Columns(Settings):
     qr : tuple of str
         Earlier name of q_ref.
     qd : tuple of str
-        Velocities that were recorded beside the positions, in the same file; unit and side of q,
+        Velocities that were recorded with the positions, in the same file; unit and side of q,
         per s. They give the velocity of the rows where they say more than differences of q do.
     qd_ref : tuple of str
         Reference velocities, in the same file, units as qd; for the law of a controller.
@@ -169,7 +169,7 @@ class Scale(Settings):
     tau : float or tuple of float or str
         On the torques; gtau where the file holds force = gtau*vir.
     wrench : float
-        On wrenches, which are those by which the sensor moves the links ahead of it: -1 where it
+        On wrenches, which are those by which the sensor moves the links ahead of it: -1 if it
         reports what they do to it.
     """
 
@@ -222,13 +222,13 @@ class RecordSettings(Settings):
     torque_side : str or None
         The same for tau alone: motor for joint angles recorded with motor currents. Default: side.
     rate : float or None, Hz
-        Sampling rate; may be left out where a time column gives it.
+        Sampling rate; may be left out if a time column gives it.
     units : Units
         Units of the columns.
     scale : Scale
         Factors on the columns.
     counts_per_revolution : float or tuple of float or None
-        Counts in one turn of the encoder, on the side of q; needed where the unit of q is counts.
+        Counts in one turn of the encoder, on the side of q; needed if the unit of q is counts.
     torque_constant : float or tuple of float or None, N*m/A or N*m/V
         For tau in A, mA, V; default: that of the robot's drives. On the side of tau: of the motor,
         or with the gear in it for the joint.

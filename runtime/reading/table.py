@@ -18,7 +18,7 @@ WIDEST = 10_000  # columns of a file; a wider one is no table of samples
 
 @dataclass(frozen=True)
 class Options:
-    """What the settings of a record say about its files.
+    """Settings of a record about its files.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Table:
     file : str
         Name of the file in messages.
     columns : mapping of str to ndarray
-        Numbers by name: a vector of N samples, or a matrix (N, k) or (k, N) that stands for k columns. Samples run along the longer side: a record has more samples than joints.
+        Numbers by name: a vector of N samples, or a matrix (N, k) or (k, N) that has k columns. Samples run along the longer side: a record has more samples than joints.
     refused : mapping of str to InputError
         What else the file holds under a name.
     empty : mapping of str to str
@@ -76,7 +76,7 @@ class Table:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the columns, or of matrices that stand for several."""
+        """Names of the columns, or of matrices with several columns."""
         return tuple(self.columns)
 
     def chosen(self, names: Sequence[str]) -> Table:
@@ -175,7 +175,7 @@ def is_numeric(x: Array) -> bool:
 
 @contextmanager
 def damage_named(title: str, file: str) -> Iterator[None]:
-    """What a library raises on bytes that are not what `title` says, as one InputError."""
+    """Turn any error of a library on damaged bytes into one InputError with `title`."""
     try:
         yield
     except (InputError, ImportError, KeyboardInterrupt, SystemExit):

@@ -98,7 +98,7 @@ def _row(path: Path, has_header: bool, i: int) -> str:
 
 
 def _parsed(path: Path, has_header: bool, delimiter: str | None, decimal: str) -> Array | None:
-    """All numbers, shape (N, k); None where something is no number, or a line has more or fewer."""
+    """All numbers, shape (N, k); None if something is no number, or a line has more or fewer."""
     lines = (line for _, line in islice(_lines(path), has_header, None))
     if decimal != ".":
         lines = (_with_point(line, decimal) for line in lines)
@@ -116,7 +116,7 @@ def _parsed(path: Path, has_header: bool, delimiter: str | None, decimal: str) -
 
 
 def _with_point(line: str, decimal: str) -> str:
-    """The line with decimal points; ValueError where it has some already: 1.234 may be a thousand."""
+    """The line with decimal points; ValueError if it has some already: 1.234 may be a thousand."""
     if "." in line:
         raise ValueError("a point beside decimal commas")
     return line.replace(decimal, ".")
@@ -131,7 +131,10 @@ def _by_fields(
     refused: dict[str, InputError],
     empty: dict[str, str],
 ) -> Array:
-    """The numbers of the lines, shape (N, k), nan where a field is none; what stands there is put among the `refused` and the `empty` columns."""
+    """Numbers of the lines, shape (N, k), with nan if a field is no number.
+
+    Columns with other texts are added to `refused`, columns with empty fields to `empty`.
+    """
     numbers = array("d")
     for count, (number, line) in enumerate(lines):
         row = f"line {number}"
@@ -167,7 +170,7 @@ def _fields(line: str, delimiter: str | None) -> list[str]:
 
 
 def _number(text: str, decimal: str) -> float | None:
-    """The number that a field holds; None where it holds none."""
+    """The number that a field holds; None if it holds none."""
     if "_" in text or not text.isascii() or (decimal != "." and "." in text):
         return None
     try:

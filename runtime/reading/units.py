@@ -1,4 +1,4 @@
-"""Units of measured columns, turned into SI where a record enters: the only place where pint is
+"""Units of measured columns, turned into SI when a record enters: the only place where pint is
 used. Inside, everything is SI.
 
     position_unit("deg")     ("angle", 0.017453292519943295)

@@ -79,7 +79,7 @@ class Certificate:
     count, rank : int
         Number of base parameters, and exact rank of their columns (the smallest over the primes).
     primes : tuple of int
-        Primes of the exact checks; empty where coefficients are numbers.
+        Primes of the exact checks; empty if coefficients are numbers.
     identities : int
         Number of column identities checked: one per standard parameter.
     failures : tuple of str
@@ -92,12 +92,12 @@ class Certificate:
         Largest difference of torques by base and by standard parameters on the independent
         regressor, of the largest torque.
     texts : mapping
-        What ran of each text, by file; empty where none was given.
+        What ran of each text, by file; empty if none was given.
     rank_in_floats : bool
         Whether `rank` is that of the independent regressor: loops of which F_p gives no points of
         one geometry.
     error_probability : float
-        Bound on the probability that a false identity passes the exact checks; 1 where coefficients
+        Bound on the probability that a false identity passes the exact checks; 1 if coefficients
         are numbers, which are checked in floats.
     """
 
@@ -323,7 +323,7 @@ def _too_small(W: Array) -> str:
 
 
 def hair_off(robot: Robot, what: str) -> str:
-    """Where a geometry is so near to a special one that floats do not tell them apart."""
+    """Message about a geometry so near to a special one that floats do not distinguish them."""
     angles = "; ".join(nearly_round(robot, WITHIN)) or "round the numbers that are meant round"
     return (
         f"the file is a hair off a special geometry: {what} of it act by less than 1e-9 of the "
@@ -403,7 +403,7 @@ def degree(regrouping: Regrouping) -> int:
 def _modulo(
     regrouping: Regrouping, seed: int, p: int, sampler: Sampler
 ) -> tuple[int | None, list[str]]:
-    """Rank of the base columns over F_p (None where no points of one geometry are found), and the
+    """Rank of the base columns over F_p (None if no points of one geometry are found), and the
     columns that are not what the formulas say.
     """
     robot = regrouping.robot

@@ -50,7 +50,7 @@ def cache_folder() -> Path:
 
 
 def cached_path(file: str, text: str) -> Path | None:
-    """Path of the cache entry of a file that holds the certified `text`; None where there is none,
+    """Path of the cache entry of a file that holds the certified `text`; None if there is none,
     or another text.
     """
     path = _entry(text)
@@ -68,7 +68,7 @@ def stored_path(file: str, text: str) -> Path:
     """Path of a file that holds `text`, in the cache, by what its certificate vouches
     for and by the whole, or, where that cannot be written, in a folder of this process.
 
-    Raises SymgenError where no file can be written at all.
+    Raises SymgenError if no file can be written at all.
     """
     folder, whole = _entry(without_certificate(text)), _entry(text)
     if folder is not None and whole is not None:
@@ -87,7 +87,7 @@ def stored_path(file: str, text: str) -> Path:
 
 
 def without_certificate(text: str) -> str:
-    """What the certificate of a text vouches for: all but the lines that it consists of."""
+    """Text that the certificate covers: all lines except its own."""
     return CERTIFICATE.sub("", text, count=1)
 
 
@@ -103,9 +103,7 @@ def imported(path: Path) -> ModuleType:
 
 
 class _TextLoader(SourceFileLoader):
-    """Loader of the text alone, which it keeps: bytecode of an earlier text that lies beside is
-    neither read nor written.
-    """
+    """Loader that reads the text only: bytecode of an earlier text is neither read nor written."""
 
     text = ""
 
@@ -144,7 +142,7 @@ def _key(text: str) -> str:
 def _entry(text: str) -> Path | None:
     """Folder of a text in the cache; None without a home folder, or where others may write.
 
-    Raises SymgenError where SYMGEN_CACHE names such a folder.
+    Raises SymgenError if SYMGEN_CACHE names such a folder.
     """
     try:
         folder = cache_folder().absolute()

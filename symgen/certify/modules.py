@@ -133,7 +133,7 @@ def model(robot: str | Path | Robot, *, options: Sequence[str] = ()) -> ModuleTy
 
 
 def _certified_path(robot: Robot, target: str, options: Sequence[str] = ()) -> Path | None:
-    """Path of a text in the cache: what lies there has been certified. None where the robot has no
+    """Path of a text in the cache: what lies there has been certified. None if the robot has no
     text of the target.
     """
     for file, text in generate_files(robot, targets=(target,), options=options).items():

@@ -52,7 +52,7 @@ TILES = 71  # samples of the functions in C: some tiles, the last not full
 
 @dataclass(frozen=True)
 class TextCheck:
-    """What ran of a text.
+    """Results of the run of a text.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class TextCheck:
     sha256 : str
         Hash of the text below its header.
     errors : mapping
-        Largest difference of each function from the witness, of the largest entry; infinite where
+        Largest difference of each function from the witness, of the largest entry; infinite if
         it does not run, has another shape, or other values than the file's where no constants are
         given.
     constants : str
@@ -71,7 +71,7 @@ class TextCheck:
     uses : tuple of str
         The ways in which a module ran.
     not_run : str
-        Why nothing ran; empty where it did.
+        Why nothing ran; empty if it did.
     raised : mapping
         What functions of a module raised in place of a result.
     """
@@ -87,7 +87,7 @@ class TextCheck:
 
     @property
     def wrong(self) -> list[str]:
-        """What disagrees; NaN does."""
+        """Functions that disagree; NaN counts as disagreement."""
         return [name for name, error in self.errors.items() if not error < TOLERANCE]
 
     @property
@@ -113,7 +113,7 @@ class TextCheck:
 
     @property
     def sentence(self) -> str:
-        """What ran."""
+        """Sentence on what ran."""
         if self.not_run:
             return f"not run: {self.not_run}"
         uses = ", ".join(self.uses)
@@ -216,7 +216,7 @@ def largest(
     call: Use,
     witness: Witness,
 ) -> tuple[float, str]:
-    """Largest error of a function in all its checks, and what it raised; infinite where it has other
+    """Largest error of a function in all its checks, and what it raised; infinite if it has other
     constants than the file by itself.
     """
     try:
@@ -235,7 +235,7 @@ def largest(
 def outcome(
     call: Use, module: ModuleType, name: str, check: Check, constants: Mapping[str, float]
 ) -> bytes | str:
-    """What a function gives, as bytes, or what it raises, as text."""
+    """Result of a function as bytes, or its exception as text."""
     try:
         return call(module, name, check, constants).tobytes()
     except Exception as error:  # a text may fail in any way
@@ -419,7 +419,7 @@ def _flat(a: Array) -> list[float]:
 
 
 def _run(command: list[str], given: str = "") -> str:
-    """What a command prints. Raises SubprocessError where it fails, or takes too long."""
+    """Output of a command; SubprocessError if it fails or takes too long."""
     return subprocess.run(
         command, input=given, capture_output=True, text=True, timeout=LONGEST_RUN, check=True
     ).stdout

@@ -44,7 +44,7 @@ def variants(robot: str | Path | Robot) -> ModuleType:
     -------
     module
         Constants free_alpha1, free_d1, free_theta1, free_r1 ... (gamma and b where a frame has
-        them), free_gx, free_gy, free_gz, beside those of the robot file; their defaults are its
+        them), free_gx, free_gy, free_gz, in addition to those of the robot file; their defaults are its
         entries.
     """
     robot = freed(robot if isinstance(robot, Robot) else load_robot(robot))

@@ -43,7 +43,7 @@ RANDOM, OF_THE_FILE = "random constants", "the constants of the file"
 
 @dataclass(frozen=True)
 class Check:
-    """What a function has to give.
+    """Expected values of a function.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Check:
     scale : ndarray or float
         What a difference is divided by.
     keywords : mapping
-        Keyword arguments beside the constants.
+        Keyword arguments besides the constants.
     compared : callable
         Makes of the result what is compared with `expected`.
     """
@@ -131,7 +131,7 @@ class Witness:
 
     @property
     def defaults(self) -> dict[str, float]:
-        """What these constants are in the file."""
+        """Values of these constants in the file."""
         return {name: self.robot.constants[name] for name in self.regrouping.constants}
 
     @property
@@ -234,8 +234,9 @@ class Witness:
     def value(
         self, name: str, of: int = 0, frame: int = 0, rows: Sequence[int] | None = None
     ) -> Array:
-        """What a model has to give, (N, ...): of frame `of`, in components of frame `frame`; of a
-        determinant, of these rows from 1, else of those that are not zero.
+        """Value of a model, (N, ...), for frame `of` in components of frame `frame`.
+
+        A determinant uses the given rows, from 1, or else those that are not zero.
         """
         N, chi, T, friction = len(self.q), self.chi, self.poses, lambda e: e.is_friction
         R = T[:, frame, :3, :3].swapaxes(1, 2)

@@ -30,7 +30,7 @@ def compare(
     """Identify ROBOT with each treatment of the records, and rank them by how well they predict the
     validation record.
 
-    A single study gives up to three treatments: as stated, without the rows of standing joints, and
+    A single study gives up to three treatments: as stated, without the rows of resting joints, and
     without its known torques. Each treatment uses the set of parameters that predicts best. Exit
     code 1 if the best one cannot be used.
     """

@@ -149,7 +149,7 @@ def _wrapped(line: str, width: int) -> str:
 
 
 def end(*, good: bool) -> None:
-    """Exit code 1 where the answer of a verb is negative."""
+    """Exit code 1 if the answer of a verb is negative."""
     if not good:
         raise typer.Exit(NEGATIVE)
 
@@ -295,7 +295,7 @@ def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
 
 
 def require_record(study: Study, file: str) -> None:
-    """InputError where the study of that file names no record."""
+    """InputError if the study of that file names no record."""
     from runtime.core.errors import InputError
 
     if not study.record:
@@ -348,7 +348,7 @@ def stopped(checkpoint: Checkpoint | None) -> NoReturn:
 
 @contextmanager
 def progress_lines(after: float = 2.0) -> Iterator[None]:
-    """What long work is at, one line each on the error stream, from `after` seconds on."""
+    """Report long work on the error stream, one line for each stage, after `after` seconds."""
     import logging
     from time import monotonic
 

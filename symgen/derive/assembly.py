@@ -42,7 +42,7 @@ def loop_ends(robot: Robot, algebra: GraphAlgebra, closure: Closure) -> list[tup
 
 
 def coincidence(ends: list[tuple[Pose, Pose]]) -> list[Scalar]:
-    """P_cut - P_twin and A_cut - A_twin, twelve entries a loop; zero where the frames coincide."""
+    """P_cut - P_twin and A_cut - A_twin, twelve entries a loop; zero if the frames coincide."""
     return [
         sub(x, y)
         for (A, P), (B, Q) in ends
@@ -236,7 +236,7 @@ class Assembly:
         return min(ends, key=self.gap)
 
     def solve(self, q: Array) -> Array | None:
-        """Newton for the passive joints from `q`; None where the loops do not close."""
+        """Newton for the passive joints from `q`; None if the loops do not close."""
         closed = newton(self.rows, q, self.passive, steps=STEPS, tolerance=TOLERANCE)
         return closed if self.gap(closed) < 10 * TOLERANCE else None
 

@@ -52,7 +52,7 @@ HALF = Expression.number(Fraction(1, 2))
 
 
 class CompositeRates(CompositeLinks):
-    """HP and BP of every composite link beside its parameters.
+    """HP and BP of every composite link, with its parameters.
 
     Parameters
     ----------

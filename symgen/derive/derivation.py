@@ -34,7 +34,7 @@ ABSORBED = ("YY", "MZ", "M")
 
 @dataclass(frozen=True)
 class Derivation:
-    """What `derive` found. Later models may add nodes to its graph, and change none.
+    """Result of `derive`. Later models may add nodes to its graph, but change none.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Derivation:
 
 @lru_cache(maxsize=8)
 def derive(robot: Robot) -> Derivation:
-    """The derivation of `robot`, made once. Raises DescriptionError where its loops cannot
+    """The derivation of `robot`, made once. Raises DescriptionError if its loops cannot
     close.
     """
     return derived(robot, close)

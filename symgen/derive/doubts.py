@@ -21,7 +21,7 @@ UNLIMITED = 1000.0  # ... unless it stands for none at all
 
 
 def doubts(robot: Robot) -> list[str]:
-    """A sentence for each. Raises DescriptionError where a loop does not close."""
+    """A sentence for each. Raises DescriptionError if a loop does not close."""
     return [
         *nearly_round(robot),
         *other_units(robot),

@@ -133,7 +133,7 @@ def linear_in(
     e: Expression, state: str, along: Row
 ) -> tuple[dict[int, Expression], Expression] | None:
     """(row, rest) of e = row . x + rest, x the positions (q) or velocities (qd) of the joints and
-    `state` alone the sum of those `along` a row; None where e is something else.
+    `state` alone the sum of those `along` a row; None if e is something else.
     """
     row: dict[int, Expression] = {}
     rest = ZERO

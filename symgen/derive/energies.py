@@ -96,7 +96,7 @@ def kinetic_energy(d: Derivation) -> Scalar:
 
 
 def potential_energy(d: Derivation) -> Scalar:
-    """U of gravity, springs and constant torques; zero where the origin of frame 0 is, springs at q
+    """U of gravity, springs and constant torques; zero if the origin of frame 0 is, springs at q
     = 0.
     """
     frames, half = Frames(d.geometry), d.algebra.constant(HALF)

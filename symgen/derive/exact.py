@@ -314,7 +314,7 @@ def primes_for(robot: Robot, count: int, seed: int | None = None) -> tuple[int, 
     """`count` primes p < 2**31 with p = -1 modulo 4 and 2D, over which the square roots of the
     robot's rationals exist: the largest, or below a random place.
 
-    Raises SymgenError where there are too few.
+    Raises SymgenError if there are too few.
     """
     primes = tuple(islice(candidates(robot, seed), count))
     if len(primes) == count:

@@ -67,7 +67,7 @@ class Frames:
         return v
 
     def position(self, j: int, i: int, seen_from: int) -> Vector:
-        """From the origin of frame i to that of frame j, in components of frame `seen_from`."""
+        """Vector from the origin of frame i to that of frame j, in components of frame `seen_from`."""
         to, start = self.robot.path(j), self.robot.path(i)
         total = ZERO3
         for f in to:

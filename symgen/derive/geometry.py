@@ -102,7 +102,7 @@ def displacement(A: Matrix, b: Scalar, d: Scalar, r: Scalar) -> Vector:
 
 
 class Geometry:
-    """Rotations, positions and carriers of all frames of `robot`, as nodes of `algebra`; of those that frame `root` carries alone, where it is not the base."""
+    """Rotations, positions and carriers of all frames of `robot`, as nodes of `algebra`; of those that frame `root` carries alone, if it is not the base."""
 
     def __init__(
         self, robot: Robot, algebra: GraphAlgebra, closure: Closure, root: int = 0

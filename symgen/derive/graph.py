@@ -69,7 +69,7 @@ class Node:
 
     `value` says what exact arithmetic has to know: the Symbol of an input, the number of a
     constant, the Angle of a cosine or sine, the Velocity of a sign or positive part, the Expression
-    of a square root; None where it knows nothing but the operands. `name` is what the emitted line is called; `hint` is used for the name of a node that turns out
+    of a square root; None if it knows nothing but the operands. `name` is what the emitted line is called; `hint` is used for the name of a node that turns out
     to be shared and has none.
     """
 
@@ -305,7 +305,7 @@ def interpret(
 ) -> list[Any]:
     """The values of graph scalars over a domain; 0, 1 and -1 stay whole numbers.
 
-    known : values of nodes by their index; those that are needed beside them are added.
+    known : values of nodes by their index; those that are needed besides them are added.
     """
     value: dict[int, Any] = {} if known is None else known
 

@@ -54,7 +54,7 @@ class GraphAlgebra:
         self.labels: dict[str, Angle] = {}
 
     def section(self, title: str) -> None:
-        """What follows belongs under this heading."""
+        """Put the following steps under this heading."""
         self.sections.append((len(self.graph.nodes), title))
 
     def constant(self, e: Expression) -> Scalar | int:

@@ -160,7 +160,7 @@ class Lagrange:
         return _floats(self._functions[name], *arguments, self._values)
 
     def vary(self, rng: np.random.Generator, states: int) -> None:
-        """Draw channels, functions of time, at each of so many states."""
+        """Draw channels (functions of time) at each of `states` states."""
         self._values = np.tile(self._values, (states, 1))
         for name in self.robot.channels:
             self._values[:, [*self.constants].index(name)] = rng.uniform(0.5, 2, states)
@@ -395,7 +395,7 @@ def _functions(robot: Robot) -> dict[str, Any]:
 
 
 def _closure(robot: Robot, q: SX, constants: Mapping[str, SX]) -> SX:
-    """phi(q), zero where every twin coincides with its cut frame and every constrained joint has
+    """phi(q), zero if every twin coincides with its cut frame and every constrained joint has
     its value.
 
     Positions per longest length, from the frame that carries a loop: beside the lengths of an arm
@@ -489,7 +489,7 @@ class Sample:
 
 def _leverage(robot: Robot, constants: Mapping[str, float]) -> Array:
     """Largest coefficient of each actuated joint among the rows of elements that several of these
-    share, 1 where there is none; shape (n,).
+    share, 1 if there is none; shape (n,).
     """
     closure = close(robot)
     rows = [dict(closure.in_independent(r)) for e in robot.elements for r in e.along.values()]
@@ -514,7 +514,7 @@ def sampled(
 
     Velocities and accelerations are standard normal; in every other state each velocity is divided
     by its leverage, so that the sign of q4 + 101.25 q5 is not that of q5 alone. `in_time`: channels
-    are drawn at every state. Raises DescriptionError where the loops close in too few of the
+    are drawn at every state. Raises DescriptionError if the loops close in too few of the
     states.
     """
     model, rng = Lagrange(robot, constants), np.random.default_rng(seed)

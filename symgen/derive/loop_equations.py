@@ -144,7 +144,7 @@ class LoopSystem:
         return float(min(PACE[0], PACE[1] / np.abs(G).max()))
 
     def turn(self) -> tuple[int, ...] | None:
-        """Whole turns of the tied joints per turn of the actuated one; None where it cannot turn
+        """Whole turns of the tied joints per turn of the actuated one; None if it cannot turn
         fully or is not the only one.
         """
         if [self.robot.frame(j).sigma for j in self.robot.joints] != [REVOLUTE]:

@@ -53,7 +53,7 @@ Sample = tuple[Mapping[str, float], Mapping[int, float]]  # constants, closed co
 @lru_cache(maxsize=64)
 def close(robot: Robot) -> Closure:
     """The closure of `robot`: declared relations checked, linear ones derived. Raises
-    DescriptionError where the loops cannot close.
+    DescriptionError if the loops cannot close.
     """
     return find_relations(robot) if robot.passive else open_tree(robot)
 
@@ -83,7 +83,7 @@ def find_relations(robot: Robot) -> Closure:
 
 
 def _configurations(assembly: Assembly) -> Iterator[Array]:
-    """Closed configurations: the one nearest to the `start` of the loops and no other where there
+    """Closed configurations: the one nearest to the `start` of the loops and no other if there
     is one, else from random places, or from the closest approach.
     """
     robot, rng, closed = assembly.robot, np.random.default_rng(3), False
@@ -106,7 +106,7 @@ def _configurations(assembly: Assembly) -> Iterator[Array]:
 def _nearest(assembly: Assembly, wanted: Mapping[int, float]) -> Array | None:
     """The closed configuration nearest to the joints that `start` names, hinges up to whole turns:
     those that it does not name are free, from several places, and passive ones that it names from
-    beside it; None where none closes.
+    beside it; None if none closes.
     """
     rng, free = np.random.default_rng(5), assembly.free
     others, passive = [k for k, j in enumerate(free) if j not in wanted], assembly.passive
@@ -226,7 +226,7 @@ def _closure(
 
 def _samples(assembly: Assembly, q: Array) -> list[Sample]:
     """Constants with the configuration there: those of the file with q, and others near them, at
-    which equal values of different symbols differ. Empty where the loops do not close there.
+    which equal values of different symbols differ. Empty if the loops do not close there.
     """
     rng, robot = np.random.default_rng(7), assembly.robot
     angles = {s for f in robot.frames for e in (f.gamma, f.alpha, f.theta0) for s in e.symbols}
@@ -277,7 +277,7 @@ def _offset(
 
 
 def _beside(robot: Robot, row: Mapping[int, Expression]) -> Expression:
-    """sum n_i c_i, c_i the constant beside q_i in theta or in r."""
+    """sum n_i c_i, with c_i the constant added to q_i in theta or r."""
     frames = {i: robot.frame(i) for i in row}
     terms = ((f.theta0 if f.sigma == REVOLUTE else f.r0) * row[i] for i, f in frames.items())
     return sum(terms, ZERO)

@@ -24,7 +24,7 @@ TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")  # of an origin, and the angular ve
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked of a model.
+    """Parameters, frames and substitutions for a model.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class Request:
     of, frame : int
         Which frame's model, in components of which frame.
     inputs : mapping
-        What stands in the place of inputs.
+        Values that replace inputs.
     """
 
     parameters: Mapping[str, str]
@@ -102,7 +102,7 @@ class Model:
     denominator : str
         What its entries are still to be divided by, where the closed form says that apart.
     result : str
-        What emitted text calls the array; empty where no target has the function.
+        What emitted text calls the array; empty if no target has the function.
     symbolic : bool
         Whether it can be had as symbols.
     of_frames : bool
@@ -116,11 +116,11 @@ class Model:
     up_to_a_constant : bool
         Whether a constant may be added to it.
     page : int
-        Its place on the page of a robot, from 1; 0 where it is not shown there.
+        Its place on the page of a robot, from 1; 0 if it is not shown there.
     case_of : str
         The model that it is where the arguments that it has not are zero: Python modules call that.
     option : str
-        What asks targets for it (`symgen generate --with`); empty where they always have it.
+        What asks targets for it (`symgen generate --with`); empty if they always have it.
     latex : str
         The letter in LaTeX; where left out, `letter` in bold.
     """
@@ -150,7 +150,7 @@ class Model:
 
     @property
     def summary(self) -> str:
-        """What it is, as a sentence; a symbol at its start stays as it is."""
+        """Description of the model in one sentence; a symbol at its start keeps its case."""
         word = self.meaning.partition(" ")[0]
         first = (
             self.meaning[0] if word in self.arguments + (self.result,) else self.meaning[0].upper()

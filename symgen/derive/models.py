@@ -43,7 +43,7 @@ def _still(d: Derivation, *kinds: str, tied: bool = True) -> dict[Symbol, Input]
 def _without(
     d: Derivation, kept: Callable[[Element], bool], links: bool = True
 ) -> dict[Symbol, Input]:
-    """Zero parameters: of elements that are not `kept`, and of links where they are not."""
+    """Zero parameters: of elements that are not `kept`, and of links if they are not."""
     elements = element_names(d.robot)
     return {
         Symbol("parameter", name): ZERO

@@ -1,7 +1,7 @@
 """One model out of the derivation: its graph with inputs replaced, and no value written twice.
 
 Every model is the recursion with some inputs set: bias is Gamma at qdd = 0, a column of the inertia
-matrix Gamma of a unit acceleration at qd = 0 without gravity, base parameters stand in the place of
+matrix Gamma of a unit acceleration at qd = 0 without gravity, base parameters replace
 the standard parameters they are called after and all others are 0. What becomes zero goes.
 
 Hash-consing finds what is written alike; a few nodes are equal but written differently, and some
@@ -193,7 +193,7 @@ class Rewrite:
         return same if image.sign > 0 else -same
 
     def _first_of(self, node: Node) -> Scalar | int:
-        """0, 1 or -1 where that is the value of the node, else the first node of its value."""
+        """0, 1 or -1 if that is the value of the node, else the first node of its value."""
         p = self.draw.p
         (value,) = interpret([self.graph.scalar(node.index, 1)], self.draw, self._value)
         residues = self.draw.residues(value).tolist()

@@ -1,5 +1,5 @@
 """What a message adds when a novice's mistake is recognised: the thing to write instead. Each
-returns "" where it has nothing to say.
+returns "" if it has nothing to say.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _YAML = {  # what the scanner says: what to change
 
 
 def yaml_advice(problem: str) -> str:
-    """What to change where the YAML scanner says `problem`."""
+    """Remedy for the message `problem` of the YAML scanner."""
     return next((f"; {advice}" for part, advice in _YAML.items() if part in problem), "")
 
 
@@ -48,7 +48,7 @@ def symbol_advice(name: str, declared: Iterable[str]) -> str:
 
 
 def unit_advice(token: str) -> str:
-    """For what follows a number and is no operator: a unit."""
+    """Remedy for a number that is followed by a unit."""
     unit = token.lower()
     if unit in ("deg", "degree", "degrees", "°", "grad"):
         return "; angles are in rad: 90 degrees are pi/2"
@@ -58,9 +58,7 @@ def unit_advice(token: str) -> str:
 
 
 def degrees_advice(angle: Expression, constants: dict[str, float]) -> str:
-    """For an angle that exceeds a full turn by more than multiples of pi: it was meant in degrees.
-    angle : without q_j.
-    """
+    """Remedy for an angle beyond a full turn that is no multiple of pi: degrees were meant. angle : without q_j."""
     turn = angle - PI * angle.coefficient("pi")
     if "pi" in turn.atoms or turn.symbols - constants.keys():
         return ""

@@ -15,7 +15,7 @@ ALL_DIGITS = 1e-12  # rad: closer to a multiple of pi/12 is that multiple in eve
 
 
 class RobotFileWarning(UserWarning):
-    """What a foreign robot file says that its author probably did not mean."""
+    """Statement of a foreign robot file that its author probably did not intend."""
 
 
 class InertiaWarning(RobotFileWarning):
@@ -43,7 +43,7 @@ class Angles:
     near: list[tuple[str, float, int]] = field(default_factory=list)
 
     def twelfths(self, angle: float, name: str) -> int | None:
-        """k of the multiple k pi/12 that `angle` is taken as; None where it stays."""
+        """k of the multiple k pi/12 that `angle` is taken as; None if it stays."""
         k = twelfths(angle, SNAP)
         if k is None or abs(k * (math.pi / 12) - angle) <= ALL_DIGITS:
             return k
@@ -51,7 +51,7 @@ class Angles:
         return None if self.exact else k
 
     def report(self, file: str) -> tuple[str, tuple[str, ...]]:
-        """How the angles were read, for headers and as a note; an AngleWarning tells it too."""
+        """How angles were read, for headers and as a note, with an AngleWarning."""
         if not self.near:
             return "", ()
         near = f"{len(self.near)} angle{'s' * (len(self.near) > 1)} near multiples of pi/12"

@@ -56,14 +56,14 @@ def at_values(robot: Robot, values: Mapping[str, Expression] | None = None) -> R
 
 
 def round_angle(e: Expression) -> Expression:
-    """An angle, a joint's with it, its decimal as a multiple of pi/12 where it is one."""
+    """An angle, a joint's with it, its decimal as a multiple of pi/12 if it is one."""
     c = e.terms.get((), Fraction(0))
     near = c and twelfths(float(c), WITHIN) is not None
     return e - c + exact(float(c), angle=True) if near else e
 
 
 def substituted(e: Expression, values: Mapping[str, Expression]) -> Expression:
-    """`e` at these values; raises DescriptionError where it has none there."""
+    """`e` at these values; raises DescriptionError if it has none there."""
     try:
         return e.substitute(values)
     except (ArithmeticError, ValueError) as error:
@@ -112,7 +112,7 @@ def _numbers(robot: Robot) -> dict[str, Expression]:
 
 
 def exact(value: float, *, angle: bool = False) -> Expression:
-    """A value as its shortest decimal, or an angle as a multiple of pi/12 where it is one."""
+    """A value as its shortest decimal, or an angle as a multiple of pi/12 if it is one."""
     if angle and value and (k := twelfths(value, WITHIN)) is not None and math.isfinite(value):
         return PI * Fraction(k, 12)
     return Expression.number(repr(float(value)))

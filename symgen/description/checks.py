@@ -163,7 +163,7 @@ def _check_expression(
 
 
 def _check_finite(e: Expression, path: Path, constants: Mapping[str, float]) -> None:
-    """Refuse a division by zero and the root of a negative number; joints stand at 1."""
+    """Refuse division by zero and roots of negative numbers; joints have the value 1."""
     try:
         finite = math.isfinite(e.value({**dict.fromkeys(e.symbols, 1.0), **constants}))
     except (ArithmeticError, ValueError):
@@ -207,7 +207,7 @@ def _check_exact(e: Expression, path: Path, *, angle: bool) -> None:
 
 
 def _other_sigma(f: Frame) -> str:
-    """What sigma says, where the row reads as one of another joint."""
+    """Sentence on the right sigma, if the row looks like that of another kind of joint; else ""."""
     if moves(f.theta) or (f.sigma == PRISMATIC and moves(f.r)):
         return ""
     if f.sigma == REVOLUTE:

@@ -26,7 +26,7 @@ from symgen.errors import DescriptionError
 
 def khalil_frames(frames: tuple[Frame, ...]) -> tuple[Frame, ...]:
     """Khalil's table of a distal one, fixed frames of the branch ends last; raises DescriptionError
-    where gamma or b is given.
+    if gamma or b is given.
     """
     for f in frames:
         for key in ("gamma", "b"):

@@ -22,7 +22,7 @@ def khalil_values(robot: Robot) -> dict[str, float]:
 
         MS' = ms + M p,     J' = R J R' + 2 (ms p) E - p ms' - ms p' + M (p p E - p p')
 
-    A value is given where all that enters it is. Raises DescriptionError where one that was given
+    A value is given where all that enters it is. Raises DescriptionError if one that was given
     enters none, with what is missing.
     """
     values = dict(robot.values)

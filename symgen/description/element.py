@@ -3,7 +3,7 @@
     along {j: G}:  s = G q,  Gamma += G' c law(s, sd, sdd)
     form  {j: B}:  Gamma += c B qdd | c B qd | c B q
 
-The laws are the expressions of KINDS, in which q, qd, qdd stand for s, sd, sdd; a column of the
+The laws are the expressions of KINDS, in which q, qd, qdd mean s, sd, sdd; a column of the
 user's has its own, over s, sd, q1, qd1 ... of any joints, constants and scalars, as a torque or as
 an energy, Gamma += c dU/dq. Forms are for laws that are qdd, qd or q. With `when`, viscous and
 coulomb elements act in motion along s in this direction only. Parameter c is called family + key.
@@ -172,7 +172,7 @@ class Element:
         return sorted(name.removeprefix(CHANNEL) for name in names if name.startswith(CHANNEL))
 
     def law(self, j: int) -> Expression:
-        """Torque along s of key j for parameter 1; zero where it is that of an energy."""
+        """Torque along s of key j for parameter 1; zero if it is that of an energy."""
         return self._of_key(self.torque or KINDS[self.kind].torque, j)
 
     def potential(self, j: int) -> Expression:
@@ -286,7 +286,7 @@ def _positions(robot: Any, row: Any) -> tuple[float, float]:
 
 
 def check_channels(robot: Any) -> None:
-    """What a record gives as a function of time is no constant of anything else."""
+    """Check that a channel is used in laws only, not as a constant elsewhere."""
     of_frames = [
         getattr(f, name)
         for f in robot.frames

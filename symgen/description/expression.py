@@ -172,7 +172,7 @@ class Expression:
         return isinstance(other, Expression) and self.terms == other.terms
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """By its terms: the hash of a text is another in another process."""
+        """Pickle by the terms, because hashes of texts differ between processes."""
         return Expression, (self.terms,)
 
     def __hash__(self) -> int:
@@ -322,7 +322,7 @@ ZERO, ONE, PI = Expression(), Expression.number(1), Expression.symbol("pi")
 
 
 def decimal(c: Fraction, *, fractions: bool = True) -> str:
-    """A rational as an exact decimal where it is one of reasonable length, else as p/q; halves,
+    """A rational as an exact decimal if it is one of reasonable length, else as p/q; halves,
     quarters and eighths are p/q too where `fractions` is true.
     """
     if c.denominator == 1:
@@ -503,7 +503,7 @@ class Function(NamedTuple):
     number : callable
         Its value at a number.
     numpy, casadi, c, sympy : str
-        Its name there; empty where it is written otherwise.
+        Its name there; empty if it is written otherwise.
     """
 
     at_zero: int | None
@@ -607,7 +607,7 @@ def quarter_turns(angle: Expression) -> tuple[int, Expression]:
 
 
 def ratio(x: float) -> Fraction:
-    """The fraction of a denominator up to LARGEST_RATIO that x is but for rounding, such as 1/3 of
+    """The fraction of a denominator up to LARGEST_RATIO that x is except for rounding, such as 1/3 of
     0.3333333333333333, else its shortest decimal.
     """
     near = Fraction(x).limit_denominator(LARGEST_RATIO)
@@ -615,7 +615,7 @@ def ratio(x: float) -> Fraction:
 
 
 def twelfths(angle: float, within: float) -> int | None:
-    """k of the multiple k pi/12 that lies within `within` rad of a decimal angle; None where none
+    """k of the multiple k pi/12 that lies within `within` rad of a decimal angle; None if none
     does. Drawings have such angles.
     """
     k = round(angle * 12 / math.pi)

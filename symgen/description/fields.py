@@ -55,8 +55,9 @@ def located(file: str, line: Callable[[Path], int] = lambda _: 1) -> Iterator[No
 
 @dataclass
 class Declared:
-    """What a robot file declares, the context in which its tables are read: names of constants,
-    these and joint variables, the number of rows, whether they are distal, and the frames read.
+    """Names that a robot file declares, and other context in which its tables are read.
+
+    Names of constants; these and joint variables; the number of rows; whether they are distal; the frames read.
     """
 
     constants: frozenset[str]

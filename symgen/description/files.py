@@ -188,7 +188,7 @@ def write_robot(
 
 
 def content_of(path: Path) -> bytes:
-    """Bytes of a robot file, one more than MAX_BYTES at most; DescriptionError where it cannot be
+    """Bytes of a robot file, one more than MAX_BYTES at most; DescriptionError if it cannot be
     read.
     """
     names = ", ".join(packaged_robots())

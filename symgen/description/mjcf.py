@@ -310,9 +310,7 @@ def _relations(growing: _Growing) -> dict[str, Expression]:
 
 
 def _equation(model: Any, names: list[str], e: int, line: int) -> Expression:
-    """What is zero by relation e:  y1 - y1_0 - a0 - a1 (y2 - y2_0), y a joint position or the
-    length of a fixed tendon.
-    """
+    """Left side of relation e: y1 - y1_0 - a0 - a1 (y2 - y2_0), y a joint position or the length of a fixed tendon."""
     kind, name = int(model.eq_type[e]), model.equality(e).name
     a0, a1, *higher = (ratio(float(x)) for x in model.eq_data[e][:5])
     if any(higher):

@@ -3,7 +3,7 @@ that it names is opened, nothing is multiplied, nothing is drawn.
 
 Assets, sensors, contacts, cameras and the rest are left out. A geom that is a mesh becomes one
 without mass where its body has an <inertial>, or never moves; a mass that only a mesh would tell is
-refused, and so are elements that stand for many others (replicate, composite, flexcomp, attach,
+refused, and so are elements that replace many others (replicate, composite, flexcomp, attach,
 plugins). Of actuators the names of the joints that they drive are read.
 """
 
@@ -42,7 +42,7 @@ TEXTS = re.compile(r"\w*(name|class|joint\d?|tendon\d?|body\d?|model|mesh|materi
 
 @dataclass(frozen=True)
 class Mjcf:
-    """What an MJCF file says of its mechanism.
+    """Mechanism of an MJCF file.
 
     Attributes
     ----------
@@ -213,9 +213,7 @@ def _spec(root: XmlElement) -> tuple[Any, list[int]]:
 
 
 def _errors_with_lines(act: Callable[[], Any], lines: Sequence[int]) -> Any:
-    """What MuJoCo makes; its errors with the line of the file, and without its remarks on its own
-    simulation, which would go to the screen and to a file of the working folder.
-    """
+    """Model that MuJoCo compiles; its errors get the line of the file, its remarks on simulation are dropped."""
     import mujoco
 
     before = mujoco.get_mju_user_warning()
@@ -241,7 +239,7 @@ def _take_out_meshes(
     body: Any, lines: Sequence[int], *, moves: bool, from_geoms: bool, all_weighed: bool
 ) -> None:
     """The geoms of a body, and of those on it, that are meshes weigh nothing; DescriptionError
-    where their mass matters.
+    if their mass matters.
     """
     moves = moves or bool(body.joints)
     weighed = (moves or all_weighed) and (from_geoms or not body.explicitinertial)

@@ -141,7 +141,7 @@ def check_families(elements: Sequence[Element]) -> None:
 
 
 def _of_others(name: str) -> str:
-    """What of ours, of the grammar or of Python is called so in every text; empty if nothing."""
+    """Reason why a name is taken in every text (by symgen, the grammar or Python); empty if it is free."""
     if STATES.match(name):
         return "a joint position, rate or torque (q, QP, QDP, GAM and a number)"
     if name in LAYOUT:

@@ -63,7 +63,7 @@ def skeleton(name: str) -> str:
 def skeleton_for(file: Path) -> str:
     """Text of a skeleton for the robot file `file`; its first lines lead editors to the JSON Schema.
 
-    Raises DescriptionError where the name of the file is none of a robot file.
+    Raises DescriptionError if the name of the file is none of a robot file.
     """
     if file.suffix not in (".yaml", ".yml"):
         raise DescriptionError(f"{file}: a robot file ends in .yaml")

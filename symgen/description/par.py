@@ -8,7 +8,7 @@
     frame 0, as here
 
 Links are 1 .. NL, cut joints NL+1 .. NJ; frame NJ+k, fixed, coincides with cut joint NL+k, so that
-NF = 2 NJ - NL. Comments may stand anywhere, lists may break over lines, keys are read in any case,
+NF = 2 NJ - NL. Comments may be anywhere, lists may break over lines, keys are read in any case,
 Pi and ^ as in Mathematica. The format has no place for the value of a symbol; comments that SYMORO
 skips carry them: `(* constants: D3 = 0.45, g = 9.81 *)`, likewise `values` and `start 1`.
 
@@ -219,9 +219,7 @@ def _comment(text: str, line: int, par: _Par) -> None:
 
 
 def _expression(text: str, line: int) -> Expression:
-    """An expression of the file, in the grammar of robot files but for Pi, ^, [ ] and capital
-    functions.
-    """
+    """Read an expression of the file: the grammar of robot files, and also Pi, ^, [ ] and capital functions."""
     text = re.sub(r"\b(Pi|PI|Sin|Cos|Tan|Sqrt)\b", lambda word: word.group().lower(), text)
     text = re.sub(r"\b(theta|th|t|q)\((\d+)\)", r"\1\2", text)
     try:
@@ -366,9 +364,7 @@ def _frames(par: _Par, NF: int, *, loops: bool) -> tuple[Frame, ...]:
 
 
 def _variable(e: Expression, j: int, key: str, line: int) -> str:
-    """Name of the joint variable in theta_j or r_j: th1, t1, theta1, q1 or r1, else the one symbol
-    that stands alone.
-    """
+    """Name of the joint variable in theta_j or r_j: th1, t1, theta1, q1 or r1, or the only symbol there."""
     names = {"theta": (f"th{j}", f"t{j}", f"theta{j}", f"q{j}"), "r": (f"r{j}", f"q{j}")}[key]
     usual = sorted((s for s in e.symbols if s.lower() in names), key=lambda s: s not in names)
     alone = [s for s in e.symbols if e == Expression.symbol(s)]

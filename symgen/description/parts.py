@@ -204,7 +204,7 @@ def _of_motors(value: list[float] | float | None, declared: Declared) -> tuple[f
 
 
 def _of_motors_if_given(value: Any, declared: Declared) -> tuple[float, ...] | None:
-    """One number for each actuated joint; None where none is given: currents are then refused."""
+    """One number for each actuated joint; None if none is given: currents are then refused."""
     return None if value is None else _of_motors(value, declared)
 
 
@@ -247,7 +247,7 @@ class Drives:
 
 @dataclass(frozen=True, config=CONFIG)
 class LimitsTable:
-    """For exciting trajectories, one entry per actuated joint."""
+    """Limits for exciting trajectories, one entry for each actuated joint."""
 
     q: Annotated[
         list[Interval] | None,

@@ -233,7 +233,7 @@ class Robot:
         check_robot(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """By its fields, in memory: a table that cannot be written to has no copy of its own."""
+        """Pickle by the fields, because read-only tables cannot be copied."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         plain: dict[str, Any] = {
             k: dict(x) if isinstance(x, MappingProxyType) else x for k, x in values.items()

@@ -118,7 +118,7 @@ def json_schema() -> dict[str, Any]:
 
 
 def schema_text() -> str:
-    """The text of robot.schema.json, which is installed beside this module."""
+    """Text of robot.schema.json, which is installed in this folder."""
     return json.dumps(json_schema(), indent=2, ensure_ascii=False) + "\n"
 
 
@@ -183,7 +183,7 @@ def explain(error: ValidationError) -> DescriptionError:
 
 
 def _advice(path: Path, given: Any, message: str) -> str:
-    """What to write instead, where a value of the wrong type shows what was meant."""
+    """Remedy, if a value of the wrong type shows what was meant."""
     if path[-1:] == ("sigma",):
         return ": 0 revolute, 1 prismatic, 2 fixed"
     if path[:2] == ("drives", "ratio"):

@@ -1,4 +1,4 @@
-"""A tree of links and joints with any axes, as URDF and MJCF tell it: what both are read into, and
+"""A tree of links and joints with any axes, as URDF and MJCF describe it: what both are read into, and
 what becomes a table of Khalil frames; and part of one: joints held at positions, of a chain from
 `base` to `tip` all but those between these two links, at zero.
 
@@ -167,7 +167,7 @@ def transform(row: Sequence[float]) -> Array:
 
 @dataclass(frozen=True)
 class TreePart:
-    """What of a tree is kept.
+    """Part of a tree that is kept.
 
     Attributes
     ----------
@@ -185,7 +185,7 @@ WHOLE_TREE = TreePart()
 
 
 def part_of(tree: Tree, part: TreePart) -> Tree:
-    """The tree with the joints of `part.lock` held, and those beside `part.chain`; notes tell which.
+    """Tree in which the joints of `part.lock` and those outside `part.chain` are held; notes name them.
 
     Raises
     ------

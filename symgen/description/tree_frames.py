@@ -9,7 +9,7 @@ Where fixed joints are kept, each link that one holds is a fixed frame too, its 
 the file, after all that move; its inertia stays with the body, so that formulas and numbers of
 joints are the same either way.
 
-Lengths become constants, equal ones (but for the sign) the same constant, so that the formulas know
+Lengths become constants, equal ones (except for the sign) the same constant, so that the formulas know
 what is special about the robot.
 """
 

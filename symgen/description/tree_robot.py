@@ -246,7 +246,7 @@ def _limits(
 
 
 def _values(table: Table, actuated: list[int]) -> tuple[dict[str, float], frozenset[int]]:
-    """Standard parameters by name, empty where no link has inertia, and the frames without a link
+    """Standard parameters by name, empty if no link has inertia, and the frames without a link
     of their own.
     """
     links = table.tree.links

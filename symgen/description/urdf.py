@@ -1,7 +1,7 @@
 """URDF to a Robot: the text becomes a tree of links and joints, the tree a table of Khalil frames
 (`tree_frames`) with values (`tree_robot`).
 
-Numbers are read as they stand; meshes, textures and packages are never opened. A URDF library would
+Numbers are read as they are; meshes, textures and packages are never opened. A URDF library would
 load them, and its XML parser expands entities (`xml_text` reads neither). Every error names its
 line.
 """
@@ -172,7 +172,7 @@ def _inertial(link: XmlElement, angles: Angles) -> Inertial | None:
 
 
 def no_body(M: float, tensor: Array) -> str:
-    """Why no body has this mass and this tensor about its centre of mass; "" where one has."""
+    """Why no body has this mass and this tensor about its centre of mass; "" if one has."""
     if not M and tensor.any():
         return "mass 0 with an inertia"
     small, middle, large = np.linalg.eigvalsh(tensor)

@@ -45,7 +45,7 @@ def write_urdf(
     robot : Robot
         Without loops; passive joints follow one joint each.
     values : mapping, SI, optional
-        Standard parameters by name; those of the robot file where left out. A URDF holds masses, so
+        Standard parameters by name; those of the robot file if left out. A URDF holds masses, so
         they must be those of a physical robot:
         of a feasible estimate, or CAD.
 
@@ -156,7 +156,7 @@ def _limit(robot: Robot, f: Frame) -> dict[str, float]:
 
 
 def _follows(robot: Robot, j: int) -> tuple[int, float, float]:
-    """q_j = multiplier q_i + offset; DescriptionError where it depends on several joints."""
+    """q_j = multiplier q_i + offset; DescriptionError if it depends on several joints."""
     e = robot.constraints[j]
     leaders = [i for i in robot.moving if f"q{i}" in e.symbols]
     factor = e.coefficient(f"q{leaders[0]}") if len(leaders) == 1 else None

@@ -29,7 +29,7 @@ def assignment(text: str, option: str = "--constant") -> tuple[str, float]:
 
 def values_of_csv(content: bytes, file: str) -> dict[str, float]:
     """Standard parameters by name from lines of name,value or name,value,note; a header with these
-    names may stand first.
+    names may be the first line.
 
     Raises DescriptionError, with file and line, where a line is something else, or there is none.
     """

@@ -198,7 +198,7 @@ def tables_of(robot: Robot) -> dict[str, Any]:
 
 
 def write_yaml(robot: Robot, *, comments: Sequence[str] = ()) -> str:
-    """Text of the file; `comments` are lines that stand first, each after a #."""
+    """Text of the file; `comments` are its first lines, each after a #."""
     lines = [f"# {line}" for line in comments]
     for key, table in tables_of(robot).items():
         if key in BY_ROW and table:

@@ -50,7 +50,7 @@ class ClosedDraw(Draw):
 
     `geometry` gives residues, shape (count, 1), of what varies; default: all lengths, or those that
     are constants where `at_numbers` leaves the others at their values. `wide` times as many states
-    as usual are drawn. Raises ArithmeticError where no two joints close each loop.
+    as usual are drawn. Raises ArithmeticError if no two joints close each loop.
     """
 
     def __init__(

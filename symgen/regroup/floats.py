@@ -153,7 +153,7 @@ def _columns_near_start(
 
 
 def _in_time(robot: Robot, rng: np.random.Generator, count: int) -> Any:
-    """Values of the channels of laws at so many states."""
+    """Values of the channels of laws at `count` states."""
     return {name: rng.uniform(0.5, 2, count) for name in robot.channels}
 
 

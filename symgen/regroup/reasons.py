@@ -1,4 +1,4 @@
-"""Why a standard parameter stands in a base parameter, and what an edit of the robot file does to
+"""Why a standard parameter is part of a base parameter, and what an edit of the robot file does to
 the base parameters.
 
 The regressor columns of the standard parameters are combinations of those of the base,
@@ -7,7 +7,7 @@ Gamma = sum_k D_k chi_k = sum_b D_b X_b, hence
     D_k = sum_b K[b, k] D_b ,
 
 K[b, k] the coefficient of chi_k in the formula of X_b: YY2 is subtracted in XX2R because the
-columns of YY2 and XX2R are opposite. Which rule gave the relation is told by the step that moved
+columns of YY2 and XX2R are opposite. Which rule gave the relation follows from the step that moved
 the parameter: a general one (`rules`), or one of this robot alone.
 """
 

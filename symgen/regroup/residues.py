@@ -26,7 +26,7 @@ def draw_states(
     count: int = 0,
 ) -> Draw:
     """`samples` random states over F_p at one geometry, or at each of `count`; closed where joints
-    are tied. Raises ArithmeticError where general loops have no points of one geometry.
+    are tied. Raises ArithmeticError if general loops have no points of one geometry.
     """
     if close(robot).tied:
         return closed_draw(robot, seed, samples, p=p, count=max(count, 1), geometry=geometry)

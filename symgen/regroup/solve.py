@@ -129,7 +129,7 @@ class Pool:
         }
 
     def grow(self, count: int) -> None:
-        """At least `count` geometries."""
+        """Draw until there are at least `count` geometries."""
         if count <= self.count:
             return
         more = max(count - self.count, self.count, FEWEST_GEOMETRIES)
@@ -153,7 +153,7 @@ class Pool:
         return total
 
     def vector(self, name: str, k: int, P: Products, Q: Products) -> dict[int, int] | None:
-        """{place among [*Q, *P]: residue} of the first relation with a denominator, or None where
+        """{place among [*Q, *P]: residue} of the first relation with a denominator, or None if
         there is none; cos(a) and cos(3a) make others.
         """
         count = len(P) + len(Q) + 4
@@ -178,7 +178,7 @@ class Pool:
 
 @dataclass(frozen=True)
 class Dependence:
-    """What a coefficient depends on: `free` variables, and others as factors with a power."""
+    """Variables of a coefficient: `free` ones, and others as factors with a power."""
 
     free: tuple[Variable, ...]
     powers: Mapping[str | Number | Call, int]
@@ -256,7 +256,7 @@ class Recognition:
         return result
 
     def _power(self, reference: int, scaled: Sequence[int]) -> int:
-        """n where scaling a variable by SCALES scales a coefficient by their n-th powers, 0 where
+        """n where scaling a variable by SCALES scales a coefficient by their n-th powers, 0 if
         it does not.
         """
         p = self.pools[0].p

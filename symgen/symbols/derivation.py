@@ -106,7 +106,7 @@ def source_of(
     passive: str | None = None,
     regrouping: Regrouping | None = None,
 ) -> Source:
-    """The robot with what was asked, see `symgen.symbolic`; `regrouping` is that of the robot where
+    """The robot with what was asked, see `symgen.symbolic`; `regrouping` is that of the robot if
     it is known already.
     """
     _one_of("parameters", parameters, PARAMETERS)

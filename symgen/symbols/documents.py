@@ -87,7 +87,7 @@ EXPANDED = 2000  # terms that are multiplied out to see
 
 
 def printed(model: SymbolicModel, form: str, language: str) -> str:
-    """A model as text, latex, sympy or json, in closed or recursive form. Raises SymgenError where
+    """A model as text, latex, sympy or json, in closed or recursive form. Raises SymgenError if
     the form has too many terms or is none.
     """
     for what, given, known in (("form", form, FORMS), ("format", language, FORMATS)):
@@ -343,7 +343,7 @@ def aligned(equations: Iterable[str], environment: str = "align*") -> str:
 
 
 def broken(line: str) -> list[str]:
-    """`left &= right` on as many lines as it needs."""
+    """`left &= right`, broken into as many lines as needed."""
     left, _, right = line.partition(" &= ")
     if width(line) > LATEX_WIDTH:  # brackets that grow cannot be broken
         right = re.sub(r"\\(left|right)\b", "", right)
@@ -363,7 +363,7 @@ def escaped(text: str) -> str:
 
 
 def _written(c: str) -> str:
-    """A letter as it is, or with its number beside it."""
+    """A letter, with its number if it has one."""
     common = (c < "\u0180" and c not in "ĦħĸĿŀŉŦŧſ") or c in "–—‘’“”„…•€"
     return c if common else rf"\other{{{ord(c):04X}}}{{{c}}}"
 
@@ -425,9 +425,7 @@ def sympy_lines(model: SymbolicModel, form: str) -> str:
 
 
 def json_text(model: SymbolicModel, form: str) -> str:
-    """Plain values: labels of the axes, entries or equations as text, what C and S stand for, what
-    is to be known of the passive joints.
-    """
+    """Plain values: labels of the axes, entries or equations as text, meaning of C and S, notes on passive joints."""
     robot = model.source.robot
     values: dict[str, Any] = {
         "name": robot.name,
@@ -486,7 +484,7 @@ def shown_models(regrouping: Regrouping) -> tuple[list[ShownModel], list[str]]:
 
 
 def _shown(model: SymbolicModel) -> ShownModel | None:
-    """None where the robot has neither form of the model."""
+    """None if the robot has neither form of the model."""
     title = model.model.name.replace("_", " ")
     try:
         closed = model.closed

@@ -98,7 +98,7 @@ class Expansion:
     # --- generators ---
 
     def _names(self, taken: set[str]) -> dict[Angle, tuple[Tree, Tree]]:
-        """What the cosine and the sine of every angle of the graph are called."""
+        """Names of the cosine and the sine of every angle of the graph."""
         names: dict[Angle, tuple[Tree, Tree]] = {}
         for node in self.algebra.graph.nodes:
             if not isinstance(node.value, Angle):
@@ -112,7 +112,7 @@ class Expansion:
         return names
 
     def _generators(self, node: Node) -> Iterable[tuple[Tree, int]]:
-        """What a node needs of K, with its rank."""
+        """Generators of K that a node needs, with its rank."""
         name = str(node.value)
         match node.op:
             case "sym":

@@ -43,7 +43,7 @@ def rational(c: Fraction) -> Tree:
 
 
 def product(c: Fraction, factors: Iterable[Tree]) -> Tree:
-    """c times the factors; a minus stands before the whole product."""
+    """c times the factors, with a minus in front of the whole product."""
     written = [f for f in factors if f != 1]
     if not written:
         return rational(c) if c.denominator == 1 else signed(c, power(Number(abs(c)), 1))
@@ -65,12 +65,12 @@ def negative(x: Tree) -> Tree:
 
 
 def is_negative(x: Tree) -> bool:
-    """Whether a minus stands before x."""
+    """Whether x begins with a minus."""
     return bool(x.is_negative if x.is_Number else x.is_Mul and x.args[0] is MINUS)
 
 
 def total(terms: Iterable[Tree]) -> Tree:
-    """The sum of the terms in their order; the terms of a sum among them stand side by side."""
+    """Sum of the terms in their order; terms of an inner sum stay together."""
     flat = [x for term in terms for x in (term.args if term.is_Add else (term,))]
     return sympy.Add(*flat, evaluate=False)
 

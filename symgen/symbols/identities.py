@@ -22,7 +22,7 @@ Coefficient = Any  # of the ring of cosines, sines, constants and rates
 
 
 class Identities:
-    """What is known of cosines and sines.
+    """Known relations between cosines and sines.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ class Identities:
 
 
 def number(c: Fraction) -> Fraction | int:
-    """An integer where it is one."""
+    """An integer if it is one."""
     return c.numerator if c.denominator == 1 else c
 
 

@@ -19,7 +19,7 @@ from symgen.emit.printers import PLAIN, Text
 
 @dataclass(frozen=True)
 class Equation:
-    """name = expression, both as text; `section` is the heading that it stands under."""
+    """name = expression, both as text, under the heading `section`."""
 
     section: str
     name: str

@@ -49,7 +49,7 @@ INDEXED = re.compile(r"(.*?[^\d_])_?(\d*(?:_\d+)*)(R?)")
 
 
 def letter(name: str) -> tuple[str, str]:
-    """(letter, subscript) of a name; both may be printed as they are but for Greek letters."""
+    """Letter and subscript of a name; both are printed as they are, except Greek letters."""
     if not name[0].isidentifier():  # a number
         return name, ""
     if match := ENTRY.fullmatch(name):
@@ -66,7 +66,7 @@ def letter(name: str) -> tuple[str, str]:
 
 
 def split_sign(x: Tree) -> tuple[Any, Tree]:
-    """(number, rest) of a product whose number stands before it: -1, or a fraction; else (1, x)."""
+    """(number, rest) of a product with a leading number, -1 or a fraction; else (1, x)."""
     number, rest = x.as_coeff_Mul()
     before = number == -1 or (not number.is_Integer and rest.free_symbols)
     return (number, rest) if before else (sympy.S.One, x)

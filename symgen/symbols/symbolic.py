@@ -40,9 +40,9 @@ def symbolic(
         Value of any symbol (constants, q1, QP1, QDP1, parameters), by name: a number, or a text as
         in robot files ("pi/2"). Zeros leave the recursion.
     passive : str, optional
-        Of closed loops. "functions": passive joints in terms of the actuated ones, where the
+        Of closed loops. "functions": passive joints in terms of the actuated ones, if the
         relation is linear. "symbols": all of them stay symbols, with `closure` zero. Left out:
-        functions where there are any, symbols for the rest.
+        functions if there are any, symbols for the rest.
     limit : int
         Terms that a closed form may have, multiplied out; a longer one is refused, its recursion
         never.

@@ -29,9 +29,7 @@ LARGEST = 10_000  # terms of a model, multiplied out
 
 @dataclass(frozen=True)
 class ClosedModel:
-    """Entries that differ from zero, each over `denominator` where there is one, and the angles
-    that their C and S stand for.
-    """
+    """Nonzero entries, over `denominator` if there is one, and the angles of their C and S."""
 
     entries: Mapping[Place, Tree]
     denominator: Tree | None
@@ -97,7 +95,7 @@ class SymbolicModel:
 
     @property
     def summary(self) -> str:
-        """What the model is, its frames by their numbers."""
+        """Description of the model, with numbers of its frames."""
         text = self.model.summary
         if self.model.of_frames:
             text = text.replace("frame `of`", f"frame {self.request.of}").replace(
@@ -109,7 +107,7 @@ class SymbolicModel:
 
     @cached_property
     def closed(self) -> ClosedModel:
-        """The closed form. Raises SymgenError where it has too many terms, or where the model has
+        """The closed form. Raises SymgenError if it has too many terms, or where the model has
         none; the message names the form that works.
         """
         try:
@@ -184,8 +182,9 @@ class SymbolicModel:
         return ClosedModel(entries, denominator, angles)
 
     def _determinant(self) -> ClosedModel:
-        """Of the whole Jacobian in the frames that give the fewest terms: neither the frame nor the
-        point of the last link changes it.
+        """Determinant of the whole Jacobian, in the frames that give the fewest terms.
+
+        Neither the frame nor the point of the last link changes it.
         """
         robot, n, of = self.source.robot, len(self.source.robot.joints), self.request.of
         if n > 6:
@@ -263,7 +262,7 @@ class SymbolicModel:
     @cached_property
     def listing(self) -> Listing:
         """The recursion as equations in the order in which they are computed. Raises SymgenError
-        where the model has none.
+        if the model has none.
         """
         if self.model.cases is None:
             raise SymgenError(

@@ -28,11 +28,11 @@ class Change:
         In the file, and in the new text.
     sigma : float
         Standard deviation that the record leaves, of the part that it tells; conditions of a
-        physical robot aside; nan where the record tells nothing of it.
+        physical robot aside; nan if the record does not determine it.
     told_by : str
         record: determined; sum: only together with other numbers, this is the value nearest to the
         file; file: no torque depends on it,
-        and it changes only where no physical robot is left otherwise.
+        and it changes only if no physical robot is left otherwise.
     """
 
     place: str

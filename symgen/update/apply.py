@@ -54,12 +54,12 @@ def apply(
     ----------
     estimate : Estimate, Identification, str or Path
         Result, its estimate.json, or the folder that `symgen identify -o` wrote. Of a whole
-        identification the parameters that stand for the robot are taken, or the physical ones where
+        identification the parameters that are used are taken, or the physical ones if
         the essential ones do (`Identification.whole_estimate`).
     model : str or Path
         The file: .urdf, or .xml and .mjcf (MJCF).
     robot : str or Path, optional
-        Robot file that was identified, where it is not `model` itself: converted from it, perhaps
+        Robot file that was identified, if it is not `model` itself: converted from it, perhaps
         with other elements or drives.
     lock, chain, exact
         As of `read_robot`, and as when the robot was identified or converted.
@@ -153,9 +153,7 @@ def _estimate(given: Any) -> Estimate:
 
 
 def _require_same_joints(result: Estimate, robot: Robot, of: str) -> None:
-    """Raise DescriptionError where the estimate tells names of joints, and they are not those of
-    the robot.
-    """
+    """Raise DescriptionError if the estimate names joints and the robot has others."""
     theirs = result.provenance.get("labels")
     if not isinstance(theirs, Mapping):
         return
@@ -184,7 +182,7 @@ def _inertial(physical: PhysicalModel) -> set[str]:
 def _determined_names(
     result: Estimate, physical: PhysicalModel, of: str
 ) -> tuple[list[str], Array, list[str]]:
-    """Names and values of the base parameters that the record tells, and names of the others."""
+    """Names and values of the base parameters that the record determines, and names of the others."""
     if unknown := [name for name in result.names if name not in physical.base]:
         raise DescriptionError(
             f"{', '.join(unknown[:8])} of the estimate are no base parameters of {of}; name the "
@@ -203,7 +201,7 @@ def _determined_names(
 
 def _root(result: Estimate, names: Sequence[str]) -> Array:
     """A root of the covariance of the known base parameters, (b, b), deviations corrected where
-    they are; zero where there is none.
+    they are; zero if there is none.
     """
     at = [result.names.index(name) for name in names]
     C = np.nan_to_num(result.covariance[np.ix_(at, at)])

@@ -15,9 +15,9 @@ base parameter depends does not move, nor does a mass that enters none but by it
 its tensor.
 
 A body may be several links, held together by fixed joints: the record knows their sum. First the
-link that the joint carries changes alone; only where no physical link is left, the others change
-with it. What the torques cannot tell from a motor inertia is one, whether the format has a place
-for it or not; other elements that the file does not have change only where links cannot take them
+link that the joint carries changes alone; only if no physical link is left, the others change
+with it. What the torques cannot separate from a motor inertia is one, whether the format has a place
+for it or not; other elements that the file does not have change only if links cannot take them
 in.
 """
 
@@ -160,7 +160,7 @@ def nearest(
     X : ndarray, shape (len(names),), SI
         Their values.
     absent : collection of str
-        Elements that the file does not have; they change only where the links cannot.
+        Elements that the file does not have; they change only if the links cannot.
 
     Raises
     ------
@@ -273,7 +273,7 @@ def _sizes_of(x: Array) -> Array:
 
 
 def _spare(physical: PhysicalModel, own: Sequence[str], absent: Sequence[str]) -> list[str]:
-    """Absent parameters that the own ones can stand in for."""
+    """Absent parameters whose columns are combinations of those of the other parameters."""
     spare: list[str] = []
 
     def rank(names: Sequence[str]) -> int:
@@ -327,7 +327,7 @@ def _violated(part: Numbers, u: Array) -> bool:
 
 def _solve(part: Numbers, K: Array, rest: Array, start: Array, free: Array) -> Array | None:
     """The numbers with K chi(u) = rest nearest to `start`, of which those that are `free` move; None
-    where Newton's steps do not find them.
+    if Newton's steps do not find them.
     """
     S, u = (part.size * part.ease)[free], start.copy()
     for _ in range(STEPS):

@@ -228,7 +228,7 @@ class Places:
                 )
 
     def link(self, name: str, tree: Tree, X: Array) -> LinkPlace:
-        """Where the numbers of link `name` stand, which has pose X in frame j of `tree`."""
+        """Places of the numbers of link `name`, which has pose X in frame j of `tree`."""
         link, inertial = self.links[name], tree.links[name]
         e = next(link.own("inertial"), None)
         if e is not None and e not in link:
@@ -357,7 +357,7 @@ class FileLink:
     ten : ndarray, shape (10,)
         XX .. ZZ, MX, MY, MZ, M of the file in frame j.
     place : LinkPlace
-        Where its numbers stand.
+        Places of its numbers.
     """
 
     name: str
@@ -386,7 +386,7 @@ class RobotText:
     robot : Robot
         The robot of `tree`.
     places : Places
-        Where the numbers stand.
+        Places of the numbers.
     """
 
     file: str
@@ -408,7 +408,7 @@ class RobotText:
         ]
 
     def joint_values(self, j: int) -> dict[str, float]:
-        """What the file says of the elements along joint j, by family."""
+        """Values of the file for the elements along joint j, by family."""
         return {family: value(self.table.joint[j]) for family, _, value in JOINT_TERMS}
 
     def attribute(self, family: str, j: int) -> str | None:

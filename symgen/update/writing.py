@@ -23,7 +23,7 @@ SLIDING = {"FV": "N*s/m", "FS": "N", "Ia": "kg", "OFFSET": "N", "K": "N/m"}
 
 @dataclass(frozen=True, eq=False)
 class Writing:
-    """What goes into a file.
+    """Values that are written into a file.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Writing:
         return rows
 
     def _link_rows(self, link: FileLink) -> list[Change]:
-        """One row for each number of a link: from, to, deviation, and what tells it."""
+        """One row for each number of a link: from, to, deviation, and source."""
         rows, at = [], self.nearest.links[link.name]
         for k in link.place.attributes.order:
             name, label, unit = NUMBERS[k]

@@ -1,4 +1,4 @@
-"""Numbers of an XML text replaced where they stand: every other byte stays.
+"""Numbers of an XML text replaced in place: every other byte stays.
 
 `symgen.description.xml_text` reads the text, refuses what is no plain XML, and tells where each
 element starts. Here the start tag is read again, as bytes: an edit is a span of bytes and what
@@ -57,7 +57,7 @@ class XmlEdits:
         values: Sequence[float],
         default: Sequence[float] | None = None,
     ) -> None:
-        """The numbers of an attribute, the first ones where it has more; those that stay are not
+        """The numbers of an attribute, the first ones if it has more; those that stay are not
         touched.
 
         Parameters
@@ -118,7 +118,7 @@ class XmlEdits:
         self.added.append(f"line {e.line}: {name} of <{e.tag}>")
 
     def _value(self, e: XmlElement, name: str) -> tuple[int, int] | None:
-        """Where the value of an attribute stands, without its quotes."""
+        """Place of the value of an attribute, without its quotes."""
         match = self._attributes(e).get(name.encode())
         return None if match is None else (match.start("quoted") + 1, match.end("quoted") - 1)
 

@@ -78,9 +78,9 @@ def cestac(
     own_encoder : callable
         From a record to the encoder that made it, where the law of rounding asks for it.
     loop_of : callable
-        From a problem to the closed loop that it simulates; None where it simulates none.
+        From a problem to the closed loop that it simulates; None if it simulates none.
     columns : sequence of str, optional
-        Essential names where they are known; default: those of the problem. Unused where settings.cestac.columns is "all".
+        Essential names if they are known; default: those of the problem. Unused where settings.cestac.columns is "all".
     map : callable, optional
         As the built-in one; computes the runs, in processes (`runtime.parallel.processes.processes`) or by a
         Dask cluster (`runtime.parallel.cluster.cluster`). The results do not depend on it in any bit.
@@ -183,7 +183,7 @@ def cestac(
 
 
 def _refuse(reference: Estimate) -> None:
-    """InputError where the method finds no estimate that runs could be compared with."""
+    """InputError if the method finds no estimate that runs could be compared with."""
     if reference.status not in (*USABLE, "rank-deficient", "no-redundancy", "singular-weights"):
         raise InputError(
             f"{reference.method}: no estimate of the record as measured to compare with: "
@@ -233,9 +233,7 @@ def _all_runs(
     progress: Progress | None,
     checkpoint: Checkpoint | None,
 ) -> Runs:
-    """Every run, by level and number, in whatever order they finished. identity : gives what tells
-    this study from others on disk.
-    """
+    """All runs, sorted by level and number; identity : function that identifies this study on disk."""
     runs, levels, b = task.settings.runs, range(len(task.levels)), len(task.names)
     finished = checkpoint.resume(identity(), b) if checkpoint else Runs.of((), b)
     parts = [finished.where((finished.level < len(levels)) & (finished.run < runs))]
@@ -265,9 +263,7 @@ def _measured(record: PreparedRecord) -> Iterator[memoryview]:
 def _identity(
     task: Task, described: Mapping[str, Any], provenance: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """What decides every bit of every run: JSON values that tell studies apart, the number of runs
-    aside.
-    """
+    """Data that determine every bit of every run, as JSON values that identify a study; without the number of runs."""
     drives = task.drives
     return {
         **{key: value for key, value in described.items() if key != "cestac"},

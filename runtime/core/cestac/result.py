@@ -345,7 +345,7 @@ class Cestac(Result, Part):
         }
 
     def _level_summary(self, level: LevelResult) -> dict[str, Any]:
-        """The fields of one level; of many runs, their number stands for them."""
+        """The fields of one level; for many runs only their number."""
         shown = {f.name: getattr(level, f.name) for f in fields(level)}
         runs = list(level.runs) if self.lists_runs else None
         return {**shown, "runs": runs, "run_count": len(level.runs)}

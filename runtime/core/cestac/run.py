@@ -49,7 +49,7 @@ def one_run(columns: Columns, task: Task, key: tuple[int, int]) -> Run:
 
 
 def _estimated(task: Task, observation: Observation) -> Array:
-    """X of the method of the task, shape (b,); of nan where it finds no estimate."""
+    """X of the method of the task, shape (b,); of nan if it finds no estimate."""
     if task.estimate.method in LINEAR:
         return linear_system(observation, task.estimate).solve().X
     try:

@@ -72,7 +72,7 @@ def deletions(blocks: Iterable[Array], X: Array, T: Array, into: Array) -> Array
 
 
 def _without_its_own(G: Array, g: Array, into: Array, size: Array) -> Array:
-    """into (1 - G)^-1 g on the directions that other blocks know too; nan where one that they do
+    """into (1 - G)^-1 g on the directions that other blocks know too; nan if one that they do
     not know takes part.
     """
     share, V = np.linalg.eigh(G)

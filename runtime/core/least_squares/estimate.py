@@ -58,7 +58,7 @@ class JointFit:
     residual_norm : float, N m or N
         ||Y_j - W_j X||.
     relative_error : float, %
-        100 ||Y_j - W_j X|| / ||Y_j||; nan where Y_j is zero: a joint without a motor.
+        100 ||Y_j - W_j X|| / ||Y_j||; nan if Y_j is zero: a joint without a motor.
     sigma_rho : float
         ||Y_j - W_j X|| / sqrt(N_j (1 - b/r)), the share of joint j in eq. (9).
     scale : float, N m or N
@@ -102,7 +102,7 @@ class Estimate:
     sigma_rho : float, N m or N
         Eq. (9) of the system that was solved; with weights near 1 and without unit.
     cond : float
-        Condition number of that W; inf where it is rank-deficient.
+        Condition number of that W; inf if it is rank-deficient.
     cond_unit : float
         The same with columns of norm 1.
     rank : int
@@ -120,7 +120,7 @@ class Estimate:
     message : str
         Explanation of the outcome.
     groups : tuple of tuple of str
-        For rank-deficient: the names that cannot be told apart, group by group.
+        For rank-deficient: the names that cannot be separated, group by group.
     iterations : int
         Number of passes.
     settings : mapping

@@ -1,5 +1,5 @@
 """Least squares from a triangular factor, with the rank of the record and the parameters it cannot
-tell apart.
+separate.
 
 With D the norms of the columns of W, R_11 D^-1 = U diag(s) V' is the singular value decomposition
 of a (b, b) matrix. Judged on unit columns, rank is the number of s_i above tolerance * s_1. Full
@@ -42,7 +42,7 @@ class Solution:
     cond_unit : float
         Condition number of W with unit columns.
     groups : tuple of tuples of str
-        Names that this record cannot tell apart; a group of one has no effect on the rows.
+        Names that this record cannot separate; a group of one has no effect on the rows.
     """
 
     X: Array

@@ -67,7 +67,7 @@ class Observation:
     files : mapping of str to str
         SHA-256 of the measured files, by name.
     closed_loop : LoopRows or None
-        What can simulate the same rows with other parameters, where it is known.
+        What can simulate the same rows with other parameters, if it is known.
     findings : tuple of str
         What the reader of counts says of the encoders, a sentence each.
     rates : tuple of float, Hz

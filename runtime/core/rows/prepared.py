@@ -119,7 +119,7 @@ class Prepared:
             vars(self)["states"] = replace(other.states, channels=self.channels)
 
     def __getstate__(self) -> dict[str, Any]:
-        """For other processes: nothing of what was made."""
+        """State for other processes, without computed results."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
 

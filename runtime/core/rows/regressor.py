@@ -154,7 +154,7 @@ def distinct_entries(model: GeneratedModel, columns: Array | None = None) -> Ent
 
     The emitted text copies equal rows, so equal signals agree in every bit; different ones do not
     agree at 64 random states. Where the random states are out of reach (loops that do not close),
-    every entry stands for itself.
+    each entry is its own signal.
     """
     columns = np.arange(len(model.BASE_PARAMETERS)) if columns is None else columns
     row, j = np.nonzero(np.asarray(model.STRUCTURE)[columns])

@@ -41,7 +41,7 @@ def cutoff(
     """Cut-off, Hz, to two digits, for records that are fitted together, and the reason in words.
 
     positions : q, shape (N, n), rad or m, and rate, Hz, of each record.
-    crossing : Hz, from which on recorded velocities stand for differences of q
+    crossing : Hz, from which on recorded velocities replace differences of q
         (`runtime.speeds`).
     """
     low, parts = signals.lowpass or Lowpass(), []

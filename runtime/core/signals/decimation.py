@@ -21,7 +21,7 @@ sample of block b and v_b the backward state w at its last one, everything is li
 v are K/G short steps. The start, and the samples behind the last whole block with their reflection,
 are products of their own: x_0 = X0 u, [v; y] = A u + Ax x. The signals are never stored. Of a long
 record, PART kept samples are computed at a time, from the samples that decide them: the filter has
-forgotten all others but for TRUNCATION.
+forgotten all others except for TRUNCATION.
 
 |lambda|^n_d is between 0.4 and 0.83 whatever n_d, so nothing grows; residues come from zeros and
 poles, polynomial coefficients would lose all

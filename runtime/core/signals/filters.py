@@ -30,7 +30,7 @@ Array = np.ndarray
 class SpeedErrors:
     """Known errors of the velocities; errors of different encoders are independent.
 
-    deviation : ndarray, shape (N, encoders), per s; infinite where counts are missing and the state
+    deviation : ndarray, shape (N, encoders), per s; infinite if counts are missing and the state
         is unknown.
     root : ndarray, shape (n, encoders), joint velocity per encoder velocity.
     """

@@ -1,4 +1,4 @@
-"""Velocities that were recorded beside differences of the positions: how they differ on the motion itself.
+"""Velocities that were recorded, compared with differences of the positions: how they differ on the motion itself.
 
 v = gain (dq/dt - lag d2q/dt2) + rest
 """
@@ -26,7 +26,7 @@ class SpeedAgreement:
     gain : ndarray
         Of the differences in the recorded velocity.
     lag : ndarray, s
-        By which the recorded velocity is late, whatever its gain; nan where that is zero.
+        By which the recorded velocity is late, whatever its gain; nan if that is zero.
     share : ndarray
         What gain and lag take, of the rms of the velocity.
     crossing : ndarray, Hz
