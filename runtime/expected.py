@@ -204,8 +204,9 @@ def expected_error(
 
 
 def with_values(physical: PhysicalModel, K: Array, R: Array, y: Array) -> tuple[Array, Array]:
-    """Standard parameters chi of rows R K chi = y with errors of variance 1 and of the values of
-    the robot file, and their covariance; those without a value are free.
+    """Standard parameters chi of rows R K chi = y with errors of variance 1 and of the values of the robot file, and their covariance.
+
+    Those without a value are free.
     """
     known = np.array([physical.values.get(name, np.nan) for name in physical.standard])
     deviation = np.abs(known)
@@ -237,8 +238,9 @@ def limits_of(model: GeneratedModel) -> tuple[Array, Array] | None:
 def reference_states(
     model: GeneratedModel, records: Sequence[Prepared]
 ) -> tuple[Array, Array, Array] | None:
-    """q, qd, qdd of a motion over the range of the robot, shape (K, n) each; None if no range is
-    known.
+    """q, qd, qdd of a motion over the range of the robot, shape (K, n) each.
+
+    None if no range is known.
     """
     n = len(model.JOINTS)
     limits = limits_of(model)

@@ -1,6 +1,4 @@
-"""Results as files in a folder: the page, figures, tables, and everything that another program
-reads.
-"""
+"""Results as files in a folder: the page, figures, tables, and everything that another program reads."""
 
 from __future__ import annotations
 
@@ -92,9 +90,7 @@ def identification_files(
     verdict: str = "",
     sections: Sequence[Section] = (),
 ) -> Files:
-    """Files of an identification; title, warning, verdict, sections : as for
-    `identification_page`.
-    """
+    """Files of an identification; title, warning, verdict, sections : as for `identification_page`."""
     unit = result.torque_unit
     fit = result.model_estimate
     settings: Any = result.study

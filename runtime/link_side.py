@@ -30,8 +30,9 @@ def torques_of_links(problem: Problem) -> Problem:
 
 
 def _behind_gears(records: Sequence[Any]) -> bool:
-    """Whether the torques are those of sensors behind the gears, by the settings of the records; SettingsError if those of one
-    record are and those of another are not.
+    """Whether the torques are those of sensors behind the gears, by the settings of the records.
+
+    SettingsError if those of one record are and those of another are not.
     """
     sides = {record.sides[1] == "link" for record in records}
     message = "link in one record and not in another; fit them in studies of their own"

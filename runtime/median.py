@@ -25,8 +25,9 @@ Array = np.ndarray
 
 
 def share_taken(tau: Array, q: Array, rate: float, window: int) -> Array:
-    """Share of the torques tau, shape (N, n), that a median over `window` samples takes with the
-    motion q, shape (N, n), shape (n,); 0 if most of what it takes goes with no motion.
+    """Share of the torques tau, shape (N, n), that a median over `window` samples takes with the motion q, shape (N, n), shape (n,).
+
+    0 if most of what it takes goes with no motion.
     """
     block = max(1, round(LIMIT.TORQUE_BLOCK * rate))
     count, n = len(tau) // block, tau.shape[1]

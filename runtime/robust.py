@@ -57,9 +57,7 @@ class IrlsOptions(LinearOptions):
 
 @dataclass(frozen=True, eq=False)
 class Robust:
-    """State of the iteration: X, shape (b,), u and w, shape (r,), S, shape (n,), T with T T' =
-    (sum_j W_j'W_j / S_j^2)^-1.
-    """
+    """State of the iteration: X, shape (b,), u and w, shape (r,), S, shape (n,), T with T T' = (sum_j W_j'W_j / S_j^2)^-1."""
 
     X: Array
     u: Array
@@ -71,9 +69,7 @@ class Robust:
 
 
 def fit(start: Beginning) -> Fitted:
-    """The robust fit; `details` holds the scales S_j and the share of down-weighted rows by
-    joint.
-    """
+    """The robust fit; `details` holds the scales S_j and the share of down-weighted rows by joint."""
     W, options = start.observation.W, start.options
     found = _iterated(start, W, start.solution.X, "huber")
     if options.loss == "tukey":

@@ -33,8 +33,7 @@ Array = np.ndarray
 def crossings(
     records: Sequence[tuple[Array, Mapping[str, Array], float]], signals: Signals
 ) -> tuple[tuple[float, ...], str]:
-    """signals.velocity of records that are fitted together, Hz by joint, and what it is, in words;
-    half the rate of the slowest record where v of a joint is not used.
+    """signals.velocity of records that are fitted together, Hz by joint, and what it is, in words; half the rate of the slowest record where v of a joint is not used.
 
     records : positions, channels with qd, and rate of each.
     """

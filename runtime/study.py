@@ -118,8 +118,9 @@ class Study(chapter.Study, Recorded):
 
 
 def study_from_mapping(mapping: Mapping[str, Any]) -> Study:
-    """The Study of a mapping as read from a study file; raises SettingsError with the path of the
-    offending key.
+    """The Study of a mapping as read from a study file.
+
+    Raises SettingsError with the path of the offending key.
 
     Numbers may be texts such as "2*pi/10000"; one value means a list of one (files, delta,
     record).

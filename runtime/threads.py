@@ -1,6 +1,4 @@
-"""BLAS with one thread: several would fight for the cores, and their number could change the last
-bit of a sum.
-"""
+"""BLAS with one thread: several would fight for the cores, and their number could change the last bit of a sum."""
 
 from __future__ import annotations
 
@@ -22,9 +20,7 @@ BLAS_THREADS = (
 
 
 def single_threaded(function: Callable[P, R]) -> Callable[P, R]:
-    """The function with one BLAS thread while it runs: its matrices are small, and several threads
-    wait for each other ten times as long as they compute.
-    """
+    """The function with one BLAS thread while it runs: its matrices are small, and several threads wait for each other ten times as long as they compute."""
 
     @wraps(function)
     def limited(*args: P.args, **kwargs: P.kwargs) -> R:

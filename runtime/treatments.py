@@ -222,9 +222,7 @@ def treatments(
 
 
 def standing_set(result: Identification) -> tuple[SetName, Estimate]:
-    """The set of parameters that predicts data it has not seen best (`best_set`, the essential one
-    among them), and its name.
-    """
+    """The set of parameters that predicts data it has not seen best (`best_set`, the essential one among them), and its name."""
     name = best_set(result.set_errors, essential=True) if result.set_errors else "all"
     fit = result.sets.get(name, result.estimate)
     if name == "essential" and not result.sets:  # of a method that is not linear

@@ -210,9 +210,7 @@ class WrenchModel:
         return np.asarray(self.regressor(q, qd, qdd, **constants) @ X)
 
     def base_parameters(self, standard: Any, **constants: Any) -> Array:
-        """X of standard parameters: a vector, a matrix of columns, or by name, where an offset that
-        is not named is zero.
-        """
+        """X of standard parameters: a vector, a matrix of columns, or by name, where an offset that is not named is zero."""
         if isinstance(standard, Mapping):
             standard = np.array([standard.get(name, 0.0) for name in self.STANDARD_PARAMETERS])
         return np.asarray(self._regrouped(constants) @ standard)

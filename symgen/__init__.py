@@ -1,5 +1,4 @@
-"""From a robot file to base parameters with their formulas, and to a module that evaluates its
-models.
+"""From a robot file to base parameters with their formulas, and to a module that evaluates its models.
 
     model = symgen.model("arm.urdf")
             # the module: derived, emitted, certified, imported

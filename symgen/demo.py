@@ -149,8 +149,7 @@ def simulated_record(
     encoder: float = ENCODER,
     noise: float = 0.02,
 ) -> Prepared:
-    """The record of a motion, written as a .csv.gz file q1..qn,tau1..taun of the motor side and
-    read from it like any other.
+    """The record of a motion, written as a .csv.gz file q1..qn,tau1..taun of the motor side and read from it like any other.
 
     study : settings except for the record. encoder : rad on the motor. noise : standard deviation, of
     the largest torque of each motor.
@@ -228,9 +227,7 @@ def demonstrate(
 
 
 def recorded_step(record: Record) -> float:
-    """The coarsest step of the recorded positions, rad: of every joint the smallest change between
-    two samples that is none of rounding.
-    """
+    """The coarsest step of the recorded positions, rad: of every joint the smallest change between two samples that is none of rounding."""
     changes = np.abs(np.diff(record.q, axis=0))
     return float(max(column[column > ROUNDING].min() for column in changes.T))
 

@@ -24,9 +24,7 @@ class SymgenError(Exception):
 
 
 def printable(text: str) -> str:
-    """`text` as a terminal may show it: what controls one (escape sequences, changes of direction)
-    spelled out, the middle of a long one left out.
-    """
+    """`text` as a terminal may show it: what controls one (escape sequences, changes of direction) spelled out, the middle of a long one left out."""
     for _ in range(2):  # spelled out, a text may be too long again
         if len(text) > LONGEST:
             text = f"{text[: LONGEST - 400]} ... {text[-300:]}"

@@ -1,6 +1,4 @@
-"""A limit on the processor time of a derivation: whatever a robot file holds, a command ends with a
-result or with one sentence.
-"""
+"""A limit on the processor time of a derivation: whatever a robot file holds, a command ends with a result or with one sentence."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""What the resolution advisor answers: steps, curves, sampled confirmation, and the verdict in
-words.
-"""
+"""What the resolution advisor answers: steps, curves, sampled confirmation, and the verdict in words."""
 
 from __future__ import annotations
 
@@ -85,8 +83,9 @@ class Limit:
 
     @property
     def agrees(self) -> bool:
-        """Sampled and predicted %e differ by no more than the interval and 30 %, which is 15 % in
-        Delta; True without runs.
+        """Sampled and predicted %e differ by no more than the interval and 30 %, which is 15 % in Delta.
+
+        True without runs.
         """
         return (
             self.sampled is None
@@ -123,8 +122,9 @@ class EncoderAdvice:
     unit: str = "rad"
 
     def reached(self, percent: float) -> Array:
-        """Step at which the |change| of every parameter first reaches `percent`, shape (b,); nan
-        if it does not within the curve.
+        """Step at which the |change| of every parameter first reaches `percent`, shape (b,).
+
+        nan if it does not within the curve.
         """
         return np.array([crossing(self.delta, np.abs(e), percent) for e in self.change.T])
 
@@ -451,8 +451,7 @@ class Advice(Result, Part):
 
 
 def advice_figure(advice: Advice) -> Figure:
-    """%e against Delta for every parameter that matters, all encoders alike: line predicted, points
-    sampled with their Student intervals.
+    """%e against Delta for every parameter that matters, all encoders alike: line predicted, points sampled with their Student intervals.
 
     Real encoders, where they were judged, by both readers; else those of the chapter's law.
     """
@@ -580,9 +579,7 @@ def _summary(advice: EncoderAdvice) -> dict[str, Any]:
 def confirm_by_runs(
     advice: EncoderAdvice, reference: Estimate, level: Callable[[float], Sampled]
 ) -> EncoderAdvice:
-    """The advice with runs at the steps of its limits; of all encoders, also between and above
-    them.
-    """
+    """The advice with runs at the steps of its limits; of all encoders, also between and above them."""
     made = {limit.delta: level(limit.delta) for limit in advice.limits if np.isfinite(limit.delta)}
     limits = []
     for limit in advice.limits:
@@ -606,8 +603,9 @@ def confirm_by_runs(
 
 
 def limits_of(delta: Array, change: Array, reference: Estimate) -> tuple[Limit, ...]:
-    """Where the first parameter that matters crosses the limits; nan if the finest step is
-    already beyond or none is judged, inf if no step is.
+    """Where the first parameter that matters crosses the limits.
+
+    nan if the finest step is already beyond or none is judged, inf if no step is.
     """
     names, limits = deciding_names(reference), []
     e = {name: np.abs(change[:, reference.names.index(name)]) for name in names}
@@ -626,8 +624,9 @@ def limits_of(delta: Array, change: Array, reference: Estimate) -> tuple[Limit, 
 
 
 def crossing(delta: Array, e: Array, percent: float) -> float:
-    """First step at which e reaches `percent`, straight lines between the points of logarithmic
-    axes; nan if it does not.
+    """First step at which e reaches `percent`, straight lines between the points of logarithmic axes.
+
+    nan if it does not.
     """
     above = np.flatnonzero(e >= percent)
     if not len(above) or (above[0] == 0 and e[0] > percent):

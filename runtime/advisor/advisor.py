@@ -1,5 +1,4 @@
-"""Resolution advisor: the coarsest encoder that keeps the change of the estimate below 1 % and
-below 5 %, predicted without sampling.
+"""Resolution advisor: the coarsest encoder that keeps the change of the estimate below 1 % and below 5 %, predicted without sampling.
 
 CESTAC rounds every position at random, many times, and asks how far the mean estimate moves. That
 mean is known to first order in the variance v of the rounding (errors in variables), from the
@@ -258,8 +257,9 @@ def _selections(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str
 def _advice(
     predictor: Predictor, label: str, encoders: Sequence[int], reference: Estimate, unit: str
 ) -> EncoderAdvice:
-    """Limits by a walk on steps in geometric progression; the curve of all encoders goes on beyond
-    them.
+    """Limits by a walk on steps in geometric progression.
+
+    The curve of all encoders goes on beyond them.
     """
     decisive = [reference.names.index(name) for name in deciding_names(reference)]
     rate = np.abs(predictor.rate(encoders)[decisive]).max(initial=0.0)

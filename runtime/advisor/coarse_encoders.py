@@ -81,9 +81,7 @@ class Encoders:
 
 
 class CoarseEncoders:
-    """Coarser encoders on several records of one robot, by a law and a reader in place of those of
-    the study.
-    """
+    """Coarser encoders on several records of one robot, by a law and a reader in place of those of the study."""
 
     def __init__(
         self,
@@ -129,8 +127,9 @@ class CoarseEncoders:
 
     @property
     def coarsest(self) -> Array:
-        """Largest step of each encoder, shape (n,): LIMIT.LINES_IN_MOTION of them in its motion;
-        inf of one at rest.
+        """Largest step of each encoder, shape (n,): LIMIT.LINES_IN_MOTION of them in its motion.
+
+        Inf of one at rest.
         """
         spans = np.min([np.ptp(part.x, axis=0) for part in self.parts], axis=0)
         return np.where(spans > 0, spans / LIMIT.LINES_IN_MOTION, np.inf)
@@ -153,8 +152,9 @@ class CoarseEncoders:
         return np.full(len(self.reference), np.nan)
 
     def locking(self, delta: Array) -> Array:
-        """Power of the sawtooth that passes the low-pass, over that of white noise, the largest of
-        the encoders, shape (m,); delta, shape (m,).
+        """Power of the sawtooth that passes the low-pass, over that of white noise, the largest of the encoders, shape (m,).
+
+        delta, shape (m,).
 
         Harmonic h of the error of a count has the frequency h |qd|/Delta and a power as 1/h^2;
         sampled, it is as slow as its distance from a multiple of the rate. Where a joint keeps a
@@ -174,8 +174,9 @@ class CoarseEncoders:
         return most
 
     def nodes(self, delta: float, moving: Sequence[int], read: int = 0) -> list[list[Array]]:
-        """Errors of every record at the first PHASES nodes of the quadrature, or at as many as have
-        been `read`, in the middle between those; the encoders `moving` coarse.
+        """Errors of every record at the first PHASES nodes of the quadrature, or at as many as have been `read`, in the middle between those.
+
+        The encoders `moving` coarse.
         """
         few, seed, n = PHASES[self.reader], self.task.settings.seed, len(self.root)
         count, first = read or few, stream(seed, QUADRATURE).random(n)
@@ -202,8 +203,9 @@ class CoarseEncoders:
         return sampled(delta, np.array(ratios))
 
     def _rounded(self, delta: float, encoders: Sequence[int], run: int) -> list[Array]:
-        """Errors of every record by a law that rounds every sample; the streams of an encoder do
-        not depend on which others are coarse.
+        """Errors of every record by a law that rounds every sample.
+
+        The streams of an encoder do not depend on which others are coarse.
         """
         seed, law = self.task.settings.seed, self.task.settings.rounding
         drawn = [
@@ -288,8 +290,6 @@ class CoarseEncoders:
 
 
 def mean_change(ratios: Array) -> Array:
-    """Mean change of the estimate, of its ratios at nodes, shape (count, b), and the deviation of
-    that mean, as if the nodes were independent, shape (2, b), %.
-    """
+    """Mean change of the estimate, of its ratios at nodes, shape (count, b), and the deviation of that mean, as if the nodes were independent, shape (2, b), %."""
     deviation = ratios.std(axis=0, ddof=1) / np.sqrt(len(ratios))
     return np.asarray(100 * np.array([ratios.mean(axis=0) - 1, deviation]))

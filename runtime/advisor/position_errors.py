@@ -79,9 +79,7 @@ class Perturbation:
     known: dict[tuple[int, int], Switched] = field(default_factory=dict)
 
     def expected(self, variance: float, encoders: Sequence[int]) -> Array:
-        """Expected Gram matrices with errors of that variance on the encoders named (from 0), the
-        others exact.
-        """
+        """Expected Gram matrices with errors of that variance on the encoders named (from 0), the others exact."""
         coarse = list(encoders)
         gram = self.clean + variance * self.smooth[coarse].sum(axis=0)
         if variance:
@@ -89,9 +87,7 @@ class Perturbation:
         return np.asarray(gram)
 
     def _add_switches(self, gram: Array, variance: float, encoders: list[int]) -> None:
-        """Means, covariances with the smooth columns and with each other, variances of the columns
-        that switch.
-        """
+        """Means, covariances with the smooth columns and with each other, variances of the columns that switch."""
         before, after = self.band.before[1, 1], self.band.after[1, 1]
         acting = []
         for switch in self.switches:
@@ -141,8 +137,9 @@ class Perturbation:
 
 
 def solution(gram: Array, weights: Array) -> Array:
-    """X, shape (b,), of least squares with the rows of joint j multiplied by weights[j]; columns
-    are scaled first. gram : by joint, shape (n, b + 1, b + 1).
+    """X, shape (b,), of least squares with the rows of joint j multiplied by weights[j].
+
+    Columns are scaled first. gram : by joint, shape (n, b + 1, b + 1).
     """
     total = np.einsum("j,jab->ab", weights**2, gram)
     D = 1 / np.sqrt(np.diag(total)[:-1])
@@ -158,8 +155,7 @@ def perturbation(
     *,
     drives: Drives | None = None,
 ) -> Perturbation:
-    """The record under errors of its encoders on the side study.cestac.side, through the filters of
-    the study with the median of study.cestac.
+    """The record under errors of its encoders on the side study.cestac.side, through the filters of the study with the median of study.cestac.
 
     names : columns, as fitted.
     drives : motor side; default: those of the record.

@@ -79,9 +79,7 @@ def curves(
     start: float,
     decisive: Sequence[int],
 ) -> dict[str, tuple[Array, Array]]:
-    """Steps and changes by label: from `start` down until all is below the first limit, up until
-    all is above the last; finer where steps lock.
-    """
+    """Steps and changes by label: from `start` down until all is below the first limit, up until all is above the last; finer where steps lock."""
     known: dict[str, dict[float, Array]] = {label: {} for label in selections}
     finest, coarsest = real.finest, real.coarsest
     start = min(max(start, finest), float(coarsest.min()))
@@ -178,8 +176,9 @@ def vague_steps(
 def uncertain(
     reader: ReaderName, advice: EncoderAdvice, error: Array, names: Sequence[str]
 ) -> list[str]:
-    """Sentences on the limits about which the change hardly depends on the step, or scatters as
-    much; error : deviation of the change, shape (m, b), %.
+    """Sentences on the limits about which the change hardly depends on the step, or scatters as much.
+
+    error : deviation of the change, shape (m, b), %.
     """
     found = []
     for limit in advice.limits:

@@ -62,8 +62,7 @@ class Switched:
     variance: Array
 
     def between(self, other: Switched, sigma: float) -> Switched:
-        """At a deviation between those of two: shift, slope*sigma and variance/sigma are
-        interpolated linearly.
+        """At a deviation between those of two: shift, slope*sigma and variance/sigma are interpolated linearly.
 
         Exact where the speed rests (slope as 1/sigma, variance as sigma) and where it passes zero
         quickly (slope constant, variance as sigma^2).
@@ -146,9 +145,7 @@ class Kernels:
 
 
 def kernels(band: Bandwidth, N: int, factor: int) -> Kernels:
-    """Kernels for series of N samples that are decimated by `factor`: they change little over an
-    eighth of it, so that sums over that many do.
-    """
+    """Kernels for series of N samples that are decimated by `factor`: they change little over an eighth of it, so that sums over that many do."""
     size = max(1, factor // 8)
     bins = -(-N // size)
     rho, r = band.speed[::size], band.decimation[::size]
@@ -165,8 +162,9 @@ def kernels(band: Bandwidth, N: int, factor: int) -> Kernels:
 
 
 def _summed_variance(coefficients: Array, near: Array, known: Kernels) -> float:
-    """sum_n sum_t,t' c_n(t) c_n(t') rho^n r, by Parseval; coefficients, shape (ORDERS + 1,
-    len(near)), over sqrt(n!), at the samples `near`.
+    """sum_n sum_t,t' c_n(t) c_n(t') rho^n r, by Parseval.
+
+    coefficients, shape (ORDERS + 1, len(near)), over sqrt(n!), at the samples `near`.
     """
     sums = np.array(
         [np.bincount(near // known.bin, weights=c, minlength=known.bins) for c in coefficients]

@@ -1,5 +1,4 @@
-"""What is to be found of the law whose torque replaces a measured one: `controller.law` with
-kd: fit, delay: fit.
+"""What is to be found of the law whose torque replaces a measured one: `controller.law` with kd: fit, delay: fit.
 
     W X = tau(t - delay),      tau = sat(tau_0 + kd v),      v = qd_ref - qd, tau_0 the law without kd
         = Y + (kd - k) V - (delay - d) d/dt Y          at the last kd k and delay d; V is v where the drive does not cut, else zero

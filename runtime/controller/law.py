@@ -1,5 +1,4 @@
-"""The torque of a controller's law, for records that hold no torque: many legged robots log q, the
-reference and the gains alone.
+"""The torque of a controller's law, for records that hold no torque: many legged robots log q, the reference and the gains alone.
 
     tau = sat(P (q_ref - q) + Vr qd_ref - Vm qd + tau_ff)
 
@@ -46,9 +45,7 @@ class TorqueLaw:
     delay: float = 0.0
 
     def signals(self, t: Array, own: Mapping[str, Array], rate: float) -> dict[str, Array]:
-        """Signals of a whole record, by name, with the torque of the law and law_v, qd_ref - qd,
-        both late by the delay.
-        """
+        """Signals of a whole record, by name, with the torque of the law and law_v, qd_ref - qd, both late by the delay."""
         v = own.get("qd_ref", 0.0) - velocity(own["q"], own, rate)
         made = {"tau": self.torque(own["q"], own, rate), "law_v": v}
         return {**own, **{key: late(t, x, self.delay) for key, x in made.items()}}
@@ -90,8 +87,9 @@ def late(t: Array, x: Array, delay: float) -> Array:
 
 
 def torque_law(controller: Controller | None, n: int, limits: Mapping[str, Any]) -> TorqueLaw:
-    """The law of a controller for n joints with these LIMITS; SettingsError if it has a memory,
-    or is none.
+    """The law of a controller for n joints with these LIMITS.
+
+    SettingsError if it has a memory, or is none.
     """
     law = (controller or Controller()).law
     gains = law.gains(n)

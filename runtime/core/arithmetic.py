@@ -1,5 +1,4 @@
-"""Numbers written as arithmetic, `2*pi/10000`: numbers, pi, + - * / ** and parentheses, nothing
-else.
+"""Numbers written as arithmetic, `2*pi/10000`: numbers, pi, + - * / ** and parentheses, nothing else.
 
 The text is parsed to a syntax tree and the tree is walked; no text is ever executed.
 """

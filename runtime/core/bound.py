@@ -1,6 +1,4 @@
-"""A model at other values of its constants, such as fitted scalars of laws: every function has them
-as defaults.
-"""
+"""A model at other values of its constants, such as fitted scalars of laws: every function has them as defaults."""
 
 from __future__ import annotations
 

@@ -65,9 +65,7 @@ def plain(value: Any) -> Any:
 
 
 def json_text(value: Any) -> str:
-    """`plain(value)` as JSON, indented by two, lists of scalars on one line, with a final
-    newline.
-    """
+    """`plain(value)` as JSON, indented by two, lists of scalars on one line, with a final newline."""
     return encodable(_render(plain(value), "")) + "\n"
 
 

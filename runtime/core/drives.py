@@ -149,9 +149,7 @@ def encoder_drives(side: str, drives: Drives | None, section: str = "signals") -
 
 
 def encoder_root(drives: Drives | None, n: int) -> Array:
-    """Joint motion per encoder motion, shape (n, n): the identity on the joint side, R^-1 on the
-    motor side.
-    """
+    """Joint motion per encoder motion, shape (n, n): the identity on the joint side, R^-1 on the motor side."""
     if drives is None:
         return np.eye(n)
     return np.asarray(

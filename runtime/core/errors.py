@@ -1,5 +1,4 @@
-"""What `runtime` raises on bad input: one root, a ValueError, with the offending place as
-attributes.
+"""What `runtime` raises on bad input: one root, a ValueError, with the offending place as attributes.
 
 A message says what was given, where, what was expected and what to do. Numerical outcomes (rank
 loss, no convergence) are not errors:

@@ -167,9 +167,7 @@ def _removals(steps: Sequence[Removal], threshold: float) -> int:
 
 
 def _trail(system: System, threshold: float) -> list[Removal]:
-    """%sigma before a parameter goes, sigma_rho ratio after, until the ratio reaches `threshold` or
-    one parameter is left.
-    """
+    """%sigma before a parameter goes, sigma_rho ratio after, until the ratio reaches `threshold` or one parameter is left."""
     steps: list[Removal] = []
     fit = system.solve()
     first, C = standard_deviations(system, fit)
@@ -187,9 +185,7 @@ def _trail(system: System, threshold: float) -> list[Removal]:
 
 
 def _relative(C: np.ndarray, X: np.ndarray) -> np.ndarray:
-    """%sigma, shape (b,); inf if the record does not determine the parameter, which therefore
-    goes first.
-    """
+    """%sigma, shape (b,); inf if the record does not determine the parameter, which therefore goes first."""
     with np.errstate(divide="ignore", invalid="ignore"):
         relative = 100 * np.sqrt(np.diag(C)) / np.abs(X)
     return np.where(np.isnan(relative), np.inf, relative)

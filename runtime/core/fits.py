@@ -1,6 +1,4 @@
-"""Fits of all rows: all parameters, the essential ones, the nested sets; and what each predicts of
-rows that did not give it.
-"""
+"""Fits of all rows: all parameters, the essential ones, the nested sets; and what each predicts of rows that did not give it."""
 
 from __future__ import annotations
 
@@ -131,9 +129,7 @@ def _validation(
     choices: Mapping[Any, EstimateSettings],
     known: Mapping[Any, Estimate],
 ) -> tuple[tuple[CrossValidation, ...], tuple[str, ...]]:
-    """The sets `choices` between windows of the records, then those `known` of all rows on further
-    records; and what could not be done.
-    """
+    """The sets `choices` between windows of the records, then those `known` of all rows on further records; and what could not be done."""
     validation, missing = [], []
     try:
         windows = problem.settings.validate.split or halves(*observation.span)

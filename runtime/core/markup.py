@@ -1,5 +1,4 @@
-"""Names, formulas and numbers as people write them: ZZ1R is ZZ with the index 1R, `D3**2*(M3 + M4)`
-has a square and no star.
+"""Names, formulas and numbers as people write them: ZZ1R is ZZ with the index 1R, `D3**2*(M3 + M4)` has a square and no star.
 
 Every piece is made by `element`, which escapes whatever is not Markup already: no name and no
 formula can bring in markup.

@@ -1,6 +1,4 @@
-"""Positions that a record does not hold: where they were measured, and at which encoders they are
-missing (`signals.reader: counts` takes them).
-"""
+"""Positions that a record does not hold: where they were measured, and at which encoders they are missing (`signals.reader: counts` takes them)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""The border to emitted modules: their functions, loading and checking one, and checks of the
-states given to it.
+"""The border to emitted modules: their functions, loading and checking one, and checks of the states given to it.
 
 A model is a plain Python module written by the generator (NumPy only): `load_model("tx40")` reads
 generated/tx40.py of the current folder. A module is code: a file runs where this installation has
@@ -132,8 +131,9 @@ def require_emitted(model: Any) -> None:
 
 
 def _reduced(module: ModuleType) -> tuple[Callable[..., ModuleType], tuple[Any, ...]]:
-    """How modules are pickled: an emitted one as text, since the process that receives it trusts
-    the one that sends it; any other by name. InputError for an emitted one without a file.
+    """How modules are pickled: an emitted one as text, since the process that receives it trusts the one that sends it.
+
+    Any other by name. InputError for an emitted one without a file.
     """
     if not hasattr(module, "SOURCE_SHA256"):
         return import_module, (module.__name__,)
@@ -336,9 +336,7 @@ def joint_units(model: GeneratedModel) -> tuple[str, ...]:
 
 
 def _check_names(model: GeneratedModel, label: str) -> None:
-    """Names enter messages, tables, file names and symbols of compiled files: identifiers, and
-    joints whole numbers.
-    """
+    """Names enter messages, tables, file names and symbols of compiled files: identifiers, and joints whole numbers."""
     names = (model.NAME, *model.BASE_PARAMETERS)
     if wrong := [
         name
@@ -353,9 +351,7 @@ def _check_names(model: GeneratedModel, label: str) -> None:
 
 
 def _check_store(model: GeneratedModel, b: int, n: int, label: str) -> None:
-    """Two samples at rest through `store` and `observation_matrix`, general loops at their
-    start.
-    """
+    """Two samples at rest through `store` and `observation_matrix`, general loops at their start."""
     N = 2
     rest = np.zeros((N, n))
     q = rest + getattr(model, "_START", rest[0])[:n]

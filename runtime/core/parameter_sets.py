@@ -10,9 +10,9 @@ The feasible set is used and is printed first, unless all parameters predict uns
 data better by more than LIMIT.PREFERRED_SET: the validation records, else the second half of the
 record and the fifths of `held_out_validation` too. Half a record may leave friction
 open, where a joint moves one way; then both sets fail on the other half, and which fails less
-means nothing. The feasible set takes semidefinite programs: it is fitted where it may be
-used (`physical_asked`), or is written for a program where the essential ones do, and the weight of its prior and the bounds by reach, which all rows
-decide, hold for fits of parts of them.
+means nothing. The feasible set needs semidefinite programs: it is fitted only if it may be used
+(`physical_asked`), or if the essential set is used and a program needs all parameters. All rows
+decide the weight of its prior and the bounds by reach, which fits of parts of the rows then use.
 
 The essential set is an aid to reading: which parameters carry the model. Its deviations take the
 parameters that were removed as zero, and what they are in truth moves those that stay: 95 %

@@ -1,5 +1,4 @@
-"""What long work is at: sentences for whoever asked, by `logging`, logger "runtime.core.progress", level
-INFO.
+"""What long work is at: sentences for whoever asked, by `logging`, logger "runtime.core.progress", level INFO.
 
 logging.getLogger("runtime.core.progress").setLevel(logging.INFO)
 

@@ -1,6 +1,4 @@
-"""Where results come from: the names of the records, their time stamps, and whether anything was
-measured.
-"""
+"""Where results come from: the names of the records, their time stamps, and whether anything was measured."""
 
 from __future__ import annotations
 

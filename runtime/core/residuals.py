@@ -168,8 +168,9 @@ def unseen_by_blocks(observation: Observation, fit: Estimate) -> float:
 
 
 def _lagged_sums(x: Array, place: Array, starts: Array) -> tuple[Array, Array]:
-    """Sums of x_t x_(t+k), k = 0, 1 ..., and the number of pairs; x, shape (N,), at places on a
-    grid. No pair spans `starts` of other records.
+    """Sums of x_t x_(t+k), k = 0, 1 ..., and the number of pairs.
+
+    x, shape (N,), at places on a grid. No pair spans `starts` of other records.
     """
     records = np.split(np.arange(len(x)), starts)
     longest = max(int(place[rows[-1]] - place[rows[0]]) + 1 for rows in records)

@@ -1,6 +1,4 @@
-"""What `identify` returns: the parameters of one robot, and everything that its records say about
-them.
-"""
+"""What `identify` returns: the parameters of one robot, and everything that its records say about them."""
 
 from __future__ import annotations
 
@@ -375,8 +373,8 @@ class Identification:
         return "\n\n".join(text for text in (head, *rest) if text)
 
     def _values(self, room: int, *, known: bool) -> str:
-        """Values in at most `room` lines, the essential ones if there is no room for all, and the
-        error of each joint. known : only those that are larger than their intervals.
+        """Values in at most `room` lines, the essential ones if there is no room for all, and the error of each joint.
+        known : only those that are larger than their intervals.
         """
         fit, names = self.model_estimate, list(self.model_estimate.names)
         index = {name: k for k, name in enumerate(names)}

@@ -1,5 +1,4 @@
-"""Settings as frozen dataclasses that pydantic checks: their base, the types of their fields,
-mappings in and out.
+"""Settings as frozen dataclasses that pydantic checks: their base, the types of their fields, mappings in and out.
 
     class Lowpass(Settings):
         cutoff: Positive = 50.0

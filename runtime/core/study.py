@@ -83,8 +83,7 @@ class Lowpass(Settings):
 
 
 class Decimate(Settings):
-    """Parallel decimation of Y and of every column of W: Chebyshev I of order 8, 0.05 dB,
-    0.8/factor, zero phase, one sample kept in `factor`.
+    """Parallel decimation of Y and of every column of W: Chebyshev I of order 8, 0.05 dB, 0.8/factor, zero phase, one sample kept in `factor`.
 
     Attributes
     ----------

@@ -1,6 +1,4 @@
-"""A table of texts, made once per result and printed as aligned text, as HTML of a notebook, or on
-the page of a report.
-"""
+"""A table of texts, made once per result and printed as aligned text, as HTML of a notebook, or on the page of a report."""
 
 from __future__ import annotations
 

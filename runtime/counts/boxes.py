@@ -1,5 +1,4 @@
-"""Expectation propagation between the bounds that counts are, and the errors that counts and time
-stamps have, by its evidence.
+"""Expectation propagation between the bounds that counts are, and the errors that counts and time stamps have, by its evidence.
 
     tilted law of a sample    N(x; m, v) [Phi((hi - x)/e) - Phi((lo - x)/e)]
                               m, v without this sample; e^2 = count^2 + (time qd Ts)^2
@@ -126,9 +125,7 @@ class Boxes:
 
     @np.errstate(divide="ignore", invalid="ignore")  # sites that do not settle
     def posterior(self, errors: Errors, c: Array, density: Array, t: Array, u: Array) -> Posterior:
-        """Expectation propagation: the sites, precisions t and pulls u, are updated until they
-        settle.
-        """
+        """Expectation propagation: the sites, precisions t and pulls u, are updated until they settle."""
         basis, gaps = self.basis, np.flatnonzero(self.rest)
         tau, pull = self.rest.copy(), np.zeros(len(self.rest))
         x, change, damping = basis.at_samples(c), np.inf, DAMPING
@@ -165,8 +162,8 @@ class Boxes:
         return self.posterior(errors, start.c, start.density, start.tau, start.nu)
 
     def promised(self, errors: Errors, read: Posterior) -> float:
-        """The rise of the evidence with other errors, to first order: where sites have settled it
-        does not depend on them. From every so many a site.
+        """The rise of the evidence with other errors, to first order: where sites have settled it does not depend on them.
+        From every so many a site.
         """
         some = slice(None, None, 1 + 2 * (len(self.sites) // (2 * TELLING)))  # odd: they are pairs
         boxes = replace(self, low=self.low[some], high=self.high[some])
@@ -175,9 +172,7 @@ class Boxes:
         return float(np.mean(mass - own) * len(self.sites))
 
     def agrees(self, read: Posterior) -> bool:
-        """Whether sites have settled and the motion leaves the interval of no count by more than
-        FAR deviations.
-        """
+        """Whether sites have settled and the motion leaves the interval of no count by more than FAR deviations."""
         x, v = self.basis.at_samples(read.c), self.basis.variances(read.Z)
         e2 = read.errors.variance(self.basis.at_samples(read.c, 1) * self.basis.Ts)
         outside = np.abs(x - self.y)[self.measured] - 0.5
@@ -211,8 +206,7 @@ class Boxes:
         return begin, boxes, boxes.posterior(read.errors, c, density, *sites)
 
     def jump(self, near: int, read: Posterior) -> tuple[int, float, float]:
-        """Sample near `near` from which counts are most likely off by one number, that number, and
-        by how many nats it raises the posterior.
+        """Sample near `near` from which counts are most likely off by one number, that number, and by how many nats it raises the posterior.
 
         The slope of the log posterior by that number is g = sum (nu - tau x) over the later sites,
         its curvature sum tau - (B tau)' A^-1 (B tau).
@@ -251,9 +245,7 @@ class Boxes:
 def of_most_evidence(
     boxes: Boxes, sizes: Sequence[float], start: Posterior, moves: Sequence[tuple[int, int]] = MOVES
 ) -> Posterior:
-    """The motion with the errors, of `sizes` and CLOCK_ERRORS, whose evidence none beside them
-    exceeds, or promises to.
-    """
+    """The motion with the errors, of `sizes` and CLOCK_ERRORS, whose evidence none beside them exceeds, or promises to."""
     best, place = start, (sizes.index(start.errors.count), CLOCK_ERRORS.index(start.errors.time))
     tried = {place}
     for move in moves:
@@ -287,8 +279,9 @@ def box_moments(a: Array, b: Array) -> tuple[Array, Array, Array]:
 
 
 def jerk_density(basis: Basis, c: Array, Z: Array, density: Array) -> Array:
-    """MacKay's rule in windows of time, the whole record counting as OF_RECORD determined jerks;
-    shape (M,).
+    """MacKay's rule in windows of time, the whole record counting as OF_RECORD determined jerks.
+
+    Shape (M,).
     """
     squares, determined = (
         basis.jerk(c) ** 2 * basis.h,

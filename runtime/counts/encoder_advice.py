@@ -1,5 +1,4 @@
-"""Whether reading counts would help a record whose positions are taken as they are: one sentence
-for identify and report.
+"""Whether reading counts would help a record whose positions are taken as they are: one sentence for identify and report.
 
 Positions taken as they are carry an error of variance step^2/12. Through the filters of the study
 it becomes an error of qdd of variance v; the columns of W are attenuated by about v over the mean
@@ -52,8 +51,9 @@ class EncoderSteps(Part):
 
 
 def visible_steps(result: Identification) -> tuple[str, float]:
-    """The steps of the positions that are taken as they are, in words, and the largest share of the mean
-    square of an acceleration that they make; "" if none are seen.
+    """The steps of the positions that are taken as they are, in words, and the largest share of the mean square of an acceleration that they make.
+
+    "" if none are seen.
     """
     said, most = "", -1.0
     for one in result.prepared:
@@ -86,8 +86,9 @@ def encoder_sentences(
 def acceleration_error(
     record: Record, states: States, signals: Signals, drives: Drives | None
 ) -> float:
-    """Largest share of the mean square of a filtered acceleration that is an error of the steps, of
-    the joints; 0 if positions show no steps.
+    """Largest share of the mean square of a filtered acceleration that is an error of the steps, of the joints.
+
+    0 if positions show no steps.
     """
     found = _steps(record, states, signals, drives)
     return 0.0 if found is None else float(found[1].max())

@@ -1,5 +1,4 @@
-"""Positions of an encoder as counts: position = count step + phase, with what contradicts that said
-or refused.
+"""Positions of an encoder as counts: position = count step + phase, with what contradicts that said or refused.
 
 The step comes from a data sheet or from the record, the phase from the record alone. Floor against
 round in a driver, and an offset of up to half a step of the zero of the joint, cannot be distinguished from
@@ -149,8 +148,9 @@ def lattice(
 
 
 def smallest_step(x: Array) -> float:
-    """The step of the lattice that distinct positions x, shape (N,), suggest; 0 if they never
-    change.
+    """The step of the lattice that distinct positions x, shape (N,), suggest.
+
+    0 if they never change.
     """
     values = np.unique(x)
     gaps = np.diff(values)
@@ -165,8 +165,9 @@ def smallest_step(x: Array) -> float:
 
 
 def to_and_fro(counts: Array) -> Array:
-    """Samples ahead of the first and behind the last of three changes in a row over one line, shape
-    (m, 2); counts, shape (N,), none missing.
+    """Samples ahead of the first and behind the last of three changes in a row over one line, shape (m, 2).
+
+    counts, shape (N,), none missing.
 
     A smooth motion crosses a line once, and twice where it turns back between two lines.
     """
@@ -188,9 +189,8 @@ def unwrapped_counts(
     *,
     name: str = "record",
 ) -> tuple[Lattice, Array, tuple[str, ...]]:
-    """The lattice of positions (see `lattice`), their counts without wraps of counters of WRAPS
-    bits, shape (N, n), and what wrapped, a sentence for each encoder. InputError if counts jump
-    otherwise.
+    """The lattice of positions (see `lattice`), their counts without wraps of counters of WRAPS bits, shape (N, n), and what wrapped, a sentence for each encoder.
+    InputError if counts jump otherwise.
     """
     lattice_of_all = lattice(position, step, name=name)
     counts = lattice_of_all.counts(position)

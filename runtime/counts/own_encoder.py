@@ -54,9 +54,7 @@ class OwnEncoder:
         return self.reading is not None
 
     def positions(self, q: Array, delta: float, rng: np.random.Generator) -> Array:
-        """Joint positions, shape (N, n), that an encoder of step delta may be judged on: q as
-        measured, or a draw.
-        """
+        """Joint positions, shape (N, n), that an encoder of step delta may be judged on: q as measured, or a draw."""
         if self.reading is None or delta >= (1 - 1e-9) * LIMIT.EXACT_FROM * self.step.max():
             return q
         drawn = self.reading.draw(rng)
@@ -64,8 +62,9 @@ class OwnEncoder:
 
 
 def own_encoder(record: Record, study: Study, drives: Drives | None) -> OwnEncoder | None:
-    """The encoder of a record under law phase; None for other laws, which take every position as
-    exact.
+    """The encoder of a record under law phase.
+
+    None for other laws, which take every position as exact.
 
     Raises
     ------

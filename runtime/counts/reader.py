@@ -38,8 +38,9 @@ def counted(record: Record, signals: Signals) -> States:
 
 
 def unwrapped(record: Record, signals: Signals, drives: Drives | None = None) -> Record:
-    """The record as reader counts takes it: counts that start anew after a turn of the counter go
-    on; another reader leaves it as it is. drives : of the robot, for encoders on the motor side.
+    """The record as reader counts takes it: counts that start anew after a turn of the counter go on.
+
+    Another reader leaves it as it is. drives : of the robot, for encoders on the motor side.
     """
     if signals.reader != "counts":
         return record

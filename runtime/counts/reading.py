@@ -1,5 +1,4 @@
-"""From the counts of encoders to positions, velocities and accelerations with their deviations
-(docs/theory/counts.md).
+"""From the counts of encoders to positions, velocities and accelerations with their deviations (docs/theory/counts.md).
 
     reading = read_counts(position, rate, step)        encoder side, shape (N, n)
     reading.q, reading.s_q, reading.findings
@@ -218,8 +217,9 @@ def read_stretch(
     rest: Array,
     starts: Mapping[int, SearchStart] | None = None,
 ) -> tuple[Part | None, list[Array], Array]:
-    """Posterior of counts, shape (N, n), None if nothing moves; q, qd, qdd, s_q, s_qd, s_qdd in
-    steps, and where the state is unknown, (N, n) each.
+    """Posterior of counts, shape (N, n), None if nothing moves.
+
+    q, qd, qdd, s_q, s_qd, s_qdd in steps, and where the state is unknown, (N, n) each.
 
     An encoder whose count never changes rests in the middle of its interval, one without a count at
     `rest`, shape (n,); `starts` by encoder. Where one count goes to and fro
@@ -255,9 +255,7 @@ def _positions_of_counts(
     uneven: float | None,
     starts: Mapping[int, SearchStart],
 ) -> Part:
-    """Posterior of the encoders that move, of counts k, shape (n, N), and their columns of the
-    states.
-    """
+    """Posterior of the encoders that move, of counts k, shape (n, N), and their columns of the states."""
     N = k.shape[1]
     known = [np.flatnonzero(np.isfinite(k[j])) for j in moving]
     shaken = (
@@ -291,9 +289,7 @@ class Gaps:
         self.last = np.full(n, np.nan)  # last count known
 
     def rest(self, counts: Array) -> Array:
-        """The last counts known, shape (n,), ahead of the record the first of `counts`, shape (N,
-        n).
-        """
+        """The last counts known, shape (n,), ahead of the record the first of `counts`, shape (N, n)."""
         first = counts[np.isfinite(counts).argmax(axis=0), np.arange(counts.shape[1])]
         return np.where(np.isnan(self.last), first, self.last)
 
@@ -310,9 +306,7 @@ class Gaps:
             self.last[j] = counts[known[-1], j] if len(known) else self.last[j]
 
     def findings(self, rate: float) -> tuple[str, ...]:
-        """How many samples are missing and what became of them, a sentence for each encoder that
-        misses any.
-        """
+        """How many samples are missing and what became of them, a sentence for each encoder that misses any."""
         return tuple(
             (
                 f"encoder {j + 1}: {self.samples[j]} samples are missing, at most "

@@ -1,5 +1,4 @@
-"""A motion between the bounds that counts are: expectation propagation under a white-jerk prior,
-one law for all speeds.
+"""A motion between the bounds that counts are: expectation propagation under a white-jerk prior, one law for all speeds.
 
     lo_k <= x(t_k) <= hi_k,   lo_k = count_k - 1/2, hi_k = count_k + 1/2
                               in steps of the encoder; at every sample
@@ -102,9 +101,7 @@ class Smoothed:
         return float(self.read.density.mean())
 
     def state(self, order: int) -> tuple[Array, Array]:
-        """Mean and deviation of the position, or of its derivative of that order, shape (N,)
-        each.
-        """
+        """Mean and deviation of the position, or of its derivative of that order, shape (N,) each."""
         N = self.basis.N
         mean = self.basis.at_samples(self.read.c, order)[:N]
         variance = self.basis.variances(self.read.Z, order)[:N]
@@ -164,9 +161,9 @@ class Counts:
     def read(
         self, sizes: Sequence[float], start: SearchStart | None = None
     ) -> tuple[Boxes, Posterior]:
-        """The motion between the bounds, with the errors of most evidence, or wider ones with which
-        it agrees with every count. Errors of a long record are those of its liveliest part, those
-        of a motion read before are known, or they are wider ones that make the whole more likely.
+        """The motion between the bounds, with the errors of most evidence, or wider ones with which it agrees with every count.
+        Errors of a long record are those of its liveliest part, those of a motion read before are
+        known, or they are wider ones that make the whole more likely.
         """
         start = start if start and start.errors.count in sizes else None
         if start or len(self.y) > 4 * LIVELIEST:
@@ -200,8 +197,9 @@ class Counts:
         return Counts(self.y[part], inside, self.rest[part], self.Ts)
 
     def searched(self, sizes: Sequence[float]) -> tuple[Boxes, Posterior]:
-        """The motion with the errors of most evidence, with the least unless that has UNEVEN nats
-        more; a jittering clock is thought of where errors are wide.
+        """The motion with the errors of most evidence, with the least unless that has UNEVEN nats more.
+
+        A jittering clock is thought of where errors are wide.
         """
         wide = max((x for x in sizes if x <= WIDE), default=sizes[0])
         boxes, read = self.first(Errors(wide))
@@ -244,8 +242,9 @@ class Counts:
         return boxes, boxes.posterior(errors, c, density, tau[sites], nu[sites])
 
     def sites(self, density: float) -> Array:
-        """Samples whose bounds count: both sides of every change and gap, and in between as often
-        as the motion forgets; ascending.
+        """Samples whose bounds count: both sides of every change and gap, and in between as often as the motion forgets.
+
+        ascending.
 
         Bounds of samples close together are one bound. Taken as many, each would see the others as
         independent knowledge.
@@ -262,9 +261,9 @@ class Counts:
         return np.asarray(known[np.unique(np.concatenate([ends.ravel(), between.astype(int)]))])
 
     def from_changes(self, errors: Errors) -> tuple[Array, Array]:
-        """First sites, precision and its product with the mean: at the two samples around a change
-        of the count, at most KNOTS of missing samples apart; a hundredth of an interval at every
-        other sample, `rest` where it is missing.
+        """First sites, precision and its product with the mean: at the two samples around a change of the count, at most KNOTS of missing samples apart.
+
+        A hundredth of an interval at every other sample, `rest` where it is missing.
         """
         y, known, near = self.y, self.measured, max(1, round(KNOTS / self.Ts))
         tau = self.rest.copy()
@@ -292,9 +291,7 @@ class Counts:
         return replace(self, y=y)
 
     def leaps(self) -> list[tuple[int, int]]:
-        """Samples at which a change of the count is off the parabola through its neighbours by LEAP
-        times what these are, and by how many counts.
-        """
+        """Samples at which a change of the count is off the parabola through its neighbours by LEAP times what these are, and by how many counts."""
         y, known = self.y, self.measured
         change = np.diff(y[known])
         bent = np.abs(change[1:-1] - (change[2:] + change[:-2]) / 2) > LEAP / 2
@@ -309,9 +306,10 @@ class Counts:
         return [(int(known[at[i] + 1]), round(off[i])) for i in leap]
 
     def jump(self, boxes: Boxes, read: Posterior) -> tuple[int, int] | None:
-        """Sample at which counts jump, and by how many, if the record around it is more likely
-        without by LIKELIER nats; not asked where counts have the least errors and the jerk is
-        nowhere SPIKE times as dense as in the mean.
+        """Sample at which counts jump, and by how many, if the record around it is more likely without by LIKELIER nats.
+
+        Not asked where counts have the least errors and the jerk is nowhere SPIKE times as dense as
+        in the mean.
         """
         spikes = read.density.max() > SPIKE * read.density.mean()
         if len(boxes.sites) < FEWEST or not (spikes or read.errors.count > COUNT_ERRORS[0]):
@@ -353,9 +351,7 @@ def _error_notes(errors: Errors, least: float, sites: int) -> list[str]:
 def _spline_through_sites(
     basis: Basis, tau: Array, nu: Array, density: float
 ) -> tuple[Array, Array]:
-    """The spline through Gaussian sites, and the jerk density that goes with it, shape (M,), after
-    at most FIRST passes from `density`.
-    """
+    """The spline through Gaussian sites, and the jerk density that goes with it, shape (M,), after at most FIRST passes from `density`."""
     tau, nu, ones = basis.filled(tau), basis.filled(nu), np.ones(basis.M)
     samples, unit, c = basis.of_samples(tau), basis.of_prior(ones), np.zeros(basis.P)
     g = basis.gradient(nu, ones, c)
@@ -371,8 +367,9 @@ def _spline_through_sites(
 
 
 def _through(basis: Basis, tau: Array, nu: Array, density: Array, c: Array) -> tuple[Array, Factor]:
-    """The spline through Gaussian sites, shape (m M,) each, corrected once, and the factor of its
-    precision; c : one near it.
+    """The spline through Gaussian sites, shape (m M,) each, corrected once, and the factor of its precision.
+
+    c : one near it.
     """
     factor = Factor.of(basis.precision(tau, density))
     for _ in range(2):

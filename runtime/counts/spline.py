@@ -1,5 +1,4 @@
-"""A position as a cubic spline with white jerk, under independent Gaussian knowledge of single
-samples: means, deviations, draws in linear time.
+"""A position as a cubic spline with white jerk, under independent Gaussian knowledge of single samples: means, deviations, draws in linear time.
 
     x(t) = sum_i c_i B((t - t_i)/h)
         B the cubic B-spline: between two knots the jerk j = (c_(i+3) - 3 c_(i+2) + 3 c_(i+1) -
@@ -72,8 +71,9 @@ class Basis:
 
     @property
     def least_density(self) -> float:
-        """Least density of the jerk that a Cholesky factor of A resolves, steps^2/s^5; sites have a
-        precision of 0.06 and more.
+        """Least density of the jerk that a Cholesky factor of A resolves, steps^2/s^5.
+
+        Sites have a precision of 0.06 and more.
         """
         return CONDITION / (self.h**5 * self.m)
 
@@ -150,9 +150,7 @@ class Factor:
 
     @classmethod
     def of(cls, A: Array) -> Factor:
-        """Factor of A, shape (4, P); where rounding made it indefinite, of A with a diagonal larger
-        by the least share that helps.
-        """
+        """Factor of A, shape (4, P); where rounding made it indefinite, of A with a diagonal larger by the least share that helps."""
         for share in (0.0, 1e-13, 1e-11, 1e-9):
             L, info = dpbtrf(np.vstack([A[:1] * (1 + share), A[1:]]), lower=1)
             if not info:
@@ -208,8 +206,7 @@ class Factor:
 
 
 def next_density(basis: Basis, samples: Array, unit: Array, g: Array, r: float) -> float:
-    """MacKay's rule for one density r of the jerk: squares of the jerk over the number of jerks
-    that sites determine.
+    """MacKay's rule for one density r of the jerk: squares of the jerk over the number of jerks that sites determine.
 
     samples, unit : shares of A that sites have, and the prior of density one.
     g : slope at c = 0.

@@ -115,8 +115,7 @@ class SetsDocument(Estimate):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class IdentificationDocument(SetsDocument):
-    """Parameters of a robot with their uncertainty; with the keys from `sets` on where a whole
-    identification is written.
+    """Parameters of a robot with their uncertainty; with the keys from `sets` on where a whole identification is written.
 
     Attributes
     ----------
@@ -224,8 +223,9 @@ class CestacDocument:
 
 
 def load_estimate(path: Path | str) -> Estimate:
-    """The Estimate in a file that `Estimate.to_json` or `symgen identify -o` wrote; InputError as
-    `Estimate.from_json`.
+    """The Estimate in a file that `Estimate.to_json` or `symgen identify -o` wrote.
+
+    InputError as `Estimate.from_json`.
     """
     return from_text(Estimate, result_text(path), ESTIMATE, str(path))
 

@@ -1,5 +1,4 @@
-"""How well a motion lets the parameters be identified, and the limits that it must keep (chapter,
-section 2.2.3).
+"""How well a motion lets the parameters be identified, and the limits that it must keep (chapter, section 2.2.3).
 
 The criterion is that of the observation matrix as an estimator uses it: rows of joint j divided by
 the deviation s_j of its torque, columns multiplied by the size of their parameter, so that
@@ -98,8 +97,9 @@ class Excess:
 
 
 def limits_of(model: GeneratedModel, given: Mapping[str, Any]) -> MotionLimits:
-    """The limits of the robot file, changed by `given`; raises SettingsError if q, qd or qdd has
-    none.
+    """The limits of the robot file, changed by `given`.
+
+    Raises SettingsError if q, qd or qdd has none.
     """
     n = len(model.JOINTS)
     known = {**dict(getattr(model, "LIMITS", None) or {}), **given}
@@ -145,8 +145,9 @@ def weights_of(
     essential: Sequence[str] = (),
     s: Sequence[float] = (),
 ) -> Weights:
-    """Columns, deviations and sizes from the parameters X by name; `essential`, `s`: those of an
-    estimate if there is one.
+    """Columns, deviations and sizes from the parameters X by name.
+
+    `essential`, `s`: those of an estimate if there is one.
     """
     n = len(model.JOINTS)
     names = base_columns(model, settings.columns, essential or model.BASE_PARAMETERS, "columns")
@@ -211,8 +212,8 @@ def excesses(
     X: Array,
     rate: float | None = None,
 ) -> list[Excess]:
-    """Limits that the motion exceeds on the grid of the controller: the worst instant of each joint
-    and quantity. Distances are not among them.
+    """Limits that the motion exceeds on the grid of the controller: the worst instant of each joint and quantity.
+    Distances are not among them.
 
     The rate of the torque is that without dry friction, whose jump at a reversal no motion avoids.
     """
@@ -259,9 +260,7 @@ def excesses(
 def usage(
     model: GeneratedModel, motion: Motion, limits: MotionLimits, rate: float, X: Array
 ) -> dict[str, list[float]]:
-    """Largest share of each limit that the motion uses at `rate`, Hz, by quantity and joint; of a
-    range, measured from its middle.
-    """
+    """Largest share of each limit that the motion uses at `rate`, Hz, by quantity and joint; of a range, measured from its middle."""
     _, q, qd, qdd = motion.sampled(rate)
     middle, half = (limits.lower + limits.upper) / 2, (limits.upper - limits.lower) / 2
     shares = {

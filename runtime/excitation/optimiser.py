@@ -1,5 +1,4 @@
-"""IPOPT on CasADi's functions: from a random start to a motion of small criterion within the
-limits.
+"""IPOPT on CasADi's functions: from a random start to a motion of small criterion within the limits.
 
 From each start, first -log det(W_w'W_w) is lowered, which is smooth and does not depend on the
 scale of a column, then the criterion itself.
@@ -222,9 +221,7 @@ def _torques(
 def _distances(
     model: GeneratedModel, settings: ExcitationSettings, q: Any
 ) -> list[tuple[Any, float, float]]:
-    """Squared distances of the spheres that stay apart, of the square of the smallest they may
-    have.
-    """
+    """Squared distances of the spheres that stay apart, of the square of the smallest they may have."""
     if not settings.pairs:
         return []
     n, M = q.shape[1], q.shape[0]

@@ -1,5 +1,4 @@
-"""Poses at rest that let the parameters of gravity be identified as well as the range of the joints
-allows.
+"""Poses at rest that let the parameters of gravity be identified as well as the range of the joints allows.
 
 Of c parameters, W the rows of the poses over the deviations s_j of the torques, W0 those of the
 poses of a record, if there is one:

@@ -1,5 +1,4 @@
-"""The result of a search for an exciting motion: the motion, what it promises, how far it uses the
-limits.
+"""The result of a search for an exciting motion: the motion, what it promises, how far it uses the limits.
 
 Every figure is that of the rows the identification will use, with sign(qd) itself. No CasADi here:
 pages read results without it.
@@ -183,9 +182,7 @@ class Excitation(Result):
 
     @property
     def verdict(self) -> str:
-        """Condition, the least certain parameter, where the motion of the record is better, and
-        limits that are unknown.
-        """
+        """Condition, the least certain parameter, where the motion of the record is better, and limits that are unknown."""
         of_record = (
             ""
             if self.known.condition is None

@@ -133,8 +133,9 @@ def excite(
 def _within(
     model: GeneratedModel, search: Search, starts: Sequence[Start]
 ) -> Iterator[tuple[Motion, float]]:
-    """Motions of the starts within the limits at the controller rate, with the margin that took;
-    none of a start where wider ones do not help.
+    """Motions of the starts within the limits at the controller rate, with the margin that took.
+
+    None of a start where wider ones do not help.
     """
     for start in starts:
         settings = search.settings

@@ -212,9 +212,7 @@ class Friction(Part):
 
 
 def friction_figure(curves: Sequence[FrictionCurve], unit: str = "N m") -> Figure:
-    """Friction against velocity: rows in grey, bins with their 95 % intervals, the first law and
-    the one that predicts.
-    """
+    """Friction against velocity: rows in grey, bins with their 95 % intervals, the first law and the one that predicts."""
     speed = "m/s" if unit == "N" else "rad/s"
     first: Any = {"color": BLUE, "linewidth": 1.2, "linestyle": "--"}
     bins: Any = {"fmt": "o", "color": BLACK, "markersize": 3, "linewidth": 1.0}
@@ -299,9 +297,7 @@ def friction_curves(problem: Problem, fit: Estimate) -> tuple[FrictionCurve, ...
 
 
 def own_friction(model: GeneratedModel, j: int) -> list[int]:
-    """Base parameters made of friction and offset of joint number j alone (j from 0), those of its
-    curve.
-    """
+    """Base parameters made of friction and offset of joint number j alone (j from 0), those of its curve."""
     physical = physical_model(model)
     elements = elements_of(model)
     of_curve = [name in elements and elements[name][0] in OWN for name in physical.standard]
@@ -415,9 +411,7 @@ def _predicting(laws: Sequence[FrictionLaw]) -> str:
 
 
 def _bins(terms: Terms) -> tuple[Array, Array, Array, Callable[[Array], Array]]:
-    """Centres, means and half intervals over bins of about equal numbers of rows, none across
-    standstill; and the function that averages over them.
-    """
+    """Centres, means and half intervals over bins of about equal numbers of rows, none across standstill; and the function that averages over them."""
     sides = [terms.v[terms.v < 0], terms.v[terms.v >= 0]]
     shares = [max(round(LIMIT.FRICTION_BINS * len(side) / len(terms.v)), 1) for side in sides]
     inner = [

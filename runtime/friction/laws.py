@@ -49,9 +49,7 @@ class Terms:
 
     @cached_property
     def grid(self) -> tuple[Array, Array]:
-        """Logarithms of the VS among which a search begins, shape (k,), and the term of FST for
-        each, shape (k, N).
-        """
+        """Logarithms of the VS among which a search begins, shape (k,), and the term of FST for each, shape (k, N)."""
         x = np.log(
             np.abs(self.v).max()
             * np.geomspace(LIMIT.STRIBECK_SLOWEST, LIMIT.STRIBECK_FASTEST, LIMIT.STRIBECK_GRID)
@@ -101,9 +99,7 @@ def fit_law(terms: Terms, names: Sequence[str], rows: Array) -> dict[str, float]
 
 
 def _excess_velocity(terms: Terms, names: Sequence[str], rows: Array) -> float:
-    """VS of the least squares of a law: the term of FST, made orthogonal to the others, takes
-    (e'r)^2 / e'e from the squares of their residual r.
-    """
+    """VS of the least squares of a law: the term of FST, made orthogonal to the others, takes (e'r)^2 / e'e from the squares of their residual r."""
     others = _columns(terms, [name for name in names if name not in ("FST", "VS")], None)[rows]
     U, s, _ = np.linalg.svd(others, full_matrices=False)
     Q = U[:, s > s[0] * max(others.shape) * np.finfo(float).eps]

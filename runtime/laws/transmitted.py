@@ -1,5 +1,4 @@
-"""Laws that read the torque that the rest of the model transmits at their joint: bilinear in the
-parameters, since
+"""Laws that read the torque that the rest of the model transmits at their joint: bilinear in the parameters, since
 
     Y = D_r X_r + D_l(tau_m) X_l + rho,        tau_m = D_r X_r
 
@@ -69,9 +68,7 @@ def transmitted_torque(problem: Problem) -> Problem:
 
 
 def _solve(observations: Sequence[Observation], weights: bool) -> Array:
-    """Least squares of all columns, with rows of each joint divided by the deviation of its
-    residual where `weights`.
-    """
+    """Least squares of all columns, with rows of each joint divided by the deviation of its residual where `weights`."""
     W = np.vstack([o.W for o in observations])
     Y = np.concatenate([o.Y for o in observations])
     X = np.linalg.lstsq(W, Y, rcond=1e-10)[0]

@@ -1,5 +1,4 @@
-"""The closed loop of a resolution study: for methods that simulate it (iv, didim), and for
-encoders that stand inside it.
+"""The closed loop of a resolution study: for methods that simulate it (iv, didim), and for encoders that stand inside it.
 
     place: record
             the positions of the record are rounded; the loop is simulated without steps, as the
@@ -99,9 +98,7 @@ class Loop:
 
     @cached_property
     def closed(self) -> ClosedLoop:
-        """The loop of the measured records; of place loop, of one made with the encoder of the
-        study.
-        """
+        """The loop of the measured records; of place loop, of one made with the encoder of the study."""
         if self.study.cestac.place == "record":
             return closed_loop(self.problem, self.problem.prepared, self.simulator, **self.options)
         return self._of(self.simulator, self.simulator.controller.seed, 0.0)
@@ -149,9 +146,7 @@ class Loop:
         return self.closed.measured()
 
     def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
-        """`observation` of the perturbed positions of every record, shape (N, n), with the loop
-        attached.
-        """
+        """`observation` of the perturbed positions of every record, shape (N, n), with the loop attached."""
         parts = [
             replace(part, prepared=replace(part.prepared, record=part.record.moved(np.asarray(q))))
             for part, q in zip(self.closed.parts, positions, strict=True)
@@ -168,9 +163,7 @@ class Loop:
         return self.simulated(level, draw).measured()
 
     def simulated(self, level: Level, draw: tuple[int, ...]) -> ClosedLoop:
-        """The loop of a record made with encoders of steps of level.delta; of those of the study at
-        a level without steps.
-        """
+        """The loop of a record made with encoders of steps of level.delta; of those of the study at a level without steps."""
         random = stream(self.study.cestac.seed, draw[-1])
         law, n = self.simulator.law, len(self.model.JOINTS)
         phase = level.delta * random.random(n)
@@ -184,8 +177,9 @@ class Loop:
         return self._of(simulator, int(random.integers(2**31)), level.delta)
 
     def _of(self, simulator: Any, seed: int, delta: float) -> ClosedLoop:
-        """A record made by `simulator`, under the loop without its steps; the reader of counts is
-        told them, and needs some.
+        """A record made by `simulator`, under the loop without its steps.
+
+        The reader of counts is told them, and needs some.
         """
         record = simulator.run(
             self.truth, self.reference, seed=seed, name=f"SIMULATED {self.model.NAME}"

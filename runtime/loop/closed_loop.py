@@ -1,5 +1,4 @@
-"""The closed loop in which a record was made, run again with other parameters: what IV and
-DIDIM compare the record with.
+"""The closed loop in which a record was made, run again with other parameters: what IV and DIDIM compare the record with.
 
     loop = closed_loop(problem, problem.prepared, simulator)
     observation = loop.measured()             Y = W X + rho, to which the loop stays attached
@@ -143,9 +142,7 @@ class ClosedLoop:
     law: tuple[LawFit, ...] = ()
 
     def run(self, X: Array, g: Array | float = 1.0) -> list[Simulation]:
-        """One simulation per record with all base parameters X (b,), from the measured position at
-        its start, at rest.
-        """
+        """One simulation per record with all base parameters X (b,), from the measured position at its start, at rest."""
         return [
             self.simulator.run(X, part.reference, g=g, ideal=True, **part.given)
             for part in self.parts
@@ -157,9 +154,7 @@ class ClosedLoop:
         return [run.tau if known is None else run.tau[: len(known)] - known for run, known in pairs]
 
     def measured(self) -> Observation:
-        """Y = W X + rho of the measured positions on the rows of the loop, which it carries
-        along.
-        """
+        """Y = W X + rho of the measured positions on the rows of the loop, which it carries along."""
         states = [p.prepared.states for p in self.parts]
         observation = self._observed([replace(s, errors=None) for s in states])
         observation = replace(
@@ -181,9 +176,7 @@ class ClosedLoop:
     def simulated(
         self, runs: Sequence[Simulation], observation: Observation, *, exact: bool
     ) -> Observation:
-        """The rows and columns of `observation` with Z of the simulated motion in place of W: of
-        its positions through the filters of the record, or of its exact states.
-        """
+        """The rows and columns of `observation` with Z of the simulated motion in place of W: of its positions through the filters of the record, or of its exact states."""
         assert observation.closed_loop is not None
         states = [
             States(run.q, run.qd, run.qdd)[: len(part.record)]
@@ -197,9 +190,7 @@ class ClosedLoop:
         return replace(observation, W=np.asfortranarray(Z[observation.closed_loop.rows]))
 
     def outputs(self, signals: Sequence[Array], observation: Observation) -> Array:
-        """Signals of every record, shape (N, n) or (N, n, c), decimated like Y, on the rows of
-        `observation`: shape (r,) or (r, c).
-        """
+        """Signals of every record, shape (N, n) or (N, n, c), decimated like Y, on the rows of `observation`: shape (r,) or (r, c)."""
         assert observation.closed_loop is not None
         by_joint: list[Array] = []
         kept = [part.decimated(x) for x, part in zip(signals, self.parts, strict=True)]
@@ -306,9 +297,7 @@ def closed_loop(
 
 
 def _at_ticks(x: Array, every: int, ticks: int) -> Array:
-    """Samples (N, n) at the ticks of the controller, (T, n), by straight lines; the last
-    one held.
-    """
+    """Samples (N, n) at the ticks of the controller, (T, n), by straight lines; the last one held."""
     places = np.arange(ticks) / every
     return np.column_stack([np.interp(places, np.arange(len(x)), column) for column in x.T])
 
@@ -363,9 +352,7 @@ def slips(qd: Array, G: Array) -> Array:
 
 
 def _usable(simulator: Simulator, record: Record, keep: Array | None) -> Array | None:
-    """`keep`, and the samples whose torque is not at its limit and whose positions are there or
-    missing for a moment only.
-    """
+    """`keep`, and the samples whose torque is not at its limit and whose positions are there or missing for a moment only."""
     bound = np.broadcast_to(np.asarray(simulator.law.saturation, dtype=float), (record.n,))
     if not np.isfinite(bound).any() and record.missing is None:
         return keep
@@ -378,9 +365,7 @@ def _usable(simulator: Simulator, record: Record, keep: Array | None) -> Array |
 
 
 def loop_of(observation: Observation, method: str) -> ClosedLoop:
-    """The loop of an observation; raises SettingsError if `method` was asked for and there is
-    none.
-    """
+    """The loop of an observation; raises SettingsError if `method` was asked for and there is none."""
     if observation.closed_loop is None:
         raise SettingsError(
             f"{method} simulates the closed loop of the record, and this study tells none; give a "

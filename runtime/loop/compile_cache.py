@@ -46,8 +46,9 @@ def shared_object(
     opened: Callable[[Path], ctypes.CDLL],
     flags: Sequence[str],
 ) -> ctypes.CDLL:
-    """The shared object of a C file, from the cache or compiled; one that does not open is compiled
-    again, once.
+    """The shared object of a C file, from the cache or compiled.
+
+    One that does not open is compiled again, once.
 
     Parameters
     ----------

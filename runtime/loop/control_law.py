@@ -110,9 +110,7 @@ class ControlLaw:
 
 
 def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
-    """The numbers of the settings for the joints of a model; SettingsError if they do
-    not fit.
-    """
+    """The numbers of the settings for the joints of a model; SettingsError if they do not fit."""
     n, law = len(model.JOINTS), controller.law
 
     def each(path: str, value: PerJoint[float] | None, absent: float = 0.0) -> Array:
@@ -158,8 +156,9 @@ def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
 
 
 def parameters_of(model: GeneratedModel, controller: Controller | None = None) -> Array:
-    """Base parameters (b,) of the standard ones of the robot file, with `values` of the settings in
-    their place; 0 for those without effect.
+    """Base parameters (b,) of the standard ones of the robot file, with `values` of the settings in their place.
+
+    0 for those without effect.
     """
     changed = {} if controller is None else controller.values
     emitted, where = cast(Any, model), ("controller", "values")
@@ -181,8 +180,7 @@ def parameters_of(model: GeneratedModel, controller: Controller | None = None) -
 
 
 def discrete_poles(law: ControlLaw, A: Array, B: Array, g: Array) -> Array:
-    """Poles of the sampled loop about a point at rest: inertia A (n, n), viscous friction B (n, n),
-    torque held between ticks.
+    """Poles of the sampled loop about a point at rest: inertia A (n, n), viscous friction B (n, n), torque held between ticks.
 
     State: q, qd, y1, y2, I, u. An integral that acts on nothing is left out.
     """

@@ -1,5 +1,4 @@
-"""One controller tick of a closed loop as one CasADi function, compiled to C if there is a
-compiler.
+"""One controller tick of a closed loop as one CasADi function, compiled to C if there is a compiler.
 
     y     = what the encoder shows of q                   qd_m = its difference
     u     = P e + Vr qd_r - Vm qd_m + K I + feed-forward,  e = q_r - y
@@ -83,8 +82,9 @@ class LoopInputs:
 
 
 def blocks(rows: Array, size: int) -> Iterator[tuple[Array, int]]:
-    """`size` rows at a time and how many of them count; the last block is filled up with copies of
-    its last row.
+    """`size` rows at a time and how many of them count.
+
+    The last block is filled up with copies of its last row.
     """
     for k in range(0, len(rows), size):
         block = rows[k : k + size]
@@ -248,9 +248,7 @@ def round_function(
     *,
     whole: int,
 ) -> Any:
-    """The plant until the next slip stops, or the whole of h: q, qd, what is left of h, qdd, f,
-    direction, Y, slips that stopped.
-    """
+    """The plant until the next slip stops, or the whole of h: q, qd, what is left of h, qdd, f, direction, Y, slips that stopped."""
     inputs = plant_inputs(model, friction)
     q, qd, tau, X, plus, minus, h = inputs
     f, direction, qdd, Y = friction_function(model, friction, constants)(q, qd, tau, X, plus, minus)
@@ -281,8 +279,9 @@ def plant_inputs(model: GeneratedModel, friction: DryFriction | None = None) -> 
 def runge_kutta(
     rates: Callable[..., Sequence[MX]], state: Sequence[MX], h: MX
 ) -> tuple[list[MX], Sequence[MX]]:
-    """The state after h by Runge-Kutta of order 4, and its derivative at the start; rates(*state)
-    gives the derivative.
+    """The state after h by Runge-Kutta of order 4, and its derivative at the start.
+
+    rates(*state) gives the derivative.
     """
 
     def moved(share: MX, slope: Sequence[MX]) -> list[MX]:
@@ -322,8 +321,9 @@ def _cvodes(model: GeneratedModel, constants: dict[str, float]) -> Any:
 
 
 def compiled(function: Any, cache: Path | None = None) -> Any:
-    """The function in C, from the cache of compiled files; the function itself, with a
-    FallbackWarning, where that cannot be had.
+    """The function in C, from the cache of compiled files.
+
+    The function itself, with a FallbackWarning, where that cannot be had.
     """
     generator = ca.CodeGenerator(f"{function.name()}.c")
     generator.add(function)

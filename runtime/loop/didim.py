@@ -1,5 +1,6 @@
-"""DIDIM: direct and inverse dynamic identification models; measured torques on the regressor of the
-simulated motion.
+"""DIDIM: direct and inverse dynamic identification models.
+
+Measured torques on the regressor of the simulated motion.
 
     X^(k+1) = argmin sum_j ||Y_j - Z_j^k X||^2 / s_j^2,
             Z^k = F_p[W(q_s, qd_s, qdd_s)] of the simulation with X^k

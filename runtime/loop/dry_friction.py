@@ -1,5 +1,4 @@
-"""Dry friction of coupled elements: the Coulomb columns of a model and the directions along which
-they act.
+"""Dry friction of coupled elements: the Coulomb columns of a model and the directions along which they act.
 
 Every Coulomb element acts along a row of G: slip s = G qd, force c_plus where s > 0, -c_minus where
 s < 0. Elements may outnumber the joints (the wrist FS5,

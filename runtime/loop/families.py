@@ -1,5 +1,4 @@
-"""Families of trajectories that rest at both ends: finite Fourier series, sinusoids of free
-frequency, point to point, triangular.
+"""Families of trajectories that rest at both ends: finite Fourier series, sinusoids of free frequency, point to point, triangular.
 
     Fourier        q = q0 + sum_l a_l/(w l) sin(w l t) - b_l/(w l) cos(w l t),   w = 2 pi/period
             (Swevers et al. 1997)
@@ -51,15 +50,11 @@ class Family:
         raise NotImplementedError
 
     def joint(self, t: Array, p: Any, math: Any) -> States:
-        """q, qd, qdd of one joint at the times t, shape (N,), from its coefficients p, shape
-        (P,).
-        """
+        """q, qd, qdd of one joint at the times t, shape (N,), from its coefficients p, shape (P,)."""
         raise NotImplementedError
 
     def guess(self, rng: np.random.Generator, lower: float, upper: float, speed: float) -> Array:
-        """Random coefficients, shape (P,), of a motion about the middle of [lower, upper], no
-        faster than about `speed`.
-        """
+        """Random coefficients, shape (P,), of a motion about the middle of [lower, upper], no faster than about `speed`."""
         raise NotImplementedError
 
     def bounds(self) -> tuple[Array, Array]:
@@ -322,17 +317,16 @@ def _linear(basis: Sequence[Array], p: Any, math: Any) -> States:
 
 
 def _step(t: Array, width: float, sign: float = 1.0) -> tuple[Array, Array, Array]:
-    """A smooth step from 0 to 1 within [0, width], 10 x^3 - 15 x^4 + 6 x^5, and its derivatives by
-    time, of time running as `sign`.
-    """
+    """A smooth step from 0 to 1 within [0, width], 10 x^3 - 15 x^4 + 6 x^5, and its derivatives by time, of time running as `sign`."""
     x = np.clip(t / width, 0.0, 1.0)
     speed, bend = 30 * x**2 * (1 - x) ** 2 / width, 60 * x * (1 - x) * (1 - 2 * x) / width**2
     return x**3 * (10 - 15 * x + 6 * x**2), sign * speed, bend
 
 
 def _corner(u: Array, blend: float) -> Array:
-    """A ramp max(u, 0) whose corner is rounded within |u| < blend/2, with its two derivatives,
-    shape (3, N); the speed rises as 3 x^2 - 2 x^3.
+    """A ramp max(u, 0) whose corner is rounded within |u| < blend/2, with its two derivatives, shape (3, N).
+
+    The speed rises as 3 x^2 - 2 x^3.
     """
     x = np.clip(u / blend + 0.5, 0.0, 1.0)
     beyond = np.maximum(u - blend / 2, 0.0)

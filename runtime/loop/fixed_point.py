@@ -1,5 +1,4 @@
-"""What IV and DIDIM share: parameters and simulation in turn, gains that follow the inertia, steps
-that stay physical.
+"""What IV and DIDIM share: parameters and simulation in turn, gains that follow the inertia, steps that stay physical.
 
     X^(k+1) = estimate from the record and the simulation with X^k and gains g(X^k), until it no longer
     changes; then again with g = 1
@@ -65,9 +64,7 @@ class FixedPointOptions(LoopOptions):
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One estimate of a pass: X of the columns (c,), their covariance, norm of its residual, and
-    what else the method keeps.
-    """
+    """One estimate of a pass: X of the columns (c,), their covariance, norm of its residual, and what else the method keeps."""
 
     X: Array
     covariance: Array
@@ -93,9 +90,7 @@ def full(names: Sequence[str], X: Array, every: Sequence[str]) -> Array:
 
 
 def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]) -> Array:
-    """X of the columns by ordinary least squares, from the robot file, of unit inertia, or as
-    given.
-    """
+    """X of the columns by ordinary least squares, from the robot file, of unit inertia, or as given."""
     names = start.observation.names
     if not isinstance(which, str):
         if unknown := [name for name in which if name not in names]:
@@ -215,8 +210,9 @@ def _simulated(
     J: Array | None,
     remedy: str,
 ) -> tuple[Array, Array, Sequence[Simulation], str]:
-    """X that can be simulated, on the way from the last one that could; g, the runs, and why none
-    could be made. remedy : what the error of the first one says.
+    """X that can be simulated, on the way from the last one that could.
+
+    g, the runs, and why none could be made. remedy : what the error of the first one says.
     """
     reason = ""
     for _ in range(LIMIT.HALVINGS + 1):
@@ -245,8 +241,9 @@ def _simulated(
 
 
 def _accelerated(last: Sequence[Mapping[str, Any]], size: Array) -> Array:
-    """The next X from the last passes, each from X to `next`; distances in units of `size`, shape
-    (c,).
+    """The next X from the last passes, each from X to `next`.
+
+    Distances in units of `size`, shape (c,).
     """
     points = np.array([own["X"] for own in last])
     steps = np.array([own["next"] - own["X"] for own in last])
@@ -267,9 +264,7 @@ def _contraction(trail: Sequence[Mapping[str, Any]]) -> float:
 
 
 def outcome_of(loop: ClosedLoop, fixed: Fixed, method: str) -> tuple[Status, str, dict[str, Any]]:
-    """Status, message, and what `details` holds of the passes: parameters after each, norm of the
-    residual, gains, change in sigmas.
-    """
+    """Status, message, and what `details` holds of the passes: parameters after each, norm of the residual, gains, change in sigmas."""
     parts = [part for part in (fixed.message, loop.assumption) if part]
     if not fixed.converged:
         parts.insert(

@@ -123,8 +123,9 @@ def _solve(W: Array, Z: Array, Y: Array) -> tuple[Array, Array, Array]:
 
 
 def _quality(W: Array, Z: Array) -> dict[str, float]:
-    """Condition of Z'VW with unit columns, smallest correlation of the two column spaces, smallest
-    of a column with its own instrument; rows are weighted.
+    """Condition of Z'VW with unit columns, smallest correlation of the two column spaces, smallest of a column with its own instrument.
+
+    Rows are weighted.
     """
     unit_W = W / np.linalg.norm(W, axis=0)
     unit_Z = Z / np.maximum(np.linalg.norm(Z, axis=0), 1e-300)
@@ -137,8 +138,9 @@ def _quality(W: Array, Z: Array) -> dict[str, float]:
 
 
 def _by_block(observation: Observation, Z: Array, residual: Array, A: Array) -> Array:
-    """Change of X = A Z'Y by each block left out (`runtime.core.least_squares.block_covariance`), shape (K,
-    b), times sqrt((K - 1)/K); nan for one block.
+    """Change of X = A Z'Y by each block left out (`runtime.core.least_squares.block_covariance`), shape (K, b), times sqrt((K - 1)/K).
+
+    nan for one block.
 
     Z, residual : weighted rows of the instruments, shape (r, b), and Y - W X, shape (r,).
     """

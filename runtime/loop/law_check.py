@@ -58,9 +58,7 @@ class LawFit:
 def law_fits(
     law: Any, parts: Sequence[Any], controller: Controller, joints: Sequence[str]
 ) -> tuple[LawFit, ...]:
-    """Each joint of the records; parts : of `ClosedLoop`, references at the rate of the
-    controller.
-    """
+    """Each joint of the records; parts : of `ClosedLoop`, references at the rate of the controller."""
     torques = [law_torque(law, part.record, part.reference, controller) for part in parts]
     rate, fits = parts[0].record.rate, []
     for j, label in enumerate(joints):
@@ -108,9 +106,7 @@ def law_torque(law: Any, record: Record, reference: Reference, controller: Contr
 
 
 def _integral(steps: Array, first: float, bound: float) -> Array:
-    """I before each step, shape (N,): I_0 = first, I_(k+1) = clip(I_k + step_k), as in
-    `runtime.loop.controller_tick`.
-    """
+    """I before each step, shape (N,): I_0 = first, I_(k+1) = clip(I_k + step_k), as in `runtime.loop.controller_tick`."""
 
     def following(I: float, step: float) -> float:
         return min(max(I + step, -bound), bound)

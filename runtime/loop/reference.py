@@ -1,5 +1,4 @@
-"""References of a controller: q_r, qd_r, qdd_r at its rate, from samples, a motion by coefficients,
-a record, or random points.
+"""References of a controller: q_r, qd_r, qdd_r at its rate, from samples, a motion by coefficients, a record, or random points.
 
 reference = Reference.sampled(q_r, rate=1000)
         # derivatives by central differences
@@ -65,9 +64,7 @@ class Reference:
         return cls(rate, q, qd, derivative(qd, rate))
 
     def at_rate(self, every: int) -> Reference:
-        """The same motion `every` times as fast sampled, N samples become (N - 1) every + 1: q by
-        cubic splines, whose derivatives are qd and qdd.
-        """
+        """The same motion `every` times as fast sampled, N samples become (N - 1) every + 1: q by cubic splines, whose derivatives are qd and qdd."""
         if every == 1:
             return self
         ticks = np.arange((len(self) - 1) * every + 1) / (every * self.rate)
@@ -90,8 +87,7 @@ def reference_of(
     records: Sequence[Record] = (),
     folder: str | Path | None = None,
 ) -> Reference:
-    """The reference that the settings describe, within the limits of the robot unless they are to
-    be ignored.
+    """The reference that the settings describe, within the limits of the robot unless they are to be ignored.
 
     Parameters
     ----------
@@ -176,8 +172,7 @@ def read_reference(path: Path, rate: float, n: int) -> Reference:
 
 
 def of_record(record: Record, controller: Controller) -> Reference:
-    """The recorded reference at the rate of the controller, by cubic splines where the record is
-    slower.
+    """The recorded reference at the rate of the controller, by cubic splines where the record is slower.
 
     SettingsError if the record holds none, or its rate is not that of every `record_every`-th
     tick.
@@ -193,9 +188,7 @@ def of_record(record: Record, controller: Controller) -> Reference:
 
 
 def require_rate(record: Record, controller: Controller) -> None:
-    """SettingsError unless the record holds every `record_every`-th tick of the controller, with
-    the setting that would make it so.
-    """
+    """SettingsError unless the record holds every `record_every`-th tick of the controller, with the setting that would make it so."""
     rate, every = controller.rate, controller.record_every
     if abs(record.rate * every / rate - 1) <= LIMIT.RATE_TOLERANCE:
         return
@@ -219,9 +212,7 @@ def require_rate(record: Record, controller: Controller) -> None:
 
 
 def check_limits(reference: Reference, limits: Mapping[str, Any], joints: Sequence[str]) -> None:
-    """Raise InputError with joint, value, limit and instant at the first reference value outside
-    LIMITS of a model.
-    """
+    """Raise InputError with joint, value, limit and instant at the first reference value outside LIMITS of a model."""
     for quantity, unit in UNITS.items():
         if quantity not in limits:
             continue
@@ -241,8 +232,7 @@ def check_limits(reference: Reference, limits: Mapping[str, Any], joints: Sequen
 
 
 def point_to_point(model: GeneratedModel, settings: Points, rate: float) -> Reference:
-    """All joints move together between random points of the middle of their range, as fast as speed
-    and acceleration limits allow.
+    """All joints move together between random points of the middle of their range, as fast as speed and acceleration limits allow.
 
     It ends with the last piece that the duration has room for.
     """

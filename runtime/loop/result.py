@@ -1,6 +1,4 @@
-"""What a closed-loop simulation gives: exact states, what a record of it would hold, sensitivities
-to the parameters.
-"""
+"""What a closed-loop simulation gives: exact states, what a record of it would hold, sensitivities to the parameters."""
 
 from __future__ import annotations
 
@@ -90,9 +88,7 @@ class Simulation(Result):
         )
 
     def to_csv(self) -> str:
-        """t, q1 ..., tau1 ..., qr1 ...: the measured columns, SI, joint side, as `identify` reads
-        them.
-        """
+        """t, q1 ..., tau1 ..., qr1 ...: the measured columns, SI, joint side, as `identify` reads them."""
         return csv_text(self.t, q=self.q_measured, tau=self.tau_measured, qr=self.q_r)
 
     @property

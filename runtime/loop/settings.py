@@ -1,5 +1,4 @@
-"""The `controller` section of a study file: the closed loop that moves the arm, its reference,
-encoders and drives.
+"""The `controller` section of a study file: the closed loop that moves the arm, its reference, encoders and drives.
 
     controller:
       law: {kind: pid, kp: [450, ...], kd: [2.5, ...], ki: 0, gain: [35.24, ...]} rate: 5000
@@ -40,8 +39,9 @@ def _a_motion(mapping: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 class Law(Settings):
-    """Control law of every joint on its own; e = q_r - q_m, u in the unit of the drive, torque =
-    gain u.
+    """Control law of every joint on its own.
+
+    E = q_r - q_m, u in the unit of the drive, torque = gain u.
 
     pid      u = kp e + kd (qd_r - qd_m) + ki I,                       I = integral of e
     cascade  u = kv (kp e + cv qd_r - qd_m) + ki I + ca qdd_r,
@@ -91,8 +91,9 @@ class Law(Settings):
             require(none, f"{value}; a {self.kind} law has no such gain", key)
 
     def gains(self, n: int) -> dict[str, np.ndarray]:
-        """P, Vr, Vm, K of u = P e + Vr qd_r - Vm qd_m + K I for n joints, each of shape (n,), N m
-        or N by unit of e, its rate and I; kd: fit counts as 0.
+        """P, Vr, Vm, K of u = P e + Vr qd_r - Vm qd_m + K I for n joints, each of shape (n,), N m or N by unit of e, its rate and I.
+
+        Kd: fit counts as 0.
         """
 
         def each(key: str) -> np.ndarray:
@@ -161,8 +162,7 @@ class Torque(Settings):
 
 
 class Points(Settings):
-    """Motion between random points in the middle of the range, as fast as the limits of the robot
-    file allow.
+    """Motion between random points in the middle of the range, as fast as the limits of the robot file allow.
 
     Attributes
     ----------

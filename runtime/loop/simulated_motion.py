@@ -75,7 +75,8 @@ class JointMotion:
 def simulated_motion(
     loop: ClosedLoop, observation: Observation, X: Array
 ) -> tuple[JointMotion, ...]:
-    """Each joint of the simulation with all base parameters X, shape (b,), beside the records;
+    """Each joint of the simulation with all base parameters X, shape (b,), beside the records.
+
     InputError if it cannot be made.
     """
     runs = loop.run(X)

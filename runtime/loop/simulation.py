@@ -247,9 +247,7 @@ class Simulator:
         return self._compiled[substeps]
 
     def _iterated(self, inputs: LoopInputs) -> tuple[Array, Array]:
-        """BLOCK ticks at a time: states after each tick (S + N, 6n), outputs y, tau, qdd (S + N,
-        3n).
-        """
+        """BLOCK ticks at a time: states after each tick (S + N, 6n), outputs y, tau, qdd (S + N, 3n)."""
         function = self._ticks(inputs.substeps)
         x = inputs.x
         states = []
@@ -341,9 +339,7 @@ def _check_shapes(reference: Reference, rate: float, n: int, N: int, *given: Arr
 
 
 def _check_motion(q: Array, reference: Reference) -> None:
-    """SimulationError at the first tick where the motion is not finite or far from all
-    reference.
-    """
+    """SimulationError at the first tick where the motion is not finite or far from all reference."""
     far = np.abs(reference.q).max() + LIMIT.MOTION_LOST * (1 + np.ptp(reference.q, axis=0))
     lost = ~(np.abs(q) < far)
     if lost.any():

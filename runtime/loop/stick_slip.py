@@ -29,8 +29,8 @@ SX = Any  # casadi.SX
 def friction_function(
     model: GeneratedModel, friction: DryFriction, constants: dict[str, float]
 ) -> Any:
-    """(q, qd, tau, Xs, c_plus, c_minus) -> f, direction of every element (-1, 0 stuck, 1), qdd, and
-    Y = A^-1 G'. Xs : X without dry friction.
+    """(q, qd, tau, Xs, c_plus, c_minus) -> f, direction of every element (-1, 0 stuck, 1), qdd, and Y = A^-1 G'.
+    Xs : X without dry friction.
     """
     n, m = len(model.JOINTS), len(friction.G)
     q, qd, tau, X = (
@@ -66,9 +66,7 @@ def kinetic(direction: SX, plus: SX, minus: SX) -> SX:
 
 
 def _at_rest(D: SX, free: SX, moving: SX, plus: SX, minus: SX) -> tuple[SX, SX]:
-    """Forces (m,) of the elements at rest and the direction in which each starts, 0 if none: ds/dt
-    = free - D f.
-    """
+    """Forces (m,) of the elements at rest and the direction in which each starts, 0 if none: ds/dt = free - D f."""
     m = D.shape[0]
     resting = moving == 0
     mode = ca.SX.zeros(m)
@@ -86,8 +84,9 @@ def _at_rest(D: SX, free: SX, moving: SX, plus: SX, minus: SX) -> tuple[SX, SX]:
 
 
 def _masked(D: SX, rows: SX) -> SX:
-    """D on the rows and columns marked 1, the identity elsewhere; a little more on the diagonal,
-    since rows of G may depend on each other.
+    """D on the rows and columns marked 1, the identity elsewhere.
+
+    A little more on the diagonal, since rows of G may depend on each other.
     """
     return (
         ca.diag(rows) @ D @ ca.diag(rows)
@@ -97,8 +96,7 @@ def _masked(D: SX, rows: SX) -> SX:
 
 
 def rest_function(friction: DryFriction, columns: int = 1) -> Any:
-    """(qd, Y, at_rest) -> qd with the slips marked 1 at zero: the nearest velocity in the metric of
-    A, so that kinetic energy only falls.
+    """(qd, Y, at_rest) -> qd with the slips marked 1 at zero: the nearest velocity in the metric of A, so that kinetic energy only falls.
 
     Of a displacement in place of qd: elements that rest over the step do not creep. qd : (n,
     columns).

@@ -1,5 +1,5 @@
-"""Trajectories: chains of families with their coefficients, each part beginning where the part
-before it ends. SI, rad.
+"""Trajectories: chains of families with their coefficients, each part beginning where the part before it ends.
+SI, rad.
 """
 
 from __future__ import annotations
@@ -93,8 +93,9 @@ class Motion:
 
 
 def motion_from_mapping(mapping: Mapping[str, Any]) -> Motion:
-    """The motion that `Motion.to_mapping` wrote; raises SettingsError with the path of the
-    offending key.
+    """The motion that `Motion.to_mapping` wrote.
+
+    Raises SettingsError with the path of the offending key.
     """
     parts = mapping.get("parts")
     if not isinstance(parts, list | tuple):

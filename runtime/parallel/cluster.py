@@ -60,9 +60,7 @@ def _mapped(client: Any, function: Callable[..., Any], keys: Any) -> Iterator[An
 
 
 async def _shake_hands(scheduler: str, timeout: float) -> None:
-    """Connect once: something that listens and never answers would keep a Client waiting for
-    ever.
-    """
+    """Connect once: something that listens and never answers would keep a Client waiting for ever."""
     from distributed.comm import connect
 
     comm = await asyncio.wait_for(connect(scheduler, timeout=timeout), timeout)

@@ -195,9 +195,7 @@ def _drives(model: GeneratedModel) -> Drives:
 
 
 def _with_motors(model: GeneratedModel, record: Prepared, drives: Drives) -> Observation:
-    """W and Y of a record, and behind W one column per motor: its share in the torque of the joint
-    of the row.
-    """
+    """W and Y of a record, and behind W one column per motor: its share in the torque of the joint of the row."""
     selection = record.certain(model)
     observation = record.observation(model)
     motor = drives.motor_command(record.record.torque) * drives.torque_constant
@@ -215,8 +213,9 @@ def _with_motors(model: GeneratedModel, record: Prepared, drives: Drives) -> Obs
 def _with_load(
     model: GeneratedModel, observation: Observation, settings: PayloadSettings, mounted: float
 ) -> Observation:
-    """Columns W, W_Lu, the torque of the known part of the load, motors; those of the load zero
-    if it is not mounted.
+    """Columns W, W_Lu, the torque of the known part of the load, motors.
+
+    Those of the load zero if it is not mounted.
     """
     load = load_columns(model, physical_model(model), settings)
     b = len(model.BASE_PARAMETERS)
@@ -235,9 +234,7 @@ def _with_load(
 def _alone(
     observation: Observation, exact: Array, load: Array, drives: Drives
 ) -> tuple[Array, Array, Array]:
-    """Deviation of the torque residual of every joint, and 1/(coefficient of the load) where one
-    motor moves one joint.
-    """
+    """Deviation of the torque residual of every joint, and 1/(coefficient of the load) where one motor moves one joint."""
     n = observation.n
     deviation = np.ones(n)
     gain = np.full(n, np.nan)
@@ -276,9 +273,7 @@ def _together(
     drives: Drives,
     seed: int,
 ) -> tuple[Array, Array]:
-    """g by total least squares with exact columns, then X and the load, nan of columns that others
-    hold, and their deviations over resampled blocks of time.
-    """
+    """g by total least squares with exact columns, then X and the load, nan of columns that others hold, and their deviations over resampled blocks of time."""
     weight = np.repeat(
         1 / np.maximum(deviation, 1e-12 * np.abs(observation.Y).max()), observation.rows
     )
@@ -298,9 +293,7 @@ def _together(
 
 
 def _gains(R: Array, D: Array) -> Array:
-    """g, and the parameters of the exact columns, from the triangular factor of [exact, known load,
-    V].
-    """
+    """g, and the parameters of the exact columns, from the triangular factor of [exact, known load, V]."""
     n = len(D)
     e = len(R) - n - 1
     g = np.linalg.svd(R[-n:, -n:] / D)[2][-1] / D
@@ -310,9 +303,7 @@ def _gains(R: Array, D: Array) -> Array:
 
 
 def _column_deviations(rows: Sequence[int], deviation: Array, drives: Drives) -> Array:
-    """Deviations of the errors of the columns of V with rows of joint j divided by s_j: s_j^2 =
-    sum_m (R_mj sigma_m)^2.
-    """
+    """Deviations of the errors of the columns of V with rows of joint j divided by s_j: s_j^2 = sum_m (R_mj sigma_m)^2."""
     largest = (deviation**2).max()
     variance = (
         largest * nnls(drives.ratio.T**2, deviation**2 / largest)[0]

@@ -1,5 +1,4 @@
-"""A mass fixed to a link, or to a frame of it: its parameters from records with and without it,
-known or unknown.
+"""A mass fixed to a link, or to a frame of it: its parameters from records with and without it, known or unknown.
 
     [Y_a; Y_b - W_Lk chi_Lk] = [[W_a, 0], [W_b, W_Lu]] [X; chi_Lu]        W_L = W K_L
 
@@ -43,8 +42,7 @@ FRICTION = ("viscous", "coulomb")
 
 @dataclass(frozen=True, eq=False)
 class Payload(Result):
-    """A load fixed to a link: ten inertial parameters at the frame of the link, or at a frame fixed
-    to it.
+    """A load fixed to a link: ten inertial parameters at the frame of the link, or at a frame fixed to it.
 
     Attributes
     ----------
@@ -152,8 +150,9 @@ def payload(
     )
 
     def extended(rows: Observation, mounted: float) -> Observation:
-        """Columns of the load behind W, zero if it is not mounted; the torque of its known part
-        moved to Y.
+        """Columns of the load behind W, zero if it is not mounted.
+
+        The torque of its known part moved to Y.
         """
         of_load = mounted * np.hstack([rows.W @ load.columns, rows.W[:, friction]])
         Y = rows.Y - mounted * (rows.W @ load.torque)

@@ -1,5 +1,4 @@
-"""Effect of a tool or load of known inertia on the base parameters: its ten parameters in the frame
-it is mounted on and in that of the link.
+"""Effect of a tool or load of known inertia on the base parameters: its ten parameters in the frame it is mounted on and in that of the link.
 
 With P the pseudo-inertia of a body (`runtime.physical.inertia`), about and along the axes of frame f,
 and lTf the pose of f in the frame of its link l,
@@ -53,9 +52,7 @@ class Mount:
 
     @property
     def action(self) -> Array:
-        """A, shape (10, 10): ten parameters at `frame` to those at the frame of the link, in the
-        order of INERTIAL.
-        """
+        """A, shape (10, 10): ten parameters at `frame` to those at the frame of the link, in the order of INERTIAL."""
         return np.column_stack(
             [ten_parameters(self.T @ pseudo_inertia(unit) @ self.T.T) for unit in np.eye(10)]
         )
@@ -133,8 +130,7 @@ def load_effect(
     link: int | None = None,
     **constants: float,
 ) -> Array:
-    """Change of the base parameters by a known load, shape (b,), in the order of BASE_PARAMETERS: X
-    + load_effect(...) is the robot with it.
+    """Change of the base parameters by a known load, shape (b,), in the order of BASE_PARAMETERS: X + load_effect(...) is the robot with it.
 
     Parameters
     ----------
@@ -167,8 +163,7 @@ def load_vector(load: Mapping[str, float]) -> Array:
 def load_of_body(
     mass: float, centre: Any, inertia: Any = None, rotation: Any = None
 ) -> dict[str, float]:
-    """Parameters of a body from its data sheet: about the origin and along the axes of the frame it
-    is mounted on.
+    """Parameters of a body from its data sheet: about the origin and along the axes of the frame it is mounted on.
 
     Parameters
     ----------
@@ -198,9 +193,7 @@ def load_of_body(
 
 
 def ten_parameters(P: Array) -> Array:
-    """The ten parameters of a pseudo-inertia, in the order of INERTIAL: J = tr(S) 1 - S of its
-    matrix S of second moments.
-    """
+    """The ten parameters of a pseudo-inertia, in the order of INERTIAL: J = tr(S) 1 - S of its matrix S of second moments."""
     S = P[:3, :3]
     J = np.trace(S) * np.eye(3) - S
     return np.array([*J[np.triu_indices(3)], *P[:3, 3], P[3, 3]])

@@ -140,8 +140,8 @@ def feasibility(
     *,
     blame: bool = True,
 ) -> Feasibility:
-    """Whether base parameters X, shape (len(names),), are those of a physical robot within the
-    limits. blame : all conditions in the way, not the first.
+    """Whether base parameters X, shape (len(names),), are those of a physical robot within the limits.
+    blame : all conditions in the way, not the first.
     """
     rows, space = limit_rows(physical, limits), solutions(physical.rows(names), X, units(physical))
     first = margin(physical.conditions, rows, space)
@@ -163,8 +163,7 @@ def feasibility(
 def within_noise(
     judged: Feasibility, physical: PhysicalModel, names: Sequence[str], X: Array, covariance: Array
 ) -> Feasibility:
-    """The same, feasible where a robot lies as near as noise takes an estimate from it: with C the
-    covariance of X, shape (b, b),
+    """The same, feasible where a robot lies as near as noise takes an estimate from it: with C the covariance of X, shape (b, b),
 
         min ||X - K chi||^2_C^-1 <= the 99 % point of chi-square,
 
@@ -192,8 +191,9 @@ def within_noise(
 def standard_parameters(
     physical: PhysicalModel, names: Sequence[str], X: Array, limits: RobotLimits | None = None
 ) -> Array:
-    """chi, shape (p,), with K chi = X to rounding and every condition fulfilled; raises InputError
-    if X is infeasible.
+    """chi, shape (p,), with K chi = X to rounding and every condition fulfilled.
+
+    Raises InputError if X is infeasible.
 
     Of all such chi the one nearest to the values of the robot file, or to zero if it has none,
     in units of their size.
@@ -279,9 +279,7 @@ def limit_rows(physical: PhysicalModel, limits: RobotLimits | None) -> LinearBou
 
 
 def scales(physical: PhysicalModel) -> Array:
-    """Sizes of the standard parameters, shape (p,): those of the robot file, typical ones if it
-    has none or zero.
-    """
+    """Sizes of the standard parameters, shape (p,): those of the robot file, typical ones if it has none or zero."""
     sizes = []
     for name in physical.standard:
         family = name.rstrip("0123456789")

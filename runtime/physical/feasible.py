@@ -111,9 +111,7 @@ class FeasibleOptions(RobotLimits):
 
 
 def fit(start: Beginning) -> Fitted:
-    """The feasible fit; `details` holds the standard parameters, the smallest eigenvalues, and what
-    least squares gave.
-    """
+    """The feasible fit; `details` holds the standard parameters, the smallest eigenvalues, and what least squares gave."""
     if start.model is None:
         raise InputError(
             "method feasible needs the model: it knows which parameters belong to one link"
@@ -207,9 +205,7 @@ def conditions_of(judged: Feasibility | None) -> dict[str, Any]:
 def within_limits(
     physical: PhysicalModel, names: Sequence[str], X: Array, options: FeasibleOptions
 ) -> Feasibility:
-    """Whether X is that of a physical robot, and if it is, whether of one within the limits: these
-    are what is known or guessed of a robot, not physics.
-    """
+    """Whether X is that of a physical robot, and if it is, whether of one within the limits: these are what is known or guessed of a robot, not physics."""
     judged = feasibility(physical, names, X, blame=options.explain)
     named = dict.fromkeys(limit_rows(physical, options).names)
     if not judged.feasible or not named:
@@ -258,8 +254,9 @@ def solve_with_weight(
 def held_out_weight(
     observation: Observation, system: System, physical: PhysicalModel, options: FeasibleOptions
 ) -> float:
-    """The weight of D by which every fifth of the record is predicted best by the others; the
-    largest of several.
+    """The weight of D by which every fifth of the record is predicted best by the others.
+
+    The largest of several.
 
     Errors of the fifths add up, and none is below that of the least squares of its own rows: a
     weight is left as soon as it cannot be the best.
@@ -394,9 +391,7 @@ def part_factor(part: Observation, system: System) -> Factor:
 def solve_feasible(
     rows: Factor, physical: PhysicalModel, options: FeasibleOptions, weight: float
 ) -> Array:
-    """chi, shape (p,), of min ||R (z - K chi)||^2 + weight D(chi) under the conditions, of a
-    factored system.
-    """
+    """chi, shape (p,), of min ||R (z - K chi)||^2 + weight D(chi) under the conditions, of a factored system."""
     size = float(np.hypot(np.linalg.norm(rows.r12), rows.r22)) or 1.0
     R, z = rows.R11 @ physical.rows(rows.names) / size, rows.r12 / size
     bounds, space = limit_rows(physical, options), everything(units(physical))

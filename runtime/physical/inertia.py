@@ -1,5 +1,4 @@
-"""Conditions on the standard parameters of a physical robot: every link has a mass density,
-actuators have inertia, friction takes power.
+"""Conditions on the standard parameters of a physical robot: every link has a mass density, actuators have inertia, friction takes power.
 
 Base parameters are X = K chi, chi the standard parameters. Of link j, with J the inertia tensor
 about the origin of its frame (the elements XX .. ZZ as they are) and l = (MX, MY, MZ), the
@@ -113,9 +112,7 @@ class PhysicalModel:
         return {name: float(value) for name, value in zip(self.standard, chi, strict=True)}
 
     def smallest(self, chi: Array) -> dict[str, float]:
-        """The smallest eigenvalue of every condition in units of its size, by its name: not
-        negative for a physical robot.
-        """
+        """The smallest eigenvalue of every condition in units of its size, by its name: not negative for a physical robot."""
         return {condition.name: condition.smallest(chi) for condition in self.conditions}
 
     def rows(self, names: Sequence[str]) -> Array:
@@ -162,9 +159,7 @@ def physical_model(
 
 
 def pseudo_inertia(ten: Array) -> Array:
-    """P_j, shape (4, 4), of the ten parameters of a link in the order of INERTIAL, about the origin
-    of its frame.
-    """
+    """P_j, shape (4, 4), of the ten parameters of a link in the order of INERTIAL, about the origin of its frame."""
     XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M = ten
     J = np.array([[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]])
     l = np.array([[MX, MY, MZ]])
@@ -211,9 +206,7 @@ def _forms(
 def _signs(
     elements: Mapping[str, Any], standard: Sequence[str], least: float
 ) -> Iterator[Condition]:
-    """c >= 0 along each row; where friction of one direction is set on that of both, their sum in
-    either direction.
-    """
+    """c >= 0 along each row; where friction of one direction is set on that of both, their sum in either direction."""
     along: dict[tuple[Any, ...], dict[str, list[str]]] = {}
     for name, (kind, when, acts) in elements.items():
         if kind in SIGNED and not is_form(acts):

@@ -97,9 +97,7 @@ def solutions(K: Array, X: Array, scale: Array) -> Space:
 
 
 def within(space: Space, rows: LinearBounds) -> tuple[Space, LinearBounds]:
-    """`space` with the rows that are equations fulfilled (nearest to that where they contradict
-    it), and the other rows.
-    """
+    """`space` with the rows that are equations fulfilled (nearest to that where they contradict it), and the other rows."""
     equal = rows.lower == rows.upper
     others = LinearBounds(
         tuple(n for n, e in zip(rows.names, equal, strict=True) if not e),
@@ -282,8 +280,7 @@ def closest(
     least: float,
     pull: Prior | None = None,
 ) -> Optimum:
-    """chi of `space` nearest to R chi = z, shapes (m, p) and (m,), scaled by the caller so that
-    ||z|| is about 1.
+    """chi of `space` nearest to R chi = z, shapes (m, p) and (m,), scaled by the caller so that ||z|| is about 1.
 
     least : smallest eigenvalue of every condition, in units of its size, not zero.
     """
@@ -299,8 +296,9 @@ def closest(
 
 
 def margin(conditions: Sequence[Condition], rows: LinearBounds, space: Space) -> Optimum:
-    """The largest t with every P - t S positive semidefinite: `margin`; negative where no physical
-    robot is in `space`.
+    """The largest t with every P - t S positive semidefinite: `margin`.
+
+    Negative where no physical robot is in `space`.
     """
     program = Program(space, rows, conditions, None)
     program.linear[-1] = -1.0
@@ -391,18 +389,14 @@ def _cone(n: int) -> Any:
 
 
 def triangle(B: Array) -> Array:
-    """Columns of the upper triangles of symmetric matrices, shape (k, n, n), entries off the
-    diagonal times sqrt(2): shape (n (n + 1)/2, k).
-    """
+    """Columns of the upper triangles of symmetric matrices, shape (k, n, n), entries off the diagonal times sqrt(2): shape (n (n + 1)/2, k)."""
     j, i = np.tril_indices(B.shape[1])
     return np.asarray((B[:, i, j] * np.where(i == j, 1.0, np.sqrt(2.0))).T)
 
 
 @lru_cache(maxsize=8)
 def _triangles(conditions: tuple[Condition, ...], p: int) -> tuple[Array, Array]:
-    """Triangles of the conditions on p standard parameters in units of their sizes, one below the
-    other, shape (rows, p), and those of the identity, (rows,).
-    """
+    """Triangles of the conditions on p standard parameters in units of their sizes, one below the other, shape (rows, p), and those of the identity, (rows,)."""
     ones = [triangle(np.eye(c.B.shape[1])[None])[:, 0] for c in conditions]
     return np.vstack(
         [on_standard(triangle(c.scaled), c.numbers, p) for c in conditions] or [np.zeros((0, p))]
@@ -416,9 +410,7 @@ def trace(z: Array) -> float:
 
 
 def on_standard(M: Array, numbers: Sequence[int], p: int) -> Array:
-    """Columns of M, shape (k, len(numbers)), as those of all p standard parameters, shape
-    (k, p).
-    """
+    """Columns of M, shape (k, len(numbers)), as those of all p standard parameters, shape (k, p)."""
     spread = np.zeros((len(M), p))
     spread[:, list(numbers)] = M
     return spread

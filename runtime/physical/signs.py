@@ -11,7 +11,8 @@ Array = np.ndarray
 
 
 def frame_origins(model: GeneratedModel, q: Array) -> Array | None:
-    """Origins of all frames in frame 0, m, shape (K, frames, 3), in the positions q, shape (K, n);
+    """Origins of all frames in frame 0, m, shape (K, frames, 3), in the positions q, shape (K, n).
+
     None without poses, or where a loop does not close.
     """
     poses = getattr(model, "frame_poses", None)
@@ -23,8 +24,7 @@ def frame_origins(model: GeneratedModel, q: Array) -> Array | None:
 
 
 def reach_of(model: GeneratedModel) -> float:
-    """Size of a robot, m: the largest distance between two of its frames in random poses, and once
-    more the longest link, whose end no frame marks.
+    """Size of a robot, m: the largest distance between two of its frames in random poses, and once more the longest link, whose end no frame marks.
 
     Joints move within their limits, without them revolute joints turn anywhere. nan if frames
     say little: a prismatic joint without limits, or fewer than two links with a length.

@@ -1,5 +1,4 @@
-"""How well a model explains the samples: by any parameters, and by those of bodies that exist, near
-the values that are known.
+"""How well a model explains the samples: by any parameters, and by those of bodies that exist, near the values that are known.
 
 Rows are weighed by joint with their own residuals, so that a wrist counts as much as a shoulder.
 The score is the negative logarithm of the likelihood with those weights profiled out, in nats,
@@ -78,8 +77,9 @@ class Grams:
         return np.asarray(np.maximum(self.of_joints @ v @ v, 0.0))
 
     def sigma(self, X: Array) -> Array:
-        """Root mean square residual of each joint, at least LIMIT.RESIDUAL_FLOOR of its torque,
-        shape (n,); 1 of a joint without rows.
+        """Root mean square residual of each joint, at least LIMIT.RESIDUAL_FLOOR of its torque, shape (n,).
+
+        1 of a joint without rows.
         """
         N = np.maximum(self.rows, 1)
         square = np.maximum(self.squares(X), LIMIT.RESIDUAL_FLOOR**2 * self.measured) / N
@@ -132,8 +132,9 @@ def solve_scaled(A: Array, g: Array, ridge: float = LIMIT.RIDGE) -> Array:
 
 
 def least_squares(grams: Grams, N: float, bodies: Bodies | None = None) -> Fit:
-    """Weighted least squares, weights by joint from their own residuals; near the values of the
-    robot file if `bodies` is given, over the standard parameters then.
+    """Weighted least squares, weights by joint from their own residuals.
+
+    Near the values of the robot file if `bodies` is given, over the standard parameters then.
     """
     sigma = grams.sigma(np.zeros(grams.of_joints.shape[1] - 1))
     for _ in range(LIMIT.WEIGHT_PASSES):
@@ -272,9 +273,7 @@ class Bodies:
         return self.program.minimum(A + self.H, g + self.h - self.heavy - self.price)
 
     def stiffness(self, chi: Array) -> Array:
-        """Curvature of D and of the conditions, as a barrier of LIMIT.WEAK_PRICE has it: what keeps
-        parameters at their bounds.
-        """
+        """Curvature of D and of the conditions, as a barrier of LIMIT.WEAK_PRICE has it: what keeps parameters at their bounds."""
         B = self.H.copy()
         sizes = [
             *self.P0,

@@ -194,9 +194,8 @@ class Case:
 
     @cached_property
     def noise_floor(self) -> float:
-        """Error of a joint, %, that noise of the positions may make: NOISE_MADE sqrt(a), a the largest
-        share of an acceleration that is noise. As much of a torque may be lost in the columns, and
-        a cause may find it again.
+        """Error of a joint, %, that noise of the positions may make: NOISE_MADE sqrt(a), a the largest share of an acceleration that is noise.
+        As much of a torque may be lost in the columns, and a cause may find it again.
         """
         median = self.study.signals.median
         shares = [noise_share(x.record.q, x.record.rate, x.low, median) for x in self.through]

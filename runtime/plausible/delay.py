@@ -223,9 +223,7 @@ class Shifts:
         return np.asarray(100 * left / np.maximum(size, 1e-300))
 
     def step(self, shift: Array) -> tuple[Array, Array, Array]:
-        """Gauss-Newton step of the delays, their deviations, and which of them the record
-        determines.
-        """
+        """Gauss-Newton step of the delays, their deviations, and which of them the record determines."""
         X, sigma, e = self.fit(shift)
         w = self.mask / sigma
         slope = -(self.rate @ X) * w

@@ -118,8 +118,8 @@ def _usual(x: Array) -> Array:
 
 
 def _frozen(steps: Array, sharp: Array) -> Array:
-    """Where a position is held for LIMIT.HELD samples once its speed has changed sharply, bool
-    (N,). sharp : such changes, (N - 2,).
+    """Where a position is held for LIMIT.HELD samples once its speed has changed sharply, bool (N,).
+    sharp : such changes, (N - 2,).
     """
     still = np.append(np.cumsum(steps == 0), 0)
     k = np.flatnonzero(sharp) + 1  # the first of the steps after each change
@@ -130,18 +130,14 @@ def _frozen(steps: Array, sharp: Array) -> Array:
 
 
 def _runs(high: Array, median: int) -> tuple[Array, Array]:
-    """First and last steps of the jumps: a jump between two stamps that is resampled takes several
-    steps.
-    """
+    """First and last steps of the jumps: a jump between two stamps that is resampled takes several steps."""
     instants = np.flatnonzero(high)
     apart = np.diff(instants) > max(median, LIMIT.JUMP_STEPS)
     return instants[np.append(True, apart)], instants[np.append(apart, True)]
 
 
 def _wrap(q: Array, high: Array, usual: Array, median: int) -> bool:
-    """Whether all jumps of every joint have one size, more than once, as those of a count or an
-    angle that starts anew.
-    """
+    """Whether all jumps of every joint have one size, more than once, as those of a count or an angle that starts anew."""
     around, again = LIMIT.JUMP_STEPS, []
     for own, jump, step in zip(q.T, high.T, usual, strict=True):
         if jump.any():
@@ -160,8 +156,9 @@ def _wrap(q: Array, high: Array, usual: Array, median: int) -> bool:
     "for less torque",
 )
 def cut_torques(case: Case) -> Answer | None:
-    """Torques that stay at their largest or smallest value, and what the model fitted to the other
-    samples gives there; None if there are none.
+    """Torques that stay at their largest or smallest value, and what the model fitted to the other samples gives there.
+
+    None if there are none.
     """
     if case.silent:
         return None

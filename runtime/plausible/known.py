@@ -1,5 +1,4 @@
-"""The values of the robot file against the record: gravity torque and inertia torque of every
-joint, ratio and sign.
+"""The values of the robot file against the record: gravity torque and inertia torque of every joint, ratio and sign.
 
     Y_j = a_j (gravity torque by the values)_j + b_j (the rest of their torque)_j + friction and
     offset,
@@ -79,9 +78,7 @@ class KnownValues(Result):
 
     @property
     def heavy(self) -> bool:
-        """Whether all gravity torques are larger, or all smaller, than LIMIT.CAD_RATIOS allow: no
-        time stamp does that.
-        """
+        """Whether all gravity torques are larger, or all smaller, than LIMIT.CAD_RATIOS allow: no time stamp does that."""
         ratios, (low, high) = self.gravity[np.isfinite(self.gravity)], LIMIT.CAD_RATIOS
         return len(ratios) > 0 and bool((ratios < low).all() or (ratios > high).all())
 
@@ -174,8 +171,9 @@ def torque_unit(result: Identification) -> TorqueUnit | None:
 
 
 def torque_unit_doubt(model: GeneratedModel, observation: Observation, by_law: bool) -> str:
-    """The question to the user, a sentence; "" if nothing speaks against the unit, or the file
-    has no values.
+    """The question to the user, a sentence.
+
+    "" if nothing speaks against the unit, or the file has no values.
     """
     values, standard = dict(getattr(model, "VALUES", {})), getattr(model, "STANDARD_PARAMETERS", ())
     inertial = [name for name in standard if name.rstrip("0123456789") in INERTIAL]

@@ -1,5 +1,5 @@
-"""Does the motion serve: do the joints move while they are used, and which parameters can it not
-tell, from W alone, before anything is fitted? Friction at rest is no law of motion.
+"""Does the motion serve: do the joints move while they are used, and which parameters can it not tell, from W alone, before anything is fitted?
+Friction at rest is no law of motion.
 
     share_i = 100 sigma_i ||W_w,i|| / ||Y_w||
             rows of W_w, Y_w divided by the deviation of their torque, sigma_i as
@@ -82,8 +82,9 @@ def standing_share(samples: Samples, study: Study) -> Array:
 
 
 def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ...] | None:
-    """rows.low_speed that leaves out the rows of joints that rest, rad/s or m/s; None if at
-    most LIMIT.REST_SHARE of them stand.
+    """rows.low_speed that leaves out the rows of joints that rest, rad/s or m/s.
+
+    None if at most LIMIT.REST_SHARE of them stand.
     """
     if standing_share(samples, study).max() <= LIMIT.REST_SHARE:
         return None

@@ -1,5 +1,5 @@
-"""After the fit: can a physical robot explain the record, of this size, with these values, with
-gravity and time as they are said to be? And would another study explain it better?
+"""After the fit: can a physical robot explain the record, of this size, with these values, with gravity and time as they are said to be?
+And would another study explain it better?
 """
 
 from __future__ import annotations
@@ -103,9 +103,7 @@ def measured(case: Case) -> Answer | None:
     "drives.ratio, torque_constant)",
 )
 def size(case: Case) -> Answer | None:
-    """Mass that the torques ask for, against the reach of the robot; None if that is not
-    known.
-    """
+    """Mass that the torques ask for, against the reach of the robot; None if that is not known."""
     if case.alone is None or not case.alone.physical.links or not case.turning.all():
         return None
     length, physical = reach(case.model, case.samples.q), case.alone.physical
@@ -188,9 +186,7 @@ def _from_to(text: str, before: float, after: float) -> str:
 
 
 def late_joints(late: Delay) -> Array:
-    """Joints whose delay is certain, bool (n,): all of them where one delay serves all, else those
-    of one sign.
-    """
+    """Joints whose delay is certain, bool (n,): all of them where one delay serves all, else those of one sign."""
     visible = late.before > LIMIT.DELAY_VISIBLE * late.after
     certain = np.fmax(LIMIT.CERTAIN_JOINT_DELAY * late.sigma, LIMIT.LATE_JOINT)
     apart = visible & (np.abs(late.shift - late.common) > certain)
@@ -223,9 +219,7 @@ def late_gain(case: Case) -> float:
 
 
 def certain_joints(case: Case) -> Array:
-    """Joints whose torques are certainly late, bool (n,): none if that gains less than
-    LIMIT.LATE_GAIN.
-    """
+    """Joints whose torques are certainly late, bool (n,): none if that gains less than LIMIT.LATE_GAIN."""
     assert case.late is not None
     return np.asarray(late_joints(case.late) & (gain_of_delays(case, case.late) >= LIMIT.LATE_GAIN))
 
@@ -235,8 +229,9 @@ def certain_joints(case: Case) -> Array:
     f"no single change explains it decisively better ({LIMIT.DECISIVE:g} nats)",
 )
 def better(case: Case, named: Sequence[Trial]) -> Answer:
-    """The alternatives that explain the record decisively better; friction that the model lacks is
-    no slip, whatever else explains a part of it.
+    """The alternatives that explain the record decisively better.
+
+    Friction that the model lacks is no slip, whatever else explains a part of it.
     """
     if not named:
         return Answer(

@@ -1,5 +1,4 @@
-"""What may be wrong with a record, a study or a robot file, found by computing: one call, one Check
-for each question.
+"""What may be wrong with a record, a study or a robot file, found by computing: one call, one Check for each question.
 
     CHECKS       of the record and the robot file, then of the fit: a family of slips a file
     EXPLAINED    of the causes (`runtime.plausible.causes`), which are tried if

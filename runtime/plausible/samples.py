@@ -177,9 +177,7 @@ def samples_of(records: Sequence[Prepared | Filtered], study: Study) -> Samples:
 
 
 def motion_cutoff(record: Record, study: Study) -> float:
-    """Cut-off of the low-pass, Hz: that of the study, or LIMIT.DYNAMIC times the frequency of the
-    motion where that is lower.
-    """
+    """Cut-off of the low-pass, Hz: that of the study, or LIMIT.DYNAMIC times the frequency of the motion where that is lower."""
     low = study.signals.lowpass
     most = min(low.hertz if low is not None else np.inf, 0.4 * record.rate)
     power = np.abs(np.fft.rfft(np.diff(record.q - record.q.mean(axis=0), axis=0), axis=0)) ** 2
@@ -205,8 +203,9 @@ def usable(record: Record, study: Study, before: int, after: int) -> Array:
 
 
 def _instants(through: Filtered, number: int) -> Samples:
-    """One record, one sample in about 0.8 rate/(2 cutoff), two where these are fewer than
-    LIMIT.INSTANTS_LEAST in a long record; without 2/cutoff at each end.
+    """One record, one sample in about 0.8 rate/(2 cutoff), two where these are fewer than LIMIT.INSTANTS_LEAST in a long record.
+
+    Without 2/cutoff at each end.
     """
     record, states, cutoff = through.record, through.states, through.low.hertz
     known = np.zeros_like(record.tau) if record.tau_known is None else record.tau_known

@@ -159,8 +159,9 @@ def accelerations(case: Case) -> Answer:
     "torque_side, columns.tau)",
 )
 def torques(case: Case) -> Answer:
-    """Largest torque against limits.tau, where the robot file gives them; torques that never
-    change.
+    """Largest torque against limits.tau, where the robot file gives them.
+
+    Torques that never change.
     """
     limits = case.limits("tau")
     if (flat := case.samples.constant()).any():
@@ -212,9 +213,7 @@ def lengths(case: Case) -> Answer | None:
     "-integral x y dm; kg m^2",
 )
 def inertias(case: Case) -> Answer | None:
-    """Whether the values of the robot file are those of bodies: every pseudo-inertia positive
-    semidefinite.
-    """
+    """Whether the values of the robot file are those of bodies: every pseudo-inertia positive semidefinite."""
     if case.physical is None or not case.physical.values:
         return None
     if far := list(_far_bodies(case.physical, reach(case.model, case.samples.q))):
@@ -226,9 +225,7 @@ def inertias(case: Case) -> Answer | None:
 
 
 def _far_bodies(physical: PhysicalModel, length: float) -> Iterator[str]:
-    """Links whose given values, fewer than ten perhaps, put their mass beyond LIMIT.LINK_EXTENT
-    times the reach of the robot, m, from their frame.
-    """
+    """Links whose given values, fewer than ten perhaps, put their mass beyond LIMIT.LINK_EXTENT times the reach of the robot, m, from their frame."""
     for j in physical.links:
         given = {family: physical.values.get(f"{family}{j}", 0.0) for family in INERTIAL}
         mass = abs(given["M"])

@@ -1,5 +1,4 @@
-"""The causes of `runtime.plausible.causes`, tried on the samples of a study: which of them explains the
-record decisively better with as few parameters.
+"""The causes of `runtime.plausible.causes`, tried on the samples of a study: which of them explains the record decisively better with as few parameters.
 
 Every cause gets weighted least squares, which bounds from below what a physical robot of it can
 reach; only those whose bound beats the best so far are fitted under the conditions of a physical
@@ -111,8 +110,9 @@ class Baseline:
     F: Array
 
     def regressor(self, cause: Cause) -> Array | None:
-        """D of a cause, shape (K, n, b), over the standard parameters where its table changes; None
-        if it cannot be evaluated.
+        """D of a cause, shape (K, n, b), over the standard parameters where its table changes.
+
+        None if it cannot be evaluated.
         """
         if cause.on_torques:
             return self.D
@@ -124,8 +124,7 @@ class Baseline:
             return None
 
     def rows(self, cause: Cause) -> tuple[Array, Array, Array] | None:
-        """F T^-1 W', F tau - F T^-1 known and the rows used, bool: T tau - known = W' X' in the
-        torques of the files F tau.
+        """F T^-1 W', F tau - F T^-1 known and the rows used, bool: T tau - known = W' X' in the torques of the files F tau.
 
         So every cause explains the same numbers, and the residuals of coupled motors are not mixed.
         """
@@ -171,9 +170,7 @@ class Baseline:
         return grams if grams.of_joints.shape[1] == p + 1 else grams.mapped(self.physical.K)
 
     def bound(self, grams: Grams) -> Fit:
-        """Least squares, near the values of the robot file if it has them: what no physical robot
-        explains better.
-        """
+        """Least squares, near the values of the robot file if it has them: what no physical robot explains better."""
         if self.bodies.near_values:
             return least_squares(self.standard(grams), self.N, self.bodies)
         return least_squares(grams, self.N)
@@ -181,8 +178,9 @@ class Baseline:
     def fit(
         self, grams: Grams, how: Callable[..., Fit] = physical_fit, sigma: Array | None = None
     ) -> Fit:
-        """The parameters of a physical robot, over the standard parameters; weights begin at sigma,
-        without it at those of least squares.
+        """The parameters of a physical robot, over the standard parameters.
+
+        Weights begin at sigma, without it at those of least squares.
         """
         sigma = self.bound(grams).sigma if sigma is None else sigma
         return how(self.standard(grams), self.bodies, self.N, sigma)
@@ -203,8 +201,9 @@ class Baseline:
         return Trial(cause, fit, gain)
 
     def unseen(self, cause: Cause) -> float:
-        """Score of a cause in nats, each of two parts of the rows by the parameters of the other;
-        parts are blocks of time by turns.
+        """Score of a cause in nats, each of two parts of the rows by the parameters of the other.
+
+        Parts are blocks of time by turns.
         """
         rows = self.rows(cause)
         if rows is None:
@@ -219,9 +218,7 @@ class Baseline:
         return score
 
     def beyond(self, V: Array) -> float:
-        """Largest part of the torques V, shape (K, n, m), on the side of the files, that no
-        parameters of the study explain, relative.
-        """
+        """Largest part of the torques V, shape (K, n, m), on the side of the files, that no parameters of the study explain, relative."""
         rows = (V / self.free.sigma[:, None]).reshape(-1, V.shape[2])
         size = np.linalg.norm(rows, axis=0)
         left = np.linalg.norm(rows - self.basis @ (self.basis.T @ rows), axis=0)
@@ -253,9 +250,7 @@ class Baseline:
 
     @cached_property
     def normal(self) -> tuple[Array, Array, Array, Array]:
-        """W over the standard parameters, shape (K, n, p), the torques it explains (K, n), and over
-        sigma the residuals e (K, n) and A + B.
-        """
+        """W over the standard parameters, shape (K, n, p), the torques it explains (K, n), and over sigma the residuals e (K, n) and A + B."""
         D, Y, mask = self.as_given
         W = D @ self.physical.K
         explained = W @ self.given.X
@@ -277,8 +272,9 @@ class Baseline:
         return np.asarray((moved - plain) / LIMIT.DIFFERENCE_STEP)
 
     def first_step(self, J: Array) -> tuple[Array, Array] | None:
-        """xi of numbers of effect J, shape (a, K, n), beside the model, and their covariance; None
-        if the samples do not tell them from it.
+        """xi of numbers of effect J, shape (a, K, n), beside the model, and their covariance.
+
+        None if the samples do not tell them from it.
         """
         W, _, e, H = self.normal
         mask = self.as_given[2]
@@ -351,9 +347,7 @@ def bodies_of(physical: PhysicalModel, size: float, Y: Array, values: bool) -> B
 
 
 def counting_rows(D: Array, Y: Array, mask: Array, X: Array) -> float:
-    """Rows of a joint that count: those of the moving joints on average, less by the correlation of
-    neighbouring residuals.
-    """
+    """Rows of a joint that count: those of the moving joints on average, less by the correlation of neighbouring residuals."""
     counts = []
     for j in range(Y.shape[1]):
         e = (Y[:, j] - D[:, j] @ X)[mask[:, j]]
@@ -364,9 +358,7 @@ def counting_rows(D: Array, Y: Array, mask: Array, X: Array) -> float:
 
 
 def reach(model: GeneratedModel, q: Array) -> float:
-    """Length of the robot, m: largest distance of a frame from the first one in the positions q,
-    shape (K, n); at least 0.1, 1 if not known.
-    """
+    """Length of the robot, m: largest distance of a frame from the first one in the positions q, shape (K, n); at least 0.1, 1 if not known."""
     P = frame_origins(model, q[:: max(1, len(q) // 32)])
     if P is None:
         return 1.0
@@ -394,8 +386,9 @@ def try_causes(baseline: Baseline, sides: Sequence[str] = ("joint", "joint")) ->
 
 
 def _of_causes(baseline: Baseline, which: Sequence[Cause]) -> list[Trial]:
-    """Trials of causes without a number; those that cannot win are not fitted under the conditions
-    of a physical robot.
+    """Trials of causes without a number.
+
+    Those that cannot win are not fitted under the conditions of a physical robot.
     """
     given, least = baseline.given, baseline.samples.moving().sum(axis=0) // 2
     trials: list[Trial] = []
@@ -429,9 +422,7 @@ def _of_causes(baseline: Baseline, which: Sequence[Cause]) -> list[Trial]:
 
 
 def _of_numbers(baseline: Baseline, robot: Robot) -> list[Trial]:
-    """Trials of the numbers whose first step gains enough, each at its best value, and those that no
-    fit can tell.
-    """
+    """Trials of the numbers whose first step gains enough, each at its best value, and those that no fit can tell."""
     trials: list[Trial] = []
     steps: list[tuple[float, float, Row, Change]] = []
     for row in NUMBERS:
@@ -499,8 +490,9 @@ def _search_number(baseline: Baseline, row: Row, change: Change, first: float) -
 
 
 def slow_friction(baseline: Baseline) -> Array | None:
-    """Friction at low speed that the model lacks, by joint, N m or N, to first order: of joints
-    that have it for certain; None without such joints.
+    """Friction at low speed that the model lacks, by joint, N m or N, to first order: of joints that have it for certain.
+
+    None without such joints.
     """
     samples = baseline.samples
     size = np.sqrt((samples.tau**2).mean(axis=0))
@@ -520,8 +512,7 @@ def decisive(
     other: Baseline | None = None,
     alone: Baseline | None = None,
 ) -> list[Trial]:
-    """Those that explain the record decisively better than the study as given, rows too that did
-    not give their parameters: the best, and those like it.
+    """Those that explain the record decisively better than the study as given, rows too that did not give their parameters: the best, and those like it.
 
     floor : error of a joint, %, that noise of the positions may make. A smaller error shows no cause,
         nor does the distance from the values where this is more than LIMIT.NOISY, or where a joint
@@ -576,8 +567,9 @@ def takes_away(given: Fit, fit: Fit) -> Array:
 
 
 def leaves_values(fit: Fit, baseline: Baseline) -> bool:
-    """Whether bodies need more or less torque in the motion of the study than those of the robot
-    file by more than LIMIT.CAD_RATIOS; False where the file lacks a body.
+    """Whether bodies need more or less torque in the motion of the study than those of the robot file by more than LIMIT.CAD_RATIOS.
+
+    False where the file lacks a body.
     """
     bodies, physical = baseline.bodies, baseline.physical
     if not bodies.near_values or not bodies.known_links.all():
@@ -590,9 +582,7 @@ def leaves_values(fit: Fit, baseline: Baseline) -> bool:
 
 
 def helps(trial: Trial, baseline: Baseline, other: Baseline) -> bool:
-    """Whether the parameters of a cause explain another record better than those of the study, read
-    as the study says or as the cause says.
-    """
+    """Whether the parameters of a cause explain another record better than those of the study, read as the study says or as the cause says."""
 
     def misfit(cause: Cause, X: Array) -> float:
         rows = other.rows(cause)
@@ -610,8 +600,9 @@ def _misfit(grams: Grams, X: Array) -> float:
 
 
 def loads(baseline: Baseline) -> list[Trial]:
-    """The study with other values of the last link than those of the robot file, as a load has
-    them; its ten parameters cost half of log N each. None where the file does not give them.
+    """The study with other values of the last link than those of the robot file, as a load has them.
+
+    Its ten parameters cost half of log N each. None where the file does not give them.
     """
     if not baseline.bodies.known_links[-1:].any():
         return []

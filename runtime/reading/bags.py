@@ -155,9 +155,7 @@ def read_bag(path: Path, options: Options) -> JointTable:
 
 
 def digest_of(path: Path) -> str:
-    """SHA-256 of a bag: of its file, or of the list of those of a folder, each of which has to lie
-    in it.
-    """
+    """SHA-256 of a bag: of its file, or of the list of those of a folder, each of which has to lie in it."""
     if not path.is_dir():
         return sha256_of(path)
     return sha256(
@@ -189,8 +187,9 @@ def stored_files(folder: Path) -> list[Path]:
 
 
 def _inside(folder: Path, name: str, where: str) -> Path:
-    """The file `name` of the folder; bags of the first ROS 2 versions write it behind the name of
-    the folder.
+    """The file `name` of the folder.
+
+    Bags of the first ROS 2 versions write it behind the name of the folder.
     """
     stored = name.removeprefix(f"{folder.name}/")
     path = folder / stored
@@ -233,8 +232,9 @@ def _topic(connections: list[Any], wanted: str | None, file: str) -> str:
 
 
 def _as_defined(definition: Any) -> bool:
-    """Whether a definition that a bag brings along, where it is in .msg text, has the fields of
-    JointState; other languages go by their hash.
+    """Whether a definition that a bag brings along, where it is in .msg text, has the fields of JointState.
+
+    Other languages go by their hash.
     """
     if definition.format.name != "MSG":
         return True

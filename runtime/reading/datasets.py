@@ -1,5 +1,4 @@
-"""Measured records that are public: where they are, what they hash to, and the settings that go
-with them.
+"""Measured records that are public: where they are, what they hash to, and the settings that go with them.
 
     fetch("tx40", "pos_read_data.csv")       path of the file
     dataset_study("tx40")                    settings as read from a study file
@@ -128,9 +127,7 @@ DATASETS: Mapping[str, Dataset] = {"tx40": TX40, "emps": EMPS}
 
 
 def listing() -> list[dict[str, Any]]:
-    """Every dataset as JSON values: name, title, source, licence and files, each with its address,
-    hash and path, null if it is not here.
-    """
+    """Every dataset as JSON values: name, title, source, licence and files, each with its address, hash and path, null if it is not here."""
     rows: list[dict[str, Any]] = []
     for name, dataset in DATASETS.items():
         files = []
@@ -155,8 +152,9 @@ def locate(name: str, file: str, *, cache: Path | None = None) -> Path | None:
 
 
 def fetch(name: str, file: str, *, cache: Path | None = None) -> Path:
-    """Path of a file of a dataset: from SYMGEN_DATA, the cache, or its source; raises
-    DataUnavailableError if none answers.
+    """Path of a file of a dataset: from SYMGEN_DATA, the cache, or its source.
+
+    Raises DataUnavailableError if none answers.
     """
     path, tried = _local(name, file, cache)
     if path is not None:

@@ -13,8 +13,9 @@ from runtime.reading.settings import RecordSettings
 
 
 def draft(settings: RecordSettings, path: Path, joints: Sequence[str]) -> str:
-    """Text of a study file of one record, `# ?` before what is open, with candidates; "" where the file
-    cannot be read.
+    """Text of a study file of one record, `# ?` before what is open, with candidates.
+
+    "" where the file cannot be read.
 
     path : of the first file. joints : names of the joints in the robot file.
     """

@@ -1,5 +1,4 @@
-"""Which columns of a file are likely to be time, positions and torques, by their names: a proposal,
-for a study that a person looks at.
+"""Which columns of a file are likely to be time, positions and torques, by their names: a proposal, for a study that a person looks at.
 
     actual_q_0 ... actual_q_5    one family: a stem, and numbers in it
     A1 Ist-Position [Grad]       also before a unit in brackets, or within; in other languages

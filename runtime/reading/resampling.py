@@ -1,5 +1,6 @@
-"""Samples at the instants of an irregular clock, brought to a uniform one; never across a gap or a
-step back of time.
+"""Samples at the instants of an irregular clock, brought to a uniform one.
+
+Never across a gap or a step back of time.
 
     t_k = t_first + k / rate,   k = 0 ... floor((t_last - t_first) rate)
                                 for every stretch without gap or step back

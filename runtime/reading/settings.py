@@ -1,5 +1,5 @@
-"""Settings of measured records: where they lie, what their columns mean, what is done about their
-time stamps. Part of a Study.
+"""Settings of measured records: where they lie, what their columns mean, what is done about their time stamps.
+Part of a Study.
 """
 
 from __future__ import annotations
@@ -159,8 +159,7 @@ class Units(Settings):
 
 
 class Scale(Settings):
-    """Factors on the columns before their unit applies: a number, one per joint, or the name of a
-    scalar in the file.
+    """Factors on the columns before their unit applies: a number, one per joint, or the name of a scalar in the file.
 
     Attributes
     ----------

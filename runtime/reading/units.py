@@ -1,5 +1,5 @@
-"""Units of measured columns, turned into SI when a record enters: the only place where pint is
-used. Inside, everything is SI.
+"""Units of measured columns, turned into SI when a record enters: the only place where pint is used.
+Inside, everything is SI.
 
     position_unit("deg")     ("angle", 0.017453292519943295)
     torque_unit("mA")        ("current", 0.001): the torque constant of the drive does the rest
@@ -85,16 +85,15 @@ QUANTITY = re.compile(r"\s*([-+]?[0-9.]{1,30}(?:[eE][-+]?[0-9]{1,3})?)\s*([^\W\d
 
 
 def position_unit(text: str) -> Unit:
-    """Kind of a unit of positions, "angle", "length" or "counts", and its factor to rad or m;
-    counts are still to be divided by those per revolution.
+    """Kind of a unit of positions, "angle", "length" or "counts", and its factor to rad or m.
+
+    Counts are still to be divided by those per revolution.
     """
     return _unit(text, POSITIONS)
 
 
 def torque_unit(text: str) -> Unit:
-    """Kind of a unit of torques, "torque", "force", "current" or "voltage", and its factor to N m,
-    N, A or V.
-    """
+    """Kind of a unit of torques, "torque", "force", "current" or "voltage", and its factor to N m, N, A or V."""
     return _unit(text, TORQUES)
 
 
@@ -104,8 +103,9 @@ def time_unit(text: str) -> float:
 
 
 def speed(value: Any) -> Any:
-    """A speed such as "30 rpm", or a list of speeds, in rad/s or m/s; a value without unit is
-    returned as it is.
+    """A speed such as "30 rpm", or a list of speeds, in rad/s or m/s.
+
+    A value without unit is returned as it is.
     """
     if isinstance(value, list | tuple):
         return [speed(x) for x in value]
@@ -149,8 +149,9 @@ def _unit(text: str, kinds: tuple[str, ...]) -> Unit:
 
 @cache
 def _of_pint(text: str) -> Unit:
-    """Kind and factor of a unit that is not in the table; ("", nan) where pint does not know the
-    unit, or its kind is none of SI.
+    """Kind and factor of a unit that is not in the table.
+
+    ("", nan) where pint does not know the unit, or its kind is none of SI.
     """
     nothing = ("", float("nan"))
     if len(text) > LONGEST or not GRAMMAR.fullmatch(text):

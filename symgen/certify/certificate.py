@@ -203,8 +203,9 @@ def _plain(value: Any) -> Any:
 def certify_formulas(
     regrouping: Regrouping, *, seed: int = 101, sampler: Sampler = sample
 ) -> Certificate:
-    """The certificate of the formulas of `regrouping`; `certify.modules.certify` adds the emitted
-    module.
+    """The certificate of the formulas of `regrouping`.
+
+    `certify.modules.certify` adds the emitted module.
 
     Parameters
     ----------
@@ -333,9 +334,7 @@ def hair_off(robot: Robot, what: str) -> str:
 
 
 def vanishing_denominators(regrouping: Regrouping) -> list[str]:
-    """Denominators of coefficients that are zero at the constants of the robot file, a sentence
-    each.
-    """
+    """Denominators of coefficients that are zero at the constants of the robot file, a sentence each."""
     values, texts = regrouping.robot.constants, []
     for b in regrouping.base:
         below = {
@@ -358,8 +357,7 @@ def vanishing_denominators(regrouping: Regrouping) -> list[str]:
 
 
 def degree(regrouping: Regrouping) -> int:
-    """A bound on the degree of the column identities in all random variables: half-angle tangents,
-    lengths, rates, directions.
+    """A bound on the degree of the column identities in all random variables: half-angle tangents, lengths, rates, directions.
 
     An entry of the regressor passes each frame of a path at most three times: outwards in products
     of two velocities, and back.
@@ -403,9 +401,7 @@ def degree(regrouping: Regrouping) -> int:
 def _modulo(
     regrouping: Regrouping, seed: int, p: int, sampler: Sampler
 ) -> tuple[int | None, list[str]]:
-    """Rank of the base columns over F_p (None if no points of one geometry are found), and the
-    columns that are not what the formulas say.
-    """
+    """Rank of the base columns over F_p (None if no points of one geometry are found), and the columns that are not what the formulas say."""
     robot = regrouping.robot
     names, own = robot.parameters, [robot.parameters.index(name) for name in regrouping.own]
     if close(robot).tied:
@@ -433,9 +429,7 @@ def _modulo(
 
 
 def _false_in_floats(regrouping: Regrouping, W: Array, base: list[int]) -> list[str]:
-    """Columns of the independent regressor that the formulas miss by more than ROUNDED of the
-    largest entry.
-    """
+    """Columns of the independent regressor that the formulas miss by more than ROUNDED of the largest entry."""
     robot = regrouping.robot
     K = base_values(regrouping, np.eye(len(robot.parameters)), robot.constants)
     off = np.abs(W[:, base] @ K - W).max(axis=0) > ROUNDED * np.abs(W).max()
@@ -445,9 +439,7 @@ def _false_in_floats(regrouping: Regrouping, W: Array, base: list[int]) -> list[
 
 @lru_cache(maxsize=4)
 def independent(robot: Robot) -> Sample:
-    """The regressor by energies at random states of `robot`, kept for further certificates of the
-    robot.
-    """
+    """The regressor by energies at random states of `robot`, kept for further certificates of the robot."""
     from symgen.derive.lagrange import (
         in_one_mode,
         sampled,

@@ -57,9 +57,7 @@ def claim(regrouping: Regrouping, certificate: Certificate) -> dict[str, Any]:
 
 
 def _element(robot: Robot, e: Element) -> dict[str, Any]:
-    """Rows and forms by key, and the sign of each row's first coefficient for the actuated joints
-    in the robot file, which directions of motion go by.
-    """
+    """Rows and forms by key, and the sign of each row's first coefficient for the actuated joints in the robot file, which directions of motion go by."""
     closure = close(robot)
     active = {j: closure.in_independent(row) for j, row in e.along.items()}
     return {

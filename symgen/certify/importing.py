@@ -33,9 +33,7 @@ CERTIFICATE = re.compile(
 
 
 def cache_folder() -> Path:
-    """Folder of the emitted modules: SYMGEN_CACHE/modules, or that of the platform for files that
-    can be made again.
-    """
+    """Folder of the emitted modules: SYMGEN_CACHE/modules, or that of the platform for files that can be made again."""
     if given := os.environ.get("SYMGEN_CACHE"):
         return Path(given) / "modules"
     if sys.platform == "win32":
@@ -50,8 +48,9 @@ def cache_folder() -> Path:
 
 
 def cached_path(file: str, text: str) -> Path | None:
-    """Path of the cache entry of a file that holds the certified `text`; None if there is none,
-    or another text.
+    """Path of the cache entry of a file that holds the certified `text`.
+
+    None if there is none, or another text.
     """
     path = _entry(text)
     try:
@@ -117,9 +116,7 @@ class _TextLoader(SourceFileLoader):
 
 
 def is_writable_by_others(folder: Path) -> bool:
-    """Whether somebody else may put files into the folder, or another folder in its place: what
-    lies there proves nothing.
-    """
+    """Whether somebody else may put files into the folder, or another folder in its place: what lies there proves nothing."""
     if os.name != "posix":
         return False
     for place in (folder, *folder.absolute().parents):

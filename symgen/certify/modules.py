@@ -27,8 +27,7 @@ def certify(
     files: Mapping[str, str] | None = None,
     options: Sequence[str] = (),
 ) -> Certificate:
-    """The certificate of the formulas of `regrouping` and of texts made from it: the verdict of
-    `symgen check`.
+    """The certificate of the formulas of `regrouping` and of texts made from it: the verdict of `symgen check`.
 
     Parameters
     ----------
@@ -65,8 +64,9 @@ def certified_files(
     command: str | None = None,
     options: Sequence[str] = (),
 ) -> dict[str, str]:
-    """{file name: text} of every target as `generate_files`, below what their certificate says;
-    they then lie in the cache of texts that runtime runs.
+    """{file name: text} of every target as `generate_files`, below what their certificate says.
+
+    They then lie in the cache of texts that runtime runs.
 
     Raises CertificateError, in one sentence, where the certificate does not hold.
     """

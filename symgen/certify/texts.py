@@ -151,9 +151,7 @@ def text_check(file: str, text: str, target: str, witness: Witness) -> TextCheck
 
 
 def with_certificate(text: str, check: TextCheck, formulas: str) -> str:
-    """The text with what its certificate says: at the end of the docstring of a module, else in
-    comments before it.
-    """
+    """The text with what its certificate says: at the end of the docstring of a module, else in comments before it."""
     said = f"{HEAD}{VERSION}: formulas {formulas}; {check.sentence}."
     if not text.startswith('"""'):
         mark = f"{EMITTERS[check.target].language.comment} "
@@ -216,8 +214,9 @@ def largest(
     call: Use,
     witness: Witness,
 ) -> tuple[float, str]:
-    """Largest error of a function in all its checks, and what it raised; infinite if it has other
-    constants than the file by itself.
+    """Largest error of a function in all its checks, and what it raised.
+
+    Infinite if it has other constants than the file by itself.
     """
     try:
         errors = [

@@ -1,5 +1,4 @@
-"""One module in which the whole table of frames is free: what a robot would be with another angle,
-length or gravity, without another derivation.
+"""One module in which the whole table of frames is free: what a robot would be with another angle, length or gravity, without another derivation.
 
     free = symgen.variants("arm.yaml")
     free.regressor(q, qd, qdd, free_alpha4=pi/2)       frame 4 turned the other way
@@ -60,9 +59,7 @@ def variants(robot: str | Path | Robot) -> ModuleType:
 
 
 def freed(robot: Robot) -> Robot:
-    """The robot with symbols in place of its angles, lengths and gravity; of a robot with loops, of
-    its gravity.
-    """
+    """The robot with symbols in place of its angles, lengths and gravity; of a robot with loops, of its gravity."""
     constants = dict(robot.constants)
     tied = {  # frames on the paths between the joints that constraints tie to each other
         frame

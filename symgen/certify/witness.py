@@ -311,9 +311,7 @@ def is_assumed(robot: Robot) -> Array:
 
 
 def bodies(robot: Robot, rng: np.random.Generator) -> Array:
-    """Standard parameters (p,): every link made of four points of mass, all else between 0.1 and
-    1.
-    """
+    """Standard parameters (p,): every link made of four points of mass, all else between 0.1 and 1."""
     chi = rng.uniform(0.1, 1.0, len(robot.parameters))
     for j in robot.links:
         m, P = rng.uniform(0.5, 2.0, 4), rng.uniform(-0.5, 0.5, (4, 3))

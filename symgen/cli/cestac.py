@@ -1,6 +1,4 @@
-"""`symgen cestac ROBOT RECORD`: what would a coarser encoder (or torque sensor) have done to the
-estimate?
-"""
+"""`symgen cestac ROBOT RECORD`: what would a coarser encoder (or torque sensor) have done to the estimate?"""
 
 from __future__ import annotations
 

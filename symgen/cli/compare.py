@@ -1,6 +1,4 @@
-"""`symgen compare ROBOT STUDY ...`: which treatment of the records, and which set of parameters,
-predicts a validation record best.
-"""
+"""`symgen compare ROBOT STUDY ...`: which treatment of the records, and which set of parameters, predicts a validation record best."""
 
 from __future__ import annotations
 
@@ -27,8 +25,7 @@ def compare(
     exact: options.Exact = False,
     json: options.Json = False,
 ) -> None:
-    """Identify ROBOT with each treatment of the records, and rank them by how well they predict the
-    validation record.
+    """Identify ROBOT with each treatment of the records, and rank them by how well they predict the validation record.
 
     A single study gives up to three treatments: as stated, without the rows of resting joints, and
     without its known torques. Each treatment uses the set of parameters that predicts best. Exit

@@ -1,6 +1,4 @@
-"""`symgen convert IN OUT`: a robot from one format into another, with a report of what the target
-cannot carry.
-"""
+"""`symgen convert IN OUT`: a robot from one format into another, with a report of what the target cannot carry."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""`symgen excite ROBOT [RECORD]`: a motion that lets the parameters be identified as well as the
-limits of the robot allow.
-"""
+"""`symgen excite ROBOT [RECORD]`: a motion that lets the parameters be identified as well as the limits of the robot allow."""
 
 from __future__ import annotations
 

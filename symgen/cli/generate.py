@@ -1,5 +1,6 @@
-"""`symgen generate ROBOT...`: derive, regroup, emit; `--check` compares with the files that are
-there.
+"""`symgen generate ROBOT...`: derive, regroup, emit.
+
+`--check` compares with the files that are there.
 """
 
 from __future__ import annotations
@@ -121,8 +122,9 @@ def emitted(
 
 
 def report_differences(output: Path, modules: dict[str, str]) -> None:
-    """Print a unified diff of every module that is not, without_certificate its certificate, what would be
-    written; exit code 1 if there is one.
+    """Print a unified diff of every module that is not, without_certificate its certificate, what would be written.
+
+    Exit code 1 if there is one.
     """
     from symgen.certify.importing import without_certificate
 

@@ -56,8 +56,9 @@ WENT = {
 
 
 class Verbs(TyperGroup):
-    """A group whose commands are modules symgen/cli/VERB.py with a function of that name; help
-    needs none of them.
+    """A group whose commands are modules symgen/cli/VERB.py with a function of that name.
+
+    Help needs none of them.
     """
 
     listing = False
@@ -121,9 +122,7 @@ def symgen(
         False, "--version", callback=_version, is_eager=True, help="Print the version."
     ),
 ) -> None:
-    """Symbolic robot dynamics: from a robot file to formulas, from a record to parameters, and what
-    the encoder allows.
-    """
+    """Symbolic robot dynamics: from a robot file to formulas, from a record to parameters, and what the encoder allows."""
 
 
 def main() -> None:
@@ -141,9 +140,7 @@ def main() -> None:
 
 
 def _open_streams() -> None:
-    """Descriptors 0 to 2 are open, if on nothing: else a file of ours gets the number of a closed
-    one, and what a library prints.
-    """
+    """Descriptors 0 to 2 are open, if on nothing: else a file of ours gets the number of a closed one, and what a library prints."""
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
     os.close(descriptor)

@@ -1,6 +1,4 @@
-"""`symgen report ROBOT RECORD`: everything one record says about a robot, in one folder with one
-page.
-"""
+"""`symgen report ROBOT RECORD`: everything one record says about a robot, in one folder with one page."""
 
 from __future__ import annotations
 
@@ -29,8 +27,7 @@ def report(
     exact: options.Exact = False,
     json: options.Json = False,
 ) -> None:
-    """Identify ROBOT from RECORD, with friction, physical consistency and encoder resolution, and
-    judge the result.
+    """Identify ROBOT from RECORD, with friction, physical consistency and encoder resolution, and judge the result.
 
     A part that cannot be done is named on the page with its reason. Exit code 1 if the values
     cannot be used.

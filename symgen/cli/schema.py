@@ -1,6 +1,4 @@
-"""`symgen schema`: the JSON Schema of robot files, for editors, and of study files and results, for
-programs that read them.
-"""
+"""`symgen schema`: the JSON Schema of robot files, for editors, and of study files and results, for programs that read them."""
 
 from __future__ import annotations
 

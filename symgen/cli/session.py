@@ -1,6 +1,4 @@
-"""What the verbs share: the model of a ROBOT argument, the study of RECORD arguments, errors as one
-line and exit code 2.
-"""
+"""What the verbs share: the model of a ROBOT argument, the study of RECORD arguments, errors as one line and exit code 2."""
 
 from __future__ import annotations
 
@@ -30,8 +28,8 @@ BROKEN_PIPE, INTERRUPTED = 141, 130  # as shells have them: 128 + SIGPIPE, 128 +
 
 
 def single_thread() -> None:
-    """One BLAS thread unless the user set another number: matrices here are small and results then
-    agree in every bit. Before numpy loads.
+    """One BLAS thread unless the user set another number: matrices here are small and results then agree in every bit.
+    Before numpy loads.
     """
     from runtime.threads import BLAS_THREADS
 
@@ -41,9 +39,10 @@ def single_thread() -> None:
 
 @contextmanager
 def reported_errors() -> Iterator[None]:
-    """What every verb runs in: one BLAS thread; bad input as one message on the error stream and
-    exit code 2, a false certificate with exit code 1, never a traceback; angles that are read
-    otherwise than written as a note.
+    """What every verb runs in: one BLAS thread.
+
+    Bad input as one message on the error stream and exit code 2, a false certificate with exit code
+    1, never a traceback; angles that are read otherwise than written as a note.
     """
     from runtime.core.errors import DataUnavailableError, InputError
     from symgen.errors import CertificateError, SymgenError
@@ -184,8 +183,9 @@ def model_of(
 
 
 def described_robot(source: str, at_values: bool = False, exact: bool = False) -> Robot:
-    """The robot of a name or file, at the values of its constants where asked; notes on it go to
-    the error stream.
+    """The robot of a name or file, at the values of its constants where asked.
+
+    Notes on it go to the error stream.
     """
     from symgen.derive.doubts import doubts
     from symgen.description import load_robot
@@ -198,8 +198,9 @@ def described_robot(source: str, at_values: bool = False, exact: bool = False) -
 
 
 def variants_of(robot: str, *, exact: bool = False) -> GeneratedModel | None:
-    """The module of a ROBOT argument with its table of frames free; None of a generated module,
-    which has no robot file.
+    """The module of a ROBOT argument with its table of frames free.
+
+    None of a generated module, which has no robot file.
     """
     import symgen
     from runtime.core.model import load_model
@@ -369,8 +370,9 @@ def progress_lines(after: float = 2.0) -> Iterator[None]:
 
 @contextmanager
 def progress_bar(what: str) -> Iterator[Any]:
-    """A bar of `what` on the error stream; the context gives what long work calls with the number
-    done and their total.
+    """A bar of `what` on the error stream.
+
+    The context gives what long work calls with the number done and their total.
     """
     from rich import progress as rich
     from rich.console import Console

@@ -1,6 +1,4 @@
-"""`symgen show ROBOT`: base parameters with their regrouping formulas, any model in symbols, or a
-page to look at.
-"""
+"""`symgen show ROBOT`: base parameters with their regrouping formulas, any model in symbols, or a page to look at."""
 
 from __future__ import annotations
 
@@ -87,8 +85,9 @@ def show(
         typer.Option("-o", "--output", help="File of the page. Default: <name>.html."),
     ] = None,
 ) -> None:
-    """Print the base parameters of ROBOT with their regrouping formulas, and the parameters without
-    effect; --json adds the operations of every model. With --model, print a model in symbols.
+    """Print the base parameters of ROBOT with their regrouping formulas, and the parameters without effect.
+
+    --json adds the operations of every model. With --model, print a model in symbols.
     """
     kind = "json" if json else format
     of_model = {

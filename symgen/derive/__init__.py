@@ -1,3 +1,4 @@
-"""Mechanics, written once over scalars: geometry, recursions, loops; Lagrange by CasADi as an
-independent check.
+"""Mechanics, written once over scalars: geometry, recursions, loops.
+
+Lagrange by CasADi as an independent check.
 """

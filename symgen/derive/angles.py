@@ -25,9 +25,7 @@ Variable = str | Number | Call | Unit
 
 
 def fixed_angles(robot: Robot) -> tuple[Expression, ...]:
-    """The distinct fixed angles of a robot that are no quarter turns, quarter turns taken off and
-    the leading sign positive.
-    """
+    """The distinct fixed angles of a robot that are no quarter turns, quarter turns taken off and the leading sign positive."""
     angles: dict[Expression, None] = {}
     for e in _angles(robot):
         rest = quarter_turns(e)[1]
@@ -137,9 +135,7 @@ def rows_of(robot: Robot) -> list[Expression]:
 
 
 def atoms_of(robot: Robot) -> Iterator[str | Number | Call]:
-    """Atoms of lengths, gravity, relations and rows of elements, and of what functions among them
-    are of.
-    """
+    """Atoms of lengths, gravity, relations and rows of elements, and of what functions among them are of."""
     pending = [e for f in robot.frames for e in (f.b, f.d, f.r)]
     pending += [*robot.gravity, *robot.constraints.values(), *rows_of(robot)]
     for e in pending:

@@ -32,9 +32,7 @@ ALL = slice(None)
 
 
 def loop_ends(robot: Robot, algebra: GraphAlgebra, closure: Closure) -> list[tuple[Pose, Pose]]:
-    """Orientation and origin of the cut frame and of its twin in the root of their loop, which no
-    joint before it turns, loop by loop.
-    """
+    """Orientation and origin of the cut frame and of its twin in the root of their loop, which no joint before it turns, loop by loop."""
     roots = [robot.root(loop) for loop in robot.loops]
     pose = {root: frame_poses(Geometry(robot, algebra, closure, root)) for root in {*roots}}
     loops = zip(robot.loops, roots, strict=True)
@@ -190,9 +188,7 @@ class Assembly:
         return tuple(self.free[k] for k in self.passive)
 
     def guess(self, start: Mapping[int, float], rng: np.random.Generator | None) -> Array:
-        """A place to look from: joints of `start` there, the others drawn, or at one and the same
-        place.
-        """
+        """A place to look from: joints of `start` there, the others drawn, or at one and the same place."""
         drawn = (
             rng.uniform(-np.pi, np.pi, len(self.free))
             if rng

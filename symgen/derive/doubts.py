@@ -31,9 +31,7 @@ def doubts(robot: Robot) -> list[str]:
 
 
 def nearly_round(robot: Robot, within: float = CLOSE) -> list[str]:
-    """Angles written as decimals, such as 1.5708: exact arithmetic takes them for oblique ones,
-    with formulas and base parameters of their own.
-    """
+    """Angles written as decimals, such as 1.5708: exact arithmetic takes them for oblique ones, with formulas and base parameters of their own."""
     notes = []
     for f in robot.frames:
         for name, angle in (("gamma", f.gamma), ("alpha", f.alpha), ("theta", f.theta0)):
@@ -82,9 +80,7 @@ def other_units(robot: Robot) -> list[str]:
 
 
 def equal_sides(robot: Robot) -> list[str]:
-    """Lengths of equal value and different names in a loop without linear relations: with one name
-    it may be a parallelogram.
-    """
+    """Lengths of equal value and different names in a loop without linear relations: with one name it may be a parallelogram."""
     if not robot.loops:
         return []
     tied = set(close(robot).tied)

@@ -42,8 +42,10 @@ def law_value(motion: Motion, e: Element, j: int, law: Expression) -> Scalar:
 
 
 class _Law:
-    """Values of the law of key j of an element over the scalars of a motion; the velocity along
-    several joints is named after the element, since other rows may have these joints.
+    """Values of the law of key j of an element over the scalars of a motion.
+
+    The velocity along several joints is named after the element, since other rows may have these
+    joints.
     """
 
     def __init__(self, motion: Motion, e: Element, j: int) -> None:

@@ -96,8 +96,9 @@ def kinetic_energy(d: Derivation) -> Scalar:
 
 
 def potential_energy(d: Derivation) -> Scalar:
-    """U of gravity, springs and constant torques; zero if the origin of frame 0 is, springs at q
-    = 0.
+    """U of gravity, springs and constant torques.
+
+    Zero if the origin of frame 0 is, springs at q = 0.
     """
     frames, half = Frames(d.geometry), d.algebra.constant(HALF)
     x, y, z = (d.algebra.gravity(axis) for axis in range(3))
@@ -127,8 +128,7 @@ def _square(d: Derivation, e: Element, j: int, x: Mapping[int, Scalar]) -> Scala
 
 
 class AtRates(Motion):
-    """The accelerations sum_k qdr_k (a_k + U_k r) of all links, by which the torques of
-    `joint_torques` are C qdr: column k of C where qdr_k = 1 is the only rate.
+    """The accelerations sum_k qdr_k (a_k + U_k r) of all links, by which the torques of `joint_torques` are C qdr: column k of C where qdr_k = 1 is the only rate.
 
     Parameters
     ----------
@@ -174,9 +174,7 @@ class AtRates(Motion):
 
 
 def _link(z: Vector, zd: Vector, w: Vector, a: Vector, half: Scalar) -> LinkMotion:
-    """U_k by its antisymmetric part (in the place of wd), its symmetric part (of w w') and the
-    differences of its diagonal.
-    """
+    """U_k by its antisymmetric part (in the place of wd), its symmetric part (of w w') and the differences of its diagonal."""
     across = dot(z, w)
     skew = ((0, -zd[2], zd[1]), (zd[2], 0, -zd[0]), (-zd[1], zd[0], 0))
     rows = []
@@ -240,9 +238,7 @@ def momentum_rate(d: Derivation) -> Columns:
 
 
 def base_wrench(d: Derivation) -> dict[str, tuple[Scalar, ...]]:
-    """{inertial parameter: force, then moment about the origin of frame 0}, in frame 0, by which
-    the base moves the robot.
-    """
+    """{inertial parameter: force, then moment about the origin of frame 0}, in frame 0, by which the base moves the robot."""
     found = {}
     for name, (p, j) in inertial_names(d.robot).items():
         F, N = (apply(d.poses[j][0], x) for x in unit_wrench(d.motion.link[j], p))

@@ -311,8 +311,7 @@ class Draw:
 
 @lru_cache
 def primes_for(robot: Robot, count: int, seed: int | None = None) -> tuple[int, ...]:
-    """`count` primes p < 2**31 with p = -1 modulo 4 and 2D, over which the square roots of the
-    robot's rationals exist: the largest, or below a random place.
+    """`count` primes p < 2**31 with p = -1 modulo 4 and 2D, over which the square roots of the robot's rationals exist: the largest, or below a random place.
 
     Raises SymgenError if there are too few.
     """
@@ -326,9 +325,7 @@ def primes_for(robot: Robot, count: int, seed: int | None = None) -> tuple[int, 
 
 
 def candidates(robot: Robot, seed: int | None = None) -> Iterator[int]:
-    """Primes with p = -1 modulo 4 and 2D over which the large radicands are squares: downwards from
-    the largest, or from a random place.
-    """
+    """Primes with p = -1 modulo 4 and 2D over which the large radicands are squares: downwards from the largest, or from a random place."""
     step = lcm(4, 2 * units_of(numbered(robot)).D)
     top = 2**31 if seed is None else int(np.random.default_rng(seed).integers(2**30, 2**31))
     squares = [c for c in radicands(robot) if c >= LARGEST_RADICAND]

@@ -87,9 +87,7 @@ class Frames:
         return ((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])), self.position(j, i, i)
 
     def columns(self, j: int, i: int) -> dict[int, tuple[Vector, Vector]]:
-        """{k: (velocity of O_j, angular velocity)} per unit rate of each moving joint k before
-        frame j, in frame i.
-        """
+        """{k: (velocity of O_j, angular velocity)} per unit rate of each moving joint k before frame j, in frame i."""
         result: dict[int, tuple[Vector, Vector]] = {}
         for k in self.robot.path(j):
             if k in self.robot.moving:
@@ -124,9 +122,7 @@ class Frames:
         return summed((*turn, *((k, -n) for k, n in other))), offset - other_offset
 
     def register_angles(self, algebra: GraphAlgebra) -> None:
-        """Make the angle of every frame against every other one about the same direction an angle
-        of `algebra`.
-        """
+        """Make the angle of every frame against every other one about the same direction an angle of `algebra`."""
         for f in self.robot.frames:
             for g in self.robot.frames:
                 if f.j < g.j and self._parallel(f.j, g.j):

@@ -190,9 +190,7 @@ class Graph:
         return s if c >= 0 else -s
 
     def add(self, a: Scalar, b: Scalar) -> Scalar | int:
-        """a + b; the node is kept with its first operand positive, so that a - b and b - a are one
-        node.
-        """
+        """a + b; the node is kept with its first operand positive, so that a - b and b - a are one node."""
         if a.node is b.node:
             return 0 if a.sign != b.sign else self.mul(self.lift(2), a)
         if a.node.op == CONST and a.node.value == 0:
@@ -226,8 +224,8 @@ class Graph:
         return s if sign > 0 else -s
 
     def call(self, op: str, x: Scalar, *more: Scalar, of: Any = None) -> Scalar:
-        """A function of the table of `description.expression`, or the positive part: even and odd
-        ones of a positive operand. `of` is what x is, as `Node.value` says it.
+        """A function of the table of `description.expression`, or the positive part: even and odd ones of a positive operand.
+        `of` is what x is, as `Node.value` says it.
         """
         parity = op in EVEN or op in ODD
         operands = (_positive(x) if parity else x, *more)

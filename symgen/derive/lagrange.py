@@ -1,5 +1,4 @@
-"""Dynamics from energies, differentiated by CasADi: an independent oracle that shares nothing with
-the Newton-Euler recursions.
+"""Dynamics from energies, differentiated by CasADi: an independent oracle that shares nothing with the Newton-Euler recursions.
 
 With T_j(q) the pose of frame j in frame 0 (4 x 4) and Sigma_j the pseudo-inertia of link j about
 the origin of its frame,
@@ -62,8 +61,9 @@ SX = Any  # casadi.SX
 
 
 def pose(frame: Frame, q: SX, constants: Mapping[str, SX]) -> SX:
-    """iTj = Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r), i =
-    ant(j); 4 x 4.
+    """iTj = Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r), i = ant(j).
+
+    4 x 4.
     """
     gamma, b, alpha, d, theta, r = (
         _symbolic(e, {}, constants)
@@ -113,9 +113,7 @@ LINK = np.array([pseudo_inertia(name) for name in INERTIAL])  # (10, 4, 4)
 
 
 def _floats(function: Any, *arguments: Array) -> Array:
-    """A CasADi function of column vectors on samples: arguments (..., m_k), result (..., rows,
-    columns).
-    """
+    """A CasADi function of column vectors on samples: arguments (..., m_k), result (..., rows, columns)."""
     shape = np.broadcast_shapes(*(np.shape(a)[:-1] for a in arguments))
     columns = [
         np.broadcast_to(a, (*shape, np.shape(a)[-1])).reshape(-1, np.shape(a)[-1]).T
@@ -140,8 +138,7 @@ def _matrices(columns: Array) -> Array:
 
 
 class Lagrange:
-    """Dynamics of the open tree of a robot in all its moving joints (order `robot.moving`),
-    geometry in floats.
+    """Dynamics of the open tree of a robot in all its moving joints (order `robot.moving`), geometry in floats.
 
     Every method takes q, qd, qdd of shape (..., n), rad or m and their rates, and returns the same
     leading axes. chi is (p,) in the order of `robot.parameters`, or (..., p).
@@ -228,24 +225,18 @@ class Lagrange:
         return np.asarray((self.regressor(q, qd, qdd) @ np.asarray(chi)[..., None])[..., 0])
 
     def inertia_matrix(self, q: Array, chi: Array) -> Array:
-        """A = d2E/dqd2, (..., n, n): column i is Gamma for qdd_i = 1 from rest, less that at
-        rest.
-        """
+        """A = d2E/dqd2, (..., n, n): column i is Gamma for qdd_i = 1 from rest, less that at rest."""
         return inertia_of(lambda qdd: self.torque(q, 0 * q, qdd, chi), q)
 
     def jacobian(self, q: Array, frame: int | None = None) -> Array:
-        """Velocity of the origin, then angular velocity w from hat(w) = Rdot R', of `frame`
-        (default: the last) in frame 0 per qd, (..., 6, n).
-        """
+        """Velocity of the origin, then angular velocity w from hat(w) = Rdot R', of `frame` (default: the last) in frame 0 per qd, (..., 6, n)."""
         j = frame or self.robot.frames[-1].j
         slope, R = self.slopes(q)[..., j - 1, :3, :], self.poses(q)[..., j - 1, :3, :3]
         W = slope[..., :3] @ np.swapaxes(R, -1, -2)[..., None, :, :]
         return np.swapaxes(np.concatenate([slope[..., 3], _axial(W)], axis=-1), -1, -2)
 
     def acceleration(self, q: Array, qd: Array, qdd: Array, frame: int) -> Array:
-        """Acceleration of the origin of `frame`, then angular acceleration wd from hat(wd) =
-        Rddot R' + Rdot Rdot', in frame 0, (..., 6).
-        """
+        """Acceleration of the origin of `frame`, then angular acceleration wd from hat(wd) = Rddot R' + Rdot Rdot', in frame 0, (..., 6)."""
         if frame == 0:
             return np.zeros((*np.shape(q)[:-1], 6))
         R = self.poses(q)[..., frame - 1, :3, :3]
@@ -294,8 +285,7 @@ class Lagrange:
         return U
 
     def motion(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array, Array]:
-        """Tree motion q, qd, qdd (..., n) and G = dq/dqa (..., n, n_a) of the actuated q, qd, qdd
-        (..., n_a).
+        """Tree motion q, qd, qdd (..., n) and G = dq/dqa (..., n, n_a) of the actuated q, qd, qdd (..., n_a).
 
         Loops are closed by Newton's method from the constraints, or followed from a `start` of all
         joints; a state that it cannot close, or reach without passing near a dead point, is NaN.
@@ -344,9 +334,7 @@ class Lagrange:
         return self._floats("loop", x)[..., 0]
 
     def _regularity(self, x: Array, passive: list[int]) -> Array:
-        """Smallest over largest singular value of the closure's derivatives by the passive
-        joints.
-        """
+        """Smallest over largest singular value of the closure's derivatives by the passive joints."""
         s = np.linalg.svd(self._floats("loop_jacobian", x)[..., passive], compute_uv=False)
         return np.asarray(s[..., -1] / s[..., 0])
 
@@ -395,8 +383,7 @@ def _functions(robot: Robot) -> dict[str, Any]:
 
 
 def _closure(robot: Robot, q: SX, constants: Mapping[str, SX]) -> SX:
-    """phi(q), zero if every twin coincides with its cut frame and every constrained joint has
-    its value.
+    """phi(q), zero if every twin coincides with its cut frame and every constrained joint has its value.
 
     Positions per longest length, from the frame that carries a loop: beside the lengths of an arm
     the digits of a small loop on it would be lost.
@@ -417,9 +404,7 @@ def _closure(robot: Robot, q: SX, constants: Mapping[str, SX]) -> SX:
 
 
 def _start(robot: Robot, q: SX, constants: Mapping[str, SX]) -> tuple[SX, SX]:
-    """The actuated joints, and all from them: passive ones from their constraint, else from `start`
-    of their loop, else 0.
-    """
+    """The actuated joints, and all from them: passive ones from their constraint, else from `start` of their loop, else 0."""
     names = {f"q{j}": q[k] for k, j in enumerate(robot.moving)}
     x = [
         names[f"q{j}"] if j in robot.joints else ca.SX(robot.start.get(j, 0.0))
@@ -488,8 +473,9 @@ class Sample:
 
 
 def _leverage(robot: Robot, constants: Mapping[str, float]) -> Array:
-    """Largest coefficient of each actuated joint among the rows of elements that several of these
-    share, 1 if there is none; shape (n,).
+    """Largest coefficient of each actuated joint among the rows of elements that several of these share, 1 if there is none.
+
+    Shape (n,).
     """
     closure = close(robot)
     rows = [dict(closure.in_independent(r)) for e in robot.elements for r in e.along.values()]
@@ -509,8 +495,7 @@ def sampled(
     constants: Mapping[str, float] | None = None,
     in_time: bool = False,
 ) -> Sample:
-    """The standard regressor at `states` random states: q within pi rad or 1 m, general loops
-    within 0.5 of their start.
+    """The standard regressor at `states` random states: q within pi rad or 1 m, general loops within 0.5 of their start.
 
     Velocities and accelerations are standard normal; in every other state each velocity is divided
     by its leverage, so that the sign of q4 + 101.25 q5 is not that of q5 alone. `in_time`: channels
@@ -561,8 +546,7 @@ def sampled(
 
 
 def in_one_mode(robot: Robot) -> Robot:
-    """`robot` with its passive joints declared where they are linear in the actuated ones: no state
-    lies in an antiparallelogram.
+    """`robot` with its passive joints declared where they are linear in the actuated ones: no state lies in an antiparallelogram.
 
     The dynamics by energies still closes every loop itself and refuses states in which the declared
     joints do not close it.

@@ -89,8 +89,7 @@ class LoopSystem:
 
     @cached_property
     def alignment(self) -> list[Scalar]:
-        """Trace of A_cut' A_twin: 3 where a loop closes, -1 half a turn from there, where the axial
-        vector is zero too.
+        """Trace of A_cut' A_twin: 3 where a loop closes, -1 half a turn from there, where the axial vector is zero too.
 
         Of the loops alone whose cut joint is tied: where it is a sum of angles, the orientations
         agree by construction.
@@ -127,15 +126,11 @@ class LoopSystem:
         return newton(self.residual_floats, q, self.tied, steps=steps, tolerance=tolerance)
 
     def mode(self) -> float:
-        """Sign of det J_u at the start: it stays as long as the mechanism passes no dead point,
-        hence in one assembly mode.
-        """
+        """Sign of det J_u at the start: it stays as long as the mechanism passes no dead point, hence in one assembly mode."""
         return float(np.sign(np.linalg.det(self.jacobian_floats(self.start)[:, self.tied])))
 
     def pace(self) -> float:
-        """A step of the actuated joints in which no tied one moves far, as fast as at the start
-        (PACE); in rad, and in the longest length for slides.
-        """
+        """A step of the actuated joints in which no tied one moves far, as fast as at the start (PACE); in rad, and in the longest length for slides."""
         J = self.jacobian_floats(self.start)
         n = self.tied.start
         frames = map(self.robot.frame, self.closure.independent)
@@ -144,8 +139,9 @@ class LoopSystem:
         return float(min(PACE[0], PACE[1] / np.abs(G).max()))
 
     def turn(self) -> tuple[int, ...] | None:
-        """Whole turns of the tied joints per turn of the actuated one; None if it cannot turn
-        fully or is not the only one.
+        """Whole turns of the tied joints per turn of the actuated one.
+
+        None if it cannot turn fully or is not the only one.
         """
         if [self.robot.frame(j).sigma for j in self.robot.joints] != [REVOLUTE]:
             return None
@@ -166,9 +162,7 @@ class LoopSystem:
 
 @lru_cache(maxsize=64)
 def loop_system(robot: Robot) -> LoopSystem:
-    """Choose the equations: pivoted elimination of their Jacobian in the tied joints at the start
-    configuration.
-    """
+    """Choose the equations: pivoted elimination of their Jacobian in the tied joints at the start configuration."""
     d = derive(robot)
     closure = d.closure
     rows = LoopSystem(d, tuple(range(6 * len(robot.loops))))

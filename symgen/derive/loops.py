@@ -1,5 +1,4 @@
-"""Relations of the passive joints: declared ones checked, linear ones derived, and the mobility of
-the mechanism.
+"""Relations of the passive joints: declared ones checked, linear ones derived, and the mobility of the mechanism.
 
 Loop: frame `cut` (one branch) and frame `twin` (sigma 2, other branch) coincide, 0T_cut = 0T_twin.
 At a closed configuration the passive rates are G = -J_u^+ J_a; where G keeps the same whole numbers
@@ -83,9 +82,7 @@ def find_relations(robot: Robot) -> Closure:
 
 
 def _configurations(assembly: Assembly) -> Iterator[Array]:
-    """Closed configurations: the one nearest to the `start` of the loops and no other if there
-    is one, else from random places, or from the closest approach.
-    """
+    """Closed configurations: the one nearest to the `start` of the loops and no other if there is one, else from random places, or from the closest approach."""
     robot, rng, closed = assembly.robot, np.random.default_rng(3), False
     wanted = {j: x for j, x in robot.start.items() if j in assembly.free}
     if wanted and (near := _nearest(assembly, wanted)) is not None:
@@ -104,9 +101,9 @@ def _configurations(assembly: Assembly) -> Iterator[Array]:
 
 
 def _nearest(assembly: Assembly, wanted: Mapping[int, float]) -> Array | None:
-    """The closed configuration nearest to the joints that `start` names, hinges up to whole turns:
-    those that it does not name are free, from several places, and passive ones that it names from
-    beside it; None if none closes.
+    """The closed configuration nearest to the joints that `start` names, hinges up to whole turns: those that it does not name are free, from several places, and passive ones that it names from beside it.
+
+    None if none closes.
     """
     rng, free = np.random.default_rng(5), assembly.free
     others, passive = [k for k, j in enumerate(free) if j not in wanted], assembly.passive
@@ -131,9 +128,7 @@ def _nearest(assembly: Assembly, wanted: Mapping[int, float]) -> Array | None:
 
 
 def _general(assembly: Assembly, q: Array) -> Closure:
-    """The configuration q as a general closure: declared relations, the sums of angles that planar
-    loops fix, the rest tied.
-    """
+    """The configuration q as a general closure: declared relations, the sums of angles that planar loops fix, the rest tied."""
     relations: dict[int, Relation] = {}
     configuration = assembly.configuration(q)
     samples = _samples(assembly, q) or [(assembly.constants, configuration)]
@@ -153,8 +148,7 @@ def _general(assembly: Assembly, q: Array) -> Closure:
 def _angle_sum(
     assembly: Assembly, loop: Loop, configuration: Mapping[int, float]
 ) -> dict[int, Expression] | None:
-    """Whole n with q_cut = sum n_j q_j + c in a planar loop: all its hinges turn about one
-    direction, forwards or backwards, slides and twists between them or not.
+    """Whole n with q_cut = sum n_j q_j + c in a planar loop: all its hinges turn about one direction, forwards or backwards, slides and twists between them or not.
 
     The directions are looked at in two configurations of the open tree; `regroup.closed_draw`
     proves the sum over F_p.
@@ -180,9 +174,7 @@ def _angle_sum(
 
 
 def _linear(assembly: Assembly, q: Array) -> Closure | None:
-    """The configuration q as a linear closure, if it is one: whole constant rates, offsets that are
-    sums of angles or lengths, proof over F_p.
-    """
+    """The configuration q as a linear closure, if it is one: whole constant rates, offsets that are sums of angles or lengths, proof over F_p."""
     N = np.round(assembly.rates(q))
     moved = q.copy()
     moved[assembly.active] += 0.37 + 0.1 * np.array(assembly.active)
@@ -225,8 +217,8 @@ def _closure(
 
 
 def _samples(assembly: Assembly, q: Array) -> list[Sample]:
-    """Constants with the configuration there: those of the file with q, and others near them, at
-    which equal values of different symbols differ. Empty if the loops do not close there.
+    """Constants with the configuration there: those of the file with q, and others near them, at which equal values of different symbols differ.
+    Empty if the loops do not close there.
     """
     rng, robot = np.random.default_rng(7), assembly.robot
     angles = {s for f in robot.frames for e in (f.gamma, f.alpha, f.theta0) for s in e.symbols}
@@ -284,8 +276,8 @@ def _beside(robot: Robot, row: Mapping[int, Expression]) -> Expression:
 
 
 def _fixed(assembly: Assembly, hinge: bool) -> list[Expression]:
-    """Fixed angles without quarter turns, or lengths, of the frames around the loops and of the
-    declared relations: distinct, and up to sign. What stands beside q_j is none.
+    """Fixed angles without quarter turns, or lengths, of the frames around the loops and of the declared relations: distinct, and up to sign.
+    What stands beside q_j is none.
     """
     robot, own = assembly.robot, REVOLUTE if hinge else PRISMATIC
     around = {k for l in robot.loops for k in {*robot.path(l.cut)} ^ {*robot.path(l.twin)}}
@@ -305,9 +297,7 @@ def _fixed(assembly: Assembly, hinge: bool) -> list[Expression]:
 
 
 def _coincide(closure: Closure) -> bool:
-    """Whether cut and twin frames are equal over F_p for random lengths and positions: the proof of
-    the relations.
-    """
+    """Whether cut and twin frames are equal over F_p for random lengths and positions: the proof of the relations."""
     draw, algebra = Draw(closure.robot, 17, 3), GraphAlgebra(closure.robot)
     rows = interpret(coincidence(loop_ends(closure.robot, algebra, closure)), draw)
     return not any(draw.residues(x).any() for x in rows)
@@ -362,9 +352,7 @@ def _cannot_close(assembly: Assembly) -> DescriptionError:
 def _contradiction(
     assembly: Assembly, declared: Mapping[int, Expression], closure: Closure
 ) -> DescriptionError:
-    """Both sides of every declared relation that is not the closure's, and how far the loop is open
-    with the declared ones.
-    """
+    """Both sides of every declared relation that is not the closure's, and how far the loop is open with the declared ones."""
     sides = []
     for j, e in declared.items():
         if j in closure.tied:

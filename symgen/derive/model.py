@@ -179,9 +179,10 @@ class Model:
         *,
         closed: bool = False,
     ) -> Values:
-        """The entries that may differ from zero, rewritten with what the request gives; over the
-        graph of `rewrite`, of the same request, where several models share one. closed : to be
-        multiplied out.
+        """The entries that may differ from zero, rewritten with what the request gives.
+
+        Over the graph of `rewrite`, of the same request, where several models share one. closed :
+        to be multiplied out.
         """
         cases = (closed and self.closed) or self.cases
         assert cases is not None
@@ -235,9 +236,7 @@ def equations(d: Derivation) -> tuple[int, ...]:
 
 
 def rewriting(d: Derivation, request: Request) -> Rewrite:
-    """What every model replaces: parameters by theirs, gravity by that of the robot, and inputs of
-    the request.
-    """
+    """What every model replaces: parameters by theirs, gravity by that of the robot, and inputs of the request."""
     inputs: dict[Symbol, Input] = {}
     for name in d.robot.parameters:
         symbol = request.parameters.get(name)

@@ -79,8 +79,9 @@ MEMBER = re.compile(rf"(?:({FAMILY})\d[\d_moxb]*|(QP|DG|DN|DF)(?:\d[\d_]*)?[A-Za
 
 
 def families_of(names: Iterable[str]) -> tuple[str, ...]:
-    """The families that `names` belong to, in the order of FAMILIES; products and sums of names
-    belong to none.
+    """The families that `names` belong to, in the order of FAMILIES.
+
+    Products and sums of names belong to none.
     """
     matches = filter(None, map(MEMBER.match, names))
     occurring = {match[1] or match[2] for match in matches}

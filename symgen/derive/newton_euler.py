@@ -234,8 +234,7 @@ def moment(m: LinkMotion, K: Mapping[str, Scalar]) -> Vector:
 
 
 def joint_torques(motion: Motion, K: Mapping[str, Scalar]) -> dict[int, Scalar]:
-    """Inward recursion: the part of Gamma_j that moves the links, for every moving joint of the
-    tree.
+    """Inward recursion: the part of Gamma_j that moves the links, for every moving joint of the tree.
 
     K maps a standard parameter's name to its scalar; a parameter that is not in K counts as 0.
     """

@@ -26,8 +26,9 @@ LARGEST_WHOLE = 12  # whole numbers up to here are counts (2, 4) rather than len
 
 @lru_cache(maxsize=64)
 def numbered(robot: Robot) -> Robot:
-    """`robot` with the numbers of its lengths, gravity, ratios, element rows and angles as `Number`
-    atoms; ratios as they are where one relation is put into another, whose angles need them.
+    """`robot` with the numbers of its lengths, gravity, ratios, element rows and angles as `Number` atoms.
+
+    Ratios as they are where one relation is put into another, whose angles need them.
     """
     followed = {a for e in robot.constraints.values() for a in e.atoms}
     chained = any(f"q{j}" in followed for j in robot.constraints)
@@ -38,9 +39,7 @@ def numbered(robot: Robot) -> Robot:
 
 
 def keep_rationals(e: Expression) -> Expression:
-    """The same polynomial with its rational coefficients as atoms, those inside square roots and
-    inverses too.
-    """
+    """The same polynomial with its rational coefficients as atoms, those inside square roots and inverses too."""
     total = Expression()
     for m, c in e.terms.items():
         term = Expression({(): Fraction(1 if c > 0 else -1)}) * _atom(abs(c))
@@ -58,8 +57,9 @@ def keep_rationals(e: Expression) -> Expression:
 
 
 def kept_angle(e: Expression) -> Expression:
-    """The same angle with its decimals as atoms, and its fractions of pi with a large denominator;
-    a joint's ratio stays a number.
+    """The same angle with its decimals as atoms, and its fractions of pi with a large denominator.
+
+    A joint's ratio stays a number.
     """
     _, rest = quarter_turns(e)
     total = e - rest

@@ -43,9 +43,7 @@ Inputs = Mapping[Symbol, Input]
 
 
 class ByNode(Draw):
-    """A draw in which every velocity has a direction of its own: sign(K qd) is not sign(qd), since
-    K may have either sign.
-    """
+    """A draw in which every velocity has a direction of its own: sign(K qd) is not sign(qd), since K may have either sign."""
 
     def forward(self, node: Node, rate: Fp) -> Fp:
         return self._opaque(SIGN, [rate])

@@ -1,6 +1,4 @@
-"""A robot at the values of its constants: symbols replaced by their numbers, for geometries at
-which the generic formulas do not hold.
-"""
+"""A robot at the values of its constants: symbols replaced by their numbers, for geometries at which the generic formulas do not hold."""
 
 from __future__ import annotations
 
@@ -22,8 +20,7 @@ WITHIN = 1e-6  # rad, of a multiple of pi/12: rounding of 1.570796
 
 
 def at_values(robot: Robot, values: Mapping[str, Expression] | None = None) -> Robot:
-    """`robot` with every constant as a number: decimals exactly, angles that are multiples of pi/12
-    as such; or some constants at given values.
+    """`robot` with every constant as a number: decimals exactly, angles that are multiples of pi/12 as such; or some constants at given values.
 
     Parameters
     ----------
@@ -74,9 +71,7 @@ def substituted(e: Expression, values: Mapping[str, Expression]) -> Expression:
 
 
 def mapped(robot: Robot, length: Change, angle: Change = lambda e: e) -> Robot:
-    """`robot` with `length` of its lengths, gravity, ratios and rows of elements, and `angle` of
-    its angles.
-    """
+    """`robot` with `length` of its lengths, gravity, ratios and rows of elements, and `angle` of its angles."""
 
     def rows(table: Mapping[int, Mapping[K, Expression]]) -> dict[int, dict[K, Expression]]:
         return {j: {i: length(g) for i, g in row.items()} for j, row in table.items()}

@@ -58,9 +58,7 @@ def check_robot(robot: Any) -> None:
 
 
 def _check_tree(frames: Sequence[Frame], massless: Collection[int]) -> None:
-    """Frames are numbered without gaps, every chain of antecedents ends at the base, some joint is
-    actuated.
-    """
+    """Frames are numbered without gaps, every chain of antecedents ends at the base, some joint is actuated."""
     numbers = [f.j for f in frames]
     if not numbers:
         raise DescriptionError("no frames; a robot has at least frame 1", path=("frames",))
@@ -192,8 +190,9 @@ def _check_declared(e: Expression, path: Path, symbols: Collection[str]) -> None
 
 
 def _check_exact(e: Expression, path: Path, *, angle: bool) -> None:
-    """Refuse what exact arithmetic has no numbers for: pi outside an angle, functions inside one; a
-    constant may have such a value.
+    """Refuse what exact arithmetic has no numbers for: pi outside an angle, functions inside one.
+
+    A constant may have such a value.
     """
     for a in e.atoms:
         if isinstance(a, Call) and not angle:
@@ -290,9 +289,7 @@ def _check_element(e: Element, robot: Any) -> None:
 
 
 def _check_loops(robot: Any) -> None:
-    """Cut joints are passive, twins fixed, constraints those of passive joints, and passive joints
-    have a relation.
-    """
+    """Cut joints are passive, twins fixed, constraints those of passive joints, and passive joints have a relation."""
     numbers = [f.j for f in robot.frames]
     for k, loop in enumerate(robot.loops):
         where = ("loops", k)

@@ -1,5 +1,4 @@
-"""Tables of the distal (classic, Denavit-Hartenberg 1955) convention, turned into those of Khalil
-and Kleinfinger.
+"""Tables of the distal (classic, Denavit-Hartenberg 1955) convention, turned into those of Khalil and Kleinfinger.
 
 Distal: frame j lies at the far end of link j, joint j turns about or moves along z of its
 antecedent,
@@ -25,8 +24,9 @@ from symgen.errors import DescriptionError
 
 
 def khalil_frames(frames: tuple[Frame, ...]) -> tuple[Frame, ...]:
-    """Khalil's table of a distal one, fixed frames of the branch ends last; raises DescriptionError
-    if gamma or b is given.
+    """Khalil's table of a distal one, fixed frames of the branch ends last.
+
+    Raises DescriptionError if gamma or b is given.
     """
     for f in frames:
         for key in ("gamma", "b"):

@@ -145,9 +145,7 @@ class Element:
 
     @property
     def constants(self) -> dict[str, float]:
-        """Names and values of its scalars that are fitted, one of each key, vs3, and of transmitted
-        torques, zero.
-        """
+        """Names and values of its scalars that are fitted, one of each key, vs3, and of transmitted torques, zero."""
         values = {name: x.value for name, x in self.scalars.items() if not x.fixed}
         if TRANSMITTED in (self.torque or KINDS.get(self.kind, KINDS["column"]).torque).symbols:
             values[TRANSMITTED] = 0.0
@@ -180,9 +178,7 @@ class Element:
         return self._of_key(self.energy or ZERO, j)
 
     def laws(self, j: int) -> tuple[Expression, dict[int, Expression]]:
-        """Torque of key j along s for parameter 1, and of its energy at the joints that it names:
-        Gamma = G' x + dU/dq_i.
-        """
+        """Torque of key j along s for parameter 1, and of its energy at the joints that it names: Gamma = G' x + dU/dq_i."""
         law, U = self.law(j), self.potential(j)
         joints = sorted(int(match[2]) for n in U.symbols if (match := STATE.match(n)) and match[2])
         return law + U.derivative("q"), {i: U.derivative(f"q{i}") for i in joints}

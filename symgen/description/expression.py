@@ -35,9 +35,7 @@ Monomial = tuple[tuple[Atom, int], ...]
 
 @dataclass(frozen=True)
 class Call:
-    """A function of an expression that the polynomial cannot hold: cos, sin, sqrt, sign, exp, tanh,
-    inv (1/argument) or pow (argument**exponent).
-    """
+    """A function of an expression that the polynomial cannot hold: cos, sin, sqrt, sign, exp, tanh, inv (1/argument) or pow (argument**exponent)."""
 
     function: str
     argument: Expression
@@ -69,8 +67,8 @@ class Call:
 
 @dataclass(frozen=True)
 class Number:
-    """A positive rational that formulas keep as the robot file writes it: 0.4318**2, not
-    0.18645124. See `derive.numbers`.
+    """A positive rational that formulas keep as the robot file writes it: 0.4318**2, not 0.18645124.
+    See `derive.numbers`.
     """
 
     value: Fraction
@@ -92,8 +90,9 @@ class Number:
 
 
 class Expression:
-    """Polynomial with rational coefficients over symbols and calls; immutable, hashable, equal by
-    value.
+    """Polynomial with rational coefficients over symbols and calls.
+
+    immutable, hashable, equal by value.
     """
 
     __slots__ = ("_hash", "terms")
@@ -210,9 +209,7 @@ class Expression:
         return names
 
     def coefficient(self, *names: str) -> Expression:
-        """The cofactor of the monomial `names` (each to the first power per mention) in the other
-        atoms.
-        """
+        """The cofactor of the monomial `names` (each to the first power per mention) in the other atoms."""
         wanted: dict[str | Number | Call, int] = {}
         for name in names:
             wanted[name] = wanted.get(name, 0) + 1
@@ -264,8 +261,7 @@ class Expression:
         number: Callable[[Fraction], Any],
         written: Callable[[Number], Any] | None = None,
     ) -> Any:
-        """Fold over any scalars: `value` of a symbol (and of pi), `function(name, argument)` of a
-        call, `number` of a rational.
+        """Fold over any scalars: `value` of a symbol (and of pi), `function(name, argument)` of a call, `number` of a rational.
 
         `written` is the value of a Number, by default that of its rational.
         """
@@ -322,8 +318,9 @@ ZERO, ONE, PI = Expression(), Expression.number(1), Expression.symbol("pi")
 
 
 def decimal(c: Fraction, *, fractions: bool = True) -> str:
-    """A rational as an exact decimal if it is one of reasonable length, else as p/q; halves,
-    quarters and eighths are p/q too where `fractions` is true.
+    """A rational as an exact decimal if it is one of reasonable length, else as p/q.
+
+    halves, quarters and eighths are p/q too where `fractions` is true.
     """
     if c.denominator == 1:
         return str(c.numerator)
@@ -374,9 +371,7 @@ def _product(m1: Monomial, m2: Monomial) -> Monomial:
 
 
 def _with_simple_roots(m: Monomial) -> tuple[Monomial, Fraction]:
-    """The monomial with every sqrt(rational) and every sign to the power 0 or 1, and the rational
-    factor that leaves: sqrt(3)**-1 = sqrt(3)/3, sign(x)**2 = 1.
-    """
+    """The monomial with every sqrt(rational) and every sign to the power 0 or 1, and the rational factor that leaves: sqrt(3)**-1 = sqrt(3)/3, sign(x)**2 = 1."""
     if not any(n != 1 and isinstance(a, Call) and a.function in ("sqrt", "sign") for a, n in m):
         return m, Fraction(1)
     factor, powers = Fraction(1), []
@@ -397,9 +392,7 @@ def _atom(a: Atom) -> Expression:
 
 
 def _sqrt_of_rational(c: Fraction) -> Expression:
-    """sqrt(m/n) = sqrt(m n)/n, m n = square * product of primes (trial division to LARGEST_PRIME) *
-    rest.
-    """
+    """sqrt(m/n) = sqrt(m n)/n, m n = square * product of primes (trial division to LARGEST_PRIME) * rest."""
     if c < 0:
         raise ValueError("square root of a negative number")
     rest, result = c.numerator * c.denominator, Expression.number(Fraction(1, c.denominator))
@@ -436,8 +429,9 @@ def _sqrt(e: Expression) -> Expression:
 
 @lru_cache(maxsize=4096)
 def call(function: str, argument: Expression) -> Expression:
-    """cos, sin, tan, sqrt, inv, sign, abs, exp or tanh of an expression; quarter turns, signs and
-    perfect squares are taken out exactly.
+    """cos, sin, tan, sqrt, inv, sign, abs, exp or tanh of an expression.
+
+    Quarter turns, signs and perfect squares are taken out exactly.
     """
     if function == "abs":
         return argument * call("sign", argument)
@@ -549,6 +543,7 @@ def with_known_cosines(e: Expression) -> Expression:
 
 
 def simplified(e: Expression) -> Expression:
+<<<<<<< HEAD
     """cos(a)**2 m + sin(a)**2 m = m and m - cos(a)**2 m = sin(a)**2 m wherever both terms are there
     with one coefficient: of the first term that has a partner, until none has.
     """
@@ -579,6 +574,9 @@ def simplified(e: Expression) -> Expression:
                     add(shorter, value)
                     return
 
+=======
+    """cos(a)**2 m + sin(a)**2 m = m and m - cos(a)**2 m = sin(a)**2 m wherever both terms are there with one coefficient."""
+>>>>>>> w-words
     for m, c in e.terms.items():
         add(m, c)
     while waiting:
@@ -607,16 +605,15 @@ def quarter_turns(angle: Expression) -> tuple[int, Expression]:
 
 
 def ratio(x: float) -> Fraction:
-    """The fraction of a denominator up to LARGEST_RATIO that x is except for rounding, such as 1/3 of
-    0.3333333333333333, else its shortest decimal.
-    """
+    """The fraction of a denominator up to LARGEST_RATIO that x is except for rounding, such as 1/3 of 0.3333333333333333, else its shortest decimal."""
     near = Fraction(x).limit_denominator(LARGEST_RATIO)
     return near if float(near) == x else Fraction(repr(x))
 
 
 def twelfths(angle: float, within: float) -> int | None:
-    """k of the multiple k pi/12 that lies within `within` rad of a decimal angle; None if none
-    does. Drawings have such angles.
+    """k of the multiple k pi/12 that lies within `within` rad of a decimal angle.
+
+    None if none does. Drawings have such angles.
     """
     k = round(angle * 12 / math.pi)
     return k if abs(angle - k * math.pi / 12) <= within else None

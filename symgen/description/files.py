@@ -1,6 +1,4 @@
-"""Robots by packaged name or file: robot files (.yaml), SYMORO's `.par`, URDF and MJCF, read and
-written by suffix.
-"""
+"""Robots by packaged name or file: robot files (.yaml), SYMORO's `.par`, URDF and MJCF, read and written by suffix."""
 
 from __future__ import annotations
 
@@ -77,8 +75,7 @@ def read_robot(
     lock: Mapping[str, float] | None = None,
     chain: tuple[str, str] | None = None,
 ) -> tuple[Robot, tuple[str, ...]]:
-    """The robot of a file as by `load_robot`, and notes on what of a foreign format was read
-    otherwise than written, or not at all.
+    """The robot of a file as by `load_robot`, and notes on what of a foreign format was read otherwise than written, or not at all.
 
     Parameters
     ----------
@@ -160,8 +157,7 @@ def _beside(path: Path) -> Callable[[str, int], bytes]:
 def write_robot(
     robot: Robot, file: str, *, comments: Sequence[str] = ()
 ) -> tuple[str, tuple[str, ...]]:
-    """Text of `robot` in the format that the suffix of `file` names, and notes on what of it the
-    format does not carry.
+    """Text of `robot` in the format that the suffix of `file` names, and notes on what of it the format does not carry.
 
     Parameters
     ----------
@@ -188,8 +184,9 @@ def write_robot(
 
 
 def content_of(path: Path) -> bytes:
-    """Bytes of a robot file, one more than MAX_BYTES at most; DescriptionError if it cannot be
-    read.
+    """Bytes of a robot file, one more than MAX_BYTES at most.
+
+    DescriptionError if it cannot be read.
     """
     names = ", ".join(packaged_robots())
     try:

@@ -213,8 +213,7 @@ def parse(
     symbols: Iterable[str] | None = None,
     functions: tuple[str, ...] = FUNCTIONS,
 ) -> Expression:
-    """Read one expression; `symbols` are the declared names (None: any), `functions` FUNCTIONS, or
-    LAWS for the law of a column.
+    """Read one expression; `symbols` are the declared names (None: any), `functions` FUNCTIONS, or LAWS for the law of a column.
 
     Raises ExpressionError with the column of whatever is outside the grammar.
     """

@@ -1,5 +1,4 @@
-"""MJCF to a Robot, by MuJoCo's own compiler (extra `mjcf`): its bodies and joints become a tree,
-the tree a table of Khalil frames.
+"""MJCF to a Robot, by MuJoCo's own compiler (extra `mjcf`): its bodies and joints become a tree, the tree a table of Khalil frames.
 
 A body with joints 1 .. k, applied one after the other about the points p_i, is a chain of k links,
 all but the last without mass,
@@ -41,8 +40,9 @@ JOINT_RELATION = 2  # mjtEq; the others left in the text are relations of tendon
 
 
 def parse_mjcf(content: bytes, file: str, *, exact: bool = False, sites: bool = False) -> Tree:
-    """Links and joints of an MJCF file; `exact` as of `read_tree`; `sites`: each is a link on a
-    fixed joint.
+    """Links and joints of an MJCF file.
+
+    `exact` as of `read_tree`; `sites`: each is a link on a fixed joint.
     """
     mjcf, angles = compiled(content), Angles(exact)
     tree = _tree(mjcf, angles, sites=sites)
@@ -158,9 +158,7 @@ def _pose(position: Array, quaternion: Array) -> Array:
 
 
 def _turned(position: Array, quaternion: Array, what: str, angles: Angles) -> Array:
-    """`_pose` of a body or site, whose roll, pitch and yaw, as a URDF has them, are taken as
-    `angles` says; with a pitch of a quarter turn roll and yaw are one angle.
-    """
+    """`_pose` of a body or site, whose roll, pitch and yaw, as a URDF has them, are taken as `angles` says; with a pitch of a quarter turn roll and yaw are one angle."""
     T = _pose(position, quaternion)
     R = T[:3, :3]
     pitch = math.atan2(-R[2, 0], math.hypot(R[0, 0], R[1, 0]))
@@ -203,8 +201,9 @@ def _body(growing: _Growing, b: int) -> None:
 
 
 def _joint(growing: _Growing, k: int, parent: str, child: str, pose: Array) -> tuple[Joint, Array]:
-    """Joint k on `parent`, where the body has `pose` at q = ref; the pose of the body in the frame
-    of the joint.
+    """Joint k on `parent`, where the body has `pose` at q = ref.
+
+    The pose of the body in the frame of the joint.
     """
     model, line = growing.mjcf.model, growing.mjcf.joints[k]
     name, kind = growing.names[k], int(model.jnt_type[k])
@@ -285,9 +284,7 @@ def _left_out(model: Any) -> list[str]:
 
 
 def _relations(growing: _Growing) -> dict[str, Expression]:
-    """The joints that linear relations determine, by the others: exact elimination of joints that
-    no actuator drives.
-    """
+    """The joints that linear relations determine, by the others: exact elimination of joints that no actuator drives."""
     model, names = growing.mjcf.model, growing.names
     relations: dict[str, Expression] = {}
     for e in range(model.neq):

@@ -72,8 +72,7 @@ class Mjcf:
 
 
 def with_includes(content: bytes, read: Callable[[str, int], bytes]) -> bytes:
-    """An MJCF file with the content of the files that it includes in their place, each on one line,
-    so that lines of the file stay.
+    """An MJCF file with the content of the files that it includes in their place, each on one line, so that lines of the file stay.
 
     read : gives the bytes of an included file by its name and the line that includes it, or raises
     DescriptionError.
@@ -238,8 +237,9 @@ def _errors_with_lines(act: Callable[[], Any], lines: Sequence[int]) -> Any:
 def _take_out_meshes(
     body: Any, lines: Sequence[int], *, moves: bool, from_geoms: bool, all_weighed: bool
 ) -> None:
-    """The geoms of a body, and of those on it, that are meshes weigh nothing; DescriptionError
-    if their mass matters.
+    """The geoms of a body, and of those on it, that are meshes weigh nothing.
+
+    DescriptionError if their mass matters.
     """
     moves = moves or bool(body.joints)
     weighed = (moves or all_weighed) and (from_geoms or not body.explicitinertial)

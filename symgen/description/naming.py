@@ -83,8 +83,9 @@ def check_identifier(name: str, path: Path) -> None:
 
 
 def check_names(robot: Any) -> None:
-    """Robot, families, constants and parameters have names of their own, which no emitted text
-    gives another meaning; texts end no docstring or comment.
+    """Robot, families, constants and parameters have names of their own, which no emitted text gives another meaning.
+
+    Texts end no docstring or comment.
     """
     check_identifier(robot.name, ("name",))
     if robot.name.upper() in DEVICES:

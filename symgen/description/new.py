@@ -53,8 +53,9 @@ elements:
 
 
 def skeleton(name: str) -> str:
-    """Text of a commented two-joint robot file called `name`; raises DescriptionError if that is no
-    identifier.
+    """Text of a commented two-joint robot file called `name`.
+
+    Raises DescriptionError if that is no identifier.
     """
     check_identifier(name, ("name",))
     return _SKELETON.format(name=name, schema=SCHEMA)

@@ -189,8 +189,9 @@ def _scan(text: str, par: _Par) -> None:
 
 
 def _without_comments(text: str, par: _Par) -> str:
-    """`text` with blanks for its comments, which go into `par`; one pass, however many a file
-    opens.
+    """`text` with blanks for its comments, which go into `par`.
+
+    One pass, however many a file opens.
     """
     parts, position = [], 0
     while (start := text.find("(*", position)) >= 0:
@@ -391,9 +392,7 @@ def _rounded(e: Expression, name: str, par: _Par) -> Expression:
 def _parameters(
     par: _Par, NL: int, fixed: set[int]
 ) -> tuple[dict[str, float], set[int], dict[str, list[int]]]:
-    """Values by name, links whose ten inertial parameters are 0, and the joints that have Ia, FV,
-    FS.
-    """
+    """Values by name, links whose ten inertial parameters are 0, and the joints that have Ia, FV, FS."""
     values: dict[str, float] = {}
     zero: dict[str, set[int]] = {}
     renamed: list[str] = []

@@ -1,6 +1,4 @@
-"""The tables of a robot: rows of the frame table, rows and forms of elements, loops, drives,
-limits.
-"""
+"""The tables of a robot: rows of the frame table, rows and forms of elements, loops, drives, limits."""
 
 from __future__ import annotations
 
@@ -271,16 +269,15 @@ def parameter(family: str, j: int) -> str:
 
 
 def row_of(e: Expression, joints: tuple[int, ...]) -> dict[int, Expression]:
-    """The row G of s = G q; raises ValueError if the expression is not linear and homogeneous in
-    the q's.
-    """
+    """The row G of s = G q; raises ValueError if the expression is not linear and homogeneous in the q's."""
     what = "a combination of joint positions such as q5 + q6 or 2*q3"
     return {j: c for (j,), c in _cofactors(e, combinations(joints, 1), what).items()}
 
 
 def form_of(e: Expression, joints: tuple[int, ...]) -> dict[tuple[int, int], Expression]:
-    """The symmetric matrix B of the quadratic form q' B q; raises ValueError if the expression is
-    not one.
+    """The symmetric matrix B of the quadratic form q' B q.
+
+    Raises ValueError if the expression is not one.
     """
     form: dict[tuple[int, int], Expression] = {}
     what = "a quadratic form in the joint positions such as q6**2 + 2*q5*q6"
@@ -293,8 +290,9 @@ def form_of(e: Expression, joints: tuple[int, ...]) -> dict[tuple[int, int], Exp
 def _cofactors(
     e: Expression, products: Iterable[tuple[int, ...]], what: str
 ) -> dict[tuple[int, ...], Expression]:
-    """The constants c of e = sum of c q_i q_j ..., by the joints of each product that occurs;
-    raises ValueError if the expression is not such a sum.
+    """The constants c of e = sum of c q_i q_j ..., by the joints of each product that occurs.
+
+    Raises ValueError if the expression is not such a sum.
     """
     cofactors, rest = {}, e
     for joints in products:

@@ -1,5 +1,4 @@
-"""What a robot is: frames of Khalil and Kleinfinger, elements on its joints, loops, and nothing
-about how it is derived.
+"""What a robot is: frames of Khalil and Kleinfinger, elements on its joints, loops, and nothing about how it is derived.
 
 Modified Denavit-Hartenberg [KK86]: frame j, antecedent i = ant(j), sigma_j = 0 revolute, 1
 prismatic, 2 fixed,
@@ -111,8 +110,9 @@ def _rows_by_name(name: str) -> BeforeValidator:
 
 @dataclass(frozen=True, config=CONFIG)
 class Robot:
-    """A mechanism, complete and checked; raises DescriptionError, with the path of the field, if it
-    is none. Numbers in SI and rad.
+    """A mechanism, complete and checked.
+
+    Raises DescriptionError, with the path of the field, if it is none. Numbers in SI and rad.
     """
 
     name: Annotated[str, Field(description="identifier; names the emitted module")]
@@ -344,9 +344,7 @@ class Robot:
 
 
 def one_joint_parameters(robot: Robot, families: Collection[str]) -> set[str]:
-    """Names of the parameters of `families`, such as FV, that act on one joint alone, in both
-    directions, as other formats mean them.
-    """
+    """Names of the parameters of `families`, such as FV, that act on one joint alone, in both directions, as other formats mean them."""
     return {
         parameter(e.family, j)
         for e in robot.elements

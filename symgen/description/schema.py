@@ -1,6 +1,4 @@
-"""A robot file as data: its JSON Schema, and reading it into a Robot, with what is wrong in a
-sentence that names the field.
-"""
+"""A robot file as data: its JSON Schema, and reading it into a Robot, with what is wrong in a sentence that names the field."""
 
 from __future__ import annotations
 
@@ -27,8 +25,9 @@ CONVENTIONS = {
 
 
 def robot_of(data: Mapping[str, Any], file: str, sha256: str) -> Robot:
-    """The Robot of a robot file of version SCHEMA; DescriptionError carries the path of the field
-    at fault.
+    """The Robot of a robot file of version SCHEMA.
+
+    DescriptionError carries the path of the field at fault.
     """
     data = {"file": Given(file), "sha256": Given(sha256), **data}
     columns = data.get("columns") or {}
@@ -139,8 +138,9 @@ _UNKNOWN, _OURS = "unexpected_keyword_argument", "described"
 
 
 def explain(error: ValidationError) -> DescriptionError:
-    """The first thing that is wrong; a misspelt key comes before the one it leaves missing, what an
-    expression says after both.
+    """The first thing that is wrong.
+
+    A misspelt key comes before the one it leaves missing, what an expression says after both.
     """
     first = min(
         error.errors(include_url=False), key=lambda e: (e["type"] != _UNKNOWN, e["type"] == _OURS)

@@ -50,8 +50,7 @@ class Inertial:
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint; along it, torque or force Gamma += armature qdd + damping qd + friction sign(qd) +
-    stiffness (q - rest).
+    """A joint; along it, torque or force Gamma += armature qdd + damping qd + friction sign(qd) + stiffness (q - rest).
 
     Attributes
     ----------
@@ -150,8 +149,9 @@ def rotation(rpy: Sequence[float], what: str, angles: Angles) -> Array:
 
 
 def transform(row: Sequence[float]) -> Array:
-    """iTj = Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r) of a row
-    gamma, b, alpha, d, theta, r; (4, 4).
+    """iTj = Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r) of a row gamma, b, alpha, d, theta, r.
+
+    (4, 4).
     """
     gamma, b, alpha, d, theta, r = row
     T = np.eye(4)
@@ -210,9 +210,7 @@ def part_of(tree: Tree, part: TreePart) -> Tree:
 
 
 def _beside(tree: Tree, base: str, tip: str) -> dict[str, float]:
-    """Positions of the moving joints that are not between two links: zero, of one that follows that
-    where its leaders are at zero.
-    """
+    """Positions of the moving joints that are not between two links: zero, of one that follows that where its leaders are at zero."""
     for link in (base, tip):
         if link not in tree.links:
             raise DescriptionError(
@@ -266,9 +264,7 @@ def _hold(tree: Tree, positions: Mapping[str, float]) -> Tree:
 
 
 def _motion(joint: Joint, q: float) -> Array:
-    """(4, 4) of a joint at position q: along its axis, or about it, R = 1 + sin q [a] + (1 - cos q)
-    [a]^2.
-    """
+    """(4, 4) of a joint at position q: along its axis, or about it, R = 1 + sin q [a] + (1 - cos q) [a]^2."""
     T = np.eye(4)
     if joint.kind == FREE_TYPE and q:
         raise DescriptionError(

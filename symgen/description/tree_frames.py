@@ -76,9 +76,7 @@ class Table:
 
 
 def placed(tree: Tree, *, keep_fixed: bool = False) -> Table:
-    """Frames of all bodies, a body before what it carries, branch by branch; then those of the
-    links that fixed joints hold, if kept.
-    """
+    """Frames of all bodies, a body before what it carries, branch by branch; then those of the links that fixed joints hold, if kept."""
     table = Table(tree)
     table.bodies[0] = _body(tree, tree.root, np.eye(4))
     waiting = [(0, joint, parent) for joint, parent in reversed(table.bodies[0].joints)]
@@ -161,7 +159,8 @@ def _nearly_parallel(axis: Array) -> bool:
 
 
 def _normal(axis: Array, point: Array) -> tuple[float, float, float, float]:
-    """gamma, b, alpha, d to the line through `point` along `axis`, both in the frame before it;
+    """gamma, b, alpha, d to the line through `point` along `axis`, both in the frame before it.
+
     |gamma| <= pi/2.
     """
     x, y, z = axis

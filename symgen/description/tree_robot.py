@@ -1,5 +1,4 @@
-"""The Robot of a URDF or MJCF, by its tree of links and joints: its Khalil frames, its joints as
-elements and limits, its inertials as standard parameters.
+"""The Robot of a URDF or MJCF, by its tree of links and joints: its Khalil frames, its joints as elements and limits, its inertials as standard parameters.
 
 With pose jX of a link in frame j, centre of mass c and rotation R = jR of the inertia I of the
 file:
@@ -56,8 +55,7 @@ def read_tree(
     keep_fixed: bool = False,
     part: TreePart = WHOLE_TREE,
 ) -> tuple[Robot, tuple[str, ...]]:
-    """The robot of a URDF or MJCF, and notes: which joint is which q, which link, body or site is
-    which kept frame, which angle was changed, what was not read.
+    """The robot of a URDF or MJCF, and notes: which joint is which q, which link, body or site is which kept frame, which angle was changed, what was not read.
 
     Parameters
     ----------
@@ -98,8 +96,7 @@ def parse_tree(content: bytes, file: str, *, exact: bool = False, sites: bool = 
 def robot_of_tree(
     tree: Tree, file: str, sha256: str, *, keep_fixed: bool = False
 ) -> tuple[Robot, tuple[str, ...]]:
-    """The robot, and notes: which joint is which q, which link is which kept frame, and what was
-    not read.
+    """The robot, and notes: which joint is which q, which link is which kept frame, and what was not read.
 
     Raises DescriptionError, with the line of the joint at fault, where the tree is no robot.
     """
@@ -166,9 +163,7 @@ def _robot(table: Table, file: str, sha256: str) -> Robot:
 
 
 def _labels(table: Table) -> dict[int, str]:
-    """Names of the joints of the file, and of the links that are kept frames, where no joint has
-    the same.
-    """
+    """Names of the joints of the file, and of the links that are kept frames, where no joint has the same."""
     names = {j: joint.name for j, joint in table.joint.items()} | table.fixed_links
     strange = sorted(name for name in names.values() if not is_label(name))
     if strange:
@@ -190,9 +185,7 @@ def _identifier(name: str) -> str:
 def _gravity(
     g: tuple[float, float, float],
 ) -> tuple[tuple[Expression, Expression, Expression], dict[str, float]]:
-    """Gravity by constants: g where it points along -z, else one for each component that is not
-    zero.
-    """
+    """Gravity by constants: g where it points along -z, else one for each component that is not zero."""
     if g[:2] == (0.0, 0.0) and g[2] < 0:
         return (ZERO, ZERO, -Expression.symbol("g")), {"g": -g[2]}
     names = [f"g{axis}" if x else "" for axis, x in zip("xyz", g, strict=True)]
@@ -212,8 +205,9 @@ def _constraints(table: Table) -> dict[int, Expression]:
 
 
 def _keys(table: Table, family: str, actuated: list[int]) -> list[int]:
-    """Joints with a parameter of the family: the actuated ones, and those that follow where the
-    file gives a value; springs only so.
+    """Joints with a parameter of the family: the actuated ones, and those that follow where the file gives a value.
+
+    Springs only so.
     """
     value = next(value for name, _, value in JOINT_TERMS if name == family)
     return [
@@ -246,9 +240,7 @@ def _limits(
 
 
 def _values(table: Table, actuated: list[int]) -> tuple[dict[str, float], frozenset[int]]:
-    """Standard parameters by name, empty if no link has inertia, and the frames without a link
-    of their own.
-    """
+    """Standard parameters by name, empty if no link has inertia, and the frames without a link of their own."""
     links = table.tree.links
     bodies = {j: body for j, body in table.bodies.items() if j in table.joint}
     bare = {j for j, body in bodies.items() if set(body.links) <= table.tree.bare}
@@ -292,9 +284,7 @@ def inertial_of(ten: Sequence[float] | Array) -> Inertial:
 
 
 def ten_of(inertial: Inertial, X: Array) -> Array:
-    """XX XY XZ YY YZ ZZ MX MY MZ M, shape (10,), of a link with pose X, (4, 4), in the frame of its
-    body.
-    """
+    """XX XY XZ YY YZ ZZ MX MY MZ M, shape (10,), of a link with pose X, (4, 4), in the frame of its body."""
     own = X @ inertial.pose
     R, c, M = own[:3, :3], own[:3, 3], inertial.M
     J = R @ inertial.I @ R.T + M * (c @ c * np.eye(3) - np.outer(c, c))

@@ -1,5 +1,4 @@
-"""URDF to a Robot: the text becomes a tree of links and joints, the tree a table of Khalil frames
-(`tree_frames`) with values (`tree_robot`).
+"""URDF to a Robot: the text becomes a tree of links and joints, the tree a table of Khalil frames (`tree_frames`) with values (`tree_robot`).
 
 Numbers are read as they are; meshes, textures and packages are never opened. A URDF library would
 load them, and its XML parser expands entities (`xml_text` reads neither). Every error names its
@@ -118,9 +117,7 @@ def _left_out(root: XmlElement) -> Iterator[str]:
 
 
 def _relations(joints: list[Joint], mimics: dict[str, Mimic]) -> dict[str, Expression]:
-    """q = multiplier q_leader + offset of the joints that mimic another, through any that follow
-    each other.
-    """
+    """q = multiplier q_leader + offset of the joints that mimic another, through any that follow each other."""
     moving = {joint.name for joint in joints if joint.kind != FIXED_TYPE}
     relations: dict[str, Expression] = {}
     for joint in (joint for joint in joints if joint.name in mimics):

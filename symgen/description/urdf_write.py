@@ -1,5 +1,4 @@
-"""URDF of a Robot with values: one link and one joint per frame, z axes, link frames those of
-Khalil; with notes on what is not carried.
+"""URDF of a Robot with values: one link and one joint per frame, z axes, link frames those of Khalil; with notes on what is not carried.
 
 The joint frame is iTj at q_j = 0 as x y z and roll, pitch, yaw. Inertials are about the centre of
 mass, c = MS / M:
@@ -171,8 +170,9 @@ def _follows(robot: Robot, j: int) -> tuple[int, float, float]:
 
 
 def _roll_pitch_yaw(R: Array) -> Array:
-    """R = Rz(yaw) Ry(pitch) Rx(roll); roll is read off what yaw and pitch leave, so that it is
-    exact at pitch = +-pi/2 too.
+    """R = Rz(yaw) Ry(pitch) Rx(roll).
+
+    Roll is read off what yaw and pitch leave, so that it is exact at pitch = +-pi/2 too.
     """
     c = math.hypot(R[0, 0], R[1, 0])
     yaw = math.atan2(R[1, 0], R[0, 0]) if c > 1e-12 else 0.0

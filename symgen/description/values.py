@@ -1,6 +1,4 @@
-"""Numbers for a robot that come from elsewhere: constants of a command line, standard parameters of
-a table or of an estimate.
-"""
+"""Numbers for a robot that come from elsewhere: constants of a command line, standard parameters of a table or of an estimate."""
 
 from __future__ import annotations
 
@@ -28,8 +26,9 @@ def assignment(text: str, option: str = "--constant") -> tuple[str, float]:
 
 
 def values_of_csv(content: bytes, file: str) -> dict[str, float]:
-    """Standard parameters by name from lines of name,value or name,value,note; a header with these
-    names may be the first line.
+    """Standard parameters by name from lines of name,value or name,value,note.
+
+    A header with these names may be the first line.
 
     Raises DescriptionError, with file and line, where a line is something else, or there is none.
     """

@@ -1,5 +1,4 @@
-"""Robot files: YAML 1.2 text to plain data with line numbers, from there to a checked Robot, and
-back to a text that reads as the same Robot.
+"""Robot files: YAML 1.2 text to plain data with line numbers, from there to a checked Robot, and back to a text that reads as the same Robot.
 
 Only what a table of numbers needs is read: mappings, lists and scalars of the core schema. Tags,
 anchors and aliases, merge keys, repeated keys, second documents and non-finite numbers are refused,

@@ -155,9 +155,7 @@ class ClosedDraw(Draw):
             return np.stack([whole, *self._points[u]])
 
         def tip(y: Array) -> tuple[Point, Array]:
-            """(cos v, sin v) that closes the loop, on the circle or not, and the determinant of its
-            equations.
-            """
+            """(cos v, sin v) that closes the loop, on the circle or not, and the determinant of its equations."""
             r, *A = (R % p * y[: len(R), None, None] % p).sum(axis=0) % p
             c, s = self._solved(np.stack(A, axis=1), -r % p)
             return (c, s), (A[0][0] * A[1][1] - A[0][1] * A[1][0] % p) % p
@@ -194,9 +192,7 @@ class ClosedDraw(Draw):
         return np.asarray(square)
 
     def _branch(self, j: int, first: Point, second: Point, around: set[int]) -> Array:
-        """Whether hinge j is on the branch of the robot file at `first`, shape (samples,); for a
-        closure whose solutions split into two branches.
-        """
+        """Whether hinge j is on the branch of the robot file at `first`, shape (samples,); for a closure whose solutions split into two branches."""
         hinges = [
             i for i in self.robot.joints if i in around and self.robot.frame(i).sigma == REVOLUTE
         ]
@@ -229,9 +225,7 @@ class ClosedDraw(Draw):
         )
 
     def _take(self, closed: Array) -> None:
-        """Leave the first samples that close of each geometry; `closed` is (geometries,
-        samples).
-        """
+        """Leave the first samples that close of each geometry; `closed` is (geometries, samples)."""
         count = self.shape[1]
         whole = self.samples
         if (closed.sum(axis=1) < count).any():
@@ -266,8 +260,9 @@ class ClosedDraw(Draw):
             self._residues[Symbol("qdd", f"QDP{u}")] = (along + bend) % self.p
 
     def _solved(self, A: Array, b: Array) -> Array:
-        """x with A x = b sample by sample, A of shape (m, m, samples); a singular sample gives
-        ArithmeticError.
+        """x with A x = b sample by sample, A of shape (m, m, samples).
+
+        A singular sample gives ArithmeticError.
         """
         M = np.moveaxis(np.concatenate([A, b[:, None]], axis=1) % self.p, -1, 0)
         x = solve_each(M, self.p, self.rng)
@@ -277,9 +272,7 @@ class ClosedDraw(Draw):
 
 
 def closed_draw(robot: Robot, seed: int, samples: int, **given: Any) -> ClosedDraw:
-    """A ClosedDraw; one that happens to be singular, or to close too rarely at one of many
-    geometries, is made again and wider.
-    """
+    """A ClosedDraw; one that happens to be singular, or to close too rarely at one of many geometries, is made again and wider."""
     for k in range(ATTEMPTS):
         try:
             return ClosedDraw(robot, seed + 1000 * k, samples, wide=1 + k, **given)

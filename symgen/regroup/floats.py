@@ -158,9 +158,7 @@ def _in_time(robot: Robot, rng: np.random.Generator, count: int) -> Any:
 
 
 def float_base(W: Array) -> tuple[list[int], Array]:
-    """Independent columns of W, leftmost first, and the coefficients of every column in them, shape
-    (rank, columns).
-    """
+    """Independent columns of W, leftmost first, and the coefficients of every column in them, shape (rank, columns)."""
     norms = np.linalg.norm(W, axis=0)
     norms[norms <= 1e-10 * norms.max(initial=0.0)] = np.inf
     U = W / norms

@@ -29,9 +29,7 @@ class Formula:
         return self.text(str)
 
     def text(self, coefficient: Callable[[Expression], str]) -> str:
-        """The whole formula: parameters with coefficient 1 one by one, the others with the
-        coefficient that they share, as `coefficient` writes it.
-        """
+        """The whole formula: parameters with coefficient 1 one by one, the others with the coefficient that they share, as `coefficient` writes it."""
         terms: list[Signed] = []
         for c, members in self.groups():
             if c in (ONE, -ONE):
@@ -48,8 +46,9 @@ class Formula:
         return _sum(terms)
 
     def groups(self) -> list[tuple[Expression, list[Signed]]]:
-        """Coefficients with the parameters that share one, as in eq. (27); those with the opposite
-        one are subtracted.
+        """Coefficients with the parameters that share one, as in eq. (27).
+
+        Those with the opposite one are subtracted.
         """
         groups: dict[Expression, list[Signed]] = {}
         for name, c in self.combination.items():

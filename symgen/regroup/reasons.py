@@ -1,5 +1,4 @@
-"""Why a standard parameter is part of a base parameter, and what an edit of the robot file does to
-the base parameters.
+"""Why a standard parameter is part of a base parameter, and what an edit of the robot file does to the base parameters.
 
 The regressor columns of the standard parameters are combinations of those of the base,
 Gamma = sum_k D_k chi_k = sum_b D_b X_b, hence

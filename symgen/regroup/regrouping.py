@@ -229,9 +229,7 @@ def _assemble(
     relations: Mapping[str, Mapping[str, Expression]],
     draw: Draw,
 ) -> Regrouping:
-    """Base parameters from the general transfer and the particular relations {dependent: {base
-    column: coefficient}}.
-    """
+    """Base parameters from the general transfer and the particular relations {dependent: {base column: coefficient}}."""
     combination: dict[str, Combination] = {name: transfer.combination[name] for name in base}
     steps = list(transfer.steps)
     for dependent, relation in relations.items():
@@ -257,17 +255,14 @@ def _assemble(
 
 
 def _vanishes(c: Expression, draw: Draw) -> bool:
-    """Whether a coefficient is zero, cos(pi/4)**2 - sin(pi/4)**2 included: angles are exact over
-    F_p.
-    """
+    """Whether a coefficient is zero, cos(pi/4)**2 - sin(pi/4)**2 included: angles are exact over F_p."""
     if all(isinstance(a, str) for a in c.atoms):
         return not c
     return not draw.residues(draw.constant(c)).any()
 
 
 def sign_conditions(regrouping: Regrouping) -> list[tuple[str, Expression, int]]:
-    """(base parameter, ratio of two rates, sign of it in the robot file) wherever a formula adds
-    frictions of dependent directions.
+    """(base parameter, ratio of two rates, sign of it in the robot file) wherever a formula adds frictions of dependent directions.
 
     sign(KR q1) is sign(KR) sign(q1): FS1 + KR FS2 holds for the sign that KR has in the file.
     """

@@ -25,8 +25,10 @@ def draw_states(
     geometry: Mapping[Variable, Array] | None = None,
     count: int = 0,
 ) -> Draw:
-    """`samples` random states over F_p at one geometry, or at each of `count`; closed where joints
-    are tied. Raises ArithmeticError if general loops have no points of one geometry.
+    """`samples` random states over F_p at one geometry, or at each of `count`.
+
+    Closed where joints are tied. Raises ArithmeticError if general loops have no points of one
+    geometry.
     """
     if close(robot).tied:
         return closed_draw(robot, seed, samples, p=p, count=max(count, 1), geometry=geometry)
@@ -34,9 +36,7 @@ def draw_states(
 
 
 def sample(draw: Draw, names: tuple[str, ...]) -> Array:
-    """The regressor columns `names` at the draw's states, shape (..., n_active * samples,
-    len(names)), int64 residues.
-    """
+    """The regressor columns `names` at the draw's states, shape (..., n_active * samples, len(names)), int64 residues."""
     robot = draw.robot
     D = derive(robot).columns
     entries = {

@@ -32,8 +32,7 @@ Step = tuple[
 
 
 class Transfer:
-    """Where the parameters of a link end up: `steps` one link down at a time, `combination` of each
-    remaining parameter.
+    """Where the parameters of a link end up: `steps` one link down at a time, `combination` of each remaining parameter.
 
     After the tips have been processed, the torque is sum over the remaining names k of D_k
     combination[k](chi).
@@ -101,9 +100,7 @@ class Transfer:
 
 
 def link_relations(f: Frame) -> dict[str, dict[tuple[str, int], Expression]]:
-    """{parameter of link j that goes: {(parameter, 1 if of link i else 0 of link j):
-    coefficient}}.
-    """
+    """{parameter of link j that goes: {(parameter, 1 if of link i else 0 of link j): coefficient}}."""
     cg, sg, ca, sa = (call(trig, e) for e in (f.gamma, f.alpha) for trig in ("cos", "sin"))
     A = axis_rotation(cg, sg, ca, sa)
     p = displacement(A, f.b, f.d, f.r0)

@@ -1,4 +1,5 @@
-"""Models as symbols: closed forms factored by parameter, the recursion as a list of equations;
+"""Models as symbols: closed forms factored by parameter, the recursion as a list of equations.
+
 SymPy, LaTeX, MathML, text.
 
 The recursions of `derive` give every model as nodes of one graph, as they do for emitted modules. A

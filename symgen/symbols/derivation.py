@@ -1,6 +1,4 @@
-"""What a model is derived from: robot, parameters, closure, and the graph algebra in which symbols
-may have values.
-"""
+"""What a model is derived from: robot, parameters, closure, and the graph algebra in which symbols may have values."""
 
 from __future__ import annotations
 
@@ -91,9 +89,7 @@ class Source:
         return Request(self.own, of, frame, inputs)
 
     def _rate(self, u: int, i: int, algebra: GraphAlgebra) -> Scalar:
-        """dq_u/dq_i: the number of a linear relation, a symbol where only the closure equations
-        give it.
-        """
+        """dq_u/dq_i: the number of a linear relation, a symbol where only the closure equations give it."""
         row, tied = self.relations.row[u], self.relations.tied
         steps = {k: algebra.rate(k, i) if k in tied else int(k == i) for k in row}
         return linear(algebra, row, steps)
@@ -106,8 +102,9 @@ def source_of(
     passive: str | None = None,
     regrouping: Regrouping | None = None,
 ) -> Source:
-    """The robot with what was asked, see `symgen.symbolic`; `regrouping` is that of the robot if
-    it is known already.
+    """The robot with what was asked, see `symgen.symbolic`.
+
+    `regrouping` is that of the robot if it is known already.
     """
     _one_of("parameters", parameters, PARAMETERS)
     formulas: dict[str, Formula]
@@ -152,9 +149,7 @@ def _one_of(what: str, given: str, known: Iterable[str]) -> None:
 def _parsed(
     robot: Robot, parameters: Iterable[str], values: Mapping[str, Any]
 ) -> dict[str, Expression]:
-    """Values as exact expressions over pi and the constants of the robot, read by the grammar of
-    robot files.
-    """
+    """Values as exact expressions over pi and the constants of the robot, read by the grammar of robot files."""
     moving = [f"{state}{j}" for state in ("q", "QP", "QDP") for j in robot.moving]
     known = [*robot.constants, *moving, *parameters]
     result = {}

@@ -1,5 +1,4 @@
-"""Models as documents: text, LaTeX, lines of SymPy, plain values for JSON, and the MathML of a
-robot's page; in closed form or as recursion.
+"""Models as documents: text, LaTeX, lines of SymPy, plain values for JSON, and the MathML of a robot's page; in closed form or as recursion.
 
 LaTeX uses amsmath alone; velocities are \\dot{q}, accelerations \\ddot{q}, torques \\Gamma;
 intermediates of a recursion keep the names of SYMORO. Long formulas are cut before + and -, outside
@@ -114,8 +113,9 @@ class Formulas:
 
 
 def closed_texts(model: SymbolicModel) -> dict[str, str]:
-    """{label: value} of the entries that are not zero; the numerators where the model has a
-    denominator.
+    """{label: value} of the entries that are not zero.
+
+    The numerators where the model has a denominator.
     """
     entries = model.closed.entries
     return {model.label(p): plain(entries[p]) for p in model.places if p in entries}
@@ -125,9 +125,7 @@ def closed_texts(model: SymbolicModel) -> dict[str, str]:
 
 
 def notes(model: SymbolicModel) -> list[str]:
-    """Sentences without which a model cannot be read: its parameters, what is left out, its passive
-    joints.
-    """
+    """Sentences without which a model cannot be read: its parameters, what is left out, its passive joints."""
     source = model.source
     lines = []
     if model.model.reads_X or "parameters" in model.model.axes:
@@ -183,9 +181,7 @@ def text(model: SymbolicModel, form: str) -> str:
 
 
 def text_lines(model: SymbolicModel, form: str) -> list[str]:
-    """The angles and the entries of a closed form, or the equations of the recursion under their
-    headings.
-    """
+    """The angles and the entries of a closed form, or the equations of the recursion under their headings."""
     if form == "closed":
         closed = model.closed
         texts = closed_texts(model)
@@ -230,9 +226,7 @@ def broken_lines(
 def pieces(
     formula: str, width: int, measure: Callable[[str], int] = len, depth: int = 0
 ) -> Iterator[str]:
-    """The formula cut before every + and - at `depth` brackets, pieces that are wider than `width`
-    cut further in.
-    """
+    """The formula cut before every + and - at `depth` brackets, pieces that are wider than `width` cut further in."""
     for piece in _cut(formula, depth):
         if measure(piece) <= width or depth > 8:
             yield piece
@@ -456,9 +450,7 @@ def json_text(model: SymbolicModel, form: str) -> str:
 
 @dataclass(frozen=True)
 class ShownModel:
-    """A model on a page: in closed form `entries` (label, terms), else the equations of its
-    recursion under their headings in `steps`.
-    """
+    """A model on a page: in closed form `entries` (label, terms), else the equations of its recursion under their headings in `steps`."""
 
     title: str
     summary: str
@@ -469,9 +461,7 @@ class ShownModel:
 
 
 def shown_models(regrouping: Regrouping) -> tuple[list[ShownModel], list[str]]:
-    """The models of a robot's page, each in the form that can be read, and what is to be known of
-    its passive joints.
-    """
+    """The models of a robot's page, each in the form that can be read, and what is to be known of its passive joints."""
     robot = regrouping.robot
     source = source_of(robot, regrouping=regrouping)
     request = source.request(robot.frames[-1].j, 0)

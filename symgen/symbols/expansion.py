@@ -132,9 +132,7 @@ class Expansion:
                 yield (node.op, node.index), DIRECTION
 
     def _constant(self, node: Node) -> Expression:
-        """The constant that a square root, or the cosine or sine of a fixed angle, is; else
-        zero.
-        """
+        """The constant that a square root, or the cosine or sine of a fixed angle, is; else zero."""
         if node.op == "sqrt":
             root: Expression = node.value
             return root

@@ -103,9 +103,7 @@ def function(op: str, operands: list[Tree]) -> Tree:
 
 
 def formula(f: Formula) -> Tree:
-    """A regrouping formula: parameters with one coefficient share it in brackets, as in eq.
-    (27).
-    """
+    """A regrouping formula: parameters with one coefficient share it in brackets, as in eq. (27)."""
     terms = []
     for c, members in f.groups():
         first = members[0][0]

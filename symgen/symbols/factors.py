@@ -89,9 +89,7 @@ class Factors:
         return number, [expressions.total(terms)]
 
     def _bracketed(self, c: Coefficient) -> tuple[Fraction, list[Tree]]:
-        """(number, factors) with the sum of all terms as the last factor, its first one
-        positive.
-        """
+        """(number, factors) with the sum of all terms as the last factor, its first one positive."""
         number, common, rest = self._split(c)
         terms = [
             self._product(Fraction(rest[m]), self._powers(m)) for m in sorted(rest, key=self._order)

@@ -1,5 +1,5 @@
-"""Cosines and sines of the angles of a model: S**2 becomes 1 - C**2 at once, hence S**2 + C**2
-never stays. `tidy` writes the other way whatever gets shorter by it:
+"""Cosines and sines of the angles of a model: S**2 becomes 1 - C**2 at once, hence S**2 + C**2 never stays.
+`tidy` writes the other way whatever gets shorter by it:
 
     1 - C**2 = S**2 ,     Ca Cb - Sa Sb = C(a + b) ,     Sa Cb + Ca Sb = S(a + b) ,
 

@@ -1,5 +1,4 @@
-"""The recursion of a model as equations: every intermediate in the order in which it is computed,
-under the names of SYMORO.
+"""The recursion of a model as equations: every intermediate in the order in which it is computed, under the names of SYMORO.
 
 What has a name of its own, and what is used more than once, has a line; everything else stands
 inside its only user: the rules of emitted code.

@@ -153,8 +153,9 @@ class MathML(str):
 
 
 class Presentation(MathMLPresentationPrinter):  # type: ignore[misc]
-    """SymPy's presentation MathML with the subscripts of the literature; every name is escaped: none
-    can bring in markup.
+    """SymPy's presentation MathML with the subscripts of the literature.
+
+    Every name is escaped: none can bring in markup.
     """
 
     def element(self, tag: str, *children: Any, **attributes: str) -> Any:
@@ -235,9 +236,7 @@ def math(x: Tree) -> MathML:
 
 
 def math_terms(x: Tree) -> list[MathML]:
-    """The terms of an expression in their order, one <math> each with its sign, so that a browser
-    may break the line between them.
-    """
+    """The terms of an expression in their order, one <math> each with its sign, so that a browser may break the line between them."""
     return [_markup(MATHML.term(y, first=not k)) for k, y in enumerate(sympy.Add.make_args(x))]
 
 

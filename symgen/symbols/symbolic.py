@@ -154,9 +154,7 @@ class SymbolicRobot:
 
     @cached_property
     def symbols(self) -> dict[str, Any]:
-        """Every symbol by name: constants, positions, velocities, accelerations, torques, rates G
-        of tied joints, parameters.
-        """
+        """Every symbol by name: constants, positions, velocities, accelerations, torques, rates G of tied joints, parameters."""
         robot = self.source.robot
         joints = [f"{state}{j}" for state in ("q", "QP", "QDP", "GAM") for j in robot.moving]
         rates = [

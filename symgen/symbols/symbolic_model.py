@@ -1,6 +1,4 @@
-"""One model of one robot: its closed form, multiplied out and factored by parameter, or its
-recursion as a listing.
-"""
+"""One model of one robot: its closed form, multiplied out and factored by parameter, or its recursion as a listing."""
 
 from __future__ import annotations
 

@@ -25,9 +25,7 @@ FACTORED = 300  # terms of a determinant, up to which it is factored over the ra
 
 
 def of_model(model: SymbolicModel) -> Any:
-    """The closed form of a model: a Matrix, a column of one for vectors, an expression for
-    scalars.
-    """
+    """The closed form of a model: a Matrix, a column of one for vectors, an expression for scalars."""
     closed = model.closed
     angles = {name: evaluated(angle(name[0], e), {}) for name, e in closed.angles.items()}
     values = {place: evaluated(x, angles) for place, x in closed.entries.items()}
@@ -40,9 +38,7 @@ def of_model(model: SymbolicModel) -> Any:
 
 
 def of_listing(model: SymbolicModel) -> tuple[list[tuple[Any, Any]], Any]:
-    """The recursion of a model as `sympy.cse` gives it: [(symbol, expression)] and the model in
-    these symbols.
-    """
+    """The recursion of a model as `sympy.cse` gives it: [(symbol, expression)] and the model in these symbols."""
     steps, outputs = model.listing.steps(Objects(), symbol)
     values = dict(zip(model.listing.places, map(sympy.sympify, outputs), strict=True))
     return [(symbol(name), x) for name, x in steps.items()], _shaped(model, values)
@@ -80,8 +76,9 @@ class Objects:
 
 
 def source_text(name: str, steps: list[tuple[Any, Any]], value: Any) -> str:
-    """Python lines that make `value` under `name`: the symbols, the steps, the value; rationals
-    stay exact.
+    """Python lines that make `value` under `name`: the symbols, the steps, the value.
+
+    Rationals stay exact.
     """
     made = {x for x, _ in steps}
     atoms = set().union(value.free_symbols, *(e.free_symbols for _, e in steps))

@@ -1,5 +1,4 @@
-"""Identified values into the URDF or MJCF file of a robot, in place: numbers change, every other
-byte stays.
+"""Identified values into the URDF or MJCF file of a robot, in place: numbers change, every other byte stays.
 
     applied = symgen.apply("results", "arm.urdf")        # or an Estimate, an Identification
     print(applied)                                       # what changes, from, to, deviation
@@ -200,8 +199,9 @@ def _determined_names(
 
 
 def _root(result: Estimate, names: Sequence[str]) -> Array:
-    """A root of the covariance of the known base parameters, (b, b), deviations corrected where
-    they are; zero if there is none.
+    """A root of the covariance of the known base parameters, (b, b), deviations corrected where they are.
+
+    Zero if there is none.
     """
     at = [result.names.index(name) for name in names]
     C = np.nan_to_num(result.covariance[np.ix_(at, at)])

@@ -1,5 +1,4 @@
-"""Numbers of a file that give the identified base parameters, as near to the file's as physics
-allows: the feasible program of `identify`, with the file as prior.
+"""Numbers of a file that give the identified base parameters, as near to the file's as physics allows: the feasible program of `identify`, with the file as prior.
 
     min ||(u - u0) / S||     subject to  K chi(u) = X,  every condition of `runtime.physical.inertia`
 
@@ -210,8 +209,7 @@ def _of_file(
     values: Mapping[str, float],
     absent: Collection[str],
 ) -> tuple[Numbers, dict[str, int], list[int]]:
-    """The numbers of the file, the places of those of elements, and how many may change, try by
-    try.
+    """The numbers of the file, the places of those of elements, and how many may change, try by try.
 
     First links that lead a body, and elements; then elements that the file does not have and the
     links can take in; then the other links.
@@ -326,8 +324,9 @@ def _violated(part: Numbers, u: Array) -> bool:
 
 
 def _solve(part: Numbers, K: Array, rest: Array, start: Array, free: Array) -> Array | None:
-    """The numbers with K chi(u) = rest nearest to `start`, of which those that are `free` move; None
-    if Newton's steps do not find them.
+    """The numbers with K chi(u) = rest nearest to `start`, of which those that are `free` move.
+
+    None if Newton's steps do not find them.
     """
     S, u = (part.size * part.ease)[free], start.copy()
     for _ in range(STEPS):
@@ -346,9 +345,7 @@ def _solve(part: Numbers, K: Array, rest: Array, start: Array, free: Array) -> A
 
 
 def _hold(part: Numbers, chi: Array) -> Array:
-    """Numbers of chi; of each link those that no base parameter tells are the file's, unless that
-    is no physical link.
-    """
+    """Numbers of chi; of each link those that no base parameter tells are the file's, unless that is no physical link."""
     u = chi.copy()
     for link, at in part.links:
         u[at] = link.place.numbers(chi[at])
@@ -360,8 +357,10 @@ def _hold(part: Numbers, chi: Array) -> Array:
 
 
 def strange(link: FileLink, closest: Nearest) -> str:
-    """How far mass and centre of a link have left those of the file, as text; "" if the mass is
-    within a factor STRANGE and the centre has moved by less than the size of the link.
+    """How far mass and centre of a link have left those of the file, as text.
+
+    "" if the mass is within a factor STRANGE and the centre has moved by less than the size of the
+    link.
     """
     before, after = (u[closest.links[link.name]] for u in (closest.u0, closest.u))
     m0, m, far = before[0], after[0], float(np.linalg.norm((after - before)[1:4]))

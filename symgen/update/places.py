@@ -269,9 +269,7 @@ class Places:
         values: Mapping[str, float],
         before: Mapping[str, float],
     ) -> None:
-        """The edits that make the file state `values` of a joint, by family, where it says
-        `before`.
-        """
+        """The edits that make the file state `values` of a joint, by family, where it says `before`."""
         e, names = self.joints[joint.name], self.attributes.joint
         new = {family: x for family, x in values.items() if not same(x, before[family])}
         own = {names[family]: x for family, x in new.items() if family not in SPRING}
@@ -305,9 +303,7 @@ def _words(attributes: Mapping[str, Any]) -> str:
 
 
 def principal(I: Array) -> tuple[Array, Array]:
-    """Moments (3,) and axes V (3, 3) with I = V diag(moments) V', V as near to the identity as it
-    may be.
-    """
+    """Moments (3,) and axes V (3, 3) with I = V diag(moments) V', V as near to the identity as it may be."""
     if np.abs(I - np.diag(np.diag(I))).max() <= DIAGONAL * np.abs(I).max():
         return np.diag(I).copy(), np.eye(3)
     moments, V = np.linalg.eigh((I + I.T) / 2)
@@ -397,9 +393,7 @@ class RobotText:
 
     @property
     def links(self) -> list[FileLink]:
-        """The links with inertia of the bodies that move, body by body, the one that the joint
-        carries first.
-        """
+        """The links with inertia of the bodies that move, body by body, the one that the joint carries first."""
         return [
             FileLink(name, j, ten_of(inertial, X), self.places.link(name, self.tree, X))
             for j in self.robot.links
@@ -439,9 +433,7 @@ def read_text(content: bytes, path: Path, exact: bool, part: TreePart) -> RobotT
 
 
 def require_same_frames(text: RobotText, robot: Robot, file: str) -> None:
-    """Raise DescriptionError unless the frames of `robot` are those of the text: parameters of a
-    link mean nothing in another frame.
-    """
+    """Raise DescriptionError unless the frames of `robot` are those of the text: parameters of a link mean nothing in another frame."""
     ours, theirs = ({f.j: f for f in one.frames} for one in (text.robot, robot))
     different = [
         j for j in ours.keys() ^ theirs.keys() if j in ours or theirs[j].sigma != FIXED

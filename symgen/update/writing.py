@@ -1,6 +1,4 @@
-"""The edits that make a file state what was found, the table of what changed, and the check that
-the new text is read as that.
-"""
+"""The edits that make a file state what was found, the table of what changed, and the check that the new text is read as that."""
 
 from __future__ import annotations
 
@@ -118,9 +116,7 @@ class Writing:
         }
 
     def require_read_back(self, again: RobotText) -> None:
-        """Raise DescriptionError unless the written text, read `again`, says what was to be
-        written.
-        """
+        """Raise DescriptionError unless the written text, read `again`, says what was to be written."""
         for link in again.links:
             at = self.nearest.links.get(link.name)
             wanted = np.zeros(10) if at is None else self.nearest.chi[at]

@@ -57,8 +57,9 @@ class XmlEdits:
         values: Sequence[float],
         default: Sequence[float] | None = None,
     ) -> None:
-        """The numbers of an attribute, the first ones if it has more; those that stay are not
-        touched.
+        """The numbers of an attribute, the first ones if it has more.
+
+        Those that stay are not touched.
 
         Parameters
         ----------

@@ -1,5 +1,4 @@
-"""Encoder resolution by the CESTAC method (chapter, section 3): what would a coarser encoder have
-done to the estimate?
+"""Encoder resolution by the CESTAC method (chapter, section 3): what would a coarser encoder have done to the estimate?
 
     q_CESTAC  every raw sample of the position rounded at random, steps of Delta:
               eqs. (15), (28), `runtime.core.cestac.rounding`

@@ -1,5 +1,4 @@
-"""Measurements as coarser sensors would have given them, and the system Y = W X + rho that they
-make, eqs. (15), (16), (28).
+"""Measurements as coarser sensors would have given them, and the system Y = W X + rho that they make, eqs. (15), (16), (28).
 
     q_CESTAC = R^-1 rounded(R (q - offset)) + offset
             on the motor side; R = 1 on the joint side

@@ -546,8 +546,9 @@ def runs_needed(spread: float) -> int:
 
 
 def _verdict(errors: Mapping[str, float]) -> tuple[Verdict, dict[str, float]]:
-    """Verdict, and the errors that decided it, largest first; the largest one alone when all are
-    negligible.
+    """Verdict, and the errors that decided it, largest first.
+
+    The largest one alone when all are negligible.
     """
     ordered = sorted(errors.items(), key=lambda item: -item[1])
     verdict = _verdict_of_error(ordered[0][1])

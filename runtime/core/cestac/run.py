@@ -1,5 +1,4 @@
-"""One run of a resolution study, from perturbed positions to the estimate of Y on W_CESTAC, eqs.
-(15)-(17): by the way of the identification, every method alike.
+"""One run of a resolution study, from perturbed positions to the estimate of Y on W_CESTAC, eqs. (15)-(17): by the way of the identification, every method alike.
 
 What does not change from run to run is made once for each block of runs. Times:
 benchmarks/performance.md, `benchmarks/cestac_run.py`.

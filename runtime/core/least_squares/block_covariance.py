@@ -1,5 +1,4 @@
-"""Uncertainty without the assumption of independent residuals: blocks of time left out one by one,
-or drawn again.
+"""Uncertainty without the assumption of independent residuals: blocks of time left out one by one, or drawn again.
 
 Filtered residuals are correlated over time, and the joints of one instant with each other; eq. (10)
 knows neither. Time is cut into K blocks,
@@ -72,8 +71,9 @@ def deletions(blocks: Iterable[Array], X: Array, T: Array, into: Array) -> Array
 
 
 def _without_its_own(G: Array, g: Array, into: Array, size: Array) -> Array:
-    """into (1 - G)^-1 g on the directions that other blocks know too; nan if one that they do
-    not know takes part.
+    """into (1 - G)^-1 g on the directions that other blocks know too.
+
+    nan if one that they do not know takes part.
     """
     share, V = np.linalg.eigh(G)
     others = share < 1 - LIMIT.BLOCK_ALONE

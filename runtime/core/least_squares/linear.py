@@ -1,5 +1,4 @@
-"""From a factored linear system to an Estimate: eqs. (7)-(11), rank and residuals by joint, all
-from triangular factors.
+"""From a factored linear system to an Estimate: eqs. (7)-(11), rank and residuals by joint, all from triangular factors.
 
 A System is the rows as a method weighs them. Ordinary least squares leaves them as they are;
 weighted least squares divides the rows of joint j by s_j. Removing columns from a System is cheap,

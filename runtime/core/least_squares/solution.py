@@ -1,5 +1,4 @@
-"""Least squares from a triangular factor, with the rank of the record and the parameters it cannot
-separate.
+"""Least squares from a triangular factor, with the rank of the record and the parameters it cannot separate.
 
 With D the norms of the columns of W, R_11 D^-1 = U diag(s) V' is the singular value decomposition
 of a (b, b) matrix. Judged on unit columns, rank is the number of s_i above tolerance * s_1. Full

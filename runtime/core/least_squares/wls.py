@@ -1,5 +1,4 @@
-"""Least squares weighted by joint: rows of joint j divided by s_j, the deviation of its residuals
-in N m.
+"""Least squares weighted by joint: rows of joint j divided by s_j, the deviation of its residuals in N m.
 
     X = argmin sum_j ||Y_j - W_j X||^2 / s_j^2,    C = (sum_j W_j'W_j / s_j^2)^-1
 

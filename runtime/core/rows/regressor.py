@@ -1,5 +1,4 @@
-"""The columns of W, decimated: only the entries of the regressor that are not identically zero, and
-equal ones once.
+"""The columns of W, decimated: only the entries of the regressor that are not identically zero, and equal ones once.
 
 Most entries of W are structurally zero or repeat each other up to the sign, and decimation is
 linear: filter the signals, then place them. They are evaluated in pieces of samples, by the
@@ -173,8 +172,9 @@ def distinct_entries(model: GeneratedModel, columns: Array | None = None) -> Ent
 
 
 def _probed(model: GeneratedModel) -> Array:
-    """The regressor at PROBES random states, shape (b, n, PROBES); nan if a loop does not close at
-    one of them.
+    """The regressor at PROBES random states, shape (b, n, PROBES).
+
+    nan if a loop does not close at one of them.
     """
     rng = np.random.default_rng(0)
     q, qd, qdd = rng.uniform(-np.pi, np.pi, (3, PROBES, len(model.JOINTS)))

@@ -1,5 +1,4 @@
-"""Which rows of Y = W X + rho are used: a window before evaluation, then decimated rows by their
-place and speed.
+"""Which rows of Y = W X + rho are used: a window before evaluation, then decimated rows by their place and speed.
 
 The choice is made once, on the measured record, and shared by every run of a study, so that a row
 is never kept or dropped because of noise.

@@ -1,5 +1,4 @@
-"""Zero-phase decimation computed at the kept samples only, exactly, of signals that may arrive in
-pieces.
+"""Zero-phase decimation computed at the kept samples only, exactly, of signals that may arrive in pieces.
 
 Reference: a Chebyshev I low-pass forward and backward in second-order sections with odd padding of
 p samples, then every n_d-th sample, which computes N outputs and throws all but N/n_d away. In
@@ -244,9 +243,7 @@ def copy_overlap(u: Array, t0: int, window: Array, start: int) -> None:
 
 
 def _forward(op: Operator, length: int) -> tuple[Array, Array]:
-    """f of `length` samples: from these samples, shape (length, length), and from x at the first
-    one, shape (length, 2 m).
-    """
+    """f of `length` samples: from these samples, shape (length, length), and from x at the first one, shape (length, 2 m)."""
     return np.tril(toeplitz(op.impulse(length))), _output(op, op.lam[:, None] ** np.arange(length))
 
 
@@ -261,9 +258,7 @@ def _backward(op: Operator, length: int, kept: int) -> tuple[Array, Array]:
 
 
 def _start(op: Operator, phase: int, pad: int) -> Array:
-    """x at the first kept sample from the first samples, shape (T0, 2 m): steady state of the first
-    reflected one, then the others.
-    """
+    """x at the first kept sample from the first samples, shape (T0, 2 m): steady state of the first reflected one, then the others."""
     T0, length = max(pad + 1, phase), pad + phase
     extended = np.zeros((length, T0))
     extended[:pad, 0] = 2
@@ -275,9 +270,7 @@ def _start(op: Operator, phase: int, pad: int) -> Array:
 
 
 def _end(op: Operator, left: int, kept: int, pad: int) -> tuple[Array, Array]:
-    """v before, and y at, the last `kept` instants: from the last samples, shape (T, 2 m + kept),
-    and from x at the first of the `left` ones.
-    """
+    """v before, and y at, the last `kept` instants: from the last samples, shape (T, 2 m + kept), and from x at the first of the `left` ones."""
     length, T = left + pad, max(left, pad + 1)
     extended = np.zeros((length, T))
     extended[np.arange(left), np.arange(T - left, T)] = 1
@@ -299,8 +292,9 @@ def _end(op: Operator, left: int, kept: int, pad: int) -> tuple[Array, Array]:
 
 
 def _output(op: Operator, factors: Array) -> Array:
-    """2 Re c'(factors x) as a matrix on the pairs of x, shape (k, 2 m); factors complex, shape (m,
-    k).
+    """2 Re c'(factors x) as a matrix on the pairs of x, shape (k, 2 m).
+
+    Factors complex, shape (m, k).
     """
     C = 2 * op.c[:, None] * factors
     return np.asarray(np.stack([C.real, -C.imag], axis=1).reshape(-1, C.shape[1]).T)

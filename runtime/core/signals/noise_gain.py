@@ -1,5 +1,4 @@
-"""What the filters of an identification make of white position noise: exact second moments, from
-their frequency responses.
+"""What the filters of an identification make of white position noise: exact second moments, from their frequency responses.
 
 Raw errors of one encoder are independent from sample to sample, variance 1. All filters are linear,
 of zero phase and of magnitude known at every frequency w (rad per sample), fs the sampling rate:
