@@ -543,10 +543,7 @@ def with_known_cosines(e: Expression) -> Expression:
 
 
 def simplified(e: Expression) -> Expression:
-<<<<<<< HEAD
-    """cos(a)**2 m + sin(a)**2 m = m and m - cos(a)**2 m = sin(a)**2 m wherever both terms are there
-    with one coefficient: of the first term that has a partner, until none has.
-    """
+    """cos(a)**2 m + sin(a)**2 m = m and m - cos(a)**2 m = sin(a)**2 m wherever both terms are there with one coefficient."""
     terms: dict[Monomial, Fraction] = {}
     monomials: list[Monomial] = []  # by their place
     places: dict[Monomial, int] = {}
@@ -574,9 +571,6 @@ def simplified(e: Expression) -> Expression:
                     add(shorter, value)
                     return
 
-=======
-    """cos(a)**2 m + sin(a)**2 m = m and m - cos(a)**2 m = sin(a)**2 m wherever both terms are there with one coefficient."""
->>>>>>> w-words
     for m, c in e.terms.items():
         add(m, c)
     while waiting:

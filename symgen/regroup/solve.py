@@ -117,7 +117,7 @@ class Pool:
 
     def solved(self, geometry: Mapping[Variable, Array], count: int) -> dict[str, Array | None]:
         """{dependent: residues of its coefficients, shape (count, support), or None if it does not depend at every geometry}."""
-        draw = drawn(self.robot, 11, self.samples, p=self.p, geometry=geometry, count=count)
+        draw = draw_states(self.robot, 11, self.samples, p=self.p, geometry=geometry, count=count)
         W = sample(draw, self.names)
         index = {name: k for k, name in enumerate(self.names)}
         return {
