@@ -29,7 +29,7 @@ from symgen.derive.numbers import numbered, numbers_of
 from symgen.description.expression import Call, Expression, Number
 from symgen.description.robot import Robot
 from symgen.regroup.finite_field import rref, small_rational, solve_each
-from symgen.regroup.residues import sample, states_for
+from symgen.regroup.residues import draw_states, sample, states_for
 from symgen.time_limit import require_time
 
 MAX_UNKNOWNS = 500
@@ -69,7 +69,9 @@ Supports = Mapping[
 def coefficients(
     robot: Robot, supports: Supports
 ) -> tuple[dict[str, list[Expression]], dict[str, str]]:
-    """beta of D_dependent = sum_k beta_k D_support,k, exact, and for those that no P/Q of moderate degree fits the reason."""
+    """beta of D_dependent = sum_k beta_k D_support,k, exact, and for those that no P/Q of moderate
+    degree fits the reason.
+    """
     supports = {name: support for name, support in supports.items() if support}
     result: dict[str, list[Expression]] = {}
     reasons: dict[str, str] = {}
@@ -81,8 +83,7 @@ def coefficients(
 
 
 class Pool:
-    """Residues of the coefficients at a growing number of random geometries over the k-th prime.
-
+    """Residues of the coefficients at a growing number of random geometries over the k-th prime;
     `free` says what may vary.
     """
 
@@ -116,7 +117,9 @@ class Pool:
         return {v: self.rng.integers(2, self.p, (count, 1)) for v in self.variables}
 
     def solved(self, geometry: Mapping[Variable, Array], count: int) -> dict[str, Array | None]:
-        """{dependent: residues of its coefficients, shape (count, support), or None if it does not depend at every geometry}."""
+        """{dependent: residues of its coefficients, shape (count, support), or None if it does not
+        depend at every geometry}.
+        """
         draw = draw_states(self.robot, 11, self.samples, p=self.p, geometry=geometry, count=count)
         W = sample(draw, self.names)
         index = {name: k for k, name in enumerate(self.names)}
@@ -150,9 +153,8 @@ class Pool:
         return total
 
     def vector(self, name: str, k: int, P: Products, Q: Products) -> dict[int, int] | None:
-        """{place among [*Q, *P]: residue} of the first relation with a denominator, or None if there is none.
-
-        cos(a) and cos(3a) make others.
+        """{place among [*Q, *P]: residue} of the first relation with a denominator, or None if
+        there is none; cos(a) and cos(3a) make others.
         """
         count = len(P) + len(Q) + 4
         self.grow(count)
@@ -254,7 +256,9 @@ class Recognition:
         return result
 
     def _power(self, reference: int, scaled: Sequence[int]) -> int:
-        """n where scaling a variable by SCALES scales a coefficient by their n-th powers, 0 if it does not."""
+        """n where scaling a variable by SCALES scales a coefficient by their n-th powers, 0 if
+        it does not.
+        """
         p = self.pools[0].p
         ratios = [int(x) * pow(int(reference), -1, p) % p for x in scaled] if reference else []
         return next((n for n in POWERS if ratios == [pow(c, n, p) for c in SCALES]), 0)
@@ -307,7 +311,9 @@ class Recognition:
     def _rationals(
         self, vector: dict[int, int], name: str, k: int, P: Products, Q: Products
     ) -> dict[int, Fraction] | None:
-        """The vector as rationals: very small ones from one prime, others by the Chinese remainder theorem until one more prime agrees."""
+        """The vector as rationals: very small ones from one prime, others by the Chinese remainder
+        theorem until one more prime agrees.
+        """
         small = {c: small_rational(x, self.pools[0].p) for c, x in vector.items()}
         if all(x is not None for x in small.values()):
             return {c: x for c, x in small.items() if x is not None}
@@ -331,9 +337,8 @@ class Recognition:
         return None
 
     def _choices(self, matters: Sequence[Variable]) -> list[tuple[Expression, ...]]:
-        """Fixed angles of the robot whose cos and sin may enter: none, one of them, two, all.
-
-        They hold every unit that matters.
+        """Fixed angles of the robot whose cos and sin may enter: none, one of them, two, all; they
+        hold every unit that matters.
         """
         units, written = {v for v in matters if isinstance(v, tuple)}, numbered(self.robot)
         every = units_of(written)
@@ -350,9 +355,8 @@ class Recognition:
     def _monomials(
         self, matters: Sequence[Variable], angles: Sequence[Expression], degree: int
     ) -> Products:
-        """Products of at most `degree` constants, cosines and sines.
-
-        Sin to the first power only, as sin**2 = 1 - cos**2.
+        """Products of at most `degree` constants, cosines and sines; sin to the first power only,
+        as sin**2 = 1 - cos**2.
         """
         sines = [_atom(Call("sin", e)) for e in angles]
         atoms = (
