@@ -35,6 +35,7 @@ from symgen.derive.regressor import acting, element_names
 from symgen.emit.generate import EMITTERS
 from symgen.emit.spec import STATES as STATE_NAMES
 from symgen.emit.targets import TARGETS
+from symgen.errors import SymgenError
 from symgen.version import VERSION
 
 TOLERANCE = 1e-9  # of the largest entry: rounding of some thousand operations, and closed loops
@@ -171,6 +172,11 @@ def module_errors(
     """Errors of the functions of a Python module, what they raised, and how they were used."""
     try:
         module, stacked = imported(path), imported(path)
+    except (RecursionError, MemoryError) as error:
+        raise SymgenError(
+            f"{path.name} has expressions that are too long for Python; name long sums of the "
+            "robot file as one constant"
+        ) from error
     except Exception as error:  # a text may fail in any way
         return {"import": float("inf")}, {"import": repr(error)}, ()
     uses: dict[str, tuple[ModuleType, Use]] = {NUMPY: (module, _called)}

@@ -8,6 +8,11 @@ import pytest
 from campaign import campaign, some
 from certify.text_faults import WAYS, Fault, equivalent, faults, refused
 
+from symgen.certify.modules import certify
+from symgen.description import parse_robot
+from symgen.errors import SymgenError
+from symgen.regroup.regrouping import regroup
+
 HOLES = (  # what older certificates let pass: target, function, old, new
     ("tx40.py", "numpy", r"^(    P13 = .*)D3", r"\1RL4"),  # both 0.225 in the file
     ("tx40.py", "numpy", r"^(def frame_poses.* D3: float = )0\.225", r"\g<1>0.2"),
@@ -32,6 +37,25 @@ def survivors(found: list[Fault]) -> list[Fault]:
 
 def test_a_few_faults_are_refused() -> None:
     assert survivors(faults(7, 5)) == []
+
+
+def test_a_text_too_long_for_python_is_no_verdict() -> None:
+    """A length that is a sum of 85 constants: its square is a formula that Python cannot compile."""
+    names = [f"c{k}" for k in range(85)]
+    robot = parse_robot(
+        f"""\
+symgen: 1
+name: long
+gravity: [0, 0, -9.81]
+constants: {{{", ".join(f"{name}: 0.01" for name in names)}}}
+frames:
+  1: {{ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}}
+  2: {{ant: 1, sigma: 0, alpha: 0, d: {" + ".join(names)}, theta: q2, r: 0}}
+""".encode(),
+        "long.yaml",
+    )
+    with pytest.raises(SymgenError, match=r"long\.py has expressions that are too long for Python"):
+        certify(regroup(robot))
 
 
 @campaign
