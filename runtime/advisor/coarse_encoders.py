@@ -129,7 +129,7 @@ class CoarseEncoders:
     def coarsest(self) -> Array:
         """Largest step of each encoder, shape (n,): LIMIT.LINES_IN_MOTION of them in its motion.
 
-        Inf of one at rest.
+        inf for an encoder at rest.
         """
         spans = np.min([np.ptp(part.x, axis=0) for part in self.parts], axis=0)
         return np.where(spans > 0, spans / LIMIT.LINES_IN_MOTION, np.inf)

@@ -93,7 +93,7 @@ class Law(Settings):
     def gains(self, n: int) -> dict[str, np.ndarray]:
         """P, Vr, Vm, K of u = P e + Vr qd_r - Vm qd_m + K I for n joints, each of shape (n,), N m or N by unit of e, its rate and I.
 
-        Kd: fit counts as 0.
+        kd: fit counts as 0.
         """
 
         def each(key: str) -> np.ndarray:
