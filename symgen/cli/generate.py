@@ -122,7 +122,7 @@ def emitted(
 
 
 def report_differences(output: Path, modules: dict[str, str]) -> None:
-    """Print a unified diff of every module that is not, without_certificate its certificate, what would be written.
+    """Print a unified diff of every module that differs from what would be written, certificates aside.
 
     Exit code 1 if there is one.
     """
