@@ -23,6 +23,7 @@ from symgen.derive.graph import Symbol, interpret, rates
 from symgen.derive.scalar import Scalar, dot
 from symgen.description.robot import REVOLUTE, Robot
 
+IN_METRES = 0.01  # m: mechanisms in which no length is above are closed to 1e-16 m
 PACE = 0.2, 0.25  # rad, or of the longest length: steps of actuated and of tied joints
 TURN_STEPS, TURN_CLOSED = 72, 1e-4  # of a full turn of the crank, and residual after each
 
@@ -129,12 +130,22 @@ class LoopSystem:
         """Sign of det J_u at the start: it stays as long as the mechanism passes no dead point, hence in one assembly mode."""
         return float(np.sign(np.linalg.det(self.jacobian_floats(self.start)[:, self.tied])))
 
+    @property
+    def units(self) -> tuple[float, ...]:
+        """Size of a motion of each independent joint: 1 rad, or the longest length for slides."""
+        frames = map(self.robot.frame, self.closure.independent)
+        return tuple(1.0 if f.sigma == REVOLUTE else self.robot.longest for f in frames)
+
+    @property
+    def tolerance(self) -> float:
+        """Largest residual, m or rad, at which emitted code calls the loops closed."""
+        return 1e-13 if self.robot.longest > IN_METRES else 1e-16
+
     def pace(self) -> float:
         """A step of the actuated joints in which no tied one moves far, as fast as at the start (PACE); in rad, and in the longest length for slides."""
         J = self.jacobian_floats(self.start)
         n = self.tied.start
-        frames = map(self.robot.frame, self.closure.independent)
-        units = np.array([1.0 if f.sigma == REVOLUTE else self.robot.longest for f in frames])
+        units = np.array(self.units)
         G = np.linalg.solve(J[:, n:], J[:, :n]) * units[:n] / units[n:, None]
         return float(min(PACE[0], PACE[1] / np.abs(G).max()))
 

@@ -28,7 +28,7 @@ from symgen.emit.c_parts import Part, in_parts, read_by, words
 from symgen.emit.c_printer import C, CText, is_word
 from symgen.emit.header import header, line_of, packed, plain
 from symgen.emit.printers import Section, under_titles
-from symgen.emit.python_target import IN_METRES, signature
+from symgen.emit.python_target import signature
 from symgen.emit.render import WIDTH, laid_out
 from symgen.emit.spec import STATES, Function, ModuleSpec, signals
 from symgen.version import VERSION
@@ -123,14 +123,13 @@ def widths(spec: ModuleSpec) -> dict[str, int]:
 def _loops(spec: ModuleSpec, closing: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """What closes the loops: the start, units and steps of Newton's method, signatures."""
     name, loops = spec.robot.name, loop_system(spec.robot)
-    kinds = [spec.robot.frame(j).sigma for j in spec.derivation.closure.independent]
     start = f"{{{', '.join(map(repr, loops.start.tolist()))}}}"
     states = [f"const real *{x}_a" for x in ("q", "qd", "qdd")]
     return {
         "tied": [f"q{u}" for u in spec.tied],
         "start": ", ".join([start, *["{0}"] * (len(widths(spec)) - 1)]),
-        "units": ", ".join(repr(spec.robot.longest) if x == PRISMATIC else "1" for x in kinds),
-        "closed": 1e-13 if spec.robot.longest > IN_METRES else 1e-16,
+        "units": ", ".join(map(repr, loops.units)),
+        "closed": loops.tolerance,
         "pace": f"{loops.pace():.2g}",
         "mode": int(loops.mode()),
         "curvatures": spec.functions["curvature"].shape[0],

@@ -30,7 +30,6 @@ from symgen.version import VERSION
 BLOCK = 4096  # samples
 MANY = 8  # values of a source that are named in one assignment, others beside them
 FEWEST_SHARED = 8  # values of the motion of the links that are worth a function of their own
-IN_METRES = 0.01  # m: mechanisms in which no length is above are closed to 1e-16 m
 
 
 def render(spec: ModuleSpec, *, command: str | None = None) -> str:
@@ -114,7 +113,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
             "turn": loop_system(robot).turn() if spec.tied else None,
             "pace": f"{loop_system(robot).pace():.2g}" if spec.tied else "",
             "joint": robot.joints[0],
-            "closed": 1e-13 if robot.longest > IN_METRES else 1e-16,
+            "closed": loop_system(robot).tolerance if spec.tied else "",
         },
     )
 
@@ -261,9 +260,7 @@ def _loop_tables(spec: ModuleSpec, slides: bool) -> Iterator[str]:
     mode = loop_system(robot).mode()
     yield f"_MODE = {mode}  # sign of det J_u in the assembly mode of _START"
     if slides:
-        kinds = [robot.frame(j).sigma for j in closure.independent]
-        units = ", ".join(repr(robot.longest) if sigma == PRISMATIC else "1.0" for sigma in kinds)
-        yield f"_UNITS = ({units},)  # rad; of slides the longest length, m"
+        yield f"_UNITS = {loop_system(robot).units}  # rad; of slides the longest length, m"
 
 
 class Heads:
