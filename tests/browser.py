@@ -266,7 +266,7 @@ class Browser:
             if method == "Runtime.exceptionThrown":
                 found.append(json.dumps(p["exceptionDetails"]))
             elif method == "Log.entryAdded" and p["entry"]["level"] in ("error", "warning"):
-                found.append(p["entry"]["text"])
+                found.append(f"{p['entry']['text']} {p['entry'].get('url', '')}".strip())
             elif method == "Runtime.consoleAPICalled" and p["type"] in (
                 "error",
                 "warning",

@@ -274,12 +274,12 @@ def test_sanitizers_of_one_state(name: str, tmp_path: Path) -> None:
     robot = files(name)
     calls = calls_of_one_state(name, robot[f"{name}.h"])
     main = OF_ONE_STATE.format(**sizes(name), calls=calls)
-    assert sanitized(tmp_path, main, robot, name) == ""
+    assert sanitized(tmp_path, main, robot, name, "-DPORTABLE") == ""
     text, count = re.subn(
         r"(real T\[\d+\], T_\[)(\d+)\]", lambda m: f"{m[1]}{int(m[2]) - 1}]", robot[f"{name}.c"]
     )
     assert count
-    seen = sanitized(tmp_path, main, {**robot, f"{name}.c": text}, name)
+    seen = sanitized(tmp_path, main, {**robot, f"{name}.c": text}, name, "-DPORTABLE")
     assert re.search("runtime error|AddressSanitizer", seen)
 
 

@@ -284,6 +284,14 @@ def test_frames_come_and_go_with_the_parts_that_are_for_them(studio: Any) -> Non
     assert len(symgen.load_robot(studio.path / "robot.yaml").joints) == 3
 
 
+def test_a_proof_asked_for_before_the_table_became_a_draft_is_no_error(studio: Any) -> None:
+    studio.upload("robot", "arm.yaml", TEXT.encode())
+    edited(studio, lambda cells: cells["frames"]["2"].update(alpha="-pi/"))
+    answer = studio.post("prove", {})
+    assert answer.status_code == 200 and "describes no robot yet" in answer.text
+    assert not studio.server.jobs.all
+
+
 def test_two_pages_do_not_overwrite_each_other(studio: Any) -> None:
     studio.upload("robot", "arm.yaml", TEXT.encode())
     old = studio.server.folder.digest
