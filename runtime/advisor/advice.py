@@ -603,9 +603,10 @@ def confirm_by_runs(
 
 
 def limits_of(delta: Array, change: Array, reference: Estimate) -> tuple[Limit, ...]:
-    """Where the first parameter that matters crosses the limits.
+    """Find the coarsest step at which every parameter that matters stays within each limit.
 
-    nan if the finest step is already beyond or none is judged, inf if no step is.
+    nan if the finest step is already too coarse or no parameter is judged; inf if every step is
+    fine enough.
     """
     names, limits = deciding_names(reference), []
     e = {name: np.abs(change[:, reference.names.index(name)]) for name in names}

@@ -114,7 +114,7 @@ class Problem:
         return self.methods[self.settings.estimate.method]
 
     def noted(self, kind: str) -> Note | None:
-        """The note with this kind; None without one."""
+        """Find the first note of this kind; None if there is none."""
         return next((note for note in self.notes if note.kind == kind), None)
 
     @property

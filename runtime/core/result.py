@@ -101,7 +101,7 @@ class Identification:
         return next((part for part in self.parts if part.name == name), None)
 
     def with_part(self, part: Part) -> Identification:
-        """The identification with this part, which replaces another one with its name."""
+        """Copy the identification and add a part; a part of the same name is replaced."""
         others = [other for other in self.parts if other.name != part.name]
         return replace(self, parts=(*others, part))
 

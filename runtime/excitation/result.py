@@ -182,7 +182,10 @@ class Excitation(Result):
 
     @property
     def verdict(self) -> str:
-        """Condition, the least certain parameter, where the motion of the record is better, and limits that are unknown."""
+        """One text: the condition number, the least certain parameter, and which limits are unknown.
+
+        It also says where the motion of the record is better.
+        """
         of_record = (
             ""
             if self.known.condition is None

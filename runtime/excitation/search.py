@@ -97,10 +97,9 @@ def excite(
     if not kept:
         least = min(starts, key=lambda s: s.violation)
         raise InputError(
-            f"no motion within the limits in {settings.starts} starts; the closest misses a limit "
-            f"by {least.violation:.2g} of it "
-            f"({least.message}). Widen the limits, lengthen the parts, ask for fewer harmonics or "
-            "points, or free `begin`"
+            f"none of {settings.starts} starts gave a motion within the limits; the best one exceeds "
+            f"a limit by {100 * least.violation:.2g} % ({least.message}). Widen the limits, make the "
+            "parts longer, ask for fewer harmonics or points, or leave `begin` open"
         )
     candidates = []
     for motion, margin in _within(model, search, kept[: LIMIT.STARTS_COMPARED]):
@@ -111,9 +110,8 @@ def excite(
     if not candidates:
         exceeded = excesses(model, motion_from_mapping(kept[0].motion), limits, settings, known.X)
         raise InputError(
-            f"between the points of the grid {'; '.join(map(str, exceeded[:3]))}, also with twice "
-            "and four times the margin; "
-            f"raise `grid` ({settings.grid:g} Hz)"
+            "every motion found exceeds a limit between the instants at which limits are checked: "
+            f"{'; '.join(map(str, exceeded[:3]))}. Raise `grid`, which is {settings.grid:g} Hz"
         )
     _, motion, margin, observation = min(candidates, key=lambda candidate: candidate[0])
     sigma = _relative_sigma(known.weights, observation, study, settings.rate)

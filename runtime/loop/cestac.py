@@ -105,7 +105,7 @@ class Loop:
 
     @property
     def parts(self) -> tuple[LoopPart, ...]:
-        """The records of the loop."""
+        """The records that the closed loop simulates, one part each."""
         return tuple(self.closed.parts)
 
     @property

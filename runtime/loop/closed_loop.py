@@ -227,7 +227,7 @@ def observed_loop(problem: Problem, simulator: Simulator | None = None) -> Obser
     settings: Any = problem.settings
     if any(is_axis(joint) for joint in problem.model.JOINTS):
         raise InputError(
-            f"estimate.method: {settings.estimate.method} does not read wrenches; leave it out, or the wrench"
+            f"estimate.method: {settings.estimate.method} cannot use the measured wrench of the base; use another method, or leave the wrench out"
         )
     if simulator is None and settings.controller is not None:
         from runtime.loop.simulation import Simulator as FromController

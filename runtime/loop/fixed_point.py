@@ -90,7 +90,11 @@ def full(names: Sequence[str], X: Array, every: Sequence[str]) -> Array:
 
 
 def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]) -> Array:
-    """X of the columns by ordinary least squares, from the robot file, of unit inertia, or as given."""
+    """Choose the X that the iteration starts from.
+
+    `which` asks for ordinary least squares, for the values of the robot file, for unit inertias, or
+    gives the values by name.
+    """
     names = start.observation.names
     if not isinstance(which, str):
         if unknown := [name for name in which if name not in names]:

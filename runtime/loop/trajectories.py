@@ -44,7 +44,9 @@ class Motion:
 
     def __post_init__(self) -> None:
         if not self.parts or len({part.p.shape[1] for part in self.parts}) != 1:
-            raise InputError("a motion needs at least one part, all of the same joints")
+            raise InputError(
+                "a motion needs at least one part, and every part must have the same number of joints"
+            )
 
     @property
     def n(self) -> int:

@@ -112,20 +112,21 @@ class Checkpoint:
             BadZipFile,
         ) as e:
             raise InputError(
-                f"damaged ({e}); delete this file, its runs are computed again", file=str(self.file)
+                f"damaged ({e}); delete this file, and the runs are computed again",
+                file=str(self.file),
             ) from e
         identity = json.loads(self._study)
         keys = sorted({*earlier, *identity})
         other = [key for key in keys if earlier.get(key) != identity.get(key)]
         if other:
             raise InputError(
-                f"holds runs of another study, {', '.join(other)} differ; use another folder, or delete this file",
+                f"holds runs of another study (different: {', '.join(other)}); use another folder, or delete this file",
                 file=str(self.file),
             )
         R = len(runs.run)
         if [x.shape for x in vars(runs).values()] != [(R,), (R,), (R, b), (R,)]:
             raise InputError(
-                f"holds runs of another shape than ({R}, {b}); delete this file, its runs are computed again",
+                f"holds arrays that do not fit {R} runs of {b} parameters; delete this file, and the runs are computed again",
                 file=str(self.file),
             )
         return runs

@@ -273,7 +273,11 @@ class Bodies:
         return self.program.minimum(A + self.H, g + self.h - self.heavy - self.price)
 
     def stiffness(self, chi: Array) -> Array:
-        """Curvature of D and of the conditions, as a barrier of LIMIT.WEAK_PRICE has it: what keeps parameters at their bounds."""
+        """Second derivatives of D plus those of a logarithmic barrier on the conditions.
+
+        The barrier has the weight LIMIT.WEAK_PRICE. It makes the matrix large in the directions in
+        which parameters would leave their bounds.
+        """
         B = self.H.copy()
         sizes = [
             *self.P0,

@@ -129,8 +129,8 @@ def _unit(text: str, kinds: tuple[str, ...]) -> Unit:
         )
     if kinds == TORQUES and text.strip() in ("%", "percent", "per cent"):
         raise InputError(
-            f"{text!r} of what? write the unit of the rated value, such as A or N*m, and a "
-            "hundredth of the rated values in record.scale"
+            f"{text!r} does not say of which quantity; write the unit of the rated value, such as A "
+            "or N*m, and a hundredth of the rated value of each joint in record.scale"
         )
     kind, factor = TABLE[text] if text in TABLE else _of_pint(text)
     if kind not in kinds:
@@ -141,7 +141,7 @@ def _unit(text: str, kinds: tuple[str, ...]) -> Unit:
         )
     if factor > LARGEST:
         raise InputError(
-            f"{text!r} is {factor:g} {SI[kind]}, which nothing here is measured in; expected units "
+            f"one {text!r} is {factor:g} {SI[kind]}, far too large a unit for a robot; expected units "
             f"such as {EXAMPLES[kinds]}"
         )
     return kind, factor

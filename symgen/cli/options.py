@@ -41,8 +41,8 @@ Exact = Annotated[
     bool,
     typer.Option(
         "--exact",
-        help="Angles of a URDF, MJCF or .par file as written. Default: those within 1e-4 rad of a "
-        "multiple of pi/12 are taken as that.",
+        help="Take the angles of a URDF, MJCF or .par file as they are written. Otherwise an angle within "
+        "1e-4 rad of a multiple of pi/12 is taken as that multiple.",
     ),
 ]
 Trust = Annotated[
@@ -75,13 +75,16 @@ Side = Annotated[Text, typer.Option(help="joint or motor: where positions are ro
 Rounding = Annotated[
     Text,
     typer.Option(
-        help="two-point, uniform, gaussian, quantise; or phase: counts of a real encoder, of "
-        "random phase."
+        help="How positions are rounded: two-point, uniform, gaussian, quantise, or phase (the counts of "
+        "a real encoder whose lines start at random)."
     ),
 ]
 Uneven = Annotated[
     float | None,
-    typer.Option(help="Deviation of the lines of --rounding phase, in steps, such as 0.1."),
+    typer.Option(
+        help="How unevenly the encoder's lines are spaced, as a standard deviation in steps, such as 0.1; "
+        "with --rounding phase."
+    ),
 ]
 Method = Annotated[
     Text,
@@ -90,8 +93,8 @@ Method = Annotated[
 Reader = Annotated[
     Text,
     typer.Option(
-        help="lowpass: positions as they are; counts: as counts of an encoder (with --rounding "
-        "phase)."
+        help="How positions become velocities: lowpass filters them as they are; counts reads them as "
+        "encoder counts (with --rounding phase)."
     ),
 ]
 Place = Annotated[

@@ -54,7 +54,10 @@ def show(
         typer.Option(help="Value of a symbol, e.g. q3=pi/2 or D3=0.225; may be repeated."),
     ] = None,
     passive: Annotated[
-        str | None, typer.Option(help="Passive joints of loops as functions or as symbols.")
+        str | None,
+        typer.Option(
+            help="Print passive joints of loops as `functions` of the others, or as `symbols`."
+        ),
     ] = None,
     format: Annotated[
         str,

@@ -51,7 +51,7 @@ class LoopSystem:
 
     @property
     def closure(self) -> Closure:
-        """The joints in the independent ones."""
+        """Each joint as a function of the independent joints."""
         return self.derivation.closure
 
     @property

@@ -344,7 +344,10 @@ class Robot:
 
 
 def one_joint_parameters(robot: Robot, families: Collection[str]) -> set[str]:
-    """Names of the parameters of `families`, such as FV, that act on one joint alone, in both directions, as other formats mean them."""
+    """Find the parameters of `families`, such as FV, that a format with one number per joint can hold.
+
+    They act on one joint alone, and alike in both directions.
+    """
     return {
         parameter(e.family, j)
         for e in robot.elements

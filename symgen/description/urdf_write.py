@@ -87,8 +87,8 @@ def _link(robot: Robot, j: int, values: Mapping[str, float]) -> list[str]:
     *_, mx, my, mz, M = standard
     if M < 0 or (M == 0 and (mx, my, mz) != (0, 0, 0)):
         raise DescriptionError(
-            f"{robot.name}: M{j} = {M} with other moments; no mass has these. Export a physically "
-            "feasible estimate"
+            f"{robot.name}: link {j} has the mass M{j} = {M} and moments that are not zero; no body "
+            "has these. Export a physically feasible estimate (--method feasible)"
         )
     own = inertial_of(standard)
     inertia = dict(zip(MOMENTS, own.I[np.triu_indices(3)], strict=True))

@@ -51,7 +51,7 @@ class XmlElement(ElementTree.Element):
     def numbers(
         self, name: str, n: int, default: str | None = None, largest: float = LARGEST
     ) -> Array:
-        """n finite numbers of an attribute."""
+        """Read an attribute that holds n finite numbers."""
         text = self.word(name, default)
         words = text.split()
         try:
@@ -66,12 +66,12 @@ class XmlElement(ElementTree.Element):
         return np.array(values)
 
     def number(self, name: str, default: str | None = None, largest: float = LARGEST) -> float:
-        """One finite number of an attribute."""
+        """Read an attribute that holds one finite number."""
         return float(self.numbers(name, 1, default, largest)[0])
 
 
 def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> XmlElement:
-    """The root element; DescriptionError with the line of whatever is no plain XML."""
+    """Parse XML and return its root element; DescriptionError names the line that is not plain XML."""
     if len(content) > MAX_BYTES:
         raise DescriptionError(
             f"more than {MAX_BYTES} bytes; meshes belong into files of their own", line=1
@@ -99,7 +99,7 @@ def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> XmlElement:
 
     def refuse(*_: object) -> int:
         raise DescriptionError(
-            "document types and entities are not read; remove <!DOCTYPE ...>",
+            "the file declares a document type or an entity, which are not read; remove <!DOCTYPE ...>",
             line=parser.CurrentLineNumber,
         )
 
@@ -112,8 +112,11 @@ def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> XmlElement:
         parser.Parse(content, True)
     except expat.ExpatError as error:
         raise DescriptionError(
-            f"no XML: {expat.ErrorString(error.code)}", line=error.lineno
+            f"this is not valid XML: {expat.ErrorString(error.code)}", line=error.lineno
         ) from error
     except (LookupError, ValueError) as error:  # of an encoding that is not one
-        raise DescriptionError(f"no XML: {error}; save the file as UTF-8", line=1) from error
+        raise DescriptionError(
+            f"the encoding of this XML file cannot be read ({error}); save the file as UTF-8",
+            line=1,
+        ) from error
     return next(iter(top))

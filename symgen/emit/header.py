@@ -343,7 +343,7 @@ def _literal(start: str, value: Any, end: str) -> list[str]:
 
 
 def plain(text: str) -> str:
-    """Text that cannot end a docstring."""
+    """Make a text safe within a docstring: no line breaks, backslashes or triple quotes."""
     return (
         " ".join(text.replace("\\", "/").replace('"""', "'''").split(" "))
         .replace("\r", " ")

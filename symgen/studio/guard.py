@@ -59,7 +59,9 @@ class Guard:
             message = await receive()
             left -= len(message.get("body", b""))
             if left < 0:
-                raise ValueError(f"more than {limit // 2**20} MB")
+                raise ValueError(
+                    f"what was sent is larger than {limit // 2**20} MB, the most that is taken"
+                )
             return message
 
         async def sent(message: Message) -> None:

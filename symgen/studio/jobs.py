@@ -102,7 +102,7 @@ class Job:
 
 
 class Jobs:
-    """The queue.
+    """A queue of commands that run one after the other, each in a process of its own.
 
     Parameters
     ----------

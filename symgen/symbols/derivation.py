@@ -1,4 +1,4 @@
-"""What a model is derived from: robot, parameters, closure, and the graph algebra in which symbols may have values."""
+"""The source of symbolic models: a robot, its parameters, its closure, and the values given for symbols."""
 
 from __future__ import annotations
 
@@ -33,16 +33,18 @@ PASSIVE = ("functions", "symbols")
 
 @dataclass(frozen=True)
 class Source:
-    """A robot as models are asked of it.
+    """Everything that a symbolic model is derived from.
 
     Attributes
     ----------
     robot : Robot
-        With the values that were given in the place of its constants.
+        The robot; numbers that were given replace its constants.
     closure : Closure
-        Its joints in the independent ones; passive joints that stay symbols are tied.
+        Each joint as a function of the independent ones. Passive joints that stay symbols count as
+        tied.
     relations : Closure
-        What is known of the passive joints: as `closure`, unless all of them stay symbols.
+        The relations of the passive joints. They differ from `closure` where all passive joints
+        stay symbols.
     own : mapping
         Symbol of each parameter, by the standard parameter whose column of the regressor it has.
     formulas : mapping
@@ -67,13 +69,13 @@ class Source:
 
     @cached_property
     def derivation(self) -> Derivation:
-        """The derivation, with all passive joints on their own where they stay symbols."""
+        """The derivation of the robot. Passive joints that stay symbols are treated as independent."""
         if self.closure is self.relations:
             return derive(self.robot)
         return derived(self.robot, open_tree)
 
     def request(self, of: int = 0, frame: int = 0) -> Request:
-        """A request of a model over the parameters, with the given values."""
+        """The request that derives a model with these parameters and the given values."""
         inputs: dict[Symbol, Input] = {}
         for kind, letter in (("q", "q"), ("qd", "QP"), ("qdd", "QDP")):
             for j in self.robot.moving:

@@ -297,8 +297,8 @@ def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple
             f"{name} = {x:.4g}" for name, x, out in zip(names, X, missed, strict=True) if out
         )
         raise DescriptionError(
-            f"the links of this file cannot have {lost}: a body without inertial has no place for "
-            "it; add an inertial to the link that moves"
+            f"no values of this file give {lost}, since a moving link has no <inertial> that could "
+            "hold it; add one to that link"
         )
     u = _solve(part, K, rest, part.u0, ~part.masses)
     if u is None or _violated(part, u):

@@ -51,19 +51,19 @@ POSE = 1e-6  # m, rad: frames of two descriptions of one robot differ by no more
 
 @dataclass(frozen=True)
 class Attributes:
-    """The map of a format.
+    """Names of the XML attributes that hold the numbers of links and joints in one format.
 
     Attributes
     ----------
     format : str
         URDF or MJCF.
     inertial : mapping
-        Attributes of each child of <inertial>, of <inertial> itself under "", and their places in
-        NUMBERS.
+        For each child element of <inertial> ("" is <inertial> itself): its attributes, and the
+        index in NUMBERS of each number in them.
     dynamics : str
-        Child of a joint that holds its parameters; "": the joint itself.
+        The child element of a joint that holds its parameters; "" if the joint itself does.
     joint : mapping
-        Attribute of each family of parameters.
+        The attribute of each family of joint parameters, such as damping for FV.
     """
 
     format: str
@@ -73,7 +73,7 @@ class Attributes:
 
     @property
     def order(self) -> list[int]:
-        """Places in NUMBERS in the order of the file."""
+        """Indices in NUMBERS of the numbers, in the order of the file."""
         return [k for row in self.inertial.values() for places in row.values() for k in places]
 
 

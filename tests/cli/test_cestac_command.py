@@ -170,7 +170,7 @@ def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(emps_data, tmp_p
     )
     assert {p.name for p in tmp_path.iterdir()} == {"runs.npz"}
     other = run(*arguments[:-2], "--seed", 2, "-o", tmp_path)
-    assert other.exit_code == 2 and "another study, cestac.seed differ" in other.stderr
+    assert other.exit_code == 2 and "another study (different: cestac.seed)" in other.stderr
     whole = run(*arguments)
     assert whole.exit_code == 0 and {p.name for p in tmp_path.iterdir()} == FILES
     assert (

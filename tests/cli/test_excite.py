@@ -117,7 +117,7 @@ def test_bad_input_is_one_line(study: Path, tmp_path: Path) -> None:
         (STUDY.replace("triangular", "square"), "no family 'square'"),
         (STUDY.replace("qd: [0.6]", "qd: [-1]"), "expected more than 0"),
         (STUDY.replace("columns: all", "columns: [ZZ9]"), "no parameter ZZ9"),
-        (STUDY.replace("iterations: 40", "begin: [0.4]"), "no motion within the limits"),
+        (STUDY.replace("iterations: 40", "begin: [0.4]"), "gave a motion within the limits"),
     ):
         wrong.write_text(text + "record: {files: [slow.csv]}\n", encoding="utf-8")
         done = run("excite", "emps", wrong, "--starts", 1)

@@ -308,7 +308,7 @@ def test_a_record_gives_parameters_and_a_motion_to_compare_with(planar: tuple) -
 
 
 def test_what_cannot_be_is_said(planar: tuple) -> None:
-    with pytest.raises(InputError, match="no motion within the limits"):
+    with pytest.raises(InputError, match="gave a motion within the limits"):
         search(planar, settings(begin=[3.0, 0.0]))
     with pytest.raises(SettingsError, match="no limits of qdd"):
         limits_of(planar[0], {"q": [1, 1], "qd": [1, 1], "qdd": None})

@@ -129,7 +129,7 @@ def test_document_types(reader, doctype):
         reader,
         "urdf",
         doctype.encode() + urdf_files()[0].split(b"?>")[-1],
-        "document types and entities",
+        "a document type or an entity",
     )
 
 

@@ -180,7 +180,9 @@ def test_disk_that_fills_up_leaves_earlier_runs(tmp_path, whole, monkeypatch):
 def test_another_study_is_refused(tmp_path, change, names):
     cestac(planar, RECORD, study(runs=2), checkpoint=Checkpoint(tmp_path))
     changed = change(RECORD, study(runs=2))
-    with pytest.raises(InputError, match=f"another study, {names} differ; use another folder"):
+    with pytest.raises(
+        InputError, match=rf"another study \(different: {names}\); use another folder"
+    ):
         cestac(planar, *changed, checkpoint=Checkpoint(tmp_path))
 
 

@@ -308,11 +308,11 @@ def test_a_converted_robot_with_other_elements(tmp_path) -> None:
 
 BOMB = '<!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "' + "&a;" * 50 + '">]>'
 REFUSED = {
-    "entities": ("arm.urdf", URDF.replace("<robot", BOMB + "<robot", 1), "document types"),
+    "entities": ("arm.urdf", URDF.replace("<robot", BOMB + "<robot", 1), "a document type"),
     "external entity": (
         "arm.urdf",
         URDF.replace("<robot", '<!DOCTYPE x SYSTEM "file:///etc/passwd"><robot', 1),
-        "document types",
+        "a document type",
     ),
     "100 MB": ("arm.urdf", URDF + " " * 100_000_000, "more than"),
     "include": (

@@ -185,8 +185,8 @@ def _refuse(reference: Estimate) -> None:
     """InputError if the method finds no estimate that runs could be compared with."""
     if reference.status not in (*USABLE, "rank-deficient", "no-redundancy", "singular-weights"):
         raise InputError(
-            f"{reference.method}: no estimate of the record as measured to compare with: "
-            f"{reference.message}"
+            f"{reference.method} finds no estimate from the record as measured, so rounded records "
+            f"have nothing to be compared with: {reference.message}"
         )
 
 
@@ -290,7 +290,10 @@ def resolution(result: Identification, own_encoder: EncoderOf, loop_of: LoopOf) 
     own_encoder, loop_of : as for `cestac`.
     """
     if not result.determined:
-        raise InputError("the record does not determine the parameters")
+        raise InputError(
+            "the record does not determine the parameters, so no encoder can be judged by it; "
+            "record a richer motion"
+        )
     essential = result.study.cestac.columns != "all"
     return cestac(
         result.problem,

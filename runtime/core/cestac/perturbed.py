@@ -345,7 +345,7 @@ def run_states(task: Task, record: PreparedRecord, q: Array, level: Level) -> St
             states = task.reader(_moved(task, record, q), known)
         except np.linalg.LinAlgError as e:
             raise InputError(
-                f"counts of steps of {level.label} cannot be read on this motion ({e}); use finer steps"
+                f"encoder counts of {level.label} a step are too coarse for this motion ({e}); use finer steps"
             ) from e
     return replace(states, channels=record.channels)
 

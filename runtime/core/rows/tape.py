@@ -176,9 +176,10 @@ def _operations(values: Sequence[Any]) -> list[Row]:
 
 
 def recorded(model: GeneratedModel, places: Sequence[tuple[int, int]]) -> Tape | None:
-    """Record the entries (k, j) of D of an emitted module.
+    """Record how an emitted module computes the entries (k, j) of its regressor D.
 
-    None if the module does more than operations on rows, or reads functions of time.
+    Returns None if the module does anything else than operations on rows, or reads measured
+    functions of time.
     """
     block = getattr(model, "_regressor_block", None)
     n = len(model.JOINTS)
