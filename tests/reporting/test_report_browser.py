@@ -216,11 +216,18 @@ def test_everything_that_can_be_focused_has_a_name(shown):
     assert ("button", "Zoom in") in found and ("button", "measured") in found
 
 
-@pytest.mark.parametrize("width", [1280, 390])
-def test_colours_have_contrast(browser, page, width):
-    browser.open(page, width)
-    browser.run(UNFOLD)
-    assert browser.run(WEAK_CONTRAST) == []
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("verb", ["report", "cestac"])
+def test_colours_have_contrast(browser, folder, verb, scheme):
+    preferred = [{"name": "prefers-color-scheme", "value": scheme}]
+    browser.call("Emulation.setEmulatedMedia", features=preferred)
+    try:
+        for width in (1280, 390):
+            browser.open(folder / verb / "report.html", width)
+            browser.run(UNFOLD)
+            assert browser.run(WEAK_CONTRAST) == []
+    finally:
+        browser.call("Emulation.setEmulatedMedia", features=[])
 
 
 def test_lines_are_the_torques(shown, folder):
