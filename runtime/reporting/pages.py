@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from runtime.core.cestac.result import Cestac
@@ -73,11 +74,20 @@ def identification_page(
 
 def resolution_page(result: Cestac, study: str) -> Page:
     """The page of a resolution study; study : text of study.yaml."""
-    return Page(
+    page = Page(
         title=f"{_robot(result.provenance)}: encoder resolution on {_records(result.provenance)}",
         verdict=result.message,
         sections=[resolution_section(result), settings_section(study)],
         numbers=level_numbers(result),
+    )
+    if not result.encoder_steps:
+        return page
+    enough = result.enough
+    return replace(
+        page,
+        question="Which resolution is enough?",
+        answer=enough.label if enough else "None of the steps tried",
+        state="good" if enough else "no",
     )
 
 

@@ -216,6 +216,14 @@ def test_everything_that_can_be_focused_has_a_name(shown):
     assert ("button", "Zoom in") in found and ("button", "measured") in found
 
 
+def test_a_study_of_encoders_answers_first(browser, folder):
+    """The only step tried, 2 pi / 5000, biases this record."""
+    browser.open(folder / "cestac" / "report.html")
+    first = browser.run("document.querySelector('.verdict').innerText.split('\\n').slice(0, 2)")
+    assert first[0] == "Which resolution is enough?"
+    assert "None of the steps tried" in " ".join(first)
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("verb", ["report", "cestac"])
 def test_colours_have_contrast(browser, folder, verb, scheme):

@@ -30,6 +30,7 @@ from bisect import bisect_left
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from itertools import takewhile
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -179,6 +180,18 @@ class Cestac(Result, Part):
         )
 
     @property
+    def encoder_steps(self) -> list[LevelResult]:
+        """The levels that round positions alone."""
+        return [r for r in self.levels if r.level.delta and not r.level.torque]
+
+    @property
+    def enough(self) -> Level | None:
+        """The coarsest step of the encoders that is practically unbiased, as are all finer ones."""
+        finest_first = sorted(self.encoder_steps, key=lambda r: r.level.delta)
+        fine = list(takewhile(lambda r: r.verdict == "unbiased", finest_first))
+        return fine[-1].level if fine else None
+
+    @property
     def finer_for_values(self) -> str:
         """Sentence if single parameters need a finer step than the residual does, else ""."""
         apart = (
@@ -250,8 +263,7 @@ class Cestac(Result, Part):
 
     def figures(self) -> tuple[Figure, ...]:
         """Figure of %e against Delta; no figure without a step of the encoders."""
-        steps = [r for r in self.levels if r.level.delta and not r.level.torque]
-        return (error_against_resolution(self),) if steps else ()
+        return (error_against_resolution(self),) if self.encoder_steps else ()
 
     def entries(self) -> dict[str, Any]:
         """Empty: the study is written to its own file, cestac.json."""
