@@ -26,6 +26,7 @@ from symgen.description.robot import FIXED, PRISMATIC
 from symgen.emit.blocks import label
 from symgen.emit.c_parts import Part, in_parts, read_by, words
 from symgen.emit.c_printer import C, CText, is_word
+from symgen.emit.c_states import CStates
 from symgen.emit.header import header, line_of, packed, plain
 from symgen.emit.printers import Section, under_titles
 from symgen.emit.python_target import signature
@@ -63,13 +64,15 @@ def render_header(spec: ModuleSpec, *, command: str | None = None) -> str:
 def _context(spec: ModuleSpec, command: str | None) -> dict[str, Any]:
     """What the file and its header say."""
     robot, free = spec.robot, spec.regrouping.constants
-    names = spec.names(is_word)
+    names, states = spec.names(is_word), CStates.of(spec)
     kernels = [
-        _kernel(spec, f, names.inner())
+        _kernel(spec, states, f, names.inner())
         for f in spec.functions.values()
         if {*f.model.axes} <= {*RESULTS}
     ]
-    closing = [_kernel(spec, f, names.inner()) for f in spec.functions.values() if f.model.of_loops]
+    closing = [
+        _kernel(spec, states, f, names.inner()) for f in spec.functions.values() if f.model.of_loops
+    ]
     most = max(kernel["computed"] for kernel in kernels)
     lines = [
         line
@@ -84,7 +87,7 @@ def _context(spec: ModuleSpec, command: str | None) -> dict[str, Any]:
         "sha256": robot.sha256,
         "version": VERSION,
         "command": _comment(command or robot.file or robot.name),
-        "header": [_comment(line) for line in _header(spec, kernels)],
+        "header": [_comment(line) for line in _header(spec, states, kernels)],
         "name": robot.name,
         **{size: spec.sizes[size] for size in ("n", "m", "frames")},
         "sizes": {"b": len(spec.regrouping), "c": max(len(free), 1)},
@@ -93,41 +96,28 @@ def _context(spec: ModuleSpec, command: str | None) -> dict[str, Any]:
         else 8,  # the rows of a short tile stay in the first cache
         "kernels": kernels,
         "closing": closing,
-        "widths": widths(spec),
-        "state_text": "s, tau"
-        if spec.tied
-        else f"q, qd, qdd, tau ({len(robot.joints)},) in rad or m and seconds",
+        "states": states,
         "parameters": packed([f'"{name}"' for name in spec.regrouping.names]),
         "constant_names": packed([f'"{name}"' for name in free] or ['""']),
         "constants": packed([repr(float(x)) for x in free.values()] or ["0.0"]),
         "helpers": {
             name: any(f"{name}(" in line for line in lines) for name in ("sign", "above", "below")
         },
-        **_kinematics(spec, names.inner()),
-        **(_loops(spec, closing) if spec.tied else {"tied": ()}),
+        **_kinematics(spec, states, names.inner()),
+        **(_loops(spec, states, closing) if spec.tied else {}),
     }
 
 
-def widths(spec: ModuleSpec) -> dict[str, int]:
-    """How many numbers each state of one sample has; of closed mechanisms in the order of their
-    struct.
-    """
-    size = spec.sizes
-    if not spec.tied:
-        return dict.fromkeys(STATES, size["n"])
-    return {**dict.fromkeys(("q", "qd", "qdd"), size["k"]), "G": size["m"] * size["n"]} | {
-        "qdd0": size["m"]
-    }
-
-
-def _loops(spec: ModuleSpec, closing: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _loops(
+    spec: ModuleSpec, states: CStates, closing: Sequence[Mapping[str, Any]]
+) -> dict[str, Any]:
     """What closes the loops: the start, units and steps of Newton's method, signatures."""
     name, loops = spec.robot.name, loop_system(spec.robot)
     start = f"{{{', '.join(map(repr, loops.start.tolist()))}}}"
-    states = [f"const real *{x}_a" for x in ("q", "qd", "qdd")]
+    actuated = [f"const real *{x}_a" for x in ("q", "qd", "qdd")]
     return {
         "tied": [f"q{u}" for u in spec.tied],
-        "start": ", ".join([start, *["{0}"] * (len(widths(spec)) - 1)]),
+        "start": ", ".join([start, *["{0}"] * (len(states.widths) - 1)]),
         "units": ", ".join(map(repr, loops.units)),
         "closed": loops.tolerance,
         "pace": f"{loops.pace():.2g}",
@@ -135,12 +125,12 @@ def _loops(spec: ModuleSpec, closing: Sequence[Mapping[str, Any]]) -> dict[str, 
         "curvatures": spec.functions["curvature"].shape[0],
         "calls": {kernel["name"]: kernel["state_call"] for kernel in closing},
         "closed1": signature(
-            f"int32_t {name}_closed1", [*states, "const real *constants", f"{name}_state *s"]
+            f"int32_t {name}_closed1", [*actuated, "const real *constants", f"{name}_state *s"]
         ),
     }
 
 
-def _kinematics(spec: ModuleSpec, names: Namespace) -> dict[str, Any]:
+def _kinematics(spec: ModuleSpec, states: CStates, names: Namespace) -> dict[str, Any]:
     """Tables and signatures of the Jacobian and of the forward dynamics."""
     robot, closure, name = spec.robot, spec.derivation.closure, spec.robot.name
     moved = [
@@ -157,7 +147,7 @@ def _kinematics(spec: ModuleSpec, names: Namespace) -> dict[str, Any]:
         for i in (k,) if k < n else range(n):
             by_tied = "" if k < n else f"*G[{(k - n) * n + i}]"
             rates.setdefault((j - 1) * n + i, []).append(f"({_constant(rate)}){by_tied}")
-    pointers = [*_states(spec, ("q", "qd")), *(f"const real *{x}" for x in ("tau", "X"))]
+    pointers = [*states.parameters("q", "qd"), *(f"const real *{x}" for x in ("tau", "X"))]
     return {
         "ant": ", ".join(str(f.ant) for f in robot.frames),
         "sigma": ", ".join(str(int(f.sigma == PRISMATIC)) for f in robot.frames),
@@ -169,7 +159,7 @@ def _kinematics(spec: ModuleSpec, names: Namespace) -> dict[str, Any]:
         "rates": [f"rate[{place}] = {' + '.join(terms)};" for place, terms in rates.items()],
         "jacobian": signature(
             f"int32_t {name}_jacobian1",
-            ["int32_t frame", *_states(spec, ["q"]), "const real *constants", "real *J"],
+            ["int32_t frame", *states.parameters("q"), "const real *constants", "real *J"],
         ),
         "forward": ""
         if robot.loaded
@@ -192,7 +182,7 @@ def _comment(text: str) -> str:
     return re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", r"\g<0> ", shown)
 
 
-def _kernel(spec: ModuleSpec, f: Function, names: Namespace) -> dict[str, Any]:
+def _kernel(spec: ModuleSpec, states: CStates, f: Function, names: Namespace) -> dict[str, Any]:
     """A function over a tile: its lines before the loops, those of sines and cosines, each a loop
     of its own (compilers merge sin(x) and cos(x) of one loop into a call that has no vector form),
     those of the loop over a tile; its rows {row of the store, signal, sign}; its C signatures.
@@ -274,24 +264,24 @@ def _kernel(spec: ModuleSpec, f: Function, names: Namespace) -> dict[str, Any]:
         parts, kept = in_parts([*inputs, *recalled], steps, results, OF_PART)
         sections = ()
     read = text.trigonometry_inputs | text.main_inputs
-    used = [s for s in widths(spec) if any(place[x][0] == s for x in read if x in place)]
+    used = [s for s in states.widths if any(place[x][0] == s for x in read if x in place)]
     laid: dict[str, Any] = {
         "name": model.name,
         "text": text,
         "result": result,
         "used": used,
-        "before": before,
+        "opening": before,
         "trigonometry": trigonometry_loops,
         "calls": len(trigonometry),
         "sections": sections,
-        "parts": parts,
+        "cut": parts,
         "kept": kept,
         "rows": packed(rows),
         "entries": len(rows),
         "computed": len(distinct.entries),
     }
     given = {"X": parameters, "constants": constants}
-    return laid | _signatures(spec, f, laid, [name for name, lines in given.items() if lines])
+    return laid | _signatures(states, f, laid, [name for name, lines in given.items() if lines])
 
 
 def _row(place: Sequence[int], shape: Sequence[int]) -> int:
@@ -315,7 +305,7 @@ def _result(result: str, k: int, expression: str, comment: str) -> list[str]:
     return [both] if len(both) <= WIDTH - 8 or not comment else [f"/* {comment} */", line]
 
 
-def _header(spec: ModuleSpec, kernels: Sequence[Mapping[str, Any]]) -> list[str]:
+def _header(spec: ModuleSpec, states: CStates, kernels: Sequence[Mapping[str, Any]]) -> list[str]:
     lines = header(spec, {k["name"]: k["text"] for k in kernels}, formulas=True)
     so = f"{spec.robot.name}.c -o {spec.robot.name}.so -lm"
     return [
@@ -324,7 +314,7 @@ def _header(spec: ModuleSpec, kernels: Sequence[Mapping[str, Any]]) -> list[str]
         *line_of(
             "Arguments",
             (
-                f"{'s (N,)' if spec.tied else 'q, qd, qdd (N, n) in C order, rad or m and seconds'}; "
+                f"{'s (N,)' if states.closed else 'q, qd, qdd (N, n) in C order, rad or m and seconds'}; "
                 "S (rows, N), samples last, comes zeroed: rows that are always zero are not written"
             ),
         ),
@@ -341,25 +331,24 @@ def _header(spec: ModuleSpec, kernels: Sequence[Mapping[str, Any]]) -> list[str]
 
 
 def _signatures(
-    spec: ModuleSpec, f: Function, laid: Mapping[str, Any], needs: Sequence[str]
+    states: CStates, f: Function, laid: Mapping[str, Any], needs: Sequence[str]
 ) -> dict[str, object]:
     """A kernel's C signatures; `needs` of X and constants."""
-    model, result, name = f.model, laid["result"], spec.robot.name
+    model, result, name = f.model, laid["result"], states.robot
     used, computed, calls = laid["used"], laid["computed"], laid["calls"]
-    states = ["s"] if spec.tied else [*model.states]
     pointers = [*(["X"] if model.reads_X else []), "constants"]
-    inline, kernel = ("static", "static") if laid["parts"] else ("INLINE", "KERNEL static")
+    inline, kernel = ("static", "static") if laid["cut"] else ("INLINE", "KERNEL static")
     scratch = ["T"] * bool(calls)
     body = [f"const real *restrict {s}" for s in (*used, *needs)]
     body += [f"real *restrict {s}" for s in (*scratch, result)]
     parts = [
         _part(laid, k, part, [*body, "real *restrict kept"])
-        for k, part in enumerate(laid["parts"], 1)
+        for k, part in enumerate(laid["cut"], 1)
     ]
-    given = [*_states(spec, states), *(f"const real *{p}" for p in pointers)]
+    taken = states.arguments(*model.states)
+    given = [*states.parameters(*model.states), *(f"const real *{p}" for p in pointers)]
     own = ["int64_t N", *given, "real *S"]
-    own_state = spec.tied and not model.of_loops
-    read = [f"s->{x}" for x in used] if own_state else used
+    read = used if model.of_loops else map(states.read, used)
     filled = model.result if model.of_loops else "S"
     shape = ", ".join(map(str, f.shape))
     size = prod(f.shape)
@@ -368,16 +357,11 @@ def _signatures(
     read_first = words([line for section in laid["trigonometry"] for line in section.lines])
     return {
         "parts": parts,
-        "before": read_by(read_first, laid["before"]) if parts else laid["before"],
+        "before": read_by(read_first, laid["opening"]) if parts else laid["opening"],
         "summary": f"/* {model.summary} S has shape ({shape}, N). */",
         "one_summary": f"/* {model.summary} S has shape ({shape}). */",
         "size": size,
-        "unread": [
-            p for p in (*states, *pointers) if p not in (*used, *["s"] * bool(used), *needs)
-        ],
-        "load": "sizeof *s/sizeof(real), s[start].{}"
-        if spec.tied
-        else f"{len(spec.robot.joints)}, {{}} + {len(spec.robot.joints)}*start",
+        "unread": [p for p in (*taken, *pointers) if p not in (*used, *["s"] * bool(used), *needs)],
         "body_prototype": signature(
             f"{inline} void {model.name}_body", ["const size_t lanes", *body]
         ),
@@ -395,11 +379,11 @@ def _signatures(
         "prototype": signature(f"int32_t {name}_{model.name}", own),
         "scratch": ", ".join(
             [
-                *(f"{s}_tile[{widths(spec)[s]}*TILE]" for s in used),
+                *(f"{s}_tile[{states.widths[s]}*TILE]" for s in used),
                 *(f"{x}[{rooms[x]}*TILE]" for x in (*scratch, result)),
             ]
         ),
-        "missing": _missing([*states, *pointers, "S"]),
+        "missing": _missing([*taken, *pointers, "S"]),
     }
 
 
@@ -407,7 +391,7 @@ def _part(
     laid: Mapping[str, Any], number: int, part: Part, parameters: Sequence[str]
 ) -> dict[str, object]:
     """A part of a body as a function, which takes those of the parameters that it reads."""
-    before = read_by(part.read, laid["before"])
+    before = read_by(part.read, laid["opening"])
     read = part.read | words(before)
     given = [p for p in parameters if p.split()[-1].lstrip("*") in read]
     name = f"{laid['name']}_part{number}"
@@ -417,13 +401,6 @@ def _part(
         "prototype": signature(f"PART void {name}", ["const size_t lanes", *given]),
         "call": f"{name}({', '.join(['lanes', *(p.split()[-1].lstrip('*') for p in given)])})",
     }
-
-
-def _states(spec: ModuleSpec, states: Sequence[str]) -> list[str]:
-    """Parameters of a function that reads these states: of a closed mechanism, one struct."""
-    if spec.tied:
-        return [f"const {spec.robot.name}_state *s"]
-    return [f"const real *{x}" for x in states]
 
 
 def _missing(pointers: Sequence[str]) -> str:
