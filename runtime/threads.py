@@ -35,7 +35,7 @@ def single_threaded(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def alone(function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
-    """The value of the function, made with one BLAS thread."""
+    """Call the function with one BLAS thread and return its result."""
     return single_threaded(function)(*args, **kwargs)
 
 

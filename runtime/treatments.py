@@ -246,8 +246,8 @@ def _require_alike(name: str, further: Sequence[Record], first: Sequence[Record]
         if not record.tau.any():
             raise InputError(
                 (
-                    "the torques are zero throughout; expected measured ones, which a validation "
-                    "record compares with"
+                    "all torques are zero; a validation record needs measured torques to compare "
+                    "predictions with"
                 ),
                 file=record.file,
             )

@@ -451,9 +451,10 @@ class Advice(Result, Part):
 
 
 def advice_figure(advice: Advice) -> Figure:
-    """%e against Delta for every parameter that matters, all encoders alike: line predicted, points sampled with their Student intervals.
+    """Plot %e against Delta for every parameter that matters, with one step for all encoders.
 
-    Real encoders, where they were judged, by both readers; else those of the chapter's law.
+    Lines are predicted; points are CESTAC samples with their Student intervals. Where real encoders
+    were judged, both readers are shown; otherwise the rounding law of the paper is.
     """
     curves = [("", advice.encoders[0], BLUE, ORANGE)]
     if advice.real:

@@ -112,8 +112,10 @@ def switch_with_error(
 
 
 def _coefficients(switch: Switch, u: Array, m: Array, phi: Array, sigma: float) -> Array:
-    """c_n/sqrt(n!), n = 1 ... ORDERS, and the root of what they leave of the variance with the sign
-    of the next; shape (ORDERS + 1, len(u)).
+    """Scaled Hermite coefficients c_n/sqrt(n!), n = 1 ... ORDERS; shape (ORDERS + 1, len(u)).
+
+    The last row is the square root of the variance that they leave, with the sign of the next
+    coefficient.
     """
     He = [np.ones_like(u), -u]
     for n in range(1, ORDERS):

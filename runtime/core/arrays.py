@@ -38,9 +38,9 @@ def real(x: Any, label: str, file: str | None = None) -> Array:
     x : array_like
         Real numbers, any shape.
     label : str
-        What messages call it.
+        Name of x in error messages.
     file : str, optional
-        Of the record that it belongs to.
+        Name of the file that x comes from, for error messages.
 
     Raises
     ------

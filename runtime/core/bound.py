@@ -18,7 +18,7 @@ class BoundModel:
     model : GeneratedModel
         An emitted module.
     constants : mapping of str to float
-        Of its CONSTANTS, the new values.
+        New values of some of its CONSTANTS, by name.
     """
 
     def __init__(self, model: GeneratedModel, constants: Mapping[str, float]) -> None:

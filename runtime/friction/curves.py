@@ -297,7 +297,10 @@ def friction_curves(problem: Problem, fit: Estimate) -> tuple[FrictionCurve, ...
 
 
 def own_friction(model: GeneratedModel, j: int) -> list[int]:
-    """Base parameters made of friction and offset of joint number j alone (j from 0), those of its curve."""
+    """Find the base parameters that contain only friction and offset of joint j (from 0).
+
+    These define the friction curve of the joint.
+    """
     physical = physical_model(model)
     elements = elements_of(model)
     of_curve = [name in elements and elements[name][0] in OWN for name in physical.standard]

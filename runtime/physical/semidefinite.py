@@ -280,9 +280,11 @@ def closest(
     least: float,
     pull: Prior | None = None,
 ) -> Optimum:
-    """chi of `space` nearest to R chi = z, shapes (m, p) and (m,), scaled by the caller so that ||z|| is about 1.
+    """Find the chi of `space` that minimises ||R chi - z|| under `conditions`; shapes (m, p), (m,).
 
-    least : smallest eigenvalue of every condition, in units of its size, not zero.
+    The caller scales R and z so that ||z|| is about 1.
+
+    least : lower bound, above zero, of the smallest eigenvalue of every condition, relative to its size.
     """
     program = Program(space, rows, conditions, least)
     program.add_squares(R, z, 1.0)

@@ -78,7 +78,10 @@ class KnownValues(Result):
 
     @property
     def heavy(self) -> bool:
-        """Whether all gravity torques are larger, or all smaller, than LIMIT.CAD_RATIOS allow: no time stamp does that."""
+        """Whether the ratios of all gravity torques lie above LIMIT.CAD_RATIOS, or all below.
+
+        Wrong time stamps cannot cause this.
+        """
         ratios, (low, high) = self.gravity[np.isfinite(self.gravity)], LIMIT.CAD_RATIOS
         return len(ratios) > 0 and bool((ratios < low).all() or (ratios > high).all())
 

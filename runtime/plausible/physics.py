@@ -200,19 +200,19 @@ def late_joints(late: Delay) -> Array:
 
 
 def gain_of_delays(case: Case, late: Delay) -> float:
-    """Gain of the delays, nats."""
+    """Log-likelihood gained by correcting the delays `late`, in nats."""
     N = 0.0 if case.baseline is None else case.baseline.N
     return N * float(np.log(late.before / np.maximum(late.after, 0.1)).sum())
 
 
 def gain_of_alternative(case: Case, trial: Trial) -> float:
-    """Gain of an alternative, nats, with rows counted as for a delay."""
+    """Log-likelihood gained by an alternative, in nats; its rows are counted as for a delay."""
     assert case.baseline is not None and trial.fit is not None
     return case.baseline.given.score - trial.fit.score
 
 
 def late_gain(case: Case) -> float:
-    """Gain of the certain delays, nats; 0 if there are none."""
+    """Log-likelihood gained by correcting the delays, in nats; 0 if no joint is certainly late."""
     if case.baseline is None or case.late is None:
         return 0.0
     return gain_of_delays(case, case.late) if certain_joints(case).any() else 0.0

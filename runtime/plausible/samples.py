@@ -152,7 +152,7 @@ class Filtered:
 
 
 def filtered(reading: Prepared, study: Study) -> Filtered:
-    """A record through a low-pass of its motion."""
+    """Filter the record with a low-pass that is chosen by its motion."""
     record = reading.record
     low = Lowpass(cutoff=motion_cutoff(record, reading.study))
     signals = replace(study.signals, lowpass=low)

@@ -51,7 +51,9 @@ def archive_of(path: Path) -> dict[str, Array]:
         if len(members) > WIDEST:
             raise InputError(f"{len(members)} arrays; at most {WIDEST} are read", file=file)
         if len({name.removesuffix(".npy") for name in members}) < len(members):
-            raise InputError("holds an array of one name twice; store it once", file=file)
+            raise InputError(
+                "contains two arrays of the same name; store each name once", file=file
+            )
         with np.load(stream, allow_pickle=False) as arrays:
             return {
                 name.removesuffix(".npy"): _plain(arrays, name)

@@ -207,7 +207,7 @@ def _require_shapes(
     for signal in signals.values():
         if len(signal.values) != N:
             raise InputError(
-                f"{N} samples in {first.file}, {len(signal.values)} of {', '.join(signal.names)}; expected the same instants",
+                f"{first.file} has {N} samples, but {', '.join(signal.names)} has {len(signal.values)}; expected both at the same instants",
                 file=signal.table.file,
             )
 

@@ -18,7 +18,7 @@ from runtime.reporting.series import series
 
 
 def detail_sections(result: Identification) -> list[Section]:
-    """What stands behind the parameters that are used, folded."""
+    """Folded sections with the details behind the parameters that are used."""
     trust = result.uncertainty
     sections = [
         every_section(result),

@@ -313,7 +313,7 @@ def _special(robot: Robot, gap: float, W: Array) -> str:
 
 
 def independent_roots(robot: Robot) -> list[str]:
-    """The square roots of what is no rational number, which over F_p are related to nothing."""
+    """Square roots of expressions that are not rational numbers; over F_p each is an independent unknown."""
     return [root.text for root in roots_of(robot) if root.argument.constant is None]
 
 

@@ -17,7 +17,7 @@ def check(
     at_values: options.AtValues = False,
     exact: options.Exact = False,
     verbose: Annotated[
-        bool, typer.Option("--verbose", help="Print every check with its figure.")
+        bool, typer.Option("--verbose", help="Print every check with its numbers.")
     ] = False,
     json: options.Json = False,
     claim: Annotated[

@@ -28,7 +28,9 @@ def convert(
     ],
     constant: Annotated[
         list[str] | None,
-        typer.Option(help="Value of a symbol of a .par file, D3=0.45 (SI, rad); repeat."),
+        typer.Option(
+            help="Value of a symbol of a .par file, such as D3=0.45 (SI units, rad); may be repeated."
+        ),
     ] = None,
     exact: options.Exact = False,
     lock: options.Lock = None,

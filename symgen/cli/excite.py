@@ -16,8 +16,8 @@ def excite(
     record: Annotated[
         str | None,
         typer.Argument(
-            help="Dataset, study file or measured file: its estimate gives parameters and torque "
-            "deviations, its motion is compared."
+            help="Dataset, study file or measured file. Its estimate gives parameters and torque "
+            "deviations; its motion is compared with the new one."
         ),
     ] = None,
     output: Annotated[
@@ -35,7 +35,9 @@ def excite(
     ] = None,
     criterion: Annotated[
         str | None,
-        typer.Option(help="record, cond, logdet or sigma; default: record where there is one."),
+        typer.Option(
+            help="What to optimise: record, cond (condition number), logdet or sigma. Default: record, if one is given."
+        ),
     ] = None,
     columns: options.Columns = None,
     starts: Annotated[int | None, typer.Option(min=1, help="Random starts.")] = None,

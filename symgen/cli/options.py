@@ -55,7 +55,7 @@ Trust = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 Columns = Annotated[
     Text,
-    typer.Option(help="essential, all, or names separated by commas."),
+    typer.Option(help="Parameters to use: essential, all, or names separated by commas."),
 ]
 Seed = Annotated[int | None, typer.Option(help="Seed of the random numbers.")]
 Workers = Annotated[

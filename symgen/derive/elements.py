@@ -106,7 +106,7 @@ class _Law:
         return algebra.function(a.function, *operands)
 
     def _turn(self, angle: Expression) -> tuple[Turn, Expression] | None:
-        """The whole multiples of independent joints that an angle is, and its constant."""
+        """Write an angle as whole multiples of independent joints plus a constant; return both."""
         if not (part := linear_in(angle, "q", self.row)):
             return None
         row, rest = self.motion.geometry.closure.relation(*part)

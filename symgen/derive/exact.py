@@ -125,7 +125,7 @@ class Draw:
     # --- a domain ---
 
     def symbol(self, symbol: Symbol) -> Scalar:
-        """A residue for each state; one, or one for each geometry, of what is no state."""
+        """Residues of a symbol: of a state variable one per state; otherwise one, or one per geometry drawn."""
         if symbol.kind == "gravity":
             return self.constant(-self.written.gravity[int(symbol.name)])
         if symbol.kind in ("constant", "pi"):

@@ -292,7 +292,7 @@ class Domain(Protocol):
         """The value of an input."""
 
     def number(self, c: Fraction) -> Any:
-        """The value of a rational number."""
+        """Represent the rational number c in this domain."""
 
     def function(self, node: Node, x: list[Any]) -> Any:
         """The value of any other operation than + and *, by those of its operands."""

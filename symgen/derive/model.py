@@ -236,7 +236,10 @@ def equations(d: Derivation) -> tuple[int, ...]:
 
 
 def rewriting(d: Derivation, request: Request) -> Rewrite:
-    """What every model replaces: parameters by theirs, gravity by that of the robot, and inputs of the request."""
+    """The substitutions that all models share.
+
+    Parameters become those of the request, gravity that of the robot, and inputs their values.
+    """
     inputs: dict[Symbol, Input] = {}
     for name in d.robot.parameters:
         symbol = request.parameters.get(name)

@@ -63,7 +63,7 @@ def linear(algebra: GraphAlgebra, row: Mapping[K, Expression], x: Mapping[K, Sca
 
 
 def turned(algebra: GraphAlgebra, turn: Turn, x: Mapping[int, Scalar]) -> Scalar:
-    """sum n_j x_j of a turn; 0 for a joint that x leaves out."""
+    """Sum n_j x_j with the joint multiples n_j of `turn`; a joint that x leaves out counts as 0."""
     row = {j: Expression.number(n) for j, n in turn}
     return linear(algebra, row, {j: x.get(j, 0) for j in row})
 

@@ -209,7 +209,10 @@ class Expression:
         return names
 
     def coefficient(self, *names: str) -> Expression:
-        """The cofactor of the monomial `names` (each to the first power per mention) in the other atoms."""
+        """Coefficient of the product of `names`, an expression in the other atoms.
+
+        A name that is given k times means its k-th power.
+        """
         wanted: dict[str | Number | Call, int] = {}
         for name in names:
             wanted[name] = wanted.get(name, 0) + 1

@@ -284,7 +284,10 @@ def _left_out(model: Any) -> list[str]:
 
 
 def _relations(growing: _Growing) -> dict[str, Expression]:
-    """The joints that linear relations determine, by the others: exact elimination of joints that no actuator drives."""
+    """Express the joints that linear relations determine by the others.
+
+    Joints without an actuator are eliminated, in exact arithmetic.
+    """
     model, names = growing.mjcf.model, growing.names
     relations: dict[str, Expression] = {}
     for e in range(model.neq):

@@ -197,7 +197,7 @@ class Namespace:
             self._written[name] = self.own(name)
 
     def of_file(self, name: str) -> str:
-        """The name of a constant or parameter as this text writes it."""
+        """The emitted name of a constant or parameter of the robot file."""
         return self._written.get(name, name)
 
     def has(self, name: str) -> bool:

@@ -205,9 +205,10 @@ def _constraints(table: Table) -> dict[int, Expression]:
 
 
 def _keys(table: Table, family: str, actuated: list[int]) -> list[int]:
-    """Joints with a parameter of the family: the actuated ones, and those that follow where the file gives a value.
+    """Find the joints that have a parameter of `family`.
 
-    Springs only so.
+    These are all actuated joints, and the joints that follow others where the file gives a value.
+    A spring needs a value of the file in any case.
     """
     value = next(value for name, _, value in JOINT_TERMS if name == family)
     return [

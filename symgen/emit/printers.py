@@ -115,7 +115,7 @@ class Section:
 
 
 def under_titles(lines: Iterable[tuple[str, str]]) -> tuple[Section, ...]:
-    """Sections of (title, line): a title comes again where others stand between its lines."""
+    """Group (title, line) into sections: lines that follow one another under one title are one section."""
     return tuple(
         Section(title, tuple(line for _, line in group))
         for title, group in groupby(lines, key=itemgetter(0))

@@ -208,7 +208,7 @@ class Jobs:
             self.changed()
 
     def _tidy(self, job: Job) -> None:
-        """Nothing is left of a command but its result."""
+        """Delete the temporary files of a command that has ended; only its result stays."""
         if job.process is None and not any(j.state == RUNNING for j in self.all):
             shutil.rmtree(self.folder / ".tmp", ignore_errors=True)
         if job.run and job.state != DONE:

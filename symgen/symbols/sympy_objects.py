@@ -57,7 +57,7 @@ def _shaped(model: SymbolicModel, values: Mapping[tuple[int, ...], Any]) -> Any:
 
 
 class Objects:
-    """SymPy objects, a domain of graph nodes; `rational` makes a number."""
+    """The domain that evaluates graph nodes to SymPy objects; `rational` converts a rational number."""
 
     def __init__(self, rational: Callable[[Fraction], Any] = rational) -> None:
         self.number = rational

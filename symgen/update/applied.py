@@ -61,14 +61,14 @@ class Applied:
     placeless : mapping, SI
         Parameters for which the format has no place, by name.
     placeless_sigma : mapping, SI
-        Their deviations.
+        Standard deviations of these parameters.
     joints : mapping
-        Names of their joints.
+        Name of the joint of each placeless parameter.
     spread : tuple of str
         Links on fixed joints that also changed, because no physical link was possible otherwise.
     undetermined : tuple of str
-        Numbers of links on which no torque depends, and which keep the value of the file. If such a
-        number had to change, `changes` has it with `told_by` "file".
+        Numbers of links that affect no torque. They keep the value of the file; if one had to
+        change, it stands in `changes` with `told_by` "file".
     strange : tuple of str
         Links whose mass or centre is far from that of the file.
     lost : tuple of str
@@ -206,7 +206,7 @@ def _percent(c: Change) -> str:
 
 
 def _by_place(lines: Sequence[str]) -> str:
-    """link: numbers; link: numbers."""
+    """Join lines `link: number` into one text in which each link stands once."""
     places: dict[str, list[str]] = {}
     for line in lines:
         place, _, what = line.partition(": ")

@@ -369,20 +369,20 @@ class FileLink:
 
 @dataclass(frozen=True, eq=False)
 class RobotText:
-    """A file of links and joints, and what it says.
+    """A parsed URDF or MJCF file that knows where each number stands in its text.
 
     Attributes
     ----------
     file : str
         Its name.
     tree : Tree
-        Links and joints of the part of it that is read.
+        Links and joints that are read: all of the file, or a chain of it.
     table : Table
         Khalil frames of `tree`.
     robot : Robot
         The robot of `tree`.
     places : Places
-        Places of the numbers.
+        Where each number stands in the text.
     """
 
     file: str
@@ -421,8 +421,8 @@ def read_text(content: bytes, path: Path, exact: bool, part: TreePart) -> RobotT
     with located(path.name):
         if (suffix := path.suffix.lower()) not in TREES:
             raise DescriptionError(
-                "values go back into a URDF (.urdf) or an MJCF (.xml, .mjcf); a robot file takes "
-                "them by `symgen convert --estimate`"
+                "apply writes URDF (.urdf) and MJCF (.xml, .mjcf) files; for a robot file use "
+                "`symgen convert --estimate`"
             )
         whole = parse_tree(content, path.name, exact=exact)
         attributes = URDF if suffix == ".urdf" else MJCF

@@ -145,7 +145,7 @@ def test_several_studies_are_treatments_by_their_names(folder):
     ("validate", "message"),
     [
         (None, "plain has no validation record"),
-        ("zero", "zero.csv: the torques are zero throughout"),
+        ("zero", "zero.csv: all torques are zero"),
         ("other", "other.csv"),
         ("still", "still.csv: none of its"),
     ],

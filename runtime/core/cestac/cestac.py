@@ -115,8 +115,8 @@ def cestac(
     if study.signals.reader == "counts" and settings.delta and settings.rounding != "phase":
         raise SettingsError(
             (
-                f"{settings.rounding} with signals.reader: counts; it rounds every sample anew and "
-                "destroys the edges that counts are read by, use phase"
+                f"{settings.rounding} does not work with signals.reader: counts. It rounds each sample "
+                "independently, which destroys the changes of the count that the reader needs; use phase"
             ),
             path=("cestac", "rounding"),
         )

@@ -207,7 +207,7 @@ def nothing_left(dropped: Mapping[str, Sequence[int]], K: int) -> str:
 def unused_joints(
     rows: Sequence[int], dropped: Mapping[str, Sequence[int]], joints: Sequence[str]
 ) -> str:
-    """Sentence on joints without used rows, with the main reason; "" if every joint has rows.
+    """Name in one sentence the joints without used rows, and the main reason; "" if every joint has rows.
 
     Parameters
     ----------
