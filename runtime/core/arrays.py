@@ -26,8 +26,7 @@ CURES = {
     "T": "texts; read them as numbers first",
     "V": "records of several fields; give one array for each signal",
 }
-"""What arrays of a kind hold that are no real numbers, and what to do, by the kind of their
-dtype."""
+"""For each kind of dtype that is not real: what the array holds, and what to do."""
 
 
 def real(x: Any, label: str, file: str | None = None) -> Array:

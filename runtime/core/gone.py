@@ -19,8 +19,8 @@ WENT: Mapping[str, str] = {
     "estimate.options.prior: pullback": "the distance pullback went; set euclidean, or none",
     "stream": "gone, every record is read whole; remove the key, and cut a record that memory does not hold into shorter ones",
 }
-"""By the key, "stream", or by the key and its value, "estimate.method: tls"; keys of lists have no
-numbers: "record.resample".
+"""Messages for settings that are gone, by key ("stream") or by key and value
+("estimate.method: tls"); keys of lists have no numbers ("record.resample").
 """
 
 

@@ -22,7 +22,7 @@ from runtime.core.uncertainty import uncertainty
 from runtime.core.validation import direct_comparison, weak_directions
 
 Extra: TypeAlias = Callable[[Identification], Part | None]
-"""What makes a Part of an identification; None where there is nothing to say."""
+"""A function that makes a Part of an identification, or None if it has nothing to say."""
 
 
 @dataclass(frozen=True)

@@ -176,7 +176,7 @@ class Settings(metaclass=SettingsType):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: Any, handler: Any) -> dict[str, Any]:
-        """That of pydantic, with what the docstring says of each key."""
+        """The JSON schema of pydantic, with the sentence of the docstring for each key."""
         made: dict[str, Any] = _with_limits(handler.resolve_ref_schema(handler(schema)))
         texts = [
             inspect.getdoc(base) or ""

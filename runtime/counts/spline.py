@@ -101,7 +101,7 @@ class Basis:
         return third_differences(c) / self.h**3
 
     def jerk_variances(self, Z: Array) -> Array:
-        """Its variances."""
+        """Variances of the jerk in every interval of the spline."""
         total = np.zeros(self.M)
         for i, j in PAIRS:
             total += (1 if i == j else 2) * JERK[i] * JERK[j] * Z[j - i, i : i + self.M]

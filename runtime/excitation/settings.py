@@ -12,7 +12,7 @@ from runtime.core.settings import Many, Positive, Real, Seed, Settings, Text, Wh
 from runtime.loop.families import AnyFamily, Fourier, PointToPoint
 
 MOST_INSTANTS = {"grid": 2e4, "rate": 2e7}
-"""Of a motion, at the points of the optimiser and of the controller."""
+"""Largest number of instants of a motion, on the grid of the optimiser and at the controller's rate."""
 
 
 class Sphere(Settings):

@@ -188,8 +188,10 @@ def iterate(
 
 
 def _physical_start(loop: ClosedLoop, start: Beginning) -> str:
-    """What to start from where parameters are not those of a physical robot: values of the robot
-    file if these have an inertia about every joint, else those of method feasible.
+    """Choose the start where least squares gives no physical robot.
+
+    It is the values of the robot file if these have an inertia about every joint, else the estimate
+    of method feasible.
     """
     try:
         X = full(

@@ -140,7 +140,7 @@ def judge_motion(
 
 
 def beside_record(fit: Callable[[Beginning], Fitted], start: Beginning) -> Fitted:
-    """What `fit`, a method that simulates the loop, gives, with its last simulation judged beside the record."""
+    """Run `fit`, a method that simulates the loop, and compare its last simulation with the record."""
     fitted = fit(start)
     loop = loop_of(start.observation, start.settings.method)
     X = full(start.system.names, fitted.solution.X, loop.model.BASE_PARAMETERS)

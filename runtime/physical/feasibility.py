@@ -324,8 +324,9 @@ def known_inertia(physical: PhysicalModel) -> tuple[int, ...]:
 
 
 def unsolved(status: str, rows: LinearBounds, attempt: Callable[[LinearBounds], Optimum]) -> str:
-    """What happened, the likely cause, what to try. attempt : the same problem with other rows;
-    each limit is released in turn.
+    """Say what happened, the likely cause and what to try.
+
+    attempt : solves the same problem with other rows; each limit is released in turn.
     """
     helps = [name for name in dict.fromkeys(rows.names) if attempt(rows.without(name)).solved]
     if helps:

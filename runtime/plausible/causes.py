@@ -27,7 +27,7 @@ from runtime.plausible.samples import Samples
 
 Array = np.ndarray
 Item = Mapping[str, Any]
-"""What a cause is tried of: words of its sentence, and what its maps read."""
+"""One candidate for a cause: the words of its sentence, and the values that its maps read."""
 Maps = dict[str, Any]
 """Fields of a Cause: what it does."""
 
@@ -49,7 +49,7 @@ GUESSES = {
     2.0: "2: half of a pair of motors",
     9.81: "9.81: kp m for N m",
 }
-"""What a factor on a torque may be."""
+"""Mistakes that multiply a torque by a known factor."""
 GRAVITY = ("free_gx", "free_gy", "free_gz")
 ENTRY = re.compile(r"free_(alpha|[drb])(\d+)")
 

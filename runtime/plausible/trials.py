@@ -512,7 +512,10 @@ def decisive(
     other: Baseline | None = None,
     alone: Baseline | None = None,
 ) -> list[Trial]:
-    """Those that explain the record decisively better than the study as given, rows too that did not give their parameters: the best, and those like it.
+    """Select the trials that explain the record decisively better than the study as given.
+
+    They must do so on rows that did not give their parameters, too. The best comes first, then those
+    like it.
 
     floor : error of a joint, %, that noise of the positions may make. A smaller error shows no cause,
         nor does the distance from the values where this is more than LIMIT.NOISY, or where a joint

@@ -118,8 +118,9 @@ def _half(fit: Estimate, name: str) -> float:
 
 
 def _difference(fit: Estimate, name: str, given: float) -> str:
-    """Of a value to that of the robot file, in % of it; empty where that is within the interval of
-    zero.
+    """Difference of a value from that of the robot file, in % of the latter.
+
+    Empty if the value of the robot file is within the interval of zero.
     """
     if name not in fit.names or not abs(given) > (half := _half(fit, name)):
         return ""

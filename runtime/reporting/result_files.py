@@ -179,7 +179,7 @@ def _sync(folder: Path) -> None:
 
 @contextmanager
 def _clear_errors(folder: Path) -> Iterator[None]:
-    """What the system says, with the place and what to do."""
+    """Turn errors of the file system into messages with the folder and what to do."""
     try:
         yield
     except OSError as e:

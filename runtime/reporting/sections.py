@@ -239,7 +239,7 @@ def decimation_cutoff(result: Identification) -> float | None:
 
 
 def part_sections(result: Identification) -> list[Section]:
-    """Of every part that has something to show, one after the other."""
+    """Make a section of every part that has something to show."""
     sections = map(part_section, result.parts)
     return [one for one in sections if one.text or one.images or one.tables]
 

@@ -29,7 +29,7 @@ CERTIFICATE = re.compile(
     rf"\A(?P<mark>\S{{1,2}} ){HEAD}.*\n((?P=mark).*\n)*?(?P=mark){END}[0-9a-f]{{64}}\n"
     rf'|\n\n{HEAD}[^"\\]*\n{END}[0-9a-f]{{64}}(?=\n"""\n)'
 )
-"""Its lines: comments at the head of a text, or the end of a docstring."""
+"""The lines of a certificate: comments at the head of a text, or the end of a docstring."""
 
 
 def cache_folder() -> Path:

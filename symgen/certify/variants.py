@@ -28,7 +28,7 @@ from symgen.emit.generate import generate_files
 from symgen.errors import CertificateError
 
 FREE = "free_"
-"""What the names of the freed entries start with: free_alpha4, free_d3, free_gx."""
+"""Prefix of the names of freed entries: free_alpha4, free_d3, free_gx."""
 
 
 def variants(robot: str | Path | Robot) -> ModuleType:

@@ -39,7 +39,7 @@ def single_thread() -> None:
 
 @contextmanager
 def reported_errors() -> Iterator[None]:
-    """What every verb runs in: one BLAS thread.
+    """Run a command with one BLAS thread and turn its errors into messages.
 
     Bad input as one message on the error stream and exit code 2, a false certificate with exit code
     1, never a traceback; angles that are read otherwise than written as a note.

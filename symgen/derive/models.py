@@ -401,7 +401,7 @@ MODELS = {
 }  # fmt: skip
 SYMBOLIC = {name: model for name, model in MODELS.items() if model.symbolic}
 EMITTED = {n: m for n, m in MODELS.items() if m.result and not m.of_loops and not m.option}
-"""Those that targets have as functions."""
+"""Models that every target has as functions."""
 ON_REQUEST = {n: m for n, m in MODELS.items() if m.option}
-"""Those that targets have when they are asked for."""
+"""Models that a target has only if they are asked for."""
 OPTIONS = tuple(dict.fromkeys(m.option for m in ON_REQUEST.values()))

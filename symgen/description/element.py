@@ -48,7 +48,7 @@ class LawScalar:
 
     @property
     def value(self) -> float:
-        """Its value before a fit."""
+        """Value from which a fit starts: `start`, or the middle of the bounds."""
         lower, upper = self.bounds
         middle = (lower * upper) ** 0.5 if lower > 0 else (lower + upper) / 2
         return middle if self.start is None else self.start
@@ -193,7 +193,7 @@ class Element:
 
     @property
     def acts_as(self) -> str:
-        """Its kind in emitted modules, which know of other laws only whether they dissipate."""
+        """Kind of the element in emitted modules; of own laws these know only whether they dissipate."""
         return OWN_LAWS[KINDS[self.kind].dissipative] if self.is_own else self.kind
 
     @property

@@ -123,7 +123,7 @@ class FunctionPrinter:
 
     @property
     def motion(self) -> Block:
-        """What the functions share, as a function of its own."""
+        """The block of the steps that all functions share."""
         own = [n for n in self.functions[0].nodes if n.index in self.shared]
         operands = {x.node.index for n in own for x in n.operands}
         return self._block(self.functions[0], own, [n for n in own if n.index in operands], ())
@@ -182,7 +182,7 @@ class FunctionPrinter:
 
 
 def label(f: Function, entry: Entry) -> str:
-    """What an entry is called: DG1ZZ2, GAM3, A12."""
+    """Name an entry in comments, such as DG1ZZ2, GAM3 or A12."""
     name = entry.comment.partition(",")[0]
     return name or f"{f.model.result}{''.join(str(k + 1) for k in entry.place)}"
 

@@ -51,12 +51,12 @@ def in_parts(
 
 
 def words(lines: Sequence[str]) -> frozenset[str]:
-    """What lines name, comments aside."""
+    """Collect the names in lines of C, without those in comments."""
     return frozenset(word for line in lines for word in re.findall(r"\w+", line.partition("/*")[0]))
 
 
 def read_by(read: frozenset[str], steps: Sequence[str]) -> list[str]:
-    """Those of the steps `const real x = ...;` whose x is among what is read, or that these read."""
+    """Select the steps `const real x = ...;` that compute the names in `read`, and those that these need."""
     needed = []
     for step in reversed(steps):
         if step.split()[2] in read:

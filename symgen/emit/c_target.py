@@ -62,7 +62,7 @@ def render_header(spec: ModuleSpec, *, command: str | None = None) -> str:
 
 @lru_cache(maxsize=1)
 def _context(spec: ModuleSpec, command: str | None) -> dict[str, Any]:
-    """What the file and its header say."""
+    """The values that the templates of the C file and of its header read."""
     robot, free = spec.robot, spec.regrouping.constants
     names, states = spec.names(is_word), CStates.of(spec)
     kernels = [
@@ -111,7 +111,7 @@ def _context(spec: ModuleSpec, command: str | None) -> dict[str, Any]:
 def _loops(
     spec: ModuleSpec, states: CStates, closing: Sequence[Mapping[str, Any]]
 ) -> dict[str, Any]:
-    """What closes the loops: the start, units and steps of Newton's method, signatures."""
+    """The values by which the template closes loops: start, units and steps of Newton's method."""
     name, loops = spec.robot.name, loop_system(spec.robot)
     start = f"{{{', '.join(map(repr, loops.start.tolist()))}}}"
     actuated = [f"const real *{x}_a" for x in ("q", "qd", "qdd")]

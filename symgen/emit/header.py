@@ -245,7 +245,7 @@ def tables(spec: ModuleSpec) -> list[str]:
 
 
 def data(spec: ModuleSpec) -> list[str]:
-    """What the robot file says beside the models: drives, limits, values, as Python source."""
+    """Drives, limits and values of the robot file as Python source."""
     robot = spec.robot
     return [
         *_drives(robot),

@@ -55,12 +55,12 @@ class Function:
 
     @property
     def states(self) -> tuple[str, ...]:
-        """What it reads of the states, and of G, the rates of the tied joints."""
+        """The states that the function reads; among them G, the rates of the tied joints."""
         kinds = {**{state: state for state in STATES}, "G": "rate"}
         return tuple(state for state, kind in kinds.items() if self.reads(kind))
 
     def constants(self, free: Iterable[str]) -> tuple[str, ...]:
-        """What it reads of the constants that may have other values, in their order."""
+        """The names in `free` that the function reads, in the same order."""
         read = {symbol.name for symbol in self.inputs if symbol.kind in ("constant", "channel")}
         return tuple(name for name in free if name in read)
 

@@ -29,7 +29,7 @@ AXES = "xyz"
 
 @dataclass(frozen=True)
 class Effect:
-    """What one standard parameter is and does.
+    """A standard parameter: its meaning, and what becomes of it.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ def effects(spec: ModuleSpec) -> tuple[Effect, ...]:
 
 
 def inertial_meaning(family: str, j: int) -> str:
-    """What XX .. M of link j is."""
+    """Describe the parameters XX .. M of link j in words."""
     if family == "M":
         return f"mass of link {j}"
     a, b = family[0].lower(), family[1].lower()

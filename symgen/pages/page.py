@@ -134,7 +134,7 @@ def _frame_rows(robot: Robot) -> dict[str, Any]:
 
 
 def _relation(closure: Closure, j: int) -> MathML:
-    """What holds for a passive joint: its formula, or its name where it is solved for."""
+    """Formula of a passive joint, or its name alone where Newton's method finds it."""
     shown = expressions.symbol(f"q{j}")
     if j not in closure.tied:
         shown = expressions.equation(shown, expressions.expression(closure.formula(j)))
@@ -203,7 +203,7 @@ def _without_effect(parameters: Sequence[Effect]) -> list[tuple[list[MathML], st
 def _pointed_at(
     spec: ModuleSpec, parameters: Sequence[Effect], absorbed: Sequence[Absorption]
 ) -> Mapping[str, Any]:
-    """What the page says of a parameter under the pointer."""
+    """Texts that the page shows for the parameter under the pointer, by name."""
     robot = spec.robot
     by_name = {e.name: e for e in parameters}
     entries = {e.name: _entry(e, e.meaning, e.base, e.joints, e.why) for e in parameters}

@@ -218,7 +218,7 @@ class WorkFolder:
         return found[name]
 
     def about(self, run: Path) -> dict[str, Any]:
-        """What pages say of one run."""
+        """Summary of one run for the pages."""
         kind = result_of(run)
         data = json_of(run / kind)
         parts = [p for part in data.get("validation") or [] for p in part.get("predictions", [])]

@@ -84,12 +84,12 @@ class Job:
 
     @property
     def counted(self) -> list[str]:
-        """What is done and the total, as its bar says last."""
+        """Done and total, from the last line of the progress bar; empty without a bar."""
         return re.findall(r"\d+(?=/\d)|(?<=\d/)\d+", "".join(self.said[-1:]))[:2]
 
     @property
     def last(self) -> str:
-        """Its last words."""
+        """Last error that the command printed, or else its last line."""
         errors = [line for line in self.said if line.startswith("error: ")]
         words = (errors or self.said or [f"exit code {self.code}"])[-1]
         return words.removeprefix("error: ")

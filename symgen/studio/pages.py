@@ -61,7 +61,7 @@ class Pages:
         self.server, self.folder, self.jobs = server, server.folder, server.jobs
 
     def routes(self) -> list[Route]:
-        """Those under /do/ take POST alone."""
+        """All routes of the pages; those under /do/ accept POST only."""
         gets = {
             "/{name}": self._show,
             "/view/{name}": self._view,
@@ -175,7 +175,7 @@ class Pages:
         return bool(json_of(self.folder.path / "check.json").get("of") == now)
 
     async def _view(self, request: Request) -> Response:
-        """What is derived from robot, record or run, as a part of a page or as JSON."""
+        """Answer with a view of robot, record or run, as a part of a page or as JSON."""
         name, asked = request.path_params["name"], dict(request.query_params)
         if name == "formulas" and self.folder.read(DRAFT):  # those of the last robot stay
             return PlainTextResponse("", headers={"hx-reswap": "none"})

@@ -31,7 +31,7 @@ PAGE_TEMPLATES = Environment(
 
 
 class Server:
-    """What all requests share.
+    """The state that all requests share.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class Server:
             return value
 
     async def robot(self) -> dict[str, Any]:
-        """What is shown of the robot file, or of its draft."""
+        """The view of the robot file, or of its draft."""
         path, draft = self.folder.robot, self.folder.read(DRAFT)
         if path is None and not draft:
             return {}

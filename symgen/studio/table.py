@@ -81,7 +81,7 @@ def blocks(text: str) -> list[tuple[str, str]]:
 
 
 def wrong(text: str) -> DescriptionError | None:
-    """What a text lacks of a robot file; None where it is one."""
+    """Error that a text has as a robot file; None if it has none."""
     try:
         parse_robot(text.encode(), "robot.yaml")
     except DescriptionError as error:

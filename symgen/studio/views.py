@@ -51,8 +51,9 @@ def answered(view: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, Any
 
 @answered
 def robot(path: str, draft: str) -> dict[str, Any]:
-    """Of a robot file, or of its draft, without deriving anything: the text of its table, drawing,
-    angles in degrees, doubts.
+    """Describe a robot file, or its draft, without deriving anything.
+
+    Returns the text of its table, its drawing, angles in degrees, and doubts.
     """
     described = (
         symgen.parse_robot(draft.encode(), "robot.yaml") if draft else symgen.load_robot(path)

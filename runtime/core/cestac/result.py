@@ -310,7 +310,7 @@ class Cestac(Result, Part):
         )
 
     def residual_table(self) -> Table:
-        """By level: both forms of %e(rho), the increase of the norm, and the verdict."""
+        """Table with one column per level: both forms of %e(rho), the increase of the norm, the verdict."""
         levels = self.levels
         rows = [
             (

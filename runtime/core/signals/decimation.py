@@ -56,7 +56,7 @@ PIECE = 4096
 PART = 16384
 """Kept samples that are computed at a time."""
 TRUNCATION = 1e-20
-"""What the filter still knows of a sample that is out of its reach, of the signal."""
+"""Weight that a sample beyond the reach of the filter would have, relative to the signal."""
 
 
 @dataclass(frozen=True, eq=False)
