@@ -50,7 +50,7 @@ class Sampled:
 
 
 def sampled(delta: float, ratios: Array) -> Sampled:
-    """Eqs. (18), (21) of estimates over those of the record, shape (runs, b)."""
+    """Change of each run's estimate from that of the record, eqs. (18), (21); shape (runs, b)."""
     N = len(ratios)
     half = float(stdtrit(N - 1, (1 + LIMIT.STUDENT_PROBABILITY) / 2)) / np.sqrt(N)
     change = 100 * (ratios.mean(axis=0) - 1)
@@ -59,7 +59,7 @@ def sampled(delta: float, ratios: Array) -> Sampled:
 
 @dataclass(frozen=True, eq=False)
 class Limit:
-    """Step at which %e reaches `percent`, and the parameter that gets there first.
+    """The step at which %e reaches `percent`, and the parameter that reaches it first.
 
     Attributes
     ----------
@@ -266,7 +266,7 @@ class Advice(Result, Part):
         return " ".join(parts)
 
     def _answers(self, encoders: Sequence[EncoderAdvice]) -> list[str]:
-        """Sentences on some encoders, all together first."""
+        """The sentences of the verdict on some encoders; those on all encoders together come first."""
         if not self.deciding:
             return [
                 (
@@ -364,7 +364,7 @@ class Advice(Result, Part):
     def _step_table(
         self, caption: str, ways: Sequence[tuple[str, tuple[EncoderAdvice, ...], Array]]
     ) -> Table:
-        """Coarsest steps by encoder, of some ways side by side."""
+        """Table of the coarsest steps by encoder, one column for each rounding law."""
         headers, rows = ["encoder"], []
         for name, encoders, _ in ways:
             for limit in encoders[0].limits:
@@ -552,7 +552,7 @@ def answer(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer
 
 @dataclass(frozen=True, eq=False)
 class NoAdvice(Part):
-    """Effect of the encoder steps that the positions show, if no advice was requested."""
+    """What the steps that the positions show do to the estimate, where no advice was asked for."""
 
     result: Identification
 
@@ -580,7 +580,10 @@ def _summary(advice: EncoderAdvice) -> dict[str, Any]:
 def confirm_by_runs(
     advice: EncoderAdvice, reference: Estimate, level: Callable[[float], Sampled]
 ) -> EncoderAdvice:
-    """The advice with runs at the steps of its limits; of all encoders, also between and above them."""
+    """Add runs at the steps of the limits.
+
+    Where all encoders are alike, runs between these steps and above them are added, too.
+    """
     made = {limit.delta: level(limit.delta) for limit in advice.limits if np.isfinite(limit.delta)}
     limits = []
     for limit in advice.limits:
@@ -626,7 +629,7 @@ def limits_of(delta: Array, change: Array, reference: Estimate) -> tuple[Limit, 
 
 
 def crossing(delta: Array, e: Array, percent: float) -> float:
-    """First step at which e reaches `percent`, straight lines between the points of logarithmic axes.
+    """First step at which e reaches `percent`; between points, straight lines on logarithmic axes.
 
     nan if it does not.
     """
@@ -642,11 +645,11 @@ def crossing(delta: Array, e: Array, percent: float) -> float:
 
 
 def counts(delta: float) -> str:
-    """A step as a share of a turn, such as 2*pi/5236."""
+    """Write a step as a share of a turn, such as 2*pi/5236."""
     return f"2*pi/{2 * np.pi / delta:.0f}" if 0 < delta < np.pi else ""
 
 
 def step_text(delta: float, unit: str) -> str:
-    """A step with its unit and, of a turn, its share, such as 9.16e-05 rad (2*pi/68626)."""
+    """Write a step with its unit and, if it is an angle, as a share of a turn: 9.16e-05 rad (2*pi/68626)."""
     text = counts(delta) if unit == "rad" else ""
     return f"{delta:.3g} {unit}" + (f" ({text})" if text else "")

@@ -93,7 +93,7 @@ class Predictor:
         return solution(self._total(0.0, ()), self.weights)
 
     def rate(self, encoders: Sequence[int]) -> Array:
-        """Change in % per Delta^2 at Delta = 0, shape (b,), columns that switch left out."""
+        """Change in % per Delta^2 at Delta = 0, without columns that switch sign; shape (b,)."""
         moved, X = self._total(0.0, ()), self.exact
         added = reduce(add, [part.smooth[i] for part in self.parts for i in encoders])
         moved[..., -1] = added @ np.append(-X, 1.0)
@@ -241,7 +241,7 @@ def advise(
 
 
 def _selections(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str, tuple[int, ...]]:
-    """Coarse encoders (from 0) by label."""
+    """The sets of coarse encoders (numbers from 0) that are judged, by label."""
     n = len(model.JOINTS)
     every = {ALL: tuple(range(n)), **{str(joint): (i,) for i, joint in enumerate(model.JOINTS)}}
     labels = tuple(wanted) if wanted is not None else tuple(every)[: n + 1 if n > 1 else 1]
@@ -257,7 +257,7 @@ def _selections(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str
 def _advice(
     predictor: Predictor, label: str, encoders: Sequence[int], reference: Estimate, unit: str
 ) -> EncoderAdvice:
-    """Limits by a walk on steps in geometric progression.
+    """Find the limits by trying steps in geometric progression.
 
     The curve of all encoders goes on beyond them.
     """
@@ -293,7 +293,7 @@ def _advice(
 
 
 def torque_sigma(predictor: Predictor, drives: Drives | None) -> Array:
-    """Deviation of X, shape (b,), per unit deviation of white noise of every motor torque."""
+    """Standard deviation of X per unit deviation of white noise on every motor torque; shape (b,)."""
     n = predictor.parts[0].observation.n
     R = np.eye(n) if drives is None else drives.ratio
     w = predictor.weights

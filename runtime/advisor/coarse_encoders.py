@@ -58,7 +58,7 @@ QUADRATURE = 1 << 20  # number of the first stream of the nodes: beyond those of
 
 @dataclass(frozen=True, eq=False)
 class Encoders:
-    """One record at its encoders.
+    """The encoders of one record.
 
     Attributes
     ----------
@@ -152,7 +152,9 @@ class CoarseEncoders:
         return np.full(len(self.reference), np.nan)
 
     def locking(self, delta: Array) -> Array:
-        """Power of the sawtooth that passes the low-pass, over that of white noise, the largest of the encoders, shape (m,).
+        """Power of the rounding error that passes the low-pass, relative to white noise, shape (m,).
+
+        The error of a slow joint is a sawtooth; the largest value of the encoders counts.
 
         delta, shape (m,).
 
@@ -174,7 +176,9 @@ class CoarseEncoders:
         return most
 
     def nodes(self, delta: float, moving: Sequence[int], read: int = 0) -> list[list[Array]]:
-        """Errors of every record at the first PHASES nodes of the quadrature, or at as many as have been `read`, in the middle between those.
+        """Errors of every record at the first PHASES nodes of the quadrature.
+
+        If `read` nodes are known already, there are as many, in the middle between those.
 
         The encoders `moving` coarse.
         """
@@ -188,7 +192,7 @@ class CoarseEncoders:
         ]
 
     def ratios(self, nodes: Sequence[Sequence[Array]], encoders: Sequence[int]) -> Array:
-        """X with these encoders coarse over X without, at every node, shape (count, b)."""
+        """X with these encoders coarse, divided by X without, at every node; shape (count, b)."""
         return np.array([self._ratio(errors, encoders) for errors in nodes])
 
     def sampled(self, encoders: Sequence[int], delta: float, runs: int | None = None) -> Sampled:
@@ -203,7 +207,7 @@ class CoarseEncoders:
         return sampled(delta, np.array(ratios))
 
     def _rounded(self, delta: float, encoders: Sequence[int], run: int) -> list[Array]:
-        """Errors of every record by a law that rounds every sample.
+        """Errors of every record under a law that rounds each sample independently.
 
         The streams of an encoder do not depend on which others are coarse.
         """
@@ -215,7 +219,7 @@ class CoarseEncoders:
         return self._read(drawn, encoders, delta)
 
     def _counted_at_random(self, delta: float, encoders: Sequence[int], run: int) -> list[Array]:
-        """Errors of every record by law phase."""
+        """Errors of every record under the law `phase`, with random phases."""
         phases = stream(self.task.settings.seed, run, *encoders).random(len(self.root))
         return self._counts(delta, delta * phases, encoders, (run, *encoders, 0))
 
@@ -256,7 +260,7 @@ class CoarseEncoders:
         return of_records
 
     def _ratio(self, errors: Sequence[Array], encoders: Sequence[int]) -> Array:
-        """X with the errors of some encoders over X without, on the same rows, shape (b,)."""
+        """X with the errors of some encoders divided by X without them, on the same rows; shape (b,)."""
         chosen = np.isin(np.arange(len(self.root)), list(encoders))
         coarse, exact = [], []
         for part, error in zip(self.parts, errors, strict=True):
@@ -274,7 +278,7 @@ class CoarseEncoders:
         return np.asarray(self._solved(coarse) / (self.reference if every else self._solved(exact)))
 
     def _solved(self, parts: Sequence[tuple[States, Array]]) -> Array:
-        """X of the states of every record in these rows, bool, shape (n, K), of theirs."""
+        """Solve for X from the states of every record, on the rows of `mask`."""
         rows = [
             observation_of(
                 self.columns,

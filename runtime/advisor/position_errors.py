@@ -87,7 +87,7 @@ class Perturbation:
         return np.asarray(gram)
 
     def _add_switches(self, gram: Array, variance: float, encoders: list[int]) -> None:
-        """Means, covariances with the smooth columns and with each other, variances of the columns that switch."""
+        """Add the expectations of the columns that switch sign: means, covariances and variances."""
         before, after = self.band.before[1, 1], self.band.after[1, 1]
         acting = []
         for switch in self.switches:
@@ -115,7 +115,7 @@ class Perturbation:
             gram[j][np.ix_(columns, columns)] += shift.T @ shift + both
 
     def _at(self, switch: Switch, sigma: float) -> Switched:
-        """The switch at one deviation of its speed, interpolated between nodes."""
+        """Interpolate the switch between nodes to one deviation of its speed."""
         node = floor(log(sigma) / log(NODE))
         return self._node(switch, node).between(self._node(switch, node + 1), sigma)
 
@@ -202,7 +202,7 @@ def perturbation(
 
 
 def _rows(observation: Observation, j: int) -> Array:
-    """[W_j Y_j]."""
+    """The rows [W_j Y_j] of every joint."""
     own = observation.joint(j)
     return np.column_stack([observation.W[own], observation.Y[own]])
 

@@ -76,7 +76,7 @@ class Errors:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """A motion given sites at S samples.
+    """A motion at S samples that is known by sites: Gaussian factors in place of the bounds of counts.
 
     c : coefficients, shape (P,).
     density : r, shape (M,).
@@ -100,7 +100,7 @@ class Posterior:
 
     @property
     def settled(self) -> bool:
-        """Whether the sites have."""
+        """Whether expectation propagation has converged."""
         return bool(np.isfinite(self.evidence))
 
 
@@ -125,7 +125,7 @@ class Boxes:
 
     @np.errstate(divide="ignore", invalid="ignore")  # sites that do not settle
     def posterior(self, errors: Errors, c: Array, density: Array, t: Array, u: Array) -> Posterior:
-        """Expectation propagation: the sites, precisions t and pulls u, are updated until they settle."""
+        """Fit the sites by expectation propagation until precisions t and pulls u no longer change."""
         basis, gaps = self.basis, np.flatnonzero(self.rest)
         tau, pull = self.rest.copy(), np.zeros(len(self.rest))
         x, change, damping = basis.at_samples(c), np.inf, DAMPING
@@ -158,12 +158,13 @@ class Boxes:
         return Posterior(c, used, t, u, Z, factor, errors, likely, without)
 
     def again(self, errors: Errors, start: Posterior) -> Posterior:
-        """The motion with other errors, from the sites of `start`."""
+        """The posterior with other errors, started from the sites of `start`."""
         return self.posterior(errors, start.c, start.density, start.tau, start.nu)
 
     def promised(self, errors: Errors, read: Posterior) -> float:
-        """The rise of the evidence with other errors, to first order: where sites have settled it does not depend on them.
-        From every so many a site.
+        """Rise of the evidence with other errors, to first order.
+
+        Once the sites have settled they need no change. The sum runs over every few sites only.
         """
         some = slice(None, None, 1 + 2 * (len(self.sites) // (2 * TELLING)))  # odd: they are pairs
         boxes = replace(self, low=self.low[some], high=self.high[some])
@@ -172,7 +173,7 @@ class Boxes:
         return float(np.mean(mass - own) * len(self.sites))
 
     def agrees(self, read: Posterior) -> bool:
-        """Whether sites have settled and the motion leaves the interval of no count by more than FAR deviations."""
+        """Whether the sites have settled and the motion stays within FAR deviations of every interval."""
         x, v = self.basis.at_samples(read.c), self.basis.variances(read.Z)
         e2 = read.errors.variance(self.basis.at_samples(read.c, 1) * self.basis.Ts)
         outside = np.abs(x - self.y)[self.measured] - 0.5
@@ -180,8 +181,10 @@ class Boxes:
         return read.settled and bool(near.all())
 
     def suspects(self, read: Posterior) -> Array:
-        """Where a jump of the counts may be, samples: where the jerk is densest, and the middles of
-        the SUSPECTS windows of time in which others foretell the counts worst.
+        """Samples at which the counts may jump.
+
+        These are the sample of largest jerk, and the middles of the SUSPECTS windows of time
+        whose counts the other windows predict worst.
         """
         m, v, speed = read.without
         off = (m - (self.low + self.high) / 2) ** 2 / (v + read.errors.variance(speed) + 1 / 12)
@@ -191,7 +194,7 @@ class Boxes:
         return np.append(worst, np.argmax(read.density) * self.basis.m)[::-1]
 
     def around(self, middle: int, read: Posterior) -> tuple[int, Boxes, Posterior]:
-        """First sample, bounds and motion of the BESIDE samples on either side of one."""
+        """Bounds and motion of the BESIDE samples on either side of a sample, and the first of them."""
         m, end = self.basis.m, min(middle + BESIDE, self.basis.N)
         first = max(0, middle - BESIDE) // m
         begin = first * m
@@ -206,7 +209,9 @@ class Boxes:
         return begin, boxes, boxes.posterior(read.errors, c, density, *sites)
 
     def jump(self, near: int, read: Posterior) -> tuple[int, float, float]:
-        """Sample near `near` from which counts are most likely off by one number, that number, and by how many nats it raises the posterior.
+        """Find the sample near `near` from which all counts are most likely off by one number.
+
+        Returns the sample, the number, and by how many nats correcting it raises the evidence.
 
         The slope of the log posterior by that number is g = sum (nu - tau x) over the later sites,
         its curvature sum tau - (B tau)' A^-1 (B tau).
@@ -231,7 +236,7 @@ class Boxes:
         return boxes, boxes.posterior(read.errors, read.c, read.density, read.tau, nu)
 
     def _tilted(self, m: Array, v: Array, e2: Array) -> tuple[Array, Array, Array]:
-        """Log of the mass of every tilted law, and the site that goes with it."""
+        """Logarithm of the mass of every tilted distribution, and the site that reproduces its moments."""
         s = np.sqrt(v + e2)
         a, b = (self.low - m) / s, (self.high - m) / s
         near = np.flatnonzero(np.minimum(-a, b) < FAR)
@@ -245,7 +250,7 @@ class Boxes:
 def of_most_evidence(
     boxes: Boxes, sizes: Sequence[float], start: Posterior, moves: Sequence[tuple[int, int]] = MOVES
 ) -> Posterior:
-    """The motion with the errors, of `sizes` and CLOCK_ERRORS, whose evidence none beside them exceeds, or promises to."""
+    """Find the errors, of `sizes` and CLOCK_ERRORS, whose evidence no neighbour exceeds, and the motion."""
     best, place = start, (sizes.index(start.errors.count), CLOCK_ERRORS.index(start.errors.time))
     tried = {place}
     for move in moves:
@@ -279,7 +284,9 @@ def box_moments(a: Array, b: Array) -> tuple[Array, Array, Array]:
 
 
 def jerk_density(basis: Basis, c: Array, Z: Array, density: Array) -> Array:
-    """MacKay's rule in windows of time, the whole record counting as OF_RECORD determined jerks.
+    """Estimate the density of the jerk in windows of time by MacKay's rule.
+
+    The whole record counts as a window with OF_RECORD determined jerks.
 
     Shape (M,).
     """

@@ -32,7 +32,7 @@ LOOKED_AT = 2**16
 
 @dataclass(frozen=True, eq=False)
 class EncoderSteps(Part):
-    """Records whose positions are taken as they are and would be read better as counts, computed when it is first asked for."""
+    """Records whose positions would be read better as counts; computed when first asked for."""
 
     result: Identification
 
@@ -40,7 +40,7 @@ class EncoderSteps(Part):
     title = "Steps of the encoders"
 
     def text(self) -> str:
-        """One sentence a record."""
+        """One sentence for each record."""
         readings = [r for r in self.result.prepared if r.study.signals.reader == "lowpass"]
         sentences = [
             sentence
@@ -51,7 +51,9 @@ class EncoderSteps(Part):
 
 
 def visible_steps(result: Identification) -> tuple[str, float]:
-    """The steps of the positions that are taken as they are, in words, and the largest share of the mean square of an acceleration that they make.
+    """Describe the steps that the positions show, and the largest share of an acceleration they cause.
+
+    The share is that of the mean square.
 
     "" if none are seen.
     """
@@ -68,7 +70,7 @@ def visible_steps(result: Identification) -> tuple[str, float]:
 def encoder_sentences(
     record: Record, states: States, signals: Signals, drives: Drives | None
 ) -> tuple[str, ...]:
-    """Positions being taken as they are, one sentence where reading counts would help.
+    """Say for each record where reading its positions as counts would help.
 
     states : of the record, through the filters.   drives : motor side; None if there is none.
     """
@@ -86,7 +88,7 @@ def encoder_sentences(
 def acceleration_error(
     record: Record, states: States, signals: Signals, drives: Drives | None
 ) -> float:
-    """Largest share of the mean square of a filtered acceleration that is an error of the steps, of the joints.
+    """Largest share of the mean square of a filtered acceleration that the steps cause.
 
     0 if positions show no steps.
     """
@@ -120,7 +122,7 @@ def _range(steps: Array) -> str:
 def _attenuation(
     rate: float, signals: Signals, motion: Array, found: Lattice, drives: Drives | None
 ) -> Array:
-    """Variance of the error of qdd over its mean square, `motion`, by joint, shape (n,)."""
+    """Variance of the error of qdd divided by its mean square `motion`, by joint; shape (n,)."""
     n = len(motion)
     gain = bandwidth(replace(signals, median=1), rate).before[2, 2]
     error = gain * (encoder_root(drives, n) * found.step) ** 2 @ np.full(n, 1 / 12)

@@ -165,7 +165,9 @@ def smallest_step(x: Array) -> float:
 
 
 def to_and_fro(counts: Array) -> Array:
-    """Samples ahead of the first and behind the last of three changes in a row over one line, shape (m, 2).
+    """Find passages to and fro: three changes in a row over one line, shape (m, 2).
+
+    Returns the sample before the first change and the one behind the last.
 
     counts, shape (N,), none missing.
 

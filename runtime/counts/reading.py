@@ -87,7 +87,7 @@ class Reading:
 
     @property
     def starts(self) -> Starts:
-        """Start of the search for the same motion with other phases of its encoders."""
+        """Start of the search for this motion with other phases of its encoders."""
         return {
             (part.begin, j): SearchStart(each.read.errors, each.basis.m, each.read.density)
             for part in self.parts
@@ -125,7 +125,7 @@ class Part:
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """Sentences about the lines of its encoders."""
+        """Sentences about the lines of the encoders of this part."""
         return tuple(
             f"encoder {j + 1}: {said}"
             for j, said in zip(self.moving, (each.said for each in self.smoothed), strict=True)
@@ -217,7 +217,7 @@ def read_stretch(
     rest: Array,
     starts: Mapping[int, SearchStart] | None = None,
 ) -> tuple[Part | None, list[Array], Array]:
-    """Posterior of counts, shape (N, n), None if nothing moves.
+    """Posterior of the counts of a stretch, shape (N, n); None if no joint moves.
 
     q, qd, qdd, s_q, s_qd, s_qdd in steps, and where the state is unknown, (N, n) each.
 
@@ -282,19 +282,19 @@ def _positions_of_counts(
 
 
 class Gaps:
-    """Samples without a count of n encoders, stretch by stretch."""
+    """Samples at which an encoder has no count."""
 
     def __init__(self, n: int) -> None:
         self.samples, self.unknown, self.run, self.longest = np.zeros((4, n), dtype=int)
         self.last = np.full(n, np.nan)  # last count known
 
     def rest(self, counts: Array) -> Array:
-        """The last counts known, shape (n,), ahead of the record the first of `counts`, shape (N, n)."""
+        """The last known counts, shape (n,); before the record, the first of `counts`, shape (N, n)."""
         first = counts[np.isfinite(counts).argmax(axis=0), np.arange(counts.shape[1])]
         return np.where(np.isnan(self.last), first, self.last)
 
     def take(self, counts: Array, unknown: Array) -> None:
-        """The next counts and where the state is unknown, shape (B, n) each."""
+        """Take the next counts, and mark where the state is unknown; shape (B, n) each."""
         missing = np.isnan(counts)
         self.samples += missing.sum(axis=0)
         self.unknown += unknown.sum(axis=0)
@@ -325,7 +325,10 @@ class Gaps:
 
 
 def stretches(N: int) -> list[tuple[int, int, int, int]]:
-    """(begin, first, stop, end): samples [begin, end) are read to know [first, stop)."""
+    """Split a record into stretches (begin, first, stop, end).
+
+    Samples [begin, end) are read in order to know [first, stop).
+    """
     count = max(1, round(N / STRETCH))
     cuts = [*(STRETCH * i for i in range(count)), N]
     return [(max(a - MARGIN, 0), a, b, min(b + MARGIN, N)) for a, b in pairwise(cuts)]

@@ -187,7 +187,7 @@ class Counts:
         return boxes, read
 
     def liveliest(self) -> Counts:
-        """LIVELIEST samples with the most changes of the count."""
+        """The LIVELIEST consecutive samples with the most changes of the count."""
         changed = np.zeros(len(self.y))
         changed[self.measured[1:]] = np.diff(self.y[self.measured]) != 0
         total = np.cumsum(changed)
@@ -197,7 +197,9 @@ class Counts:
         return Counts(self.y[part], inside, self.rest[part], self.Ts)
 
     def searched(self, sizes: Sequence[float]) -> tuple[Boxes, Posterior]:
-        """The motion with the errors of most evidence, with the least unless that has UNEVEN nats more.
+        """The motion with the errors of most evidence.
+
+        The smallest errors are taken unless those have UNEVEN nats more.
 
         A jittering clock is thought of where errors are wide.
         """
@@ -216,7 +218,7 @@ class Counts:
         return boxes, read
 
     def first(self, errors: Errors, start: SearchStart | None = None) -> tuple[Boxes, Posterior]:
-        """Bounds of counts with these errors, and the motion between them.
+        """Bounds of the counts with these errors, and the motion between them.
 
         Knots are as far apart as the motion allows that passes near the changes.
         start : of a motion read before, with whose knots and density of the jerk it begins.
@@ -242,7 +244,10 @@ class Counts:
         return boxes, boxes.posterior(errors, c, density, tau[sites], nu[sites])
 
     def sites(self, density: float) -> Array:
-        """Samples whose bounds count: both sides of every change and gap, and in between as often as the motion forgets.
+        """Choose the samples whose bounds count.
+
+        These are both sides of every change and gap, and samples between them, as often as the
+        motion forgets.
 
         ascending.
 
@@ -285,7 +290,7 @@ class Counts:
         return tau, nu
 
     def without(self, at: int, jump: int) -> Counts:
-        """These counts without a jump at a sample."""
+        """The counts without a jump at a sample."""
         y = self.y.copy()
         y[self.measured[self.measured >= at]] -= jump
         return replace(self, y=y)

@@ -104,7 +104,7 @@ def delay(problem: Problem, *, longest: float = LIMIT.LONGEST_DELAY) -> Delay:
 
 
 def delay_of(model: GeneratedModel, through: Filtered, longest: float) -> Delay:
-    """The same of a filtered record."""
+    """Estimate the delays of a record that is filtered already."""
     record = through.record
     duration = float(record.t[-1] - record.t[0])
     if not 0 < longest <= duration / 10:
@@ -131,7 +131,7 @@ def delay_of(model: GeneratedModel, through: Filtered, longest: float) -> Delay:
 
 
 def _mean(shift: Array, sigma: Array) -> tuple[float, float]:
-    """Weighted mean, and its deviation."""
+    """Weighted mean of the delays and its deviation."""
     if not len(shift):
         return float("nan"), float("nan")
     w = sigma**-2.0

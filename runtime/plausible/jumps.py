@@ -35,7 +35,7 @@ Array = np.ndarray
     "accelerates",
 )
 def jumps(case: Case) -> Answer:
-    """Positions that no joint can have passed through."""
+    """Check whether positions jump further than a joint can move between samples."""
     median, units, limits = case.study.signals.median, case.units, case.limits("qd")
     fastest = np.array([LIMIT.LARGEST_SPEED[unit][1] for unit in units])
     fastest = fastest if limits is None else 4 * limits
@@ -113,7 +113,7 @@ def jumps(case: Case) -> Answer:
 
 
 def _usual(x: Array) -> Array:
-    """90 % quantile of the nonzero values of each column, (n,)."""
+    """The 90 % quantile of the nonzero values of each column, (n,)."""
     return np.array([np.quantile(own[own > 0], 0.9) if own.any() else np.inf for own in x.T])
 
 
@@ -130,14 +130,17 @@ def _frozen(steps: Array, sharp: Array) -> Array:
 
 
 def _runs(high: Array, median: int) -> tuple[Array, Array]:
-    """First and last steps of the jumps: a jump between two stamps that is resampled takes several steps."""
+    """First and last step of each jump; a jump that was resampled takes several steps."""
     instants = np.flatnonzero(high)
     apart = np.diff(instants) > max(median, LIMIT.JUMP_STEPS)
     return instants[np.append(True, apart)], instants[np.append(apart, True)]
 
 
 def _wrap(q: Array, high: Array, usual: Array, median: int) -> bool:
-    """Whether all jumps of every joint have one size, more than once, as those of a count or an angle that starts anew."""
+    """Whether all jumps of every joint have one size and occur more than once.
+
+    A counter or an angle that starts anew jumps so.
+    """
     around, again = LIMIT.JUMP_STEPS, []
     for own, jump, step in zip(q.T, high.T, usual, strict=True):
         if jump.any():
@@ -156,7 +159,9 @@ def _wrap(q: Array, high: Array, usual: Array, median: int) -> bool:
     "for less torque",
 )
 def cut_torques(case: Case) -> Answer | None:
-    """Torques that stay at their largest or smallest value, and what the model fitted to the other samples gives there.
+    """Check whether torques stay at their largest or smallest value.
+
+    The model that is fitted to the other samples says what they would be there.
 
     None if there are none.
     """

@@ -107,7 +107,7 @@ class KnownValues(Result):
 
 
 def known_values(baseline: Baseline) -> KnownValues | None:
-    """The comparison; None if no link has all its values."""
+    """Compare the torque of the robot file's values with the record; None if no link has all values."""
     physical, s = baseline.physical, baseline.samples
     given = [all(f"{family}{j}" in physical.values for family in INERTIAL) for j in physical.links]
     if not any(given):
@@ -162,7 +162,7 @@ class TorqueUnit(Part):
     title = "Unit of the torques"
 
     def warnings(self) -> tuple[str, ...]:
-        """The question to the user."""
+        """The question to the user, as a list."""
         return (self.sentence,)
 
 
@@ -174,7 +174,7 @@ def torque_unit(result: Identification) -> TorqueUnit | None:
 
 
 def torque_unit_doubt(model: GeneratedModel, observation: Observation, by_law: bool) -> str:
-    """The question to the user, a sentence.
+    """The question to the user whether the torques are in N m.
 
     "" if nothing speaks against the unit, or the file has no values.
     """

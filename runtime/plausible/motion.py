@@ -40,7 +40,7 @@ Array = np.ndarray
     f"standing at most {100 * LIMIT.REST_SHARE:g} % of the rows that are used",
 )
 def rest(case: Case) -> Answer:
-    """Share of the instants at which a joint rests, and the change of the fit without them."""
+    """Check how long each joint rests, and how the fit changes without these samples."""
     model, study = case.model, case.study
     share = standing_share(case.samples, study)
     worst = int(np.argmax(share))
@@ -82,7 +82,7 @@ def standing_share(samples: Samples, study: Study) -> Array:
 
 
 def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ...] | None:
-    """rows.low_speed that leaves out the rows of joints that rest, rad/s or m/s.
+    """Threshold `rows.low_speed` that leaves out the rows of joints that rest, rad/s or m/s.
 
     None if at most LIMIT.REST_SHARE of them stand.
     """
@@ -102,7 +102,7 @@ def speed_of_rest(problem: Problem) -> float | tuple[float, ...] | None:
 
 
 def _rounded_up(x: float) -> float:
-    """x to two digits, not below x: a threshold rounded down would keep what it is to leave out."""
+    """Round x up to two digits, since a smaller threshold would keep what it is to leave out."""
     digit = 10.0 ** (np.floor(np.log10(x)) - 1) if x > 0 else 1.0
     return float(f"{np.ceil(x / digit * (1 - 1e-12)) * digit:.2g}")
 
@@ -115,7 +115,7 @@ def _rounded_up(x: float) -> float:
     "a motion), or leave them out (estimate.columns)",
 )
 def motion_excites(case: Case) -> Answer | None:
-    """Parameters that the motion does not determine; None if the study has no rows, or a joint rests."""
+    """Check which parameters the motion does not determine; None without rows, or if a joint rests."""
     if case.observation is None or case.samples.still.any():
         return None
     return excited(case.observation, case.given[0].study.signals, case.records[0].rate)
@@ -168,7 +168,7 @@ def unexcited_shares(observation: Observation, signals: Signals, rate: float) ->
     "joints take differences of the positions",
 )
 def recorded_speeds(case: Case) -> Answer | None:
-    """Gain and lag of recorded velocities; None if none are recorded."""
+    """Check gain and lag of recorded velocities; None if none are recorded."""
     own = max(case.straight, key=lambda one: len(one.record))
     record, signals = own.record, own.study.signals
     if "qd" not in record.channels or signals.velocity == "differences":

@@ -40,7 +40,7 @@ def not_asked(case: Case) -> Answer | None:
     "alternatives below",
 )
 def physics(case: Case) -> Answer | None:
-    """Errors by joint of the best physical robot and of free parameters."""
+    """Compare the errors of the best physical robot with those of free parameters, by joint."""
     if case.alone is None:
         return None
     free, given = case.alone.free, case.alone.given
@@ -66,7 +66,7 @@ def physics(case: Case) -> Answer | None:
     "tells of that model, not of the robot",
 )
 def measured(case: Case) -> Answer | None:
-    """Whether the torques are measured ones: some joint shows friction, and they are noisy.
+    """Check whether the torques look measured: some joint shows friction, and there is noise.
 
     Friction is a share of a joint's torque, noise comes from fifth differences of the samples.
     None if a law of the controller gives the torques.
@@ -103,7 +103,7 @@ def measured(case: Case) -> Answer | None:
     "drives.ratio, torque_constant)",
 )
 def size(case: Case) -> Answer | None:
-    """Mass that the torques ask for, against the reach of the robot; None if that is not known."""
+    """Check the mass that the torques ask for against the reach of the robot; None if that is unknown."""
     if case.alone is None or not case.alone.physical.links or not case.turning.all():
         return None
     length, physical = reach(case.model, case.samples.q), case.alone.physical
@@ -125,7 +125,7 @@ def size(case: Case) -> Answer | None:
     "subtracted as record.columns.tau_known; or the values are those of another robot",
 )
 def values(case: Case) -> Answer | None:
-    """The values of the robot file, by joint."""
+    """Check the values of the robot file, by joint."""
     if case.robot_values is None:
         return None
     if off := case.robot_values.off:
@@ -143,7 +143,10 @@ def values(case: Case) -> Answer | None:
     f"shift below {1e3 * LIMIT.LATE:g} ms, or not beyond what the record tells",
 )
 def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
-    """Time shift between positions and torques; None if the record does not determine it, or an alternative explains it better."""
+    """Check for a time shift between positions and torques.
+
+    None if the record does not determine it, or if an alternative explains the record better.
+    """
     late = None if case.baseline is None else case.late
     if late is None or not np.isfinite(late.sigma).any():
         return None
@@ -180,13 +183,16 @@ def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
 
 
 def _from_to(text: str, before: float, after: float) -> str:
-    """The text and how an error goes, %; "" if it stays."""
+    """Add to the text how an error changes, in %; "" if it stays."""
     a, b = f"{before:.1f}", f"{after:.1f}"
     return "" if a == b else f"; {text} from {a} to {b} %"
 
 
 def late_joints(late: Delay) -> Array:
-    """Joints whose delay is certain, bool (n,): all of them where one delay serves all, else those of one sign."""
+    """Joints whose delay is certain, bool (n,).
+
+    If one delay suits all joints, these are all; otherwise those whose delays have one sign.
+    """
     visible = late.before > LIMIT.DELAY_VISIBLE * late.after
     certain = np.fmax(LIMIT.CERTAIN_JOINT_DELAY * late.sigma, LIMIT.LATE_JOINT)
     apart = visible & (np.abs(late.shift - late.common) > certain)

@@ -102,7 +102,10 @@ def moving(qd: Array) -> Array:
 
 
 def excerpts(reading: Prepared) -> list[Prepared]:
-    """EXCERPTS of a long record, evenly spread over the window; one that is not longer as it is."""
+    """Cut a long record to EXCERPTS that are spread evenly over the window.
+
+    A shorter record stays whole.
+    """
     record = reading.record
     start, stop = window_of(record.t, reading.study.rows.window, record.name)
     number, length = LIMIT.EXCERPTS
@@ -127,7 +130,7 @@ def excerpts(reading: Prepared) -> list[Prepared]:
 
 @dataclass(frozen=True, eq=False)
 class Filtered:
-    """A record through a low-pass of its motion.
+    """A record whose motion is low-pass filtered.
 
     Attributes
     ----------
@@ -203,7 +206,9 @@ def usable(record: Record, study: Study, before: int, after: int) -> Array:
 
 
 def _instants(through: Filtered, number: int) -> Samples:
-    """One record, one sample in about 0.8 rate/(2 cutoff), two where these are fewer than LIMIT.INSTANTS_LEAST in a long record.
+    """Choose the instants of one record: one for about 0.8 rate/(2 cutoff) samples.
+
+    There are two where these would be fewer than LIMIT.INSTANTS_LEAST in a long record.
 
     Without 2/cutoff at each end.
     """
@@ -227,8 +232,9 @@ def _instants(through: Filtered, number: int) -> Samples:
 
 
 def _steady(qd: Array, reach: float) -> Array:
-    """Whether the sign of a velocity is one from `reach` samples before to as many after, bool
-    (N,); half of that, or none of it, where less than half of the samples would be left.
+    """Whether a velocity keeps its sign from `reach` samples before to as many after, bool (N,).
+
+    The reach is halved, or zero, where less than half of the samples would be left.
     """
     turned = np.cumsum(np.diff(np.sign(qd), prepend=np.sign(qd[:1])) != 0)
     k = np.arange(len(qd))

@@ -78,7 +78,7 @@ def _joint_names(case: Case, still: Array) -> list[tuple[int, str]]:
     "the columns, the unit and the side of the positions",
 )
 def positions(case: Case) -> Answer:
-    """Largest |q| against limits.q, else against a turn or two."""
+    """Compare the largest |q| with limits.q, or without these with a turn or two."""
     q, turning = case.samples.q, case.turning
     low, high = q.min(axis=0), q.max(axis=0)
     largest = np.maximum(-low, high)
@@ -111,7 +111,7 @@ def positions(case: Case) -> Answer:
 
 
 def _against(case: Case, key: str, values: Array, sane: dict[str, tuple[float, float]]) -> Answer:
-    """Largest speeds or accelerations against the limits of the robot file, else sane ones."""
+    """Compare the largest speeds or accelerations with the limits of the robot file, or with usual ones."""
     unit = {"qd": "s", "qdd": "s^2"}[key]
     limits = case.limits(key)
     if limits is not None:
@@ -131,7 +131,7 @@ def _against(case: Case, key: str, values: Array, sane: dict[str, tuple[float, f
     "unit and the side of the positions",
 )
 def speeds(case: Case) -> Answer:
-    """Largest speed of every joint; one that is far too slow too."""
+    """Check the largest speed of every joint; it may be far too small, too."""
     largest = np.abs(case.samples.qd).max(axis=0)
     answer = _against(case, "qd", largest, LIMIT.LARGEST_SPEED)
     if float(largest.max()) < LIMIT.NOTHING_MOVES:
@@ -145,7 +145,7 @@ def speeds(case: Case) -> Answer:
     "lower signals.lowpass.cutoff",
 )
 def accelerations(case: Case) -> Answer:
-    """Largest acceleration of every joint."""
+    """Check the largest acceleration of every joint."""
     largest = np.abs(case.samples.qdd).max(axis=0)
     answer = _against(case, "qdd", largest, LIMIT.LARGEST_ACCELERATION)
     mild = answer.state == "no" and case.limits("qdd") is not None
@@ -159,7 +159,7 @@ def accelerations(case: Case) -> Answer:
     "torque_side, columns.tau)",
 )
 def torques(case: Case) -> Answer:
-    """Largest torque against limits.tau, where the robot file gives them.
+    """Compare the largest torques with limits.tau, if the robot file gives them.
 
     Torques that never change.
     """
@@ -189,7 +189,7 @@ def torques(case: Case) -> Answer:
     "give d and r of the robot file in m",
 )
 def lengths(case: Case) -> Answer | None:
-    """Reach and the longest link of the robot file, in the positions of the record."""
+    """Check the reach and the longest link of the robot file in the positions of the record."""
     P = frame_origins(case.model, case.samples.q[:: max(1, len(case.samples) // 32)])
     if P is None or not P.shape[1]:
         return None
@@ -213,7 +213,10 @@ def lengths(case: Case) -> Answer | None:
     "-integral x y dm; kg m^2",
 )
 def inertias(case: Case) -> Answer | None:
-    """Whether the values of the robot file are those of bodies: every pseudo-inertia positive semidefinite."""
+    """Check whether the values of the robot file are those of bodies.
+
+    Every pseudo-inertia must be positive semidefinite.
+    """
     if case.physical is None or not case.physical.values:
         return None
     if far := list(_far_bodies(case.physical, reach(case.model, case.samples.q))):
@@ -225,7 +228,10 @@ def inertias(case: Case) -> Answer | None:
 
 
 def _far_bodies(physical: PhysicalModel, length: float) -> Iterator[str]:
-    """Links whose given values, fewer than ten perhaps, put their mass beyond LIMIT.LINK_EXTENT times the reach of the robot, m, from their frame."""
+    """Find links whose values put their mass further than LIMIT.LINK_EXTENT reaches from their frame.
+
+    A link may have fewer than ten values.
+    """
     for j in physical.links:
         given = {family: physical.values.get(f"{family}{j}", 0.0) for family in INERTIAL}
         mass = abs(given["M"])

@@ -55,7 +55,7 @@ Change = Callable[[float], Cause]
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A cause, fitted.
+    """A cause and the fit of its parameters.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
-    """The study as it is, fitted: what causes are compared with.
+    """The fit of the study as it is, with which causes are compared.
 
     Attributes
     ----------
@@ -170,7 +170,10 @@ class Baseline:
         return grams if grams.of_joints.shape[1] == p + 1 else grams.mapped(self.physical.K)
 
     def bound(self, grams: Grams) -> Fit:
-        """Least squares, near the values of the robot file if it has them: what no physical robot explains better."""
+        """Least squares, drawn towards the values of the robot file if it has them.
+
+        No physical robot explains the rows better.
+        """
         if self.bodies.near_values:
             return least_squares(self.standard(grams), self.N, self.bodies)
         return least_squares(grams, self.N)
@@ -186,9 +189,9 @@ class Baseline:
         return how(self.standard(grams), self.bodies, self.N, sigma)
 
     def trial(self, cause: Cause, sigma: Array | None = None) -> Trial:
-        """A cause under the conditions of a physical robot. Rows count as much as they do for the
-        residuals of the study, or for its own: what it explains makes those of the study alike.
-        sigma : first weights.
+        """Fit a cause under the conditions of a physical robot.
+
+        Its rows are weighted by the residuals of the study, or by its own. sigma : first weights.
         """
         rows = self.rows(cause)
         if rows is None:
@@ -201,7 +204,7 @@ class Baseline:
         return Trial(cause, fit, gain)
 
     def unseen(self, cause: Cause) -> float:
-        """Score of a cause in nats, each of two parts of the rows by the parameters of the other.
+        """Score of a cause in nats: each of two parts of the rows is predicted by a fit of the other.
 
         Parts are blocks of time by turns.
         """
@@ -259,7 +262,7 @@ class Baseline:
         return W, explained, e, A + self.bodies.stiffness(self.given.X)
 
     def effect(self, change: Callable[[float], Cause]) -> Array:
-        """J = d tau/d xi: derivative of the study's torques by the number xi, shape (K, n)."""
+        """Derivative J = d tau/d xi of the study's torques by the number xi, shape (K, n)."""
         explained = self.normal[1]
         cause = change(LIMIT.DIFFERENCE_STEP)
         rows = self.rows(cause)
@@ -272,7 +275,9 @@ class Baseline:
         return np.asarray((moved - plain) / LIMIT.DIFFERENCE_STEP)
 
     def first_step(self, J: Array) -> tuple[Array, Array] | None:
-        """xi of numbers of effect J, shape (a, K, n), beside the model, and their covariance.
+        """First step xi of each number, by its effect J, shape (a, K, n), and the covariance.
+
+        The parameters of the model are free, too.
 
         None if the samples do not tell them from it.
         """
@@ -340,14 +345,17 @@ def regressor(model: GeneratedModel, states: tuple[Array, Array, Array], **const
 
 
 def bodies_of(physical: PhysicalModel, size: float, Y: Array, values: bool) -> Bodies:
-    """Bodies of the size, m, that torques Y, shape (K, n), ask for."""
+    """Bodies of the size, m, that the torques Y, shape (K, n), ask for."""
     torque = float(np.sqrt((Y**2).mean(axis=0)).max()) or 1.0
     mass = max(torque / (9.81 * size), 1e-3)
     return Bodies(physical, mass, 0.3 * size, 0.01 * torque, values=values)
 
 
 def counting_rows(D: Array, Y: Array, mask: Array, X: Array) -> float:
-    """Rows of a joint that count: those of the moving joints on average, less by the correlation of neighbouring residuals."""
+    """Number of rows of a joint that count.
+
+    It is the average over moving joints, reduced by the correlation of neighbouring residuals.
+    """
     counts = []
     for j in range(Y.shape[1]):
         e = (Y[:, j] - D[:, j] @ X)[mask[:, j]]
@@ -367,7 +375,7 @@ def reach(model: GeneratedModel, q: Array) -> float:
 
 
 def try_causes(baseline: Baseline, sides: Sequence[str] = ("joint", "joint")) -> list[Trial]:
-    """All causes, the best first.
+    """Try all causes and return them, the best first.
 
     Another sampling rate has to gain LIMIT.RATE_GAIN more, since a slower motion gives the
     parameters more room, and so has a coupling, the scale of a position and a constant torque.
@@ -386,7 +394,7 @@ def try_causes(baseline: Baseline, sides: Sequence[str] = ("joint", "joint")) ->
 
 
 def _of_causes(baseline: Baseline, which: Sequence[Cause]) -> list[Trial]:
-    """Trials of causes without a number.
+    """Try the causes that have no number.
 
     Those that cannot win are not fitted under the conditions of a physical robot.
     """
@@ -422,7 +430,10 @@ def _of_causes(baseline: Baseline, which: Sequence[Cause]) -> list[Trial]:
 
 
 def _of_numbers(baseline: Baseline, robot: Robot) -> list[Trial]:
-    """Trials of the numbers whose first step gains enough, each at its best value, and those that no fit can tell."""
+    """Try the causes with a number whose first step gains enough, each at its best value.
+
+    Also returns those that no fit can distinguish from the study.
+    """
     trials: list[Trial] = []
     steps: list[tuple[float, float, Row, Change]] = []
     for row in NUMBERS:
@@ -452,7 +463,7 @@ def _of_numbers(baseline: Baseline, robot: Robot) -> list[Trial]:
 
 
 def _search_number(baseline: Baseline, row: Row, change: Change, first: float) -> Trial | None:
-    """A number at its best value, which pays half of log N for each parameter.
+    """Find the best value of a number; each parameter costs half of log N.
 
     A coarse grid, weights those of the study, then golden section, weights those of each value by
     itself: far from the best these may be worse than none.
@@ -490,7 +501,9 @@ def _search_number(baseline: Baseline, row: Row, change: Change, first: float) -
 
 
 def slow_friction(baseline: Baseline) -> Array | None:
-    """Friction at low speed that the model lacks, by joint, N m or N, to first order: of joints that have it for certain.
+    """Estimate to first order the friction at low speed that the model lacks, N m or N, by joint.
+
+    It is given for joints that certainly have it.
 
     None without such joints.
     """
@@ -570,7 +583,7 @@ def takes_away(given: Fit, fit: Fit) -> Array:
 
 
 def leaves_values(fit: Fit, baseline: Baseline) -> bool:
-    """Whether bodies need more or less torque in the motion of the study than those of the robot file by more than LIMIT.CAD_RATIOS.
+    """Whether the robot file's bodies need other torques than the fitted ones, beyond LIMIT.CAD_RATIOS.
 
     False where the file lacks a body.
     """
@@ -585,7 +598,10 @@ def leaves_values(fit: Fit, baseline: Baseline) -> bool:
 
 
 def helps(trial: Trial, baseline: Baseline, other: Baseline) -> bool:
-    """Whether the parameters of a cause explain another record better than those of the study, read as the study says or as the cause says."""
+    """Whether the parameters of a cause explain another record better than those of the study.
+
+    The record is read as the study says, or as the cause says.
+    """
 
     def misfit(cause: Cause, X: Array) -> float:
         rows = other.rows(cause)
@@ -603,7 +619,7 @@ def _misfit(grams: Grams, X: Array) -> float:
 
 
 def loads(baseline: Baseline) -> list[Trial]:
-    """The study with other values of the last link than those of the robot file, as a load has them.
+    """Try other values of the last link than those of the robot file, as a load would give.
 
     Its ten parameters cost half of log N each. None where the file does not give them.
     """

@@ -56,7 +56,7 @@ PIECE = 4096
 PART = 16384
 """Kept samples that are computed at a time."""
 TRUNCATION = 1e-20
-"""Weight that a sample beyond the reach of the filter would have, relative to the signal."""
+"""What is left of the slowest mode of the filter after `reach` samples."""
 
 
 @dataclass(frozen=True, eq=False)
