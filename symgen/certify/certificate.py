@@ -194,7 +194,7 @@ class Certificate:
 
 
 def _plain(value: Any) -> Any:
-    """The same with null in the place of numbers that are not finite."""
+    """The mapping with null in place of numbers that are not finite."""
     if isinstance(value, Mapping):
         return {key: _plain(x) for key, x in value.items()}
     return None if isinstance(value, float) and not math.isfinite(value) else value
@@ -203,7 +203,7 @@ def _plain(value: Any) -> Any:
 def certify_formulas(
     regrouping: Regrouping, *, seed: int = 101, sampler: Sampler = sample
 ) -> Certificate:
-    """The certificate of the formulas of `regrouping`.
+    """Check the formulas of `regrouping` and return the certificate.
 
     `certify.modules.certify` adds the emitted module.
 
@@ -295,7 +295,7 @@ def certify_formulas(
 
 
 def _special(robot: Robot, gap: float, W: Array) -> str:
-    """Why the rank of the base columns W at the constants of the file is below that elsewhere."""
+    """Explain why the rank of the base columns W at the file's constants is below that elsewhere."""
     if roots := independent_roots(robot):
         return (
             f"{', '.join(roots)} {'count' if len(roots) > 1 else 'counts'} as any number: the rank "
@@ -318,13 +318,13 @@ def independent_roots(robot: Robot) -> list[str]:
 
 
 def _too_small(W: Array) -> str:
-    """How many directions of the base parameters act by less than 1e-9 of the largest."""
+    """Count the directions of the base parameters that act by less than 1e-9 of the largest."""
     s = np.linalg.svd(W, compute_uv=False)
     return f"{np.sum(s < 1e-9 * s[0])} combinations of base parameters"
 
 
 def hair_off(robot: Robot, what: str) -> str:
-    """Message about a geometry so near to a special one that floats do not distinguish them."""
+    """Message about a geometry that is so near to a special one that floats cannot distinguish them."""
     angles = "; ".join(nearly_round(robot, WITHIN)) or "round the numbers that are meant round"
     return (
         f"the file is a hair off a special geometry: {what} of it act by less than 1e-9 of the "
@@ -334,7 +334,7 @@ def hair_off(robot: Robot, what: str) -> str:
 
 
 def vanishing_denominators(regrouping: Regrouping) -> list[str]:
-    """Denominators of coefficients that are zero at the constants of the robot file, a sentence each."""
+    """Find coefficients whose denominator is zero at the robot file's constants; one sentence each."""
     values, texts = regrouping.robot.constants, []
     for b in regrouping.base:
         below = {
@@ -401,7 +401,11 @@ def degree(regrouping: Regrouping) -> int:
 def _modulo(
     regrouping: Regrouping, seed: int, p: int, sampler: Sampler
 ) -> tuple[int | None, list[str]]:
-    """Rank of the base columns over F_p (None if no points of one geometry are found), and the columns that are not what the formulas say."""
+    """Check rank and formulas over F_p.
+
+    Returns the rank of the base columns, None if one geometry gives no points, and the columns
+    that differ from their formulas.
+    """
     robot = regrouping.robot
     names, own = robot.parameters, [robot.parameters.index(name) for name in regrouping.own]
     if close(robot).tied:
@@ -429,7 +433,10 @@ def _modulo(
 
 
 def _false_in_floats(regrouping: Regrouping, W: Array, base: list[int]) -> list[str]:
-    """Columns of the independent regressor that the formulas miss by more than ROUNDED of the largest entry."""
+    """Find columns of the independent regressor that the formulas miss.
+
+    A column counts if the error exceeds ROUNDED of the largest entry.
+    """
     robot = regrouping.robot
     K = base_values(regrouping, np.eye(len(robot.parameters)), robot.constants)
     off = np.abs(W[:, base] @ K - W).max(axis=0) > ROUNDED * np.abs(W).max()
@@ -439,7 +446,10 @@ def _false_in_floats(regrouping: Regrouping, W: Array, base: list[int]) -> list[
 
 @lru_cache(maxsize=4)
 def independent(robot: Robot) -> Sample:
-    """The regressor by energies at random states of `robot`, kept for further certificates of the robot."""
+    """The regressor by energies at random states of `robot`.
+
+    It is kept for further certificates of the robot.
+    """
     from symgen.derive.lagrange import (
         in_one_mode,
         sampled,

@@ -17,7 +17,9 @@ ENTRIES_OF_FRAMES = ("gamma", "b", "alpha", "d", "theta", "r")
 
 
 def claim(regrouping: Regrouping, certificate: Certificate) -> dict[str, Any]:
-    """The claim: robot, relations, rank, primes, formulas, what ran of each text with its hash.
+    """State the claim that others can check.
+
+    It holds robot, relations, rank, primes, formulas, and what ran of each text with its hash.
 
     Expressions are texts in the grammar of robot files. The identities are those of the columns of
     all standard parameters, D_chi = sum_k coefficient_k,chi D_own,k, at random points over F_p.
@@ -78,5 +80,5 @@ def _element(robot: Robot, e: Element) -> dict[str, Any]:
 
 
 def _has_energy(e: Element) -> bool:
-    """Whether a column of the file's own is an energy."""
+    """Whether a column that the robot file defines is an energy."""
     return e.is_own and any(str(e.potential(j)) != "0" for j in e.along)

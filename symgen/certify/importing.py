@@ -33,7 +33,7 @@ CERTIFICATE = re.compile(
 
 
 def cache_folder() -> Path:
-    """Folder of the emitted modules: SYMGEN_CACHE/modules, or that of the platform for files that can be made again."""
+    """Folder of the emitted modules: SYMGEN_CACHE/modules, or the cache folder of the platform."""
     if given := os.environ.get("SYMGEN_CACHE"):
         return Path(given) / "modules"
     if sys.platform == "win32":
@@ -64,8 +64,10 @@ def cached_path(file: str, text: str) -> Path | None:
 
 
 def stored_path(file: str, text: str) -> Path:
-    """Path of a file that holds `text`, in the cache, by what its certificate vouches
-    for and by the whole, or, where that cannot be written, in a folder of this process.
+    """Path of a file that holds `text`.
+
+    It lies in the cache, under a name made from the certified part and from the whole text; if
+    the cache cannot be written, in a folder of this process.
 
     Raises SymgenError if no file can be written at all.
     """
@@ -91,7 +93,7 @@ def without_certificate(text: str) -> str:
 
 
 def imported(path: Path) -> ModuleType:
-    """The module of an emitted file, called generated_ROBOT."""
+    """Import an emitted file as the module generated_ROBOT."""
     name = f"generated_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path, loader=_TextLoader(name, str(path)))
     if spec is None or spec.loader is None:
@@ -116,7 +118,10 @@ class _TextLoader(SourceFileLoader):
 
 
 def is_writable_by_others(folder: Path) -> bool:
-    """Whether somebody else may put files into the folder, or another folder in its place: what lies there proves nothing."""
+    """Whether others may write into the folder, or put another in its place.
+
+    Files there prove nothing.
+    """
     if os.name != "posix":
         return False
     for place in (folder, *folder.absolute().parents):

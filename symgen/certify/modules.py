@@ -27,7 +27,7 @@ def certify(
     files: Mapping[str, str] | None = None,
     options: Sequence[str] = (),
 ) -> Certificate:
-    """The certificate of the formulas of `regrouping` and of texts made from it: the verdict of `symgen check`.
+    """Certify the formulas of `regrouping` and the texts made from it, as `symgen check` does.
 
     Parameters
     ----------
@@ -133,9 +133,7 @@ def model(robot: str | Path | Robot, *, options: Sequence[str] = ()) -> ModuleTy
 
 
 def _certified_path(robot: Robot, target: str, options: Sequence[str] = ()) -> Path | None:
-    """Path of a text in the cache: what lies there has been certified. None if the robot has no
-    text of the target.
-    """
+    """Path of a certified text in the cache; None if the target makes no text of the robot."""
     for file, text in generate_files(robot, targets=(target,), options=options).items():
         cached = cached_path(file, text)
         return cached or stored_path(file, _certified(regroup(robot), {file: text}, options)[file])

@@ -24,7 +24,7 @@ States = tuple[Array, Array, Array]
 def requested_values(
     model: Lagrange, regrouping: Regrouping, chi: Array, states: States, tree: States, qddr: Array
 ) -> dict[str, Callable[[], Array]]:
-    """{model: its values, (N, ...)}.
+    """Independent values (N, ...) of the models that are emitted on request, by name.
 
     states : q, qd, qdd of the actuated joints, (N, n); qdd is qdr too. tree : those of all moving
     joints. qddr : reference accelerations.
@@ -40,7 +40,7 @@ def requested_values(
         return np.asarray((columns(q, qd, zero) - columns(q, zero, zero)) * rubs)
 
     def slotine_li() -> Array:
-        """A qddr + Q + friction, and C qdr, a difference of squares."""
+        """Torque A qddr + C qdr + Q + friction, with C qdr as a difference of squares."""
         h = [columns(q, u, zero) for u in (qd + qdr, qd, qdr, zero)]
         rubs = of_elements(robot, lambda e: e.is_friction)[own]
         C = (h[0] - h[1] - h[2] + h[3]) / 2 * ~rubs
@@ -74,6 +74,6 @@ def requested_values(
 
 
 def of_elements(robot: Robot, which: Callable[[Element], bool]) -> Array:
-    """Whether each standard parameter is one of such elements."""
+    """Whether each standard parameter belongs to one of these elements."""
     own = {parameter(e.family, j) for e in robot.elements if which(e) for j in e.keys}
     return np.array([name in own for name in robot.parameters])

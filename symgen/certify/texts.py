@@ -114,7 +114,7 @@ class TextCheck:
 
     @property
     def sentence(self) -> str:
-        """Sentence on what ran."""
+        """Say in one sentence what ran, and with which result."""
         if self.not_run:
             return f"not run: {self.not_run}"
         uses = ", ".join(self.uses)
@@ -169,7 +169,10 @@ def with_certificate(text: str, check: TextCheck, formulas: str) -> str:
 def module_errors(
     path: Path, witness: Witness
 ) -> tuple[dict[str, float], dict[str, str], tuple[str, ...]]:
-    """Errors of the functions of a Python module, what they raised, and how they were used."""
+    """Run the functions of a Python module.
+
+    Returns their errors, the exceptions they raised, and how they were called.
+    """
     try:
         module, stacked = imported(path), imported(path)
     except (RecursionError, MemoryError) as error:
@@ -248,7 +251,7 @@ def outcome(
 
 
 def difference(value: Any, expected: Array, scale: Array | float) -> float:
-    """Largest difference, of `scale`; infinite for another shape, and for NaN."""
+    """Largest difference relative to `scale`; infinite for other shapes and for NaN."""
     value = np.asarray(value, dtype=float)
     if value.shape != expected.shape:
         return float("inf")
@@ -265,7 +268,7 @@ def _called(module: ModuleType, name: str, check: Check, constants: Mapping[str,
 def _by_casadi(
     module: ModuleType, name: str, check: Check, constants: Mapping[str, float]
 ) -> Array:
-    """Results side by side, by sample, as on NumPy's arrays."""
+    """Run a function by CasADi, sample by sample, and stack the results as NumPy's."""
     function, arguments = _function(module, name, *check.keywords.values()), check.arguments
     alone, ndim = arguments[0].ndim == 1, check.expected.ndim
     N = 1 if alone else len(arguments[0])
@@ -287,7 +290,7 @@ def _function(module: ModuleType, name: str, *frame: int) -> Any:
 
 
 def _derivative_error(module: ModuleType, witness: Witness) -> float:
-    """Error of the derivatives of torques by q, qd, qdd, X that are known: the last two, A and D."""
+    """Error of those derivatives of the torques that are known: by qdd it is A, by X it is D."""
     function = module.casadi(DERIVATIVES)
     states = (witness.q[0], witness.qd[0], witness.qdd[0], witness.X)
     *_, A, D = map(np.asarray, function(*states, *witness.keywords.values()))
@@ -298,7 +301,7 @@ def _derivative_error(module: ModuleType, witness: Witness) -> float:
 
 
 def same_elements(table: Any, constants: Mapping[str, float], witness: Witness) -> bool:
-    """Whether every element has its kind, its direction of motion, its row or its form."""
+    """Whether every element has the kind, the direction of motion, and the row or form of the robot file."""
     expected = element_names(witness.robot)
     if list(table) != [name for name in witness.robot.parameters if name in expected]:
         return False
@@ -330,7 +333,7 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
             return {f"{CLOSED}1": float("inf")}
 
         def given(f: str, check: Check, k: Any) -> list[list[float]]:
-            """Arguments at the states k; those of closed mechanisms are one."""
+            """Arguments at the states k; for a closed mechanism this is one struct."""
             named = dict(zip(MODELS[f].arguments, check.arguments, strict=True))
             if closed is not None:
                 named = {"s": closed} | {x: a for x, a in named.items() if x not in STATE_NAMES}
@@ -379,7 +382,7 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
 
 
 def _closed(library: Path, witness: Witness, constants: list[float]) -> Array:
-    """The closed mechanism of the C file at every state, NaN where it does not get there."""
+    """Close the mechanism by the C file at every state; NaN where Newton's method fails."""
     name, closure = witness.robot.name, close(witness.robot)
     n, m = len(witness.robot.joints), len(closure.tied)
     calls: list[Call] = [
@@ -396,13 +399,13 @@ def _closed(library: Path, witness: Witness, constants: list[float]) -> Array:
 
 
 def _results(library: Path, calls: list[Call]) -> Any:
-    """[status, numbers] of calls of functions of a library."""
+    """Call functions of a library; returns [status, numbers] of each call."""
     job = {"library": str(library), "calls": calls}
     return json.loads(_run([sys.executable, "-I", call_c.__file__], json.dumps(job)))
 
 
 def _of_one_state(name: str, text: str, witness: Witness) -> Iterator[tuple[str, Check]]:
-    """The functions of one state, with what they have to give for every state."""
+    """The functions of one state, with the values that they must give at every state."""
     for f in _one_state(name, text):
         every = [c for c in witness.checks.get(f, ()) if c.arguments[0].ndim > 1]
         framed = [c for c in every if c.keywords.get("frame")]
@@ -415,7 +418,7 @@ def _one_state(name: str, text: str) -> list[str]:
 
 
 def _stored(f: str, shape: tuple[int, ...]) -> tuple[int, ...]:
-    """The shape of a result in its store: columns first, where it is stored so."""
+    """Shape of a result as it is stored: with the columns first if the model says so."""
     return shape[::-1] if MODELS[f].by_columns else shape
 
 

@@ -59,7 +59,7 @@ def variants(robot: str | Path | Robot) -> ModuleType:
 
 
 def freed(robot: Robot) -> Robot:
-    """The robot with symbols in place of its angles, lengths and gravity; of a robot with loops, of its gravity."""
+    """Replace the angles, lengths and gravity of a robot by symbols; with loops, gravity alone."""
     constants = dict(robot.constants)
     tied = {  # frames on the paths between the joints that constraints tie to each other
         frame

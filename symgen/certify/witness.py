@@ -141,7 +141,7 @@ class Witness:
 
     @cached_property
     def own(self) -> Array:
-        """Columns of the parameters that the base parameters are called after, (N, n, b)."""
+        """Columns of the parameters that give the base parameters their names, (N, n, b)."""
         return self.D[:, :, [self.robot.parameters.index(name) for name in self.regrouping.own]]
 
     @cached_property
@@ -167,7 +167,7 @@ class Witness:
 
     @cached_property
     def checks(self) -> dict[str, list[Check]]:
-        """{function: what it has to give}."""
+        """The values that each function must give, by name."""
         q, qd, qdd, X = self.q, self.qd, self.qdd, self.X
         N, _, b = self.own.shape
         columns = np.abs(self.own).max(axis=(0, 1))
@@ -234,7 +234,7 @@ class Witness:
     def value(
         self, name: str, of: int = 0, frame: int = 0, rows: Sequence[int] | None = None
     ) -> Array:
-        """Value of a model, (N, ...), for frame `of` in components of frame `frame`.
+        """Value of a model, (N, ...), for frame `of`, with components in frame `frame`.
 
         A determinant uses the given rows, from 1, or else those that are not zero.
         """
@@ -299,7 +299,7 @@ class Witness:
 
 
 def ungrouped(robot: Robot) -> Regrouping:
-    """All standard parameters as they are."""
+    """A regrouping in which every standard parameter stands for itself."""
     return Regrouping(
         robot, tuple(BaseParameter(name, name, {name: ONE}) for name in robot.parameters), ()
     )
@@ -311,7 +311,10 @@ def is_assumed(robot: Robot) -> Array:
 
 
 def bodies(robot: Robot, rng: np.random.Generator) -> Array:
-    """Standard parameters (p,): every link made of four points of mass, all else between 0.1 and 1."""
+    """Draw standard parameters (p,) of real bodies.
+
+    Every link is made of four points of mass; all other parameters lie between 0.1 and 1.
+    """
     chi = rng.uniform(0.1, 1.0, len(robot.parameters))
     for j in robot.links:
         m, P = rng.uniform(0.5, 2.0, 4), rng.uniform(-0.5, 0.5, (4, 3))
@@ -339,7 +342,7 @@ def _at(robot: Robot, constants: Mapping[str, float]) -> Sample:
 
 
 def _sampled(regrouping: Regrouping, fixed: Mapping[str, float]) -> tuple[Sample, str]:
-    """States at drawn constants, and which these are."""
+    """Draw states and constants; returns the states and these constants."""
     robot, rng = regrouping.robot, np.random.default_rng(8)
     spreads = SPREADS[2 * bool(close(robot).tied) :]
     for spread, zero in spreads if robot.constants and regrouping.method == EXACT else ():
@@ -354,6 +357,6 @@ def _sampled(regrouping: Regrouping, fixed: Mapping[str, float]) -> tuple[Sample
 
 
 def _torque(A: Array, qdd: Array, H: Array) -> Array:
-    """A qdd + H of accelerations that a wrong text may have made infinite."""
+    """Compute A qdd + H; accelerations may be infinite, if a wrong text made them."""
     with np.errstate(over="ignore", invalid="ignore"):
         return np.asarray((A @ qdd[..., None])[..., 0] + H)

@@ -121,7 +121,7 @@ class ClosedDraw(Draw):
         return closed
 
     def _dyad(self, rows: list[int], u: int, v: int, around: set[int]) -> Array:
-        """Solve two equations for joint u and hinge v; which samples have a root in F_p.
+        """Solve two equations for joint u and hinge v; says which samples have a solution in F_p.
 
         r = sum_ik R_ik y_i z_k with y = (1, cos u, sin u) or (1, u), z = (1, cos v, sin v).
         """
@@ -147,7 +147,10 @@ class ClosedDraw(Draw):
         R[:, 1:] -= R[:, :1]
 
         def place(x: Array) -> Array:
-            """Joint u at the half-angle tangent or stroke x; y there, or 1, x, x**2."""
+            """Put joint u at the half-angle tangent or stroke x.
+
+            Returns y there, or its coefficients of 1, x and x**2.
+            """
             if slides:
                 self._residues[q_u] = x
                 return np.stack([whole, x, x * x % p])
@@ -225,7 +228,7 @@ class ClosedDraw(Draw):
         )
 
     def _take(self, closed: Array) -> None:
-        """Leave the first samples that close of each geometry; `closed` is (geometries, samples)."""
+        """Keep the first samples of each geometry that close; `closed` is (geometries, samples)."""
         count = self.shape[1]
         whole = self.samples
         if (closed.sum(axis=1) < count).any():
@@ -240,7 +243,7 @@ class ClosedDraw(Draw):
         self.samples = len(places)
 
     def _move(self) -> None:
-        """Rates and accelerations of the tied joints."""
+        """Compute rates and accelerations of the tied joints."""
         joints = self.robot.joints
         n = len(joints)
         named = self.system.derivation.algebra.named
@@ -260,7 +263,7 @@ class ClosedDraw(Draw):
             self._residues[Symbol("qdd", f"QDP{u}")] = (along + bend) % self.p
 
     def _solved(self, A: Array, b: Array) -> Array:
-        """x with A x = b sample by sample, A of shape (m, m, samples).
+        """Solve A x = b sample by sample; A has shape (m, m, samples).
 
         A singular sample gives ArithmeticError.
         """
@@ -272,7 +275,11 @@ class ClosedDraw(Draw):
 
 
 def closed_draw(robot: Robot, seed: int, samples: int, **given: Any) -> ClosedDraw:
-    """A ClosedDraw; one that happens to be singular, or to close too rarely at one of many geometries, is made again and wider."""
+    """Draw closed states.
+
+    A draw that is singular by chance, or that closes too rarely at one of many geometries, is
+    repeated with more samples.
+    """
     for k in range(ATTEMPTS):
         try:
             return ClosedDraw(robot, seed + 1000 * k, samples, wide=1 + k, **given)
@@ -283,7 +290,7 @@ def closed_draw(robot: Robot, seed: int, samples: int, **given: Any) -> ClosedDr
 
 
 def lengths_of(robot: Robot) -> tuple[Length, ...]:
-    """Constants, numbers and roots in b, d and r of the frames, in their order."""
+    """Collect constants, numbers and roots in b, d and r of the frames, in their order."""
     atoms: dict[Length, None] = {}
     for f in robot.frames:
         for e in (f.b, f.d, f.r0):

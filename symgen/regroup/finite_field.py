@@ -45,7 +45,7 @@ def rref(M: Array, p: int, *, reduced: bool = True) -> tuple[list[int], Array]:
 
 
 def solve_each(W: Array, p: int, rng: np.random.Generator) -> Array | None:
-    """beta with W[g, :, -1] = W[g, :, :-1] beta[g] for every g at once, shape (G, columns - 1).
+    """Solve W[g, :, -1] = W[g, :, :-1] beta[g] for every g at once; shape (G, columns - 1).
 
     None unless all are consistent.
 
@@ -69,8 +69,10 @@ def solve_each(W: Array, p: int, rng: np.random.Generator) -> Array | None:
 
 
 def small_rational(x: int, p: int, bound: int = 30) -> Fraction | None:
-    """The fraction a/b with |a|, b <= bound that equals x mod p, if there is one (Wang's reconstruction).
-    One random residue of 31 bits in two million is one up to 30, in two thousand up to 1000.
+    """Find the fraction a/b with |a|, b <= bound that equals x mod p, by Wang's reconstruction.
+
+    Of random residues of 31 bits, one in two million is such a fraction up to 30, one in two
+    thousand up to 1000.
     """
     r0, r1, t0, t1 = p, x % p, 0, 1
     while r1 > bound:

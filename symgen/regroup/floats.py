@@ -33,7 +33,7 @@ Relations = dict[str, dict[str, Expression]]  # {dependent: {base column: coeffi
 
 
 def float_relations(robot: Robot, names: Sequence[str]) -> tuple[tuple[str, ...], Relations]:
-    """Base columns among `names`, in order of preference, and the others as their sums."""
+    """Choose base columns among `names`, in order of preference, and express the others by them."""
     pivots, K = float_base(float_regressor(robot, names))
     base = tuple(names[c] for c in pivots)
     return base, {
@@ -115,7 +115,7 @@ def sampled_columns(floats: Floats, names: Sequence[str], count: int) -> Array:
 def _columns_near_start(
     system: LoopSystem, names: Sequence[str], count: int, rng: np.random.Generator
 ) -> Array:
-    """Columns `names` at those of `count` random states that close, (joints, states, columns)."""
+    """Columns `names` at `count` random closed states near the start, (joints, states, columns)."""
     robot = system.robot
     closure = system.closure
     n = len(robot.joints)
@@ -153,12 +153,15 @@ def _columns_near_start(
 
 
 def _in_time(robot: Robot, rng: np.random.Generator, count: int) -> Any:
-    """Values of the channels of laws at `count` states."""
+    """Draw values of the channels of laws at `count` states."""
     return {name: rng.uniform(0.5, 2, count) for name in robot.channels}
 
 
 def float_base(W: Array) -> tuple[list[int], Array]:
-    """Independent columns of W, leftmost first, and the coefficients of every column in them, shape (rank, columns)."""
+    """Find the independent columns of W, leftmost first, and the coefficients of all columns in them.
+
+    The coefficients have shape (rank, columns).
+    """
     norms = np.linalg.norm(W, axis=0)
     norms[norms <= 1e-10 * norms.max(initial=0.0)] = np.inf
     U = W / norms

@@ -15,7 +15,7 @@ Signed = tuple[bool, str]  # whether a term is added, and the term
 
 @dataclass(frozen=True)
 class Formula:
-    """sum_k c_k chi_k.
+    """A sum of parameters with coefficients, sum_k c_k chi_k.
 
     Attributes
     ----------

@@ -163,7 +163,7 @@ def _edits(before: Robot, after: Robot) -> Iterator[str]:
 
 
 def _leaves(table: Any, path: Path = ()) -> dict[Path, str]:
-    """Text of each value by the keys that lead to it."""
+    """List every value of a nested mapping as text, by the keys that lead to it."""
     if not isinstance(table, Mapping):
         return {path: flow(table)}
     parts = [_leaves(value, (*path, key)) for key, value in table.items()]

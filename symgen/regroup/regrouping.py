@@ -114,7 +114,7 @@ class Regrouping:
 
 
 def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
-    """The base parameters of a robot with their formulas.
+    """Derive the base parameters of a robot with their formulas.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
 
 
 def _warn(regrouping: Regrouping) -> None:
-    """An InertiaWarning for each link whose inertia no body can have, with what it enters."""
+    """Warn of each link whose inertia no body can have, and name the base parameters it enters."""
     for j, wrong in regrouping.robot.impossible:
         moments = {parameter(p, j) for p in INERTIAL[:6]}
         names = [b.name for b in regrouping.base if moments & b.combination.keys()]
@@ -152,7 +152,7 @@ def _warn(regrouping: Regrouping) -> None:
 
 @lru_cache(maxsize=16)
 def _regrouped(robot: Robot, seed: int) -> Regrouping:
-    """Kept, since formulas, certificate and module of a robot are asked for one after the other."""
+    """The regrouping, cached: formulas, certificate and module of a robot ask for it in turn."""
     given, robot = robot, numbered(robot)
     transfer = Transfer(robot)
     names = preference(robot, transfer.remaining)
@@ -191,7 +191,7 @@ def _regrouped(robot: Robot, seed: int) -> Regrouping:
 
 
 def _reason(missing: Mapping[str, str]) -> str:
-    """Why coefficients were not recognised: of the first column, and how many more there are."""
+    """Say why coefficients of the first column were not recognised, and how many more there are."""
     name, reason = next(iter(missing.items()))
     return (
         f"coefficients of {name}{f' and {len(missing) - 1} more' if len(missing) > 1 else ''} "
@@ -203,7 +203,7 @@ regrouping = regroup  # its public name, symgen.regrouping: symgen.regroup is th
 
 
 def preference(robot: Robot, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Columns in the order in which they may become base parameters."""
+    """Order the columns: earlier ones rather become base parameters."""
     inertial, elements = inertial_names(robot), element_names(robot)
 
     def rank(name: str) -> tuple[int, int, int]:
@@ -229,7 +229,10 @@ def _assemble(
     relations: Mapping[str, Mapping[str, Expression]],
     draw: Draw,
 ) -> Regrouping:
-    """Base parameters from the general transfer and the particular relations {dependent: {base column: coefficient}}."""
+    """Build the base parameters from the general rules and the particular relations.
+
+    The latter are {dependent: {base column: coefficient}}.
+    """
     combination: dict[str, Combination] = {name: transfer.combination[name] for name in base}
     steps = list(transfer.steps)
     for dependent, relation in relations.items():
@@ -255,14 +258,16 @@ def _assemble(
 
 
 def _vanishes(c: Expression, draw: Draw) -> bool:
-    """Whether a coefficient is zero, cos(pi/4)**2 - sin(pi/4)**2 included: angles are exact over F_p."""
+    """Whether a coefficient is zero, also where this takes sin**2 + cos**2 = 1; angles are exact over F_p."""
     if all(isinstance(a, str) for a in c.atoms):
         return not c
     return not draw.residues(draw.constant(c)).any()
 
 
 def sign_conditions(regrouping: Regrouping) -> list[tuple[str, Expression, int]]:
-    """(base parameter, ratio of two rates, sign of it in the robot file) wherever a formula adds frictions of dependent directions.
+    """Find the formulas that add frictions of dependent directions.
+
+    Each gives (base parameter, ratio of two rates, sign of this ratio in the robot file).
 
     sign(KR q1) is sign(KR) sign(q1): FS1 + KR FS2 holds for the sign that KR has in the file.
     """

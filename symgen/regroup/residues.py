@@ -53,7 +53,7 @@ def sample(draw: Draw, names: tuple[str, ...]) -> Array:
 
 
 def states_for(robot: Robot, names: Sequence[str], spare: int = 4) -> int:
-    """Random states that show the rank of the columns `names`, and `spare` more.
+    """Draw enough random states to show the rank of the columns `names`, and `spare` more.
 
     The columns that act on the joints of a set S alone need |columns| <= states |S| rows: counted
     for the set of every column, and for all joints.
@@ -69,6 +69,6 @@ def states_for(robot: Robot, names: Sequence[str], spare: int = 4) -> int:
 
 @lru_cache(maxsize=8)
 def _acting(robot: Robot) -> dict[str, Array]:
-    """{column: whether it acts on each joint} of all standard parameters, at random states."""
+    """Test at random states on which joints each standard parameter acts."""
     W = sample(Draw(robot, 5, 2), robot.parameters).reshape(len(robot.joints), 2, -1)
     return dict(zip(robot.parameters, (W != 0).any(axis=1).T, strict=True))

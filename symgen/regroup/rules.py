@@ -32,7 +32,10 @@ Step = tuple[
 
 
 class Transfer:
-    """Where the parameters of a link end up: `steps` one link down at a time, `combination` of each remaining parameter.
+    """Where the parameters of a link go.
+
+    `steps` holds the moves from each link to the one before; `combination` what each remaining
+    parameter then stands for.
 
     After the tips have been processed, the torque is sum over the remaining names k of D_k
     combination[k](chi).
@@ -75,7 +78,7 @@ class Transfer:
                 self._move(parameter(name, frame.j), acting)
 
     def _reached(self, name: str, j: int) -> Combination:
-        """The columns of links that the column of a parameter of frame j is."""
+        """Columns of other links that make up the column of a parameter of frame j."""
         if j == 0:
             return {}
         if j not in self.rigid:
@@ -87,7 +90,7 @@ class Transfer:
         return total
 
     def _move(self, source: str, image: Combination) -> None:
-        """Remove the column `source` = sum_k image_k column k."""
+        """Remove the column `source`, which equals sum_k image_k column k."""
         amount = self.combination.pop(source)
         for target, c in image.items():
             self.steps.append((source, target, c))

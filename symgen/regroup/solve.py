@@ -69,8 +69,9 @@ Supports = Mapping[
 def coefficients(
     robot: Robot, supports: Supports
 ) -> tuple[dict[str, list[Expression]], dict[str, str]]:
-    """beta of D_dependent = sum_k beta_k D_support,k, exact, and for those that no P/Q of moderate
-    degree fits the reason.
+    """Find beta in D_dependent = sum_k beta_k D_support,k, exactly.
+
+    Where no P/Q of moderate degree fits, the reason is given.
     """
     supports = {name: support for name, support in supports.items() if support}
     result: dict[str, list[Expression]] = {}
@@ -113,12 +114,13 @@ class Pool:
         self.values: dict[Expression, Array] = {}
 
     def random(self, count: int) -> dict[Variable, Array]:
-        """`count` random geometries: residues, shape (count, 1)."""
+        """Draw `count` random geometries; residues of shape (count, 1)."""
         return {v: self.rng.integers(2, self.p, (count, 1)) for v in self.variables}
 
     def solved(self, geometry: Mapping[Variable, Array], count: int) -> dict[str, Array | None]:
-        """{dependent: residues of its coefficients, shape (count, support), or None if it does not
-        depend at every geometry}.
+        """Residues of the coefficients of each dependent column, shape (count, support).
+
+        None if the column does not depend on the support at every geometry.
         """
         draw = draw_states(self.robot, 11, self.samples, p=self.p, geometry=geometry, count=count)
         W = sample(draw, self.names)
@@ -153,8 +155,9 @@ class Pool:
         return total
 
     def vector(self, name: str, k: int, P: Products, Q: Products) -> dict[int, int] | None:
-        """{place among [*Q, *P]: residue} of the first relation with a denominator, or None if
-        there is none; cos(a) and cos(3a) make others.
+        """Find the first relation with a denominator: {place among [*Q, *P]: residue}; None without one.
+
+        There can be several, since cos(a) and cos(3 a) are related.
         """
         count = len(P) + len(Q) + 4
         self.grow(count)
@@ -256,9 +259,7 @@ class Recognition:
         return result
 
     def _power(self, reference: int, scaled: Sequence[int]) -> int:
-        """n where scaling a variable by SCALES scales a coefficient by their n-th powers, 0 if
-        it does not.
-        """
+        """Power n by which a coefficient scales with a variable (tested at SCALES); 0 if it does not."""
         p = self.pools[0].p
         ratios = [int(x) * pow(int(reference), -1, p) % p for x in scaled] if reference else []
         return next((n for n in POWERS if ratios == [pow(c, n, p) for c in SCALES]), 0)
@@ -311,8 +312,10 @@ class Recognition:
     def _rationals(
         self, vector: dict[int, int], name: str, k: int, P: Products, Q: Products
     ) -> dict[int, Fraction] | None:
-        """The vector as rationals: very small ones from one prime, others by the Chinese remainder
-        theorem until one more prime agrees.
+        """Turn residues into rationals.
+
+        One prime suffices for very small ones; otherwise primes are combined by the Chinese
+        remainder theorem until one more agrees.
         """
         small = {c: small_rational(x, self.pools[0].p) for c, x in vector.items()}
         if all(x is not None for x in small.values()):
@@ -390,7 +393,7 @@ def _fraction(entries: Mapping[int, Fraction], P: Products, Q: Products) -> Expr
 
 
 def _atom(a: str | Number | Call) -> Expression:
-    """The indeterminate itself, cos(pi/6) not replaced by its value."""
+    """The indeterminate as an expression; cos(pi/6) is not replaced by its value."""
     return Expression({((a, 1),): Fraction(1)})
 
 

@@ -18,7 +18,7 @@ SOURCES = {"record": "the record", "sum": "the record, in sums", "file": "feasib
 
 @dataclass(frozen=True)
 class Change:
-    """A number of the file.
+    """One number of the file that changes.
 
     Attributes
     ----------

@@ -181,7 +181,10 @@ def _inertial(physical: PhysicalModel) -> set[str]:
 def _determined_names(
     result: Estimate, physical: PhysicalModel, of: str
 ) -> tuple[list[str], Array, list[str]]:
-    """Names and values of the base parameters that the record determines, and names of the others."""
+    """Split the base parameters.
+
+    Returns names and values of those that the record determines, and the names of the others.
+    """
     if unknown := [name for name in result.names if name not in physical.base]:
         raise DescriptionError(
             f"{', '.join(unknown[:8])} of the estimate are no base parameters of {of}; name the "
@@ -199,7 +202,9 @@ def _determined_names(
 
 
 def _root(result: Estimate, names: Sequence[str]) -> Array:
-    """A root of the covariance of the known base parameters, (b, b), deviations corrected where they are.
+    """Square root of the covariance of the known base parameters, (b, b).
+
+    It uses corrected deviations where there are any.
 
     Zero if there is none.
     """

@@ -103,7 +103,7 @@ class Numbers:
     masses: Array
 
     def head(self, count: int) -> Numbers:
-        """The first `count` numbers alone."""
+        """The program with the first `count` numbers alone."""
         p = self.physical
         kept = tuple(c for c in p.conditions if max(c.numbers) < count)
         part = replace(p, standard=p.standard[:count], K=p.K[:, :count], conditions=kept)
@@ -112,7 +112,7 @@ class Numbers:
         return Numbers(part, links, *(x[:count] for x in of_numbers))
 
     def chi(self, u: Array) -> Array:
-        """Standard parameters of numbers u, shape (p,)."""
+        """Standard parameters that the numbers u give, shape (p,)."""
         chi = u.copy()
         for link, at in self.links:
             chi[at] = link.place.ten(u[at])
@@ -209,7 +209,7 @@ def _of_file(
     values: Mapping[str, float],
     absent: Collection[str],
 ) -> tuple[Numbers, dict[str, int], list[int]]:
-    """The numbers of the file, the places of those of elements, and how many may change, try by try.
+    """Numbers of the file, places of the elements, and, for each attempt, which numbers may change.
 
     First links that lead a body, and elements; then elements that the file does not have and the
     links can take in; then the other links.
@@ -264,14 +264,14 @@ def _of_file(
 
 
 def _sizes_of(x: Array) -> Array:
-    """Sizes of NUMBERS: mass, how far the link extends, its moments."""
+    """Typical sizes of NUMBERS: the mass, and by the extent of the link its centre and moments."""
     M, moments = x[0], float(np.abs(x[[4, 7, 9]]).sum()) / 2
     extent = np.sqrt(x[1:4] @ x[1:4] + moments / M) if M > 0 else 1.0
     return np.array([M, *[max(extent, 1e-3)] * 3, *[max(moments, 1e-3 * M * extent**2)] * 6])
 
 
 def _spare(physical: PhysicalModel, own: Sequence[str], absent: Sequence[str]) -> list[str]:
-    """Absent parameters whose columns are combinations of those of the other parameters."""
+    """Find parameters that the file lacks and whose columns the other parameters make up."""
     spare: list[str] = []
 
     def rank(names: Sequence[str]) -> int:
@@ -317,14 +317,14 @@ def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple
 
 
 def _violated(part: Numbers, u: Array) -> bool:
-    """Whether a condition on numbers that moved does not hold."""
+    """Whether a condition is violated by numbers that moved."""
     chi, moved = part.chi(u), u != part.u0
     conditions = [c for c in part.physical.conditions if moved[list(c.numbers)].any()]
     return any(c.smallest(chi) < -TINY for c in conditions)
 
 
 def _solve(part: Numbers, K: Array, rest: Array, start: Array, free: Array) -> Array | None:
-    """The numbers with K chi(u) = rest nearest to `start`, of which those that are `free` move.
+    """Find the numbers nearest to `start` with K chi(u) = rest; only those in `free` move.
 
     None if Newton's steps do not find them.
     """
@@ -345,7 +345,10 @@ def _solve(part: Numbers, K: Array, rest: Array, start: Array, free: Array) -> A
 
 
 def _hold(part: Numbers, chi: Array) -> Array:
-    """Numbers of chi; of each link those that no base parameter tells are the file's, unless that is no physical link."""
+    """Numbers of chi, but with the file's value wherever no base parameter depends on it.
+
+    If that gives no physical link, chi's own numbers stay.
+    """
     u = chi.copy()
     for link, at in part.links:
         u[at] = link.place.numbers(chi[at])
@@ -357,7 +360,7 @@ def _hold(part: Numbers, chi: Array) -> Array:
 
 
 def strange(link: FileLink, closest: Nearest) -> str:
-    """How far mass and centre of a link have left those of the file, as text.
+    """Say how far mass and centre of a link are from those of the file.
 
     "" if the mass is within a factor STRANGE and the centre has moved by less than the size of the
     link.

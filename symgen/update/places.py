@@ -135,7 +135,7 @@ class LinkPlace:
         return self.attributes is MJCF and not full
 
     def numbers(self, ten: Array) -> Array:
-        """NUMBERS, shape (10,), that the file states for ten parameters in frame j."""
+        """NUMBERS, shape (10,), by which the file states ten parameters given in frame j."""
         if not np.any(ten):
             return np.zeros(10)
         if ten[-1] <= 0:
@@ -146,7 +146,7 @@ class LinkPlace:
         return np.array([own.M, *(R.T @ (own.pose[:3, 3] - self.X[:3, 3])), *tensor])
 
     def ten(self, x: Array) -> Array:
-        """The ten parameters in frame j, shape (10,), of NUMBERS that the file states."""
+        """The ten parameters in frame j, shape (10,), that NUMBERS of the file state."""
         pose, (xx, xy, xz, yy, yz, zz) = np.eye(4), x[4:]
         if self.principal or self.attributes is URDF:
             pose[:3, :3] = self.axes
@@ -192,7 +192,7 @@ class LinkPlace:
 
 
 class Places:
-    """Elements of a file by the names of the links and joints of its tree."""
+    """Elements of a file, found by the names of links and joints."""
 
     def __init__(self, content: bytes, tree: Tree, attributes: Attributes) -> None:
         root = read_elements(content, DEEPEST)
@@ -228,7 +228,7 @@ class Places:
                 )
 
     def link(self, name: str, tree: Tree, X: Array) -> LinkPlace:
-        """Places of the numbers of link `name`, which has pose X in frame j of `tree`."""
+        """Where the numbers of link `name` stand; the link has pose X in frame j of `tree`."""
         link, inertial = self.links[name], tree.links[name]
         e = next(link.own("inertial"), None)
         if e is not None and e not in link:
@@ -245,12 +245,12 @@ class Places:
         return LinkPlace(self.attributes, link, e, X @ place, axes, of_file)
 
     def attribute(self, family: str, joint: Joint) -> str | None:
-        """Where a joint holds a parameter; None: nowhere."""
+        """Where a joint holds a parameter; None if it has no place."""
         without = family in SPRING and not joint.stiffness
         return None if without else self.attributes.joint.get(family)
 
     def heed_inertials(self, edits: XmlEdits) -> None:
-        """The edit by which MuJoCo heeds an <inertial> that was inserted."""
+        """The edit that makes MuJoCo use an <inertial> that was inserted."""
         own = (e for body in self.links.values() for e in body.own("inertial"))
         ignored = next(own, None)
         if self.from_geoms and ignored is not None:

@@ -57,7 +57,7 @@ class XmlEdits:
         values: Sequence[float],
         default: Sequence[float] | None = None,
     ) -> None:
-        """The numbers of an attribute, the first ones if it has more.
+        """Replace the numbers of an attribute; if it has more numbers, its first ones.
 
         Those that stay are not touched.
 
@@ -85,20 +85,20 @@ class XmlEdits:
                 self.edits.append((word.start(), word.end(), number(x).encode()))
 
     def set_word(self, e: XmlElement, name: str, word: str) -> None:
-        """Another word as the value of an attribute."""
+        """Replace the value of an attribute by another word."""
         span = self._value(e, name)
         if span is not None:
             self.edits.append((*span, word.encode()))
             self.added.append(f"line {e.line}: {name}={word} in <{e.tag}>")
 
     def replace_attribute(self, e: XmlElement, old: str, new: str, values: Sequence[float]) -> None:
-        """Another attribute in the place of one."""
+        """Replace one attribute by another."""
         match = self._attributes(e)[old.encode()]
         self.edits.append((match.start("name"), match.end(), f'{new}="{numbers(values)}"'.encode()))
         self.added.append(f"line {e.line}: {new} in place of {old} of <{e.tag}>")
 
     def insert_child(self, parent: XmlElement, text: str) -> None:
-        """An element before the first child of `parent`, indented as that is."""
+        """Insert an element before the first child of `parent`, with that child's indentation."""
         tag = self._tag(parent)
         end = tag.end()
         self.added.append(f"line {parent.line}: {text.partition(' ')[0]}> in <{parent.tag}>")
@@ -146,7 +146,7 @@ def same(x: float, y: float) -> bool:
 
 
 def number(x: float) -> str:
-    """A number as it is written: the shortest text that means this double."""
+    """Write a number by the shortest text that means this double."""
     return repr(float(x) + 0.0)
 
 
