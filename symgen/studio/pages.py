@@ -269,9 +269,8 @@ class Pages:
             raise InputError("another page has changed the robot; reload this one")
 
     async def _prove(self, form: dict[str, str]) -> str:
-        if self.folder.read(
-            DRAFT
-        ):  # the page asks by itself; the draft may be newer than its question
+        # The page asks by itself; the draft may be newer than its question.
+        if self.folder.read(DRAFT):
             return "certificate"
         self.jobs.add(
             "certificate",
