@@ -145,7 +145,7 @@ def weights_of(
     essential: Sequence[str] = (),
     s: Sequence[float] = (),
 ) -> Weights:
-    """Columns, deviations and sizes from the parameters X by name.
+    """Columns, deviations and sizes of the parameters, from their values X by name.
 
     `essential`, `s`: those of an estimate if there is one.
     """
@@ -178,7 +178,7 @@ def weights_of(
 
 
 def criterion_of(weights: Weights, observation: Observation, criterion: str) -> float:
-    """The criterion on the rows of the identification, exact; smaller is better."""
+    """Evaluate the criterion exactly, on the rows of the identification; smaller is better."""
     if criterion == "cond":
         return weights.condition(observation)
     if criterion in (
@@ -260,7 +260,10 @@ def excesses(
 def usage(
     model: GeneratedModel, motion: Motion, limits: MotionLimits, rate: float, X: Array
 ) -> dict[str, list[float]]:
-    """Largest share of each limit that the motion uses at `rate`, Hz, by quantity and joint; of a range, measured from its middle."""
+    """Largest share of each limit that the motion uses at `rate`, Hz, by quantity and joint.
+
+    Shares of a range are measured from its middle.
+    """
     _, q, qd, qdd = motion.sampled(rate)
     middle, half = (limits.lower + limits.upper) / 2, (limits.upper - limits.lower) / 2
     shares = {

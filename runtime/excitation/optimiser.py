@@ -131,7 +131,7 @@ def _logdet(A: Any) -> Any:
 
 
 def _spread(A: Any, criterion: str) -> Any:
-    """Logarithm of the smooth bound of the criterion."""
+    """Logarithm of a smooth bound of the condition number."""
     C = ca.solve(A, ca.DM.eye(A.shape[0]), "qr")
     if criterion in ("sigma", "record"):
         return ca.log(ca.sum1(ca.diag(C) ** 8)) / 8
@@ -221,7 +221,7 @@ def _torques(
 def _distances(
     model: GeneratedModel, settings: ExcitationSettings, q: Any
 ) -> list[tuple[Any, float, float]]:
-    """Squared distances of the spheres that stay apart, of the square of the smallest they may have."""
+    """Squared distances of spheres that must stay apart, relative to the squares of the smallest allowed."""
     if not settings.pairs:
         return []
     n, M = q.shape[1], q.shape[0]
@@ -268,7 +268,7 @@ def _minimised(
     range_of_g: tuple[Array, Array],
     iterations: int,
 ) -> tuple[Array, float, float, str]:
-    """x, criterion, largest violation of a constraint, and what IPOPT says."""
+    """Minimise the criterion; returns x, its value, the largest violation, and IPOPT's message."""
     options: dict[str, Any] = {
         "ipopt": {
             "hessian_approximation": "limited-memory",
@@ -343,5 +343,5 @@ def _guess(search: Search, family: Any, rng: np.random.Generator) -> Array:
 
 
 def _rows(x: Array, M: int) -> Any:
-    """x, shape (n,), in each of M rows."""
+    """Repeat x, shape (n,), in each of M rows."""
     return ca.DM(np.tile(x, (M, 1)))

@@ -65,7 +65,7 @@ class StaticPoses(Result, keys="poses condition sigma compared s taken_in"):
     taken_in: tuple[str, ...]
 
     def to_table(self) -> str:
-        """Condition, deviations and poses, and what was not looked at."""
+        """Condition, deviations and poses as text, and what the search did not check."""
         lost = ", ".join(self.taken_in)
         sigma = Table(
             "",
@@ -174,12 +174,12 @@ def _acting(model: GeneratedModel, q: Array, columns: Any) -> tuple[str, ...]:
 
 
 def _sum(A: Array, M: Array, chosen: Array) -> Array:
-    """M with the rows of these poses; A, shape (K, n, c), of all candidates."""
+    """Add the rows of these poses to M; A, shape (K, n, c), holds those of all candidates."""
     return np.asarray(M + np.einsum("kni,knj->ij", A[chosen], A[chosen]))
 
 
 def _exchanged(A: Array, M: Array, chosen: Array) -> Array:
-    """Numbers of the poses after exchange."""
+    """Exchange poses one by one while this helps; returns the numbers of the poses."""
     chosen, before = chosen.copy(), np.empty(0)
     while not np.array_equal(chosen, before):
         before = chosen.copy()
@@ -191,6 +191,6 @@ def _exchanged(A: Array, M: Array, chosen: Array) -> Array:
 
 
 def _quality(M: Array) -> tuple[float, Array]:
-    """Condition of W, and deviations, shape (c,); infinite if it does not determine them."""
+    """Condition of W, and deviations, shape (c,); infinite for parameters it does not determine."""
     condition, sigma = float(np.sqrt(np.linalg.cond(M))), np.sqrt(np.diag(np.linalg.inv(M)))
     return (condition, sigma) if condition < LARGEST_CONDITION else (np.inf, np.inf * sigma)

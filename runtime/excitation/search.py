@@ -44,7 +44,7 @@ def excite(
     map: Callable[..., Iterable[Any]] = map,
     progress: Callable[[int, int], None] | None = None,
 ) -> Excitation:
-    """Search the motion with the smallest criterion over all starts of study.excitation.
+    """Search the motion with the smallest criterion, from all starts of study.excitation.
 
     It keeps the limits at the controller rate.
 
@@ -131,7 +131,9 @@ def excite(
 def _within(
     model: GeneratedModel, search: Search, starts: Sequence[Start]
 ) -> Iterator[tuple[Motion, float]]:
-    """Motions of the starts within the limits at the controller rate, with the margin that took.
+    """Select the motions that stay within the limits at the controller's rate.
+
+    Each comes with the margin that this took.
 
     None of a start where wider ones do not help.
     """

@@ -190,7 +190,7 @@ class Friction(Part):
     title = "Friction curves"
 
     def text(self) -> str:
-        """How a law is chosen; what the signs of the curves mean."""
+        """Say how a law is chosen, and what the signs of the curves mean."""
         notes = [f"Joint {curve.joint}: {curve.note}." for curve in self.curves if curve.note]
         return "\n".join([CHOSEN, *notes])
 
@@ -403,7 +403,10 @@ def _curve(joint: str, terms: Terms) -> FrictionCurve:
 
 
 def _predicting(laws: Sequence[FrictionLaw]) -> str:
-    """The law with the smallest held-out error among those whose terms are significant; the first law if none is."""
+    """Choose the law with the smallest held-out error among those whose terms are significant.
+
+    If there is none, it is the first law.
+    """
     first, *others = laws
     worth = [
         law

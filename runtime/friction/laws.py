@@ -67,7 +67,7 @@ LAWS: Mapping[str, tuple[str, ...]] = {
 
 
 def joined(parts: Sequence[Terms]) -> Terms:
-    """The rows of several records."""
+    """Join the rows of several records."""
     linear = {
         name: np.concatenate([part.linear[name] for part in parts]) for name in parts[0].linear
     }
@@ -90,7 +90,7 @@ def _columns(terms: Terms, names: Sequence[str], VS: float | None) -> Array:
 
 
 def fit_law(terms: Terms, names: Sequence[str], rows: Array) -> dict[str, float]:
-    """Least squares of a law on some rows; VS by a search on a logarithmic axis."""
+    """Fit a law to some rows by least squares; VS is searched on a logarithmic axis."""
     f = terms.f[rows]
     VS = _excess_velocity(terms, names, rows) if "VS" in names else None
     x = np.linalg.lstsq(_columns(terms, names, VS)[rows], f, rcond=None)[0]
@@ -106,7 +106,7 @@ def _excess_velocity(terms: Terms, names: Sequence[str], rows: Array) -> float:
     r = terms.f[rows] - Q @ (Q.T @ terms.f[rows])
 
     def left(excess: Array) -> Array:
-        """Squares of the residual, less those of r; excess, shape (..., N)."""
+        """Sum of squares that remain with an excess, minus that of r; excess has shape (..., N)."""
         e = excess[..., rows]
         e = e - (e @ Q) @ Q.T
         length = np.sum(e**2, axis=-1)
@@ -142,7 +142,7 @@ def held_out_error(terms: Terms, names: Sequence[str], even: Array) -> float:
 
 
 def deviations(terms: Terms, law: Mapping[str, float], residual: Array) -> dict[str, float]:
-    """Deviations by blocks of time, VS by its derivative."""
+    """Standard deviations by blocks of time; that of VS by the derivative of the law."""
     A = _columns(terms, tuple(law), law.get("VS"))
     if "VS" in law:
         VS, h = law["VS"], 1e-4 * law["VS"]

@@ -50,7 +50,7 @@ ALIKE = ("around", "reference")  # estimate.options that are the loop's, whateve
 
 @dataclass(frozen=True)
 class Loop:
-    """The loop of one study.
+    """The simulated closed loop of a study.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Loop:
     simulator: Simulator
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """State for other processes, which make the simulator anew."""
+        """State for other processes; each makes the simulator anew."""
         return _loop, (self.problem,)
 
     @property
@@ -79,7 +79,7 @@ class Loop:
 
     @property
     def options(self) -> Mapping[str, Any]:
-        """estimate.options that are the loop's."""
+        """Those of estimate.options that concern the loop."""
         return {
             key: self.study.estimate.options[key]
             for key in ALIKE
@@ -98,7 +98,10 @@ class Loop:
 
     @cached_property
     def closed(self) -> ClosedLoop:
-        """The loop of the measured records; of place loop, of one made with the encoder of the study."""
+        """The closed loop of the measured records.
+
+        For place loop, it is made with the encoder of the study.
+        """
         if self.study.cestac.place == "record":
             return closed_loop(self.problem, self.problem.prepared, self.simulator, **self.options)
         return self._of(self.simulator, self.simulator.controller.seed, 0.0)
@@ -146,7 +149,7 @@ class Loop:
         return self.closed.measured()
 
     def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
-        """`observation` of the perturbed positions of every record, shape (N, n), with the loop attached."""
+        """Rows from perturbed positions of every record, shape (N, n), with the loop attached."""
         parts = [
             replace(part, prepared=replace(part.prepared, record=part.record.moved(np.asarray(q))))
             for part, q in zip(self.closed.parts, positions, strict=True)
@@ -159,11 +162,11 @@ class Loop:
         )
 
     def rows(self, level: Level, draw: tuple[int, ...]) -> Observation:
-        """Rows of a record made with encoders of steps of level.delta."""
+        """Rows of a record simulated with encoders of step level.delta."""
         return self.simulated(level, draw).measured()
 
     def simulated(self, level: Level, draw: tuple[int, ...]) -> ClosedLoop:
-        """The loop of a record made with encoders of steps of level.delta; of those of the study at a level without steps."""
+        """The loop of a record simulated with encoders of step level.delta, or of the study's without one."""
         random = stream(self.study.cestac.seed, draw[-1])
         law, n = self.simulator.law, len(self.model.JOINTS)
         phase = level.delta * random.random(n)

@@ -82,7 +82,7 @@ class LoopOptions(Settings):
 
 @dataclass(frozen=True, eq=False)
 class LoopPart:
-    """One record.
+    """One record of a closed loop.
 
     Attributes
     ----------
@@ -130,8 +130,10 @@ class LoopPart:
 
 @dataclass(frozen=True, eq=False)
 class ClosedLoop:
-    """The records with their loop. `assumption`: what was assumed about the reference; empty if
-    it is known. `law`: what the control law explains of them.
+    """The records with their loop.
+
+    `assumption`: what was assumed about the reference; empty if it is known. `law`: how well the
+    control law explains the records.
     """
 
     model: GeneratedModel
@@ -202,7 +204,7 @@ class ClosedLoop:
         return np.asarray(np.concatenate(by_joint)[observation.closed_loop.rows])
 
     def inertia(self, X: Array) -> Array:
-        """J_j, shape (n,): mean of A_jj over the references."""
+        """Mean of A_jj over the references, for each joint: J_j, shape (n,)."""
         functions: Any = self.model
         q = np.concatenate(
             [part.reference.q[:: max(1, len(part.reference) // 500)] for part in self.parts]
@@ -297,7 +299,7 @@ def closed_loop(
 
 
 def _at_ticks(x: Array, every: int, ticks: int) -> Array:
-    """Samples (N, n) at the ticks of the controller, (T, n), by straight lines; the last one held."""
+    """Interpolate samples (N, n) linearly at the ticks of the controller, (T, n); the last is held."""
     places = np.arange(ticks) / every
     return np.column_stack([np.interp(places, np.arange(len(x)), column) for column in x.T])
 
@@ -341,8 +343,9 @@ def _reference(
 
 
 def slips(qd: Array, G: Array) -> Array:
-    """Smallest speed of what rubs on each joint, its own included, shape (N, n).   qd : (N, n).   G
-    : (elements, n), slips G qd of dry friction.
+    """Smallest speed of what rubs on each joint, shape (N, n); its own speed counts too.
+
+    qd : (N, n). G : (elements, n), slips G qd of dry friction.
     """
     speed: Array = np.abs(qd)
     for element in G:

@@ -32,11 +32,11 @@ UNSAFE = (
 
 
 class FallbackWarning(UserWarning):
-    """CasADi's own interpreter is used in place of C; the message says why."""
+    """CasADi's interpreter is used instead of C; the message says why."""
 
 
 class NotCompiledError(Exception):
-    """Why there is no C."""
+    """C could not be compiled; the message says why."""
 
 
 def shared_object(
@@ -134,7 +134,7 @@ def _compiled(
 
 
 def compiler() -> tuple[tuple[str, ...], str]:
-    """Command of the C compiler and what it says of its version; raises if there is none."""
+    """Command of the C compiler and its version; raises if there is none."""
     given = shlex.split(os.environ.get("CC", ""))
     program = (
         shutil.which(given[0])

@@ -87,8 +87,9 @@ class ControlLaw:
         return len(self.P)
 
     def matrix(self, g: Array, *, ideal: bool) -> Array:
-        """`law` of a tick, (n, columns): the vectors, R, R^-1, offset. ideal : no steps of encoder
-        and converter.
+        """The numbers of the law for one tick, (n, columns).
+
+        ideal : encoder and converter have no steps.
         """
         vectors = {name: getattr(self, name) for name in VECTORS if name != "g"} | {"g": g}
         if ideal:
@@ -110,7 +111,7 @@ class ControlLaw:
 
 
 def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
-    """The numbers of the settings for the joints of a model; SettingsError if they do not fit."""
+    """Turn the settings into numbers for the joints of a model; SettingsError if they do not fit."""
     n, law = len(model.JOINTS), controller.law
 
     def each(path: str, value: PerJoint[float] | None, absent: float = 0.0) -> Array:

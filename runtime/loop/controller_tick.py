@@ -49,7 +49,7 @@ CVODES = {"abstol": 1e-10, "reltol": 1e-9}
 
 @dataclass(frozen=True, eq=False)
 class LoopInputs:
-    """A run in numbers.
+    """The inputs of a run as arrays.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class LoopInputs:
 
 
 def blocks(rows: Array, size: int) -> Iterator[tuple[Array, int]]:
-    """`size` rows at a time and how many of them count.
+    """Split the inputs into blocks of `size` rows; each block says how many of them count.
 
     The last block is filled up with copies of its last row.
     """
@@ -165,7 +165,7 @@ def _clip(x: MX, bound: MX) -> MX:
 
 
 def _steps(x: MX, step: MX) -> MX:
-    """x on the grid of `step`; x itself for a step of 0."""
+    """Round x to the grid of `step`; a step of 0 leaves x as it is."""
     return ca.if_else(step > 0, step * ca.floor(x / step + 0.5), x)
 
 
@@ -199,13 +199,13 @@ def plant_function(
 
 
 def sliding_friction(friction: DryFriction, qd: MX, plus: MX, minus: MX) -> tuple[MX, MX]:
-    """f and direction of every element where all of them slide."""
+    """Friction forces f and directions if every element slides."""
     direction = ca.sign(ca.DM(friction.G) @ qd)
     return kinetic(direction, plus, minus), direction
 
 
 def keeps_sliding(friction: DryFriction, direction: MX, qd: MX, end: MX) -> MX:
-    """Whether every slip keeps its direction from qd to `end`."""
+    """Whether every slip has the same direction at qd and at `end`."""
     G = ca.DM(friction.G)
     return ca.mmin(ca.vertcat(ca.fabs(G @ qd), direction * (G @ end))) > LIMIT.SLIP_REST
 

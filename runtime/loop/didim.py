@@ -30,8 +30,10 @@ from runtime.loop.result import Simulation
 
 
 def fit(start: Beginning) -> Fitted:
-    """The fit; `details`: list of the passes, contraction. SettingsError if no loop is attached
-    to the observation.
+    """Fit by method didim.
+
+    `details`: list of the passes, contraction. SettingsError if no loop is attached to the
+    observation.
     """
     loop, observation = loop_of(start.observation, start.settings.method), start.observation
 

@@ -64,7 +64,11 @@ class FixedPointOptions(LoopOptions):
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One estimate of a pass: X of the columns (c,), their covariance, norm of its residual, and what else the method keeps."""
+    """One estimate of a pass.
+
+    X of the columns (c,), their covariance, the norm of its residual, and what else the method
+    keeps.
+    """
 
     X: Array
     covariance: Array
@@ -84,7 +88,7 @@ class Fixed:
 
 
 def full(names: Sequence[str], X: Array, every: Sequence[str]) -> Array:
-    """All base parameters (b,) from those of the columns `names`; the others are zero."""
+    """Fill all base parameters (b,) from those of the columns `names`; the others are zero."""
     by_name = dict(zip(names, X, strict=True))
     return np.array([by_name.get(name, 0.0) for name in every])
 
@@ -133,7 +137,7 @@ def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]
 def iterate(
     loop: ClosedLoop, start: Beginning, update: Callable[[Sequence[Simulation], Array], Step]
 ) -> Fixed:
-    """The fixed point of X -> update(simulation with X, X), X of the columns of the rows."""
+    """Find the fixed point of X -> update(simulation with X, X), for the X of the rows' columns."""
     options: FixedPointOptions = start.options
     names, every = start.observation.names, loop.model.BASE_PARAMETERS
     X = initial(loop, start, options.start)
@@ -216,7 +220,7 @@ def _simulated(
     J: Array | None,
     remedy: str,
 ) -> tuple[Array, Array, Sequence[Simulation], str]:
-    """X that can be simulated, on the way from the last one that could.
+    """Find an X that can be simulated, on the way from the last one that could.
 
     g, the runs, and why none could be made. remedy : what the error of the first one says.
     """
@@ -247,7 +251,7 @@ def _simulated(
 
 
 def _accelerated(last: Sequence[Mapping[str, Any]], size: Array) -> Array:
-    """The next X from the last passes, each from X to `next`.
+    """Extrapolate the next X from the last passes, each from X to `next`.
 
     Distances in units of `size`, shape (c,).
     """

@@ -41,8 +41,9 @@ from runtime.loop.result import Simulation
 
 
 def fit(start: Beginning) -> Fitted:
-    """The fit on the rows of the measured positions. SettingsError if no loop is attached to the
-    observation.
+    """Fit by method iv on the rows of the measured positions.
+
+    SettingsError if no loop is attached to the observation.
     """
     loop, observation = loop_of(start.observation, start.settings.method), start.observation
     raw = start.system.raw
@@ -123,7 +124,10 @@ def _solve(W: Array, Z: Array, Y: Array) -> tuple[Array, Array, Array]:
 
 
 def _quality(W: Array, Z: Array) -> dict[str, float]:
-    """Condition of Z'VW with unit columns, smallest correlation of the two column spaces, smallest of a column with its own instrument.
+    """Condition of Z'VW with unit columns, and two correlations.
+
+    These are the smallest one of the two column spaces, and the smallest of a column with its own
+    instrument.
 
     Rows are weighted.
     """

@@ -58,7 +58,10 @@ class LawFit:
 def law_fits(
     law: Any, parts: Sequence[Any], controller: Controller, joints: Sequence[str]
 ) -> tuple[LawFit, ...]:
-    """Each joint of the records; parts : of `ClosedLoop`, references at the rate of the controller."""
+    """Compare the law with the records, joint by joint.
+
+    parts : of `ClosedLoop`, references at the rate of the controller.
+    """
     torques = [law_torque(law, part.record, part.reference, controller) for part in parts]
     rate, fits = parts[0].record.rate, []
     for j, label in enumerate(joints):
@@ -135,7 +138,7 @@ def law_text(fits: Sequence[LawFit]) -> str:
 
 
 def _share(y: Array, x: Array) -> tuple[float, float, float]:
-    """Share of y that x explains, %; the factor of x nearest to y; the share with it."""
+    """Share of y that x explains, %; the best factor of x; the share with this factor."""
     norm, size = float(np.linalg.norm(y)), float(x @ x)
     if not norm:
         return 100.0, 1.0, 100.0

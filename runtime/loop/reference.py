@@ -58,13 +58,19 @@ class Reference:
 
     @classmethod
     def sampled(cls, q: Array, rate: float) -> Reference:
-        """Positions alone, shape (N, n): velocities and accelerations by central differences."""
+        """Make a reference of positions alone, shape (N, n).
+
+        Velocities and accelerations are central differences.
+        """
         q = np.asarray(q, dtype=float)
         qd = derivative(q, rate)
         return cls(rate, q, qd, derivative(qd, rate))
 
     def at_rate(self, every: int) -> Reference:
-        """The same motion `every` times as fast sampled, N samples become (N - 1) every + 1: q by cubic splines, whose derivatives are qd and qdd."""
+        """Sample the same motion `every` times as fast: N samples become (N - 1) every + 1.
+
+        q is interpolated by cubic splines, whose derivatives are qd and qdd.
+        """
         if every == 1:
             return self
         ticks = np.arange((len(self) - 1) * every + 1) / (every * self.rate)
@@ -188,7 +194,10 @@ def of_record(record: Record, controller: Controller) -> Reference:
 
 
 def require_rate(record: Record, controller: Controller) -> None:
-    """SettingsError unless the record holds every `record_every`-th tick of the controller, with the setting that would make it so."""
+    """Raise SettingsError unless the record holds every `record_every`-th tick of the controller.
+
+    The error names the setting that would make it so.
+    """
     rate, every = controller.rate, controller.record_every
     if abs(record.rate * every / rate - 1) <= LIMIT.RATE_TOLERANCE:
         return
@@ -232,7 +241,9 @@ def check_limits(reference: Reference, limits: Mapping[str, Any], joints: Sequen
 
 
 def point_to_point(model: GeneratedModel, settings: Points, rate: float) -> Reference:
-    """All joints move together between random points of the middle of their range, as fast as speed and acceleration limits allow.
+    """Move all joints together between random points in the middle of their range.
+
+    The motion is as fast as the limits of speed and acceleration allow.
 
     It ends with the last piece that the duration has room for.
     """

@@ -20,8 +20,9 @@ TORQUE = {"rad": "N m", "m": "N"}  # unit of the torque by that of the position
 
 
 class SimulationError(InputError):
-    """A run that cannot be made: inertia not positive definite, loop unstable, motion lost. `time`
-    : s, of the reference, where it shows.
+    """A run that cannot be made: inertia not positive definite, loop unstable, or motion lost.
+
+    `time` : s of the reference at which this shows.
     """
 
     def __init__(self, message: str, *, time: float) -> None:
@@ -31,7 +32,7 @@ class SimulationError(InputError):
 
 @dataclass(frozen=True, eq=False)
 class Simulation(Result):
-    """A run, at the recorded ticks; arrays of shape (N, n), joint side, SI.
+    """A simulated run at the recorded ticks; arrays of shape (N, n), joint side, SI.
 
     Attributes
     ----------
@@ -88,7 +89,10 @@ class Simulation(Result):
         )
 
     def to_csv(self) -> str:
-        """t, q1 ..., tau1 ..., qr1 ...: the measured columns, SI, joint side, as `identify` reads them."""
+        """Write the measured columns t, q1 ..., tau1 ..., qr1 ..., as `identify` reads them.
+
+        They are of the joint side, SI.
+        """
         return csv_text(self.t, q=self.q_measured, tau=self.tau_measured, qr=self.q_r)
 
     @property

@@ -155,7 +155,7 @@ class Torque(Settings):
     bandwidth: Positive = 50.0
 
     def largest(self, limits: Mapping[str, Any]) -> PerJoint[float] | None:
-        """The saturation, N m or N, by the LIMITS of a model; None: none."""
+        """The saturation, N m or N, from the settings or the LIMITS of a model; None without one."""
         if self.saturation != "limits":
             return self.saturation
         return tuple(limits["tau"]) if "tau" in limits else None
@@ -211,7 +211,7 @@ class ReferenceSettings(Settings):
 
 
 class Controller(Settings):
-    """A closed loop.
+    """A closed loop: law, encoder, torque and reference.
 
     Attributes
     ----------

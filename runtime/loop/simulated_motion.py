@@ -58,7 +58,7 @@ class JointMotion:
 
     @property
     def apart(self) -> str:
-        """How the simulation misses the record, in words; "" if it follows."""
+        """Say how the simulation differs from the record; "" if it follows."""
         if not self.position <= LIMIT.MOTION_APART:
             return f"position of joint {self.joint} off by {self.position:.0f} % of its motion"
         if self.tracking > LIMIT.MOTION_TRACKING and self.position > LIMIT.MOTION_SMALL:
@@ -75,7 +75,7 @@ class JointMotion:
 def simulated_motion(
     loop: ClosedLoop, observation: Observation, X: Array
 ) -> tuple[JointMotion, ...]:
-    """Each joint of the simulation with all base parameters X, shape (b,), beside the records.
+    """Simulate with all base parameters X, shape (b,), and compare each joint with the records.
 
     InputError if it cannot be made.
     """

@@ -88,7 +88,7 @@ class Simulator:
         seed: int | None = None,
         name: str = "simulation",
     ) -> Simulation:
-        """The arm along the reference.
+        """Simulate the arm along the reference.
 
         Parameters
         ----------
@@ -134,7 +134,7 @@ class Simulator:
         feedforward: Array | None,
         seed: int | None,
     ) -> LoopInputs:
-        """seed : None for an ideal run."""
+        """Draw the inputs of a run. seed : None for an ideal run."""
         n, b, N = len(self.model.JOINTS), len(self.model.BASE_PARAMETERS), len(reference)
         X, g = np.asarray(X, dtype=float), np.broadcast_to(np.asarray(g, dtype=float), (n,)).copy()
         if X.shape != (b,) or not np.isfinite(X).all():
@@ -198,8 +198,10 @@ class Simulator:
         )
 
     def substeps(self, X: Array, reference: Reference, g: Array) -> int:
-        """Steps per tick. SimulationError if the inertia is not positive definite or the sampled
-        loop is unstable on the reference.
+        """Number of integration steps per tick.
+
+        SimulationError if the inertia is not positive definite or the sampled loop is unstable on
+        the reference.
         """
         fastest = 0.0
         for k in np.unique(np.linspace(0, len(reference) - 1, LIMIT.LOOP_POINTS).astype(int)):
@@ -247,7 +249,10 @@ class Simulator:
         return self._compiled[substeps]
 
     def _iterated(self, inputs: LoopInputs) -> tuple[Array, Array]:
-        """BLOCK ticks at a time: states after each tick (S + N, 6n), outputs y, tau, qdd (S + N, 3n)."""
+        """Run BLOCK ticks at a time.
+
+        Returns states after each tick (S + N, 6n), and outputs y, tau, qdd (S + N, 3n).
+        """
         function = self._ticks(inputs.substeps)
         x = inputs.x
         states = []

@@ -61,7 +61,7 @@ def friction_function(
 
 
 def kinetic(direction: SX, plus: SX, minus: SX) -> SX:
-    """Forces (m,) of elements that slide in a direction; 0 for direction 0."""
+    """Friction forces (m,) of elements that slide in a direction; 0 where the direction is 0."""
     return (direction > 0) * plus - (direction < 0) * minus
 
 
@@ -84,7 +84,7 @@ def _at_rest(D: SX, free: SX, moving: SX, plus: SX, minus: SX) -> tuple[SX, SX]:
 
 
 def _masked(D: SX, rows: SX) -> SX:
-    """D on the rows and columns marked 1, the identity elsewhere.
+    """Keep D on rows and columns marked 1; elsewhere the identity.
 
     A little more on the diagonal, since rows of G may depend on each other.
     """
@@ -146,7 +146,10 @@ def event_function(friction: DryFriction) -> Any:
 
 
 def _root(c: SX, b: SX, end: SX) -> SX:
-    """Where c + b x + a x**2 first falls through zero in [0, 1]; c >= 0 at 0, `end` < 0 at 1."""
+    """Find where c + b x + a x**2 first falls through zero in [0, 1].
+
+    It is c >= 0 at 0 and `end` < 0 at 1.
+    """
     a = end - b - c
     root = ca.sqrt(ca.fmax(b**2 - 4 * a * c, 0))
     rising = (b + root) / ca.fmax(-2 * a, 1e-300)

@@ -20,7 +20,7 @@ BLOCK = 2**22  # times at once, by coefficients: a family holds a row of them fo
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A family with the coefficients of every joint, shape (P, n)."""
+    """One part of a motion: a family with the coefficients of every joint, shape (P, n)."""
 
     family: Family
     p: Array

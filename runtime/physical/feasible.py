@@ -111,7 +111,11 @@ class FeasibleOptions(RobotLimits):
 
 
 def fit(start: Beginning) -> Fitted:
-    """The feasible fit; `details` holds the standard parameters, the smallest eigenvalues, and what least squares gave."""
+    """Fit by method feasible.
+
+    `details` holds the standard parameters, the smallest eigenvalues, and the estimate of least
+    squares.
+    """
     if start.model is None:
         raise InputError(
             "method feasible needs the model: it knows which parameters belong to one link"
@@ -224,7 +228,7 @@ def solve_with_weight(
     options: FeasibleOptions,
     without_prior: Array | None = None,
 ) -> tuple[Array, float]:
-    """chi of a factored system, and the weight of D.
+    """Solve a factored system for chi, and choose the weight of D.
 
     without_prior : chi of weight 0, shape (p,), if it is known.
     """
@@ -254,7 +258,7 @@ def solve_with_weight(
 def held_out_weight(
     observation: Observation, system: System, physical: PhysicalModel, options: FeasibleOptions
 ) -> float:
-    """The weight of D by which every fifth of the record is predicted best by the others.
+    """Choose the weight of D with which each fifth of the record is predicted best by the others.
 
     The largest of several.
 
@@ -300,7 +304,7 @@ def held_out_weight(
 def decide_options(
     options: FeasibleOptions, model: GeneratedModel, physical: PhysicalModel
 ) -> FeasibleOptions:
-    """The options with the prior and the bounds that they leave to the robot.
+    """Fill in the prior and the bounds where the options leave them to the robot.
 
     No centre of mass lies further from the origin of its frame, along any axis, than the robot
     reaches, and all links together weigh less than a fifth of the water in a cube of that side.
@@ -334,7 +338,7 @@ def decide_options(
 
 
 def reach_text(options: FeasibleOptions) -> str:
-    """Bounds that were guessed from the lengths of the robot, in words."""
+    """Describe the bounds that were guessed from the lengths of the robot."""
     if options.reach is None or options.reach == "auto":
         return ""
     mass = options.total_mass[1] if isinstance(options.total_mass, tuple) else np.inf
@@ -348,7 +352,7 @@ def reach_text(options: FeasibleOptions) -> str:
 def by_reach(
     rows: Factor, physical: PhysicalModel, unbounded: FeasibleOptions, bounded: FeasibleOptions
 ) -> tuple[Array | None, Array | None]:
-    """chi without a prior, and without and with bounds that were guessed; None: no robot is within them."""
+    """Fit chi without a prior, once without and once with guessed bounds; None if no robot is within them."""
     found: list[Array | None] = []
     for limits in (unbounded, bounded):
         options = replace(limits, prior="none", weight="auto")  # a weight is of a prior
@@ -362,7 +366,11 @@ def by_reach(
 def bounds_contradict(
     rows: Factor, physical: PhysicalModel, unbounded: Array | None, bounded: Array | None
 ) -> bool:
-    """Whether guessed bounds raise the residual by more than LIMIT.WEIGHT_INCREASE, or let no robot be."""
+    """Whether guessed bounds contradict the record.
+
+    They do if they raise the residual by more than LIMIT.WEIGHT_INCREASE, or if no robot is
+    within them.
+    """
     if unbounded is None or bounded is None:
         return unbounded is not None
     K = physical.rows(rows.names)
@@ -372,7 +380,7 @@ def bounds_contradict(
 
 
 def prior_text(physical: PhysicalModel, options: FeasibleOptions, weight: float) -> str:
-    """Effect of the values of the robot file, in words."""
+    """Describe the effect of the robot file's values."""
     if options.prior == "none":
         return ""
     missing = len(physical.links) * 10 - len(known_inertia(physical))

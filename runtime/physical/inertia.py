@@ -76,7 +76,7 @@ class Condition:
 
 @dataclass(frozen=True, eq=False)
 class PhysicalModel:
-    """Standard parameters of a model: their map to base parameters and the conditions on them.
+    """The standard parameters of a model: their map to base parameters, and their conditions.
 
     Attributes
     ----------
@@ -231,7 +231,7 @@ def _form(acts: Mapping[Any, float]) -> dict[tuple[int, int], float]:
 
 
 def _coupled(groups: Sequence[set[int]]) -> list[set[int]]:
-    """Sets that share a joint, united."""
+    """Unite sets that share a joint."""
     united: list[set[int]] = []
     for group in groups:
         touching = [other for other in united if other & group]

@@ -97,7 +97,10 @@ def solutions(K: Array, X: Array, scale: Array) -> Space:
 
 
 def within(space: Space, rows: LinearBounds) -> tuple[Space, LinearBounds]:
-    """`space` with the rows that are equations fulfilled (nearest to that where they contradict it), and the other rows."""
+    """Restrict `space` by those rows that are equations; returns it and the other rows.
+
+    If the equations contradict the space, its nearest points are taken.
+    """
     equal = rows.lower == rows.upper
     others = LinearBounds(
         tuple(n for n, e in zip(rows.names, equal, strict=True) if not e),
@@ -207,7 +210,7 @@ class Program:
             self.at_least_zero(sign * A[given], sign * (b - bound)[given])
 
     def more(self, count: int) -> Array:
-        """Numbers of `count` further unknowns."""
+        """Add `count` unknowns and return their numbers."""
         first = len(self.linear)
         self.linear, self.diagonal = (
             np.append(x, np.zeros(count)) for x in (self.linear, self.diagonal)
@@ -215,18 +218,18 @@ class Program:
         return np.arange(first, first + count)
 
     def of_chi(self, M: Array) -> tuple[Array, Array]:
-        """M chi as A x + b, M of shape (k, p): A and b."""
+        """Write M chi as A x + b, M of shape (k, p); returns A and b."""
         A = np.zeros((len(M), len(self.linear)))
         A[:, : self.m] = M @ self.space.basis
         return A, M @ self.space.origin
 
     def at_least_zero(self, A: Array, b: Array) -> None:
-        """A x + b >= 0, row by row."""
+        """Add the constraints A x + b >= 0, row by row."""
         if len(b):
             self.constraints.append((_clarabel().NonnegativeConeT(len(b)), A, b))
 
     def add_squares(self, M: Array, z: Array, weight: float) -> None:
-        """weight ||M chi - z||^2 in the criterion; the residual are further unknowns."""
+        """Add weight ||M chi - z||^2 to the criterion; the residuals are further unknowns."""
         own = self.more(len(z))
         A, b = self.of_chi(M)
         A[np.arange(len(z)), own] = -1.0
@@ -234,7 +237,7 @@ class Program:
         self.constraints.append((_clarabel().ZeroConeT(len(z)), A, b - z))
 
     def solve(self) -> Optimum:
-        """The optimum, by the tightest of TOLERANCES that Clarabel reaches."""
+        """Solve by the tightest of TOLERANCES that Clarabel reaches."""
         cones, A, b = zip(*self.constraints, strict=True)
         count, status = len(self.linear), ""
         Q = np.diag(self.diagonal)
@@ -298,7 +301,7 @@ def closest(
 
 
 def margin(conditions: Sequence[Condition], rows: LinearBounds, space: Space) -> Optimum:
-    """The largest t with every P - t S positive semidefinite: `margin`.
+    """Find the largest t for which every P - t S is positive semidefinite.
 
     Negative where no physical robot is in `space`.
     """
@@ -376,7 +379,7 @@ def _solved(*data: Any) -> Any:
 
 
 def _solution(solve: Callable[[], Any]) -> Any:
-    """Solution of Clarabel; None if it stops with an error of its own."""
+    """Run Clarabel; None if it stops with an error of its own."""
     try:
         return solve()
     except BaseException as e:  # a panic of Rust is no Exception

@@ -187,7 +187,7 @@ def stored_files(folder: Path) -> list[Path]:
 
 
 def _inside(folder: Path, name: str, where: str) -> Path:
-    """The file `name` of the folder.
+    """Path of the file `name`, which must lie in the folder.
 
     Bags of the first ROS 2 versions write it behind the name of the folder.
     """
@@ -232,7 +232,7 @@ def _topic(connections: list[Any], wanted: str | None, file: str) -> str:
 
 
 def _as_defined(definition: Any) -> bool:
-    """Whether a definition that a bag brings along, where it is in .msg text, has the fields of JointState.
+    """Whether a definition in the bag has the fields of JointState; only .msg text is compared.
 
     Other languages go by their hash.
     """

@@ -13,7 +13,7 @@ from runtime.reading.settings import RecordSettings
 
 
 def draft(settings: RecordSettings, path: Path, joints: Sequence[str]) -> str:
-    """Text of a study file of one record, `# ?` before what is open, with candidates.
+    """Write a study file of one record; `# ?` and candidates stand before what is open.
 
     "" where the file cannot be read.
 

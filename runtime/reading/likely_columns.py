@@ -97,7 +97,7 @@ class Family:
 
     @property
     def order(self) -> tuple[int, int, int, int, str]:
-        """Smallest first: measured, the better word, more joints, joints before a single array."""
+        """Sort key; the smallest comes first: measured, the better word, more joints, joints before a single array."""
         return self.target, self.word, -len(self.names), len(self.stem), self.stem
 
 
@@ -112,7 +112,10 @@ def likely_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str
 
 
 def known_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str, Any]:
-    """The same as far as names allow; without torques if their number differs from that of positions."""
+    """Settings as `likely_columns`, as far as the names allow.
+
+    Torques are left out if their number differs from that of the positions.
+    """
     families = sorted(families_of(names, joints), key=lambda family: family.order)
     of = {key: [f for f in families if f.quantity == key] for key in WORDS}
     whole = [f for f in of["q"] if len(f.names) == len(joints)] or of["q"]

@@ -41,7 +41,9 @@ def read_records(
     folder: str | Path | None = None,
     missing: bool = False,
 ) -> list[Record]:
-    """Several records of one robot, no name twice; a record that `resample` splits at gaps is one record by piece.
+    """Read several records of one robot; no two have the same name.
+
+    A record that `resample` splits at gaps becomes one record for each piece.
 
     Parameters
     ----------
@@ -139,7 +141,7 @@ class Signal:
     values: Array
 
     def finite(self, values: Array, hint: str = "", largest: float | None = None) -> Array:
-        """The values, of these columns, if they are finite and, in SI, of a size that exists."""
+        """The values, which must be finite and, in SI, of a size that exists."""
         limits = {} if largest is None else {"largest": largest}
         return require_finite(
             values, self.names, self.table.file, self.table.row, hint=hint, **limits
@@ -219,7 +221,10 @@ def _joint_side(
     side: Conversion,
     missing: bool,
 ) -> dict[str, Array]:
-    """The signals, joint side, SI, and `missing`, True for each position that is missing, where any is."""
+    """Convert the signals to joint side and SI.
+
+    Also returns `missing`, True for each missing position, if there are any.
+    """
     samples: dict[str, Array] = {}
     for key, signal in signals.items():
         values = signal.values
@@ -251,12 +256,12 @@ def _joint_side(
 
 
 def _columns_of_joints(names: Sequence[str]) -> tuple[str, ...]:
-    """The columns of the joints that have one."""
+    """The columns of those joints that have one."""
     return tuple(name for name in names if name != NONE)
 
 
 def _spread(values: Array, names: Sequence[str], absent: float) -> Array:
-    """Columns of the joints that have one, `absent` for the others, shape (N, n)."""
+    """Spread the columns over all joints, shape (N, n); joints without one get `absent`."""
     present = [name != NONE for name in names]
     if all(present):
         return values
@@ -305,7 +310,7 @@ def _uniform(
 
 
 def _places(settings: RecordSettings, tables: Sequence[Table]) -> tuple[Table, Table, Table]:
-    """The files of the positions, of the torques and of the known torques.
+    """The files that hold the positions, the torques and the known torques.
 
     Of two files the second holds the torques, except for known torques that it has and the first has not, beside torques of the first.
     """

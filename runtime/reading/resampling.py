@@ -121,7 +121,7 @@ def resampled(
     *,
     file: str,
 ) -> tuple[list[Stretch], float, str]:
-    """Stretches at a uniform rate, that rate in Hz, and what was done, as a sentence.
+    """Resample the signals; returns stretches at a uniform rate, this rate in Hz, and a sentence.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def resampled(
 
 
 def _counted(t: Array, signals: Sequence[Array], rate: float, file: str) -> Stretch:
-    """The signals unchanged, at t[0] + k/rate.
+    """Leave the signals unchanged, at t[0] + k/rate.
 
     Raises InputError if the time stamps last longer or shorter than this number of samples.
     """
@@ -195,7 +195,7 @@ def _counted(t: Array, signals: Sequence[Array], rate: float, file: str) -> Stre
 
 
 def _uniform(t: Array, signals: Sequence[Array], rate: float, method: str) -> Stretch:
-    """The signals at t[0] + k/rate."""
+    """Interpolate the signals at t[0] + k/rate."""
     K = int(np.floor((t[-1] - t[0]) * rate + LAST)) + 1
     grid = t[0] + np.arange(K) / rate
     at = np.minimum(grid, t[-1])

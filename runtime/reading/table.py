@@ -80,8 +80,9 @@ class Table:
         return tuple(self.columns)
 
     def chosen(self, names: Sequence[str]) -> Table:
-        """The table of the samples that hold these columns: of most files, all of them. Rows in which
-        all columns but one, the time, are empty are those of another source, and left out.
+        """The table of the samples that hold these columns; for most files, all samples.
+
+        Rows whose columns are all empty but the time come from another source, and are left out.
         """
         gaps = [name for name in dict.fromkeys(names) if name in self.empty]
         if not gaps or len({*names}) - len(gaps) > 1:

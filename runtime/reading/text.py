@@ -65,7 +65,7 @@ def read_text(path: Path, options: Options) -> Table:
 
 
 def _lines(path: Path) -> Lines:
-    """Lines that hold something, comments aside."""
+    """The lines that are neither empty nor comments."""
     number = 0
     try:
         with opened(path) as stream, TextIOWrapper(stream, encoding="utf-8-sig") as text:
@@ -92,7 +92,7 @@ def _not_utf8(path: Path) -> InputError:
 
 
 def _row(path: Path, has_header: bool, i: int) -> str:
-    """The line of sample i, from 0."""
+    """The line of sample i, counted from 0."""
     number, _ = next(islice(_lines(path), i + has_header, None))
     return f"line {number}"
 
@@ -170,7 +170,7 @@ def _fields(line: str, delimiter: str | None) -> list[str]:
 
 
 def _number(text: str, decimal: str) -> float | None:
-    """The number that a field holds; None if it holds none."""
+    """The number in a field; None if there is none."""
     if "_" in text or not text.isascii() or (decimal != "." and "." in text):
         return None
     try:

@@ -19,7 +19,7 @@ MOST_SECONDS = 3600  # processor time of one command
 
 
 def watched() -> None:
-    """End this process and its own ones when standard input closes: its holder has ended."""
+    """End this process and those it started when standard input closes, as its holder has then ended."""
     limited(MOST_SECONDS)
     threading.Thread(target=_end_with_input, daemon=True).start()
 
@@ -31,7 +31,7 @@ def _end_with_input() -> None:
 
 
 def limited(seconds: int = 10**9) -> None:
-    """Limits of memory and processor time of this process, where the system has them."""
+    """Limit memory and processor time of this process, if the system allows it."""
     with suppress(ImportError, OSError, ValueError):
         import resource
 
@@ -47,7 +47,7 @@ class ViewProcess:
         self.pool: ProcessPoolExecutor | None = None
 
     def start(self) -> ProcessPoolExecutor:
-        """Spawn it, unless it is there; it loads the views meanwhile."""
+        """Start the process unless it runs; it loads the views meanwhile."""
         if self.pool is None:
             self.pool = ProcessPoolExecutor(
                 1, mp_context=get_context("spawn"), initializer=_of_parent
@@ -57,11 +57,11 @@ class ViewProcess:
         return self.pool
 
     def submit(self, view: Callable[..., Any], *args: Any) -> Future[Any]:
-        """A view, as soon as the ones before are done."""
+        """Ask for a view; it is computed once those before are done."""
         return self.start().submit(view, *args)
 
     def end(self) -> None:
-        """End it at once, whatever it does."""
+        """End the process at once, whatever it does."""
         if self.pool is not None:
             with suppress(BrokenProcessPool, ProcessLookupError):
                 os.kill(self.number.result(), signal.SIGKILL)

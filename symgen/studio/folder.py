@@ -41,7 +41,7 @@ RESULT_FILES = ("estimate.json", "cestac.json", "advice.json")  # of a run that 
 
 
 class WorkFolder:
-    """Files of one robot, its records and results.
+    """The folder that holds one robot, its records and its results.
 
     Parameters
     ----------
@@ -57,21 +57,21 @@ class WorkFolder:
             remove(left)
 
     def write(self, name: str, content: str | bytes) -> None:
-        """One file of ours, whole or not at all."""
+        """Write a file of the folder, whole or not at all."""
         write_all(self.path, {name: content})
 
     def read(self, name: str) -> str:
-        """Text of a file of ours; "" where there is none."""
+        """Text of a file of the folder; "" if it does not exist."""
         path = self.path / name
         return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
 
     @property
     def robot(self) -> Path | None:
-        """The robot file that commands take."""
+        """The robot file that commands use."""
         return self.first(ROBOT_ENDINGS)
 
     def first(self, endings: tuple[str, ...]) -> Path | None:
-        """The robot file with the first of these endings: of TREES, the user's own."""
+        """The first existing robot file with one of these endings; with those of TREES it is the user's own."""
         found = (self.path / f"robot{ending}" for ending in endings)
         return next((path for path in found if path.is_file()), None)
 
@@ -98,8 +98,9 @@ class WorkFolder:
             remove(old)
 
     def bring_back(self, history: str = "robot", other: str = "undone") -> None:
-        """The last robot of one history takes the place of the present one, which goes to the other;
-        InputError where there is none.
+        """Swap the present robot with the last one of a history.
+
+        The present one goes to the other history; InputError if the history is empty.
         """
         if not (before := self.kept(history)):
             raise InputError("nothing to undo; reload the page")
@@ -114,7 +115,7 @@ class WorkFolder:
             (self.path / name).unlink(missing_ok=True)
 
     def take_robot(self, name: str, content: bytes) -> None:
-        """A file becomes the robot; results and record stay, the robot before goes to its history."""
+        """Make a file the robot; the robot before goes to its history, results and record stay."""
         self._keep_robot()
         self._remove_robot()
         self.write(robot_file(name), content)
@@ -134,8 +135,9 @@ class WorkFolder:
             self.take_robot(source, content_of(Path(source)))
 
     def edit_robot(self, text: str, *, draft: bool) -> None:
-        """A text of the table: a draft where it describes no robot, else the robot file. The history
-        holds whole robots.
+        """Save a text of the table: as a draft if it describes no robot, otherwise as the robot file.
+
+        The history holds whole robots only.
         """
         if not self.read(DRAFT):
             self._keep_robot()
@@ -148,8 +150,9 @@ class WorkFolder:
         return next((p for p in sorted(self.path.glob(f"{kind}.*")) if is_measured(p)), None)
 
     def take_measured(self, kind: str, name: str, part: Path) -> None:
-        """A file that has arrived, called `name` by its owner, becomes the record or the
-        validation; a record has a new study.
+        """Make a file that has arrived, called `name` by its owner, the record or the validation.
+
+        A record starts a new study.
         """
         ending = "".join(s for s in map(str.lower, Path(name).suffixes) if s in (*endings(), ".gz"))
         if not name.lower().endswith(ending) or ending.removesuffix(".gz") not in endings():
@@ -253,12 +256,12 @@ def result_of(run: Path) -> str:
 
 
 def remove(path: Path) -> None:
-    """No file or folder of that name is left."""
+    """Remove a file or folder of that name, if there is one."""
     shutil.rmtree(path, ignore_errors=True) if path.is_dir() else path.unlink(missing_ok=True)
 
 
 def json_of(path: Path) -> dict[str, Any]:
-    """A mapping that was written as JSON; empty where there is none."""
+    """Read a mapping from a JSON file; empty if it does not exist."""
     try:
         return dict(json.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):

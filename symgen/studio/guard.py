@@ -78,7 +78,7 @@ class Guard:
         await sent({"type": "http.response.body", "body": reason[1].encode()})
 
     def refusal(self, scope: Message, limit: int) -> tuple[int, str] | None:
-        """Status and sentence of what is refused; None for a request of our own pages."""
+        """Status and sentence with which a request is refused; None for a request of our own pages."""
         headers: dict[str, list[str]] = {}
         for name, value in scope["headers"]:
             headers.setdefault(name.decode("latin-1").lower(), []).append(value.decode("latin-1"))

@@ -31,7 +31,7 @@ WAITING, RUNNING, DONE, FAILED, CANCELLED = "waiting", "running", "done", "faile
 
 @dataclass
 class Job:
-    """One command.
+    """One command in the queue.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class Job:
 
     @property
     def said(self) -> list[str]:
-        """Lines of its error stream without what draws in a terminal."""
+        """Lines of the error stream, without control sequences."""
         lines = re.split(r"[\r\n]+", CONTROL_CODES.sub(" ", self.progress))
         return [" ".join(line.split()) for line in lines if line.strip()]
 
@@ -89,13 +89,13 @@ class Job:
 
     @property
     def last(self) -> str:
-        """Last error that the command printed, or else its last line."""
+        """The last command with that title."""
         errors = [line for line in self.said if line.startswith("error: ")]
         words = (errors or self.said or [f"exit code {self.code}"])[-1]
         return words.removeprefix("error: ")
 
     def signal(self, number: signal.Signals) -> None:
-        """A signal to its process and those that it has started, where they are."""
+        """Send a signal to the process and to those that it started, if they still run."""
         if self.process is not None:
             with suppress(ProcessLookupError, PermissionError):
                 os.killpg(self.process.pid, number)
@@ -122,7 +122,7 @@ class Jobs:
         self.wake = asyncio.Event()
 
     def add(self, title: str, words: Sequence[str], result: str, *, run: str = "") -> None:
-        """Queue a command; one with the same title gives way to it."""
+        """Queue a command; an earlier one with the same title is removed."""
         for job in self.all:
             if job.title == title:
                 self.cancel(job)
@@ -140,7 +140,7 @@ class Jobs:
         return next((job for job in reversed(self.all) if job.title == title), None)
 
     def cancel(self, job: Job) -> None:
-        """Take it out of the queue, or end its process."""
+        """Remove a command from the queue, or end its process."""
         if job.open:
             waited, job.state = job.state == WAITING, CANCELLED
             if waited:
@@ -195,7 +195,7 @@ class Jobs:
             job.state = DONE if told else FAILED
 
     def _written(self, job: Job) -> int:
-        """When its result was written, ns; 0 where there is none."""
+        """When the result was written, ns; 0 if it was not."""
         path = self.folder / job.result
         return path.stat().st_mtime_ns if path.is_file() else 0
 

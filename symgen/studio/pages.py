@@ -53,8 +53,10 @@ ESTIMATORS = {
 
 
 class Pages:
-    """The handlers of one server: those of GET answer, those of POST change something and name the
-    part of a page that shows it, "" for all of it.
+    """The handlers of one server.
+
+    Those of GET answer. Those of POST change something and return the name of the part of a page
+    that shows it, "" for the whole page.
     """
 
     def __init__(self, server: Server) -> None:
@@ -346,7 +348,7 @@ class Pages:
 
 
 def answering(handler: Handler) -> Handler:
-    """A handler whose bad input is one sentence on the page, with status 422."""
+    """Wrap a handler so that bad input becomes one sentence on the page, with status 422."""
 
     async def answer(request: Request) -> Response:
         try:
@@ -360,5 +362,5 @@ def answering(handler: Handler) -> Handler:
 
 
 def safe(text: str) -> str:
-    """Letters, digits, _ . - of a text, for the name of a file."""
+    """Keep only letters, digits, _ . and - of a text, for the name of a file."""
     return re.sub(r"[^A-Za-z0-9_.-]", "", text).lstrip(".-")[:60]

@@ -94,6 +94,6 @@ class Server:
 
 
 def page(name: str, status: int = 200, **context: Any) -> Response:
-    """A template as an answer; every name in it is escaped."""
+    """Render a template as an answer; all names in it are escaped."""
     text = PAGE_TEMPLATES.get_template(f"{name}.html.jinja").render(step=name, **context)
     return HTMLResponse(text, status)

@@ -40,7 +40,7 @@ def cells_of(text: str) -> dict[str, Any]:
 
 
 def _texts(x: Any) -> Any:
-    """The same with a text in place of every scalar; what stands deeper than a cell as JSON."""
+    """Turn every scalar into a text; what stands deeper than a cell becomes JSON."""
     if isinstance(x, dict):
         return {str(key): _texts(value) for key, value in x.items()}
     if isinstance(x, list):
@@ -49,8 +49,9 @@ def _texts(x: Any) -> Any:
 
 
 def with_cells(text: str, asked: str) -> str:
-    """The text of a robot file with the cells of `asked`, JSON as `cells_of`; its other parts, and
-    their comments, stay.
+    """Put the cells of `asked`, JSON as `cells_of`, into the text of a robot file.
+
+    The other parts stay, with their comments.
 
     Raises DescriptionError where that is no table.
     """
@@ -75,7 +76,7 @@ def with_cells(text: str, asked: str) -> str:
 
 
 def blocks(text: str) -> list[tuple[str, str]]:
-    """(key, lines) of every part of a robot file, in order; what stands ahead has the key ""."""
+    """Split a robot file into its parts (key, lines), in order; lines ahead of all parts have the key ""."""
     parts = [part if part.endswith("\n") else f"{part}\n" for part in TOP_LEVEL.split(text) if part]
     return [(re.match(r"[A-Za-z_]*", part)[0], part) for part in parts]  # type: ignore[index]
 
@@ -90,8 +91,9 @@ def wrong(text: str) -> DescriptionError | None:
 
 
 def fitted(text: str) -> tuple[str, list[str]]:
-    """A text after frames have come or gone, without the parts that are for the others; their
-    names.
+    """Remove the parts of a text that no longer fit after frames were added or removed.
+
+    Returns the text and the names of these parts.
     """
     left_out: list[str] = []
     while (error := wrong(text)) is not None and error.path and error.path[0] in SIZED:
@@ -108,7 +110,7 @@ def _flow(items: Iterable[tuple[str, Any]]) -> str:
 
 
 def _scalar(x: Any) -> str:
-    """A text as YAML, between quotes unless it is plain; a deeper value as JSON."""
+    """Write a text as YAML, in quotes unless it is plain; a deeper value as JSON."""
     if not isinstance(x, str):
         return json.dumps(x)
     return x if PLAIN_CELL.match(x) and len(x) <= CELL else json.dumps(x[: CELL + 1])

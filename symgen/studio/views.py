@@ -33,7 +33,7 @@ NAMES_LISTED = 200  # columns that are listed
 
 
 def answered(view: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, Any]]:
-    """A view whose errors are values, {error, path}; with the notes of the library."""
+    """Wrap a view so that its errors become values {error, path}; notes of the library are added."""
 
     @wraps(view)
     def shown(*args: Any) -> dict[str, Any]:
@@ -259,7 +259,7 @@ def check() -> None:
 
 
 def digest_of(*paths: Path) -> str:
-    """SHA-256 of files together."""
+    """SHA-256 of several files together."""
     return sha256(b"".join(path.read_bytes() for path in paths if path.is_file())).hexdigest()
 
 
