@@ -109,7 +109,7 @@ def test_a_link_to_the_file_stays_one(folder) -> None:
         (["results", "nowhere.urdf"], "no file nowhere.urdf"),
         (["results", "arm.xml", "--lock", "a2=0"], "no base parameters of arm.xml"),
         (["results", "arm.xml", "--chain", "world", "nothing"], "no link 'nothing'"),
-        (["results", "results/estimate.json"], "go back into a URDF"),
+        (["results", "results/estimate.json"], "apply writes URDF"),
     ],
 )
 def test_errors_are_one_line(folder, words, message) -> None:

@@ -93,7 +93,7 @@ def test_torque_steps_and_named_columns(emps_data):
         (["--columns", "M9"], ["M9", "M1R"]),
         (["--uneven", "0.1"], ["cestac.uneven", "rounding: phase"]),
         (["--uneven", "0.6", "--rounding", "phase"], ["cestac.uneven", "0.5"]),
-        (["--reader", "counts"], ["cestac.rounding", "destroys the edges"]),
+        (["--reader", "counts"], ["cestac.rounding", "destroys the changes"]),
         (["--reader", "edges"], ["signals.reader", "counts"]),
         (["--place", "loop"], ["cestac.rounding", "phase alone"]),
         (["--method", "best"], ["estimate.method", "didim"]),

@@ -99,5 +99,5 @@ def test_steps_near_those_of_the_record_are_put_into_draws():
 
 
 def test_other_laws_destroy_the_edges():
-    with pytest.raises(SettingsError, match="destroys the edges"):
+    with pytest.raises(SettingsError, match="destroys the changes"):
         cestac(planar, RECORD, study(rounding="two-point"))

@@ -171,7 +171,7 @@ def test_too_much_is_refused_where_the_length_was_a_lie(
     monkeypatch.setattr(guard, "LARGEST_UPLOAD", 10**5)
     parts = (b"0,1\n" * 10**4 for _ in range(10))
     answer = studio.post("upload", params={"kind": "record", "name": "a.csv"}, content=parts)
-    assert answer.status_code == 422 and "more than" in answer.text
+    assert answer.status_code == 422 and "larger than" in answer.text
     assert [p.name for p in studio.path.iterdir() if p.is_file()] == []
 
 

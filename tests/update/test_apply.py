@@ -284,7 +284,7 @@ def test_estimates_of_other_robots_are_refused(tmp_path) -> None:
         symgen.apply(1.0, path)
     with pytest.raises(InputError, match="nowhere"):
         symgen.apply(tmp_path / "nowhere", path)
-    with pytest.raises(DescriptionError, match=r"ends in|go back into a URDF"):
+    with pytest.raises(DescriptionError, match=r"ends in|apply writes URDF"):
         symgen.apply(exact(tx40, dict(tx40.VALUES)), written(tmp_path, "arm.yaml", "symgen: 1"))
 
 
