@@ -153,7 +153,7 @@ class Baseline:
 
     @cached_property
     def basis(self) -> Array:
-        """Orthonormal basis of the span of W, rows over the residual of their joint, (K*n, rank)."""
+        """Orthonormal basis of the span of W, each row divided by the residual of its joint; (K*n, rank)."""
         weighted = (self.as_given[0] / self.free.sigma[:, None]).reshape(-1, self.D.shape[2])
         scale = np.linalg.norm(weighted, axis=0)
         Q, R, _ = qr(weighted / np.where(scale > 0, scale, 1.0), mode="economic", pivoting=True)

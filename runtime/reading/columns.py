@@ -260,7 +260,7 @@ def conversion(
 def require_alike(
     names: Columns, first: Table, last: Table, q: tuple[int, ...], tau: tuple[int, ...]
 ) -> None:
-    """Raise InputError if positions and torques, of these shapes, are not of one record."""
+    """Raise InputError unless the shapes of positions and torques fit one record."""
     if (
         first is not last
         and not set(names.q) & set(names.tau)

@@ -150,7 +150,7 @@ def candidates(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str, li
 
 
 def families_of(names: Sequence[str], joints: Sequence[str] = ()) -> Iterator[Family]:
-    """Names that differ by a joint, by its name or by a number, and names by themselves."""
+    """Group column names that differ only by a joint's name or number; other names stay by themselves."""
     stems: dict[str, list[str]] = {}
     for joint, name in product(joints, names):
         stem, found = re.subn(rf"(?<![^\W_]){re.escape(joint)}(?![^\W_])", "#", name)

@@ -203,7 +203,7 @@ class Element:
 
     @property
     def is_friction(self) -> bool:
-        """Whether its torque is one of velocities."""
+        """Whether the torque depends on velocities."""
         return any((match := STATE.match(name)) and match[1] == "qd" for name in self.symbols)
 
     @property
@@ -213,7 +213,7 @@ class Element:
 
 
 def check_law(e: Element, robot: Any) -> None:
-    """The names of a law, its scalars, and that it is finite at rest and in motion."""
+    """Check that a law uses only known names and scalars, and is finite at rest and in motion."""
     where: Path = ("elements", e.family)
     states = [f"{state}{j}" for state in ("q", "qd") for j in ("", *robot.moving)]
     for name, x in e.scalars.items():

@@ -111,7 +111,7 @@ def _context(spec: ModuleSpec, command: str | None) -> dict[str, Any]:
 def _loops(
     spec: ModuleSpec, states: CStates, closing: Sequence[Mapping[str, Any]]
 ) -> dict[str, Any]:
-    """The values by which the template closes loops: start, units and steps of Newton's method."""
+    """Values of the template's loop code: start, units, Newton steps and signatures."""
     name, loops = spec.robot.name, loop_system(spec.robot)
     start = f"{{{', '.join(map(repr, loops.start.tolist()))}}}"
     actuated = [f"const real *{x}_a" for x in ("q", "qd", "qdd")]

@@ -47,7 +47,7 @@ class ViewProcess:
         self.pool: ProcessPoolExecutor | None = None
 
     def start(self) -> ProcessPoolExecutor:
-        """Start the process unless it runs; it loads the views meanwhile."""
+        """Start the child process unless it is running; it imports the views in the background."""
         if self.pool is None:
             self.pool = ProcessPoolExecutor(
                 1, mp_context=get_context("spawn"), initializer=_of_parent

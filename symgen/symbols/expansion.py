@@ -249,5 +249,5 @@ class Expansion:
 
 
 def length(a: Polynomial) -> int:
-    """Terms, multiplied out."""
+    """Number of terms of `a` after expansion."""
     return sum(map(len, a.values()))

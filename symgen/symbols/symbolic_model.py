@@ -35,7 +35,7 @@ class ClosedModel:
 
     @property
     def size(self) -> int:
-        """Terms as they are written."""
+        """Number of terms as written, not expanded."""
         below = () if self.denominator is None else (self.denominator,)
         return sum(map(expressions.size, (*self.entries.values(), *below)))
 
