@@ -42,6 +42,19 @@ def small():
     return cestac(planar, RECORD, study())
 
 
+def test_enough_is_the_coarsest_step_without_a_worse_finer_one(small):
+    def of(**verdicts):
+        steps = {"fine": Level(1e-6), "middle": Level(1e-4), "coarse": Level(1e-2)}
+        steps["torque"] = Level(0.0, 0.1)
+        levels = [replace(small.levels[0], level=steps[k], verdict=v) for k, v in verdicts.items()]
+        return replace(small, levels=tuple(levels)).enough
+
+    assert of(coarse="biased", middle="unbiased", fine="unbiased") == Level(1e-4)
+    assert of(coarse="unbiased", middle="doubtful", fine="unbiased") == Level(1e-6)
+    assert of(coarse="unbiased", fine="biased") is None
+    assert of(torque="unbiased") is None
+
+
 def test_one_run_is_equations_15_to_17(small):
     """The same run written out: perturb, filter, regressor on all columns, decimate, lstsq."""
     bits = np.random.Generator(np.random.Philox(np.random.SeedSequence(1, spawn_key=(1, 2))))
