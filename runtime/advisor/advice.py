@@ -364,7 +364,7 @@ class Advice(Result, Part):
     def _step_table(
         self, caption: str, ways: Sequence[tuple[str, tuple[EncoderAdvice, ...], Array]]
     ) -> Table:
-        """Table of the coarsest steps by encoder, one column for each rounding law."""
+        """Table of the coarsest steps by encoder; each rounding law or reader has columns of its own."""
         headers, rows = ["encoder"], []
         for name, encoders, _ in ways:
             for limit in encoders[0].limits:

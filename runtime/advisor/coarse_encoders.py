@@ -154,7 +154,7 @@ class CoarseEncoders:
     def locking(self, delta: Array) -> Array:
         """Power of the rounding error that passes the low-pass, relative to white noise, shape (m,).
 
-        The error of a slow joint is a sawtooth; the largest value of the encoders counts.
+        The rounding error is a sawtooth; of all records and speeds the largest power is taken.
 
         delta, shape (m,).
 
@@ -278,7 +278,7 @@ class CoarseEncoders:
         return np.asarray(self._solved(coarse) / (self.reference if every else self._solved(exact)))
 
     def _solved(self, parts: Sequence[tuple[States, Array]]) -> Array:
-        """Solve for X from the states of every record, on the rows of `mask`."""
+        """Solve for X from the states of every record and the mask of its rows, bool, shape (n, K)."""
         rows = [
             observation_of(
                 self.columns,

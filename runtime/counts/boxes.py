@@ -183,7 +183,7 @@ class Boxes:
     def suspects(self, read: Posterior) -> Array:
         """Samples at which the counts may jump.
 
-        These are the sample of largest jerk, and the middles of the SUSPECTS windows of time
+        These are the sample at which the density of the jerk is largest, and the middles of the SUSPECTS windows of time
         whose counts the other windows predict worst.
         """
         m, v, speed = read.without
@@ -211,7 +211,7 @@ class Boxes:
     def jump(self, near: int, read: Posterior) -> tuple[int, float, float]:
         """Find the sample near `near` from which all counts are most likely off by one number.
 
-        Returns the sample, the number, and by how many nats correcting it raises the evidence.
+        Returns the sample, the number, and by how many nats correcting it raises the posterior.
 
         The slope of the log posterior by that number is g = sum (nu - tau x) over the later sites,
         its curvature sum tau - (B tau)' A^-1 (B tau).
@@ -250,7 +250,7 @@ class Boxes:
 def of_most_evidence(
     boxes: Boxes, sizes: Sequence[float], start: Posterior, moves: Sequence[tuple[int, int]] = MOVES
 ) -> Posterior:
-    """Find the errors, of `sizes` and CLOCK_ERRORS, whose evidence no neighbour exceeds, and the motion."""
+    """The motion with those errors, of `sizes` and CLOCK_ERRORS, whose evidence no neighbour clearly exceeds."""
     best, place = start, (sizes.index(start.errors.count), CLOCK_ERRORS.index(start.errors.time))
     tried = {place}
     for move in moves:

@@ -131,7 +131,7 @@ def _logdet(A: Any) -> Any:
 
 
 def _spread(A: Any, criterion: str) -> Any:
-    """Logarithm of a smooth bound of the condition number."""
+    """Logarithm of a smooth bound of the criterion: of the condition number, or of the largest deviation."""
     C = ca.solve(A, ca.DM.eye(A.shape[0]), "qr")
     if criterion in ("sigma", "record"):
         return ca.log(ca.sum1(ca.diag(C) ** 8)) / 8

@@ -191,6 +191,6 @@ def _exchanged(A: Array, M: Array, chosen: Array) -> Array:
 
 
 def _quality(M: Array) -> tuple[float, Array]:
-    """Condition of W, and deviations, shape (c,); infinite for parameters it does not determine."""
+    """Condition of W, and deviations, shape (c,); all infinite if it does not determine the parameters."""
     condition, sigma = float(np.sqrt(np.linalg.cond(M))), np.sqrt(np.diag(np.linalg.inv(M)))
     return (condition, sigma) if condition < LARGEST_CONDITION else (np.inf, np.inf * sigma)

@@ -110,7 +110,8 @@ def excite(
     if not candidates:
         exceeded = excesses(model, motion_from_mapping(kept[0].motion), limits, settings, known.X)
         raise InputError(
-            "every motion found exceeds a limit between the instants at which limits are checked: "
+            "the best motions exceed a limit between the points of the grid, also with twice and four "
+            "times the margin: "
             f"{'; '.join(map(str, exceeded[:3]))}. Raise `grid`, which is {settings.grid:g} Hz"
         )
     _, motion, margin, observation = min(candidates, key=lambda candidate: candidate[0])

@@ -192,10 +192,10 @@ def iterate(
 
 
 def _physical_start(loop: ClosedLoop, start: Beginning) -> str:
-    """Choose the start where least squares gives no physical robot.
+    """Say which start to set where the parameters are not those of a physical robot.
 
-    It is the values of the robot file if these have an inertia about every joint, else the estimate
-    of method feasible.
+    These are the values of the robot file if they have an inertia about every joint, else those of
+    method feasible.
     """
     try:
         X = full(

@@ -162,7 +162,7 @@ class TorqueUnit(Part):
     title = "Unit of the torques"
 
     def warnings(self) -> tuple[str, ...]:
-        """The question to the user, as a list."""
+        """The question to the user, as a tuple."""
         return (self.sentence,)
 
 

@@ -130,7 +130,7 @@ def excerpts(reading: Prepared) -> list[Prepared]:
 
 @dataclass(frozen=True, eq=False)
 class Filtered:
-    """A record whose motion is low-pass filtered.
+    """A record filtered by a low-pass that is chosen by its motion.
 
     Attributes
     ----------

@@ -228,9 +228,10 @@ def inertias(case: Case) -> Answer | None:
 
 
 def _far_bodies(physical: PhysicalModel, length: float) -> Iterator[str]:
-    """Find links whose values put their mass further than LIMIT.LINK_EXTENT reaches from their frame.
+    """Find links whose values put their mass too far from their frame.
 
-    A link may have fewer than ten values.
+    That is further than LIMIT.LINK_EXTENT times the reach of the robot, m. A link may have fewer
+    than ten values.
     """
     for j in physical.links:
         given = {family: physical.values.get(f"{family}{j}", 0.0) for family in INERTIAL}

@@ -342,7 +342,7 @@ def _at(robot: Robot, constants: Mapping[str, float]) -> Sample:
 
 
 def _sampled(regrouping: Regrouping, fixed: Mapping[str, float]) -> tuple[Sample, str]:
-    """Draw states and constants; returns the states and these constants."""
+    """Draw states, with other constants where that is possible; returns them and the constants in words."""
     robot, rng = regrouping.robot, np.random.default_rng(8)
     spreads = SPREADS[2 * bool(close(robot).tied) :]
     for spread, zero in spreads if robot.constants and regrouping.method == EXACT else ():

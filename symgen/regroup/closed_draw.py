@@ -149,7 +149,7 @@ class ClosedDraw(Draw):
         def place(x: Array) -> Array:
             """Put joint u at the half-angle tangent or stroke x.
 
-            Returns y there, or its coefficients of 1, x and x**2.
+            Returns y = (1, cos q_u, sin q_u) there, or (1, x, x**2) if u slides.
             """
             if slides:
                 self._residues[q_u] = x

@@ -122,7 +122,7 @@ class Jobs:
         self.wake = asyncio.Event()
 
     def add(self, title: str, words: Sequence[str], result: str, *, run: str = "") -> None:
-        """Queue a command; an earlier one with the same title is removed."""
+        """Queue a command; an open one with the same title is cancelled."""
         for job in self.all:
             if job.title == title:
                 self.cancel(job)
