@@ -161,6 +161,8 @@ class Jobs:
                 await self._run(job)
             finally:
                 job.signal(signal.SIGKILL)
+                if job.process is not None:
+                    await job.process.communicate()  # to the end of its pipes: asyncio closes them
                 job.process = None
                 self._tidy(job)
 

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import gzip
 import io
 import json
+import sys
+import threading
+import warnings
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -19,7 +23,7 @@ import symgen
 from symgen.studio import guard, server, serving, table
 from symgen.studio.child import ViewProcess
 from symgen.studio.folder import WorkFolder
-from symgen.studio.jobs import Job
+from symgen.studio.jobs import Job, Jobs
 
 EVIL = """<script>alert(1)</script>'"><img src=x onerror=alert(1)>&{{7*7}}"""
 TEXT = """\
@@ -520,6 +524,29 @@ def test_a_run_that_was_cancelled_while_it_waited_leaves_nothing(studio: Any) ->
     assert waiting.state == "waiting" and (studio.path / f"study-{waiting.run}.yaml").exists()
     studio.post("cancel", {"number": str(waiting.number)})
     assert waiting.state == "cancelled" and not (studio.path / f"study-{waiting.run}.yaml").exists()
+
+
+def test_a_studio_that_ends_closes_the_pipes_of_its_run(tmp_path: Path) -> None:
+    """Else the garbage collector closes them, anywhere, with an error and no one to catch it."""
+    sleep = "import time; print(1, flush=True); time.sleep(60)"
+
+    async def interrupted() -> None:
+        jobs = Jobs(tmp_path, {"sleep": [sys.executable, "-c", sleep]}, lambda: None)
+        work = asyncio.create_task(jobs.work())
+        jobs.add("Sleep", ["sleep"], "none")
+        while not jobs.all[0].output:
+            await asyncio.sleep(0.01)
+        work.cancel()
+        await asyncio.gather(work, return_exceptions=True)
+
+    before = {*threading.enumerate()}
+    with warnings.catch_warnings(record=True) as leaked:
+        warnings.simplefilter("always", ResourceWarning)
+        asyncio.run(interrupted())
+        for thread in {*threading.enumerate()} - before:  # asyncio's, until the process ends
+            thread.join()
+        gc.collect()
+    assert [str(warning.message) for warning in leaked] == []
 
 
 def test_pages_do_not_wait_for_formulas(studio: Any) -> None:
