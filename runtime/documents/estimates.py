@@ -201,6 +201,8 @@ class CestacDocument:
         Parameters that decide the verdict.
     verdict : str
         The worst of the levels.
+    enough : str or None
+        Coarsest encoder step that is practically unbiased, as are all finer ones; None: no step is.
     levels : tuple of LevelDocument
         One result per level.
     settings : mapping
@@ -216,6 +218,7 @@ class CestacDocument:
     relative_sigma_LS: Vector
     deciding: tuple[str, ...]
     verdict: Verdict
+    enough: str | None
     levels: tuple[LevelDocument, ...]
     settings: dict[str, Any]
     provenance: dict[str, Any]

@@ -234,6 +234,7 @@ class WorkFolder:
             "unseen": max(unseen, default=None),
             "checklist": data.get("checklist") or {},
             "verdict": data.get("verdict", ""),
+            "enough": data.get("enough"),
             "levels": data.get("levels") or [],
             "command": self.read(f"study-{run.name}.yaml").partition("\n")[0].partition("# ")[2],
             "files": sorted(p.name for p in run.iterdir() if p.is_file() and p.name[0] != "."),

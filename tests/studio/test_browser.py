@@ -321,6 +321,8 @@ def test_resolution_replay_a_restart_and_a_table_beside_the_urdf(
     assert page.run("document.documentElement.scrollWidth") <= 390
     result = json.loads((studio.work / "runs" / "03-cestac" / "cestac.json").read_text())
     assert [level["run_count"] for level in result["levels"]] == [10, 10]
+    answer = page.run("document.querySelector('.verdict .answer').textContent")
+    assert answer == (result["enough"] or "None of the steps tried")
 
     go(page, studio.address + "results?run=01-ols")
     until(page, "document.querySelectorAll('.plots svg').length === 4")

@@ -350,6 +350,7 @@ class Cestac(Result, Part):
             "relative_sigma_LS": self.reference.relative_sigma,
             "deciding": self.deciding,
             "verdict": self.verdict,
+            "enough": self.enough.label if self.enough else None,
             "levels": [self._level_summary(level) for level in self.levels],
             "settings": self.settings,
             "provenance": self.provenance,
