@@ -4,6 +4,7 @@ here.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from runtime.core.markup import number
@@ -11,16 +12,20 @@ from runtime.core.part import Part
 from runtime.core.result import Identification
 from runtime.core.signals.decimation import CUTOFF
 from runtime.core.table import Table
+from runtime.core.validation import JointComparison
 from runtime.reporting import figures as plots
 from runtime.reporting.page import Section
 from runtime.reporting.parameters import correlation_section, every_section
 from runtime.reporting.series import series
+
+FIGURES_SHOWN = 8  # of joints, before the table of parameters
 
 
 def detail_sections(result: Identification) -> list[Section]:
     """Folded sections with the details behind the parameters that are used."""
     trust = result.uncertainty
     sections = [
+        *other_torques_section(result),
         every_section(result),
         Section("How far to trust it", trust.verdict, tables=trust.tables()[:2]),
         trail_section(result),
@@ -37,7 +42,38 @@ def detail_sections(result: Identification) -> list[Section]:
 
 
 def torque_section(result: Identification) -> Section:
-    """Fig. 4 of the chapter, one figure per joint, which a script lets zoom."""
+    """Figure 4 of the chapter for each joint; of many joints, for those with the largest errors.
+
+    A script on the page lets the reader zoom.
+    """
+    shown = _joints_shown(result)
+    section = _torque_figures(result, shown, f"{result.source.capitalize()} and predicted torques")
+    if len(shown) == len(result.comparison):
+        return section
+    text = f"The {len(shown)} joints with the largest errors; the others are below, folded."
+    return replace(section, text=[text, *section.text])
+
+
+def other_torques_section(result: Identification) -> list[Section]:
+    """Figures of the joints that `torque_section` leaves out, as one section; none if it shows all."""
+    shown = _joints_shown(result)
+    others = [joint for joint in result.comparison if joint not in shown]
+    return [_torque_figures(result, others, "Torques of the other joints")] if others else []
+
+
+def _joints_shown(result: Identification) -> list[JointComparison]:
+    """Joints whose figures stand before the parameters, in the order of the robot."""
+    joints = result.comparison
+    if len(joints) <= FIGURES_SHOWN:
+        return list(joints)
+    worst = sorted(joints, key=lambda joint: joint.relative_error)[-FIGURES_SHOWN:]
+    return [joint for joint in joints if joint in worst]
+
+
+def _torque_figures(
+    result: Identification, joints: Sequence[JointComparison], title: str
+) -> Section:
+    """Section with a figure of measured torque, predicted torque and error for each joint."""
     unit = result.torque_unit
     columns = {"essential": "the essential", "feasible": "the physical", "all": "all"}[
         result.model_columns
@@ -55,7 +91,7 @@ def torque_section(result: Identification) -> Section:
             ),
             series=series(joint, unit, result.source),
         )
-        for joint in result.comparison
+        for joint in joints
     ]
     text = []
     thinned = max(
@@ -67,7 +103,7 @@ def torque_section(result: Identification) -> Section:
             "Long records: the lines keep the largest and smallest value of every stretch and "
             "leave the instants between out."
         )
-    return Section(f"{result.source.capitalize()} and predicted torques", text, images)
+    return Section(title, text, images)
 
 
 def joint_section(result: Identification) -> Section:

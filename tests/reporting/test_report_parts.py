@@ -29,7 +29,13 @@ from runtime.reporting.parameters import (
     every_section,
     parameter_section,
 )
-from runtime.reporting.sections import decimation_cutoff, percent_sigma, probability
+from runtime.reporting.sections import (
+    decimation_cutoff,
+    other_torques_section,
+    percent_sigma,
+    probability,
+    torque_section,
+)
 from runtime.reporting.series import extremes, gaps, series
 from symgen.symbols.printers import letter as other_symbol
 
@@ -375,3 +381,22 @@ def test_a_joint_lost_with_the_removed_parameters_is_told(scale, remedy):
         lost_joints(every, every) == ""
         and lost_joints(fit(joints=(2.0, 80.0)), fit(joints=(2.0, 99.0))) == ""
     )
+
+
+def test_of_many_joints_those_with_the_largest_errors_come_first():
+    t, measured = np.arange(5.0), np.ones(5)
+    joints = [
+        JointComparison(str(j), t, measured, measured - 0.01 * (j % 20)) for j in range(1, 31)
+    ]
+    result = SimpleNamespace(
+        comparison=joints, torque_unit="N m", model_columns="all", source="measured"
+    )
+
+    def shown(section):
+        return [int(image.caption.split(":")[0].removeprefix("Joint ")) for image in section.images]
+
+    assert shown(torque_section(result)) == [*range(12, 20)]
+    (others,) = other_torques_section(result)
+    assert shown(others) == [*range(1, 12), *range(20, 31)]
+    result.comparison = joints[:8]
+    assert len(shown(torque_section(result))) == 8 and other_torques_section(result) == []
