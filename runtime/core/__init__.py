@@ -1,1 +1,1 @@
-"""What the chapter needs: a problem, its rows, least squares, essential parameters, CESTAC."""
+"""Core of the identification: records, observation matrix, least squares, CESTAC."""

@@ -1,6 +1,7 @@
-"""Numbers written as arithmetic, `2*pi/10000`: numbers, pi, + - * / ** and parentheses, nothing else.
+"""Evaluation of numbers that are written as arithmetic, such as `2*pi/10000`.
 
-The text is parsed to a syntax tree and the tree is walked; no text is ever executed.
+Allowed are numbers, pi, the operators + - * / ** and parentheses. The text is parsed to a syntax
+tree, and the tree is evaluated; no text is ever executed as code.
 """
 
 from __future__ import annotations
@@ -23,9 +24,9 @@ _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
 
 
 def number(text: str) -> float:
-    """Value of an arithmetic expression such as "2*pi/1000".
+    """Compute the value of an arithmetic expression such as "2*pi/1000".
 
-    Raises ValueError for any other text, and if the value is not finite and real.
+    Raise ValueError for any other text, and if the value is not finite and real.
     """
     if len(text) > LIMIT.NUMBER_CHARACTERS:
         raise ValueError(f"a number of {len(text)} characters; at most {LIMIT.NUMBER_CHARACTERS}")

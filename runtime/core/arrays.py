@@ -1,9 +1,9 @@
-"""Arrays that callers give: real numbers, or one sentence on what they are instead.
+"""Conversion of the arrays that callers give to float64; anything else raises an InputError.
 
     real(t, "t")        float64; InputError for dates, texts, complex or masked numbers, None, ragged lists
 
-Every array from outside passes here, so that NumPy never casts in silence: a datetime64 would
-become nanoseconds, a complex number lose its imaginary part, a masked one its mask.
+Every array of a caller is converted here, because NumPy casts without a warning: a datetime64 would
+become nanoseconds, a complex number would lose its imaginary part, a masked array its mask.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ def real(x: Any, label: str, file: str | None = None) -> Array:
     label : str
         Name of x in error messages.
     file : str, optional
-        Name of the file that x comes from, for error messages.
+        Name of the file that holds x, for error messages.
 
     Raises
     ------
     InputError
-        x is no array of real numbers; the message says its type or dtype.
+        x is not an array of real numbers; the message names its type or dtype.
     """
     if x is None or isinstance(x, str | bytes | dict | set | frozenset):
         raise InputError(f"{label} is {kind_of(x)}; expected an array of numbers", file=file)
@@ -74,19 +74,19 @@ def real(x: Any, label: str, file: str | None = None) -> Array:
 
 
 def real_number(x: Any, label: str, file: str | None = None) -> float:
-    """Return x as a real number; raise InputError for anything else."""
+    """Return x as a float; raise InputError if x is not a real number."""
     if not _is_real(x):
         raise InputError(f"{label} is {kind_of(x)}; expected a number", file=file)
     return float(x)
 
 
 def _is_real(x: Any) -> bool:
-    """Whether x is a real number; neither True nor False is."""
+    """Whether x is a real number; True and False do not count as numbers."""
     return isinstance(x, Real) and not isinstance(x, bool | np.bool_)
 
 
 def kind_of(x: Any) -> str:
-    """A value and its type for messages: None, '250' (str), a list, a dict."""
+    """Describe a value and its type for messages: "None", "'250' (str)", "a list"."""
     if x is None:
         return "None"
     if isinstance(x, str | bytes | int | float | complex):
@@ -98,7 +98,7 @@ def kind_of(x: Any) -> str:
 def require_kind(x: Any, kinds: type | tuple[type, ...], label: str, hint: str) -> None:
     """Raise InputError unless x has one of the given types.
 
-    hint : what was expected, and how to get it.
+    hint : text that says which type was expected, and how to get such a value.
     """
     if not isinstance(x, kinds):
         raise InputError(f"{label} is {kind_of(x)}; expected {hint}")

@@ -1,4 +1,4 @@
-"""The step that gives signals.lowpass.cutoff: auto its number."""
+"""Replacement of the setting `signals.lowpass.cutoff: auto` by a cut-off frequency in Hz."""
 
 from __future__ import annotations
 
@@ -12,7 +12,11 @@ from runtime.core.signals.cutoff import cutoff
 
 
 def automatic_cutoff(problem: Problem) -> Problem:
-    """The cut-off with the smallest bias, the same for all fitted records (`runtime.core.signals.cutoff`)."""
+    """Replace the setting `cutoff: auto` of the low-pass filter by a cut-off frequency in Hz.
+
+    All fitted records share this frequency, which has the smallest bias
+    (`runtime.core.signals.cutoff`). A problem with another setting is returned unchanged.
+    """
     signals = problem.settings.signals
     low = signals.lowpass
     if low is None or low.cutoff != "auto":

@@ -1,4 +1,4 @@
-"""A model at other values of its constants, such as fitted scalars of laws: every function has them as defaults."""
+"""A model with new values of its constants, for instance of a fitted friction law."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from runtime.core.model import GeneratedModel
 
 
 class BoundModel:
-    """A model whose constants replace those of the robot file.
+    """A model in which new values replace some constants of the robot file.
+
+    Every function of the model has the new values as default arguments.
 
     Parameters
     ----------

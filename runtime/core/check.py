@@ -1,9 +1,9 @@
-"""One question about a record, a study, a robot file or an identification, with its answer.
+"""A check is one question about a record, a robot file or an identification, with its answer.
 
-good       within the limit
-doubtful   usable with the care that the remedy names
-no         not usable
-open       not asked, or only the user knows: does not count
+The state of the answer is one of these:
+
+good       within the limit doubtful   usable with the care that the remedy describes no         not
+usable open       not examined, or only the user can answer; the verdict does not count it
 """
 
 from __future__ import annotations
@@ -31,14 +31,15 @@ class Check:
     finding : str
         The answer, with its numbers.
     limit : str
-        What a good answer keeps to.
+        Limit that a good answer respects, in words.
     remedy : str
-        What to do where the answer is not good.
+        What to do if the answer is not good.
     ahead : bool
-        Whether its finding is printed ahead of the values, most of which mean nothing then.
+        Whether the finding is printed before the values of the parameters, because most of these
+        values mean nothing then.
     change : mapping of str to value
-        The remedy as a change of the study, if it is one: {"record.units.q": "deg"}. What stands
-        under record.scale are factors on the scale that is there, one a joint.
+        The remedy as a change of the study, if there is such a change: {"record.units.q": "deg"}.
+        Entries under record.scale are factors, one per joint, on the present scale.
     """
 
     question: str
@@ -51,13 +52,16 @@ class Check:
 
     @property
     def sentence(self) -> str:
-        """Question, finding, and what to do."""
+        """The question, the finding and the remedy as one text."""
         remedy = f" {self.remedy[0].upper()}{self.remedy[1:]}." if self.remedy else " "
         return f"{self.question} {self.finding}.{remedy}"
 
 
 class Answer(NamedTuple):
-    """State and finding of a Check; remedy and limit replace those of its Question."""
+    """The answer to a Question: its state and its finding.
+
+    remedy and limit, if given, replace those of the Question.
+    """
 
     state: State
     finding: str
@@ -68,9 +72,10 @@ class Answer(NamedTuple):
 
 @dataclass(frozen=True)
 class Question:
-    """A decorator for functions that answer one question: it turns their Answer into a Check, and None into None.
+    """Decorator of a function that answers one question: it then returns a Check, not an Answer.
 
-    It holds the limit of a good answer and the remedy for the others.
+    The decorator holds the question, the limit of a good answer and the remedy for other answers.
+    If the function returns None, the decorated function returns None too.
     """
 
     question: str
@@ -93,19 +98,22 @@ class Question:
 
 
 def worst_of(checks: Sequence[Check]) -> Check | None:
-    """The first check with the worst answer; None if all answered checks are good."""
+    """Return the first check with the worst state; None if no check is doubtful or "no"."""
     return next((c for state in WORST[:2] for c in checks if c.state == state), None)
 
 
 def first_names(names: Sequence[str]) -> str:
-    """The first LIMIT.PARAMETERS_NAMED names, and the number of the others."""
+    """List the first few names as text, and count the rest: "M1, MX2 and 3 more".
+
+    LIMIT.PARAMETERS_NAMED is the largest number of listed names.
+    """
     more = len(names) - LIMIT.PARAMETERS_NAMED
     listed = ", ".join(names[: LIMIT.PARAMETERS_NAMED])
     return f"{listed} and {more} more" if more > 0 else listed
 
 
 def state_of(value: float, good: float, usable: float) -> State:
-    """State of a number that should be small, from its two limits."""
+    """Judge a number that should be small: good up to `good`, doubtful up to `usable`, else no."""
     if value <= good:
         return "good"
     return "doubtful" if value <= usable else "no"

@@ -1,10 +1,10 @@
-"""Can the values of an identification be used? One question after another, each with its answer,
-the limit, and what to do.
+"""The verdict on an identification: can its parameter values be used?
 
-The verdict is the worst of the answers. Limits are in runtime/core/limits.toml: they are
-conventions of practice, not theorems. Errors are relative, in %: 100 ||Y - W X|| / ||Y||;
-deviations are the larger of the corrected one and the one of the block bootstrap
-(`runtime.core.uncertainty`), never eq. (10) alone.
+The verdict consists of questions, each with its answer, its limit and a remedy; the worst answer
+decides. The limits are in runtime/core/limits.toml: they are conventions of practice, not theorems.
+Errors are relative, in %: 100 ||Y - W X|| / ||Y||. Standard deviations are the larger of the
+corrected one and the one of the block bootstrap (`runtime.core.uncertainty`); eq. (10) alone is
+used only if both are unknown.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Checklist(Result):
     ----------
     checks : tuple of Check
     use : str
-        What the parameters explain, in one sentence.
+        Sentence that says which part of the torques the parameters explain.
     grade : float, %
         Expected error of predictions of other motions; nan if it is not known.
     """
@@ -53,14 +53,17 @@ class Checklist(Result):
 
     @property
     def state(self) -> State:
-        """The worst state of all checks."""
+        """The worst state of all checks: "no", "doubtful" or "good"; "open" without any answer."""
         return next(
             (state for state in WORST if any(check.state == state for check in self.checks)), "open"
         )
 
     @property
     def answer(self) -> str:
-        """Yes, With care or No; a Yes mentions that some checks did not run."""
+        """The verdict in words: "Yes", "With care" or "No".
+
+        "Yes, as far as judged" means that some checks were not made.
+        """
         unanswered = any(check.state == "open" for check in self.checks)
         return ANSWERS[self.state] + (
             ", as far as judged" if self.state == "good" and unanswered else ""
@@ -68,12 +71,12 @@ class Checklist(Result):
 
     @property
     def worst(self) -> Check | None:
-        """The first check that is not good; None if all answered checks are good."""
+        """The first check with the worst answer; None if all answered checks are good."""
         return worst_of(self.checks)
 
     @property
     def doubt(self) -> str:
-        """The largest doubt, in one sentence."""
+        """Sentence that names the largest doubt, or the questions that were not judged."""
         if self.worst is not None:
             return f"{self.worst.question} {self.worst.finding}."
         unanswered = [check.question for check in self.checks if check.state == "open"]
@@ -81,7 +84,7 @@ class Checklist(Result):
 
     @property
     def next(self) -> str:
-        """The next step for the user, in one sentence."""
+        """Sentence that says what the user should do next."""
         if self.worst is not None:
             return f"{self.worst.remedy}."
         asked = [c.remedy for c in self.checks if c.state == "open" and c.remedy][:1]
@@ -104,11 +107,11 @@ class Checklist(Result):
         )
 
     def to_text(self) -> str:
-        """The verdict as plain text."""
+        """Write the verdict as plain text: the answer, the largest doubt and the next step."""
         return f"{self.answer}. {self.use}\nBiggest doubt: {self.doubt}\nNext: {self.next}"
 
     def summary(self) -> dict[str, Any]:
-        """The verdict as a mapping for JSON."""
+        """Return the verdict as a mapping, for JSON."""
         checks = [
             {
                 "question": c.question,
@@ -150,28 +153,29 @@ def checklist_of(
     Parameters
     ----------
     estimate : Estimate
-        All parameters.
+        Fit with all parameters.
     fit : Estimate
-        The parameters that are used.
+        Fit with the parameters that are used.
     use : str
-        What they explain, in one sentence.
+        Sentence that says what the used parameters explain.
     bootstrap : mapping of str to float
-        Deviations by name from blocks of time drawn again; parameters that it lacks have the
-        corrected deviation.
+        Standard deviations from the block bootstrap, by name of the parameter. A parameter without
+        an entry has its corrected standard deviation.
     prediction_error : float, %
-        Largest relative error of `fit` on data that did not give it; nan if there are none.
+        Largest relative error of `fit` on data that were not fitted; nan if there are no such data.
     expected_error : float, %
         Expected error of predictions of other motions; nan if it is not known.
     negative : sequence of str
-        Frictions and motor inertias certainly below zero.
+        Friction parameters and motor inertias that are certainly below zero.
     parts : sequence of Part
-        Their questions stand after those of the same subject.
+        Further analyses; their questions follow those about the same subject (record, prediction
+        or values).
     halves : bool
-        Whether `prediction_error` is that of a part of the record from another one, not of a
-        validation record.
+        Whether `prediction_error` is the error on one part of the record with parameters from
+        another part, not the error on a validation record.
     single : bool
-        Whether values are to be used one by one: deviations and correlations are doubts then, and
-        where `expected_error` is not known; else remarks.
+        Whether values are to be used one by one. If so, or if `expected_error` is not known, large
+        standard deviations and correlations count as doubts; otherwise they are only remarks.
     """
 
     def of_parts(about: About) -> list[Check]:
@@ -207,7 +211,11 @@ def checklist_of(
 
 
 def remark(check: Check, counts: bool) -> Check:
-    """Turn a check that does not count into a remark, or into None if it has nothing to report."""
+    """Change a check into a remark, which the verdict does not count.
+
+    A remark has the state "open". The check is returned unchanged if `counts` is true or if it is
+    good.
+    """
     if counts or check.state == "good":
         return check
     finding = f"Single values are not asked for. {check.finding}; {check.remedy}"
@@ -221,7 +229,11 @@ def remark(check: Check, counts: bool) -> Check:
     "fewer parameters (essential.threshold)",
 )
 def rank_and_condition(estimate: Estimate, fit: Estimate) -> Answer:
-    """Check rank and condition of W with all columns (`estimate`) and with the used ones (`fit`)."""
+    """Check the rank of the observation matrix W, and its condition number with unit columns.
+
+    The rank is checked for all parameters (`estimate`) and for the used ones (`fit`), the condition
+    number for the used parameters only.
+    """
     for one in (estimate, fit):
         if one.status == "rank-deficient":
             groups = "; ".join(", ".join(group) for group in one.groups)
@@ -256,9 +268,10 @@ def total_error(fit: Estimate) -> Answer:
 def explained_by_joint(
     estimate: Estimate, fit: Estimate, expected: float = float("nan")
 ) -> Answer | None:
-    """Check the relative error of the worst joint, which the total may hide; not for a single joint.
+    """Check the relative error of the joint with the largest error, which the total error may hide.
 
-    If predictions are expected to be good (`expected`, %), the answer is never "no".
+    Return None if fewer than two joints have a motor. If predictions are expected to be good
+    (`expected`, %), the answer is never "no".
     """
     worst = fit.worst_joint
     if sum(joint.has_motor for joint in fit.per_joint) < 2 or worst.is_axis:
@@ -274,10 +287,11 @@ def explained_by_joint(
 
 
 def lost_joints(estimate: Estimate, fit: Estimate) -> str:
-    """Joints whose torque was explained by removed parameters, and a remedy, in words; "" without such joints.
+    """Name the joints whose torque only the removed parameters explain, and a remedy; "" if none.
 
-    The threshold of the essential parameters uses ||Y - W X|| of all joints. Without weights it
-    mostly depends on the joint with the largest forces, such as a lift in N next to a wrist in N m.
+    Such joints occur because the threshold of the essential parameters uses ||Y - W X|| of all
+    joints. Without weights this norm mostly depends on the joint with the largest forces, such as a
+    lift in N next to a wrist in N m.
     """
     if len(fit.names) == len(estimate.names):
         return ""
@@ -312,12 +326,12 @@ def predicted(
     differ: bool = False,
     expected: float = float("nan"),
 ) -> Answer:
-    """Check the largest relative error, %, on data outside the fit; open if it is nan.
+    """Check the largest relative error, %, on data that were not fitted; "open" if it is nan.
 
-    halves : the error is that of one half of the record, fitted from the other half. Half a record
-    may not excite all parameters: the answer is good up to the second limit, or up to the last one
-    if predictions of the whole are expected to be good (`expected`, %), and never "no".
-    differ : records disagree by more than LIMIT.RELEVANT_DIFFERENCE.
+    halves : whether the error is that of one half of the record, with parameters from the other
+    half. Half a record may not excite all parameters: the answer is good up to the second limit, or
+    up to the last limit if predictions of other motions are expected to be good (`expected`, %),
+    and never "no". differ : whether records disagree by more than LIMIT.RELEVANT_DIFFERENCE.
     """
     limits = [
         min(max(times * fit.relative_error, least), most)
@@ -352,7 +366,10 @@ def predicted(
     "coupling, units and frame; fit again",
 )
 def signs(negative: Sequence[str]) -> Answer:
-    """Check that no friction or motor inertia is certainly below zero. Usual cause: the sign of a ratio."""
+    """Check that no friction parameter and no motor inertia is certainly below zero.
+
+    negative : names of the parameters that are. The usual cause is a wrong sign of a gear ratio.
+    """
     if negative:
         return Answer("no", f"Below zero: {', '.join(negative)}")
     return Answer("good", "None is certainly below zero")
@@ -365,7 +382,11 @@ def signs(negative: Sequence[str]) -> Answer:
     "longer record, or one that excites them",
 )
 def certain(fit: Estimate, bootstrap: Mapping[str, float]) -> Answer:
-    """Check the deviations, which do not assume independent residuals; bootstrap : as for `checklist_of`."""
+    """Check that the standard deviation of each parameter is small compared with its value.
+
+    The standard deviations do not assume independent residuals; eq. (10) is used only if no other
+    is known. bootstrap : as for `checklist_of`.
+    """
     deviations = np.fmax(fit.sigma_corrected, [bootstrap.get(name, np.nan) for name in fit.names])
     with np.errstate(divide="ignore", invalid="ignore"):
         percent = 100 * np.where(np.isfinite(deviations), deviations, fit.sigma) / np.abs(fit.X)
@@ -389,7 +410,7 @@ def certain(fit: Estimate, bootstrap: Mapping[str, float]) -> Answer:
     "use them together or not at all; a motion that moves them apart tells them (symgen excite)",
 )
 def separate(fit: Estimate) -> Answer:
-    """Check the correlations of the estimates, eq. (10)."""
+    """Check that no two estimates are strongly correlated by the covariance of eq. (10)."""
     deviation = np.sqrt(np.diag(fit.covariance))
     with np.errstate(divide="ignore", invalid="ignore"):
         correlation = fit.covariance / np.outer(deviation, deviation)
@@ -405,5 +426,5 @@ def separate(fit: Estimate) -> Answer:
 
 
 def rounded(cond: float) -> str:
-    """A condition number with three digits, with a power of ten only if it is long."""
+    """Write a condition number with three digits, for instance 1230 or 1.23e+06."""
     return f"{float(f'{cond:.3g}'):.0f}" if 100 <= cond < 1e6 else f"{cond:.3g}"

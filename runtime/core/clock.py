@@ -1,6 +1,6 @@
-"""The clock of a record: what its time stamps are like, whether they are uniform within the jitter allowed, and at what rate.
+"""The clock of a record: are its time stamps uniform, and what is the sampling rate?
 
-Steps are distinguished by the period T, the median of the steps that go forward:
+Steps between time stamps are classified by the period T, the median of the positive steps:
 
     step < 0              time goes back: the clock was set, or a second record follows
     step = 0              a repeated stamp
@@ -32,13 +32,13 @@ BRIDGED_PERIODS = 10.0
 
 
 def sample(i: int) -> str:
-    """Place of sample i, counted from 0, for messages about arrays."""
+    """Name sample i, counted from 0, in messages about arrays: "sample 1" for i = 0."""
     return f"sample {i + 1}"
 
 
 @dataclass(frozen=True)
 class Stamps:
-    """Time stamps of one record, with their names for messages.
+    """Properties of the time stamps of one record: names for messages, rate and allowed jitter.
 
     Attributes
     ----------
@@ -47,11 +47,11 @@ class Stamps:
     column : str or None
         Name of the column; None: the record is made of arrays.
     row : callable
-        Place of sample i, from 0, in words.
+        Function that names sample i, counted from 0, by its place in the file.
     rate : float or None
-        Stated rate, Hz.
+        Sampling rate that the user states, Hz.
     jitter : float
-        Largest deviation from a uniform grid, sampling periods.
+        Largest allowed difference from a uniform grid, in sampling periods.
     """
 
     file: str
@@ -62,12 +62,15 @@ class Stamps:
 
 
 def rate_of(stamps: Stamps, t: Array) -> float:
-    """Sampling rate, Hz, of the time stamps t, shape (N,), s; the stated rate if there is one.
+    """Compute the sampling rate, Hz, of the time stamps t, shape (N,), s.
+
+    If the user stated a rate and the stamps agree, the stated rate is returned.
 
     Raises
     ------
     InputError
-        Time that goes back or repeats, another rate than the stated one, or stamps off the uniform grid; it lists every irregularity and the setting that cures them.
+        Time goes back or repeats, the rate differs from the stated rate, or the stamps are off the
+        uniform grid. The message lists every irregularity and a setting that cures it.
     """
     N = len(t)
     if N < 2:
@@ -105,7 +108,7 @@ def rate_of(stamps: Stamps, t: Array) -> float:
 
 
 def remedy(stamps: TimeStamps) -> dict[str, Any]:
-    """Settings `record.resample` that suit this clock: bridge short gaps, split the record at long ones."""
+    """Propose settings `record.resample` that bridge short gaps and split the record at others."""
     periods = [gap.step / stamps.period for gap in stamps.gaps]
     most = max(BRIDGED / stamps.period, BRIDGED_PERIODS)
     short = [gap for gap in periods if gap <= most]
@@ -118,9 +121,10 @@ def remedy(stamps: TimeStamps) -> dict[str, Any]:
 
 
 def remedy_text(t: Array, stamps: TimeStamps, *, arrays: bool = False) -> str:
-    """Sentences for a user: the mean rate compared with that of the period, the remedy, and a remedy for uniform samples with jittering stamps.
+    """Write sentences on the mean sampling rate, the rate of the median step, and a remedy.
 
-    arrays : the record is made of arrays, and the remedy is a call.
+    A second remedy is for samples that are uniform although their stamps jitter. arrays : whether
+    the record is made of arrays; the remedy is then a function call, not a setting.
     """
     settings = remedy(stamps)
     step = np.diff(t)
@@ -144,14 +148,14 @@ def remedy_text(t: Array, stamps: TimeStamps, *, arrays: bool = False) -> str:
 
 @dataclass(frozen=True)
 class Irregular:
-    """An irregular step of the time stamps, larger than jitter.
+    """An irregular step between two time stamps: a gap, a step back or a repeated stamp.
 
     Attributes
     ----------
     sample : int
-        Number, from 0, of the sample in which it ends.
+        Number, from 0, of the sample at the end of the step.
     before, after : float, s
-        Time ahead of it and behind.
+        Time stamps at the start and at the end of the step.
     """
 
     sample: int
@@ -166,18 +170,18 @@ class Irregular:
 
 @dataclass(frozen=True)
 class TimeStamps:
-    """Regularity of N time stamps.
+    """Regularity of the N time stamps of a record: period, jitter and irregular steps.
 
     Attributes
     ----------
     samples : int
         N.
     period : float, s
-        T.
+        T, the median of the positive steps.
     jitter, jitter_rms : float, periods
-        Largest and rms deviation of the regular steps from T.
+        Largest and rms difference of the regular steps from T.
     gaps, resets, repeats : tuple of Irregular
-        The other steps, in time.
+        Steps that are too long, steps back, and repeated stamps, in order of time.
     longest : float, s
         A longer step is a gap.
     """
@@ -193,11 +197,14 @@ class TimeStamps:
 
     @property
     def regular(self) -> bool:
-        """Whether every step is one period, within the jitter."""
+        """Whether the time stamps have no gaps, no steps back and no repetitions."""
         return not (self.gaps or self.resets or self.repeats)
 
     def to_text(self, row: Callable[[int], str] = lambda i: f"sample {i + 1}") -> str:
-        """The regularity in one sentence; row : function from a sample number to its place in the file."""
+        """Describe the regularity of the time stamps in one sentence.
+
+        row : function from a sample number to its place in the file.
+        """
         parts = [
             (
                 f"{self.samples} samples, median step {self.period:.6g} s, jitter up to "
@@ -225,13 +232,16 @@ class TimeStamps:
 
 
 def times(number: int, kind: str) -> str:
-    """A number with its noun: "1 gap", "2 steps back"."""
+    """Write a number with its noun in singular or plural: "1 gap", "2 steps back"."""
     several = "steps back" if kind == "step back" else f"{kind}s"
     return f"{number} {kind if number == 1 else several}"
 
 
 def time_stamps(t: Array, *, gap: float = GAP, file: str = "record") -> TimeStamps:
-    """Regularity of the time stamps t, shape (N,), s."""
+    """Find the period, the jitter and the irregular steps of the time stamps t, shape (N,), s.
+
+    A step of more than `gap` periods is a gap.
+    """
     step = np.diff(t)
     forward = step[step > 0]
     if not len(forward):

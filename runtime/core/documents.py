@@ -1,4 +1,4 @@
-"""Results as JSON: mappings of plain values, and their text."""
+"""Conversion of results to JSON: first to mappings of plain values, then to text."""
 
 from __future__ import annotations
 
@@ -14,11 +14,13 @@ from runtime.core.errors import encodable
 
 
 class Result:
-    """Base of dataclasses with a text and a JSON text: `class Delay(Result, keys="joints shift")`.
+    """Base class of dataclasses that hold results: it gives each of them a text and a JSON text.
 
-    keys : fields and properties in the order of JSON, "key:name" for another name in JSON; default:
-    all fields.
-    schema : kind and version, the first key; None: a part of another result.
+        class Delay(Result, keys="joints shift")
+
+    keys : names of the fields and properties in JSON, in this order; "key:name" writes the field
+    `name` under `key`. Default: all fields. schema : kind and version of the result, the first key
+    in JSON; None for a part of another result.
     """
 
     _keys: ClassVar[str]
@@ -33,21 +35,21 @@ class Result:
         return str(text())
 
     def summary(self) -> dict[str, Any]:
-        """The content of the JSON text as a mapping."""
+        """Return the content of the JSON text as a mapping."""
         head = {} if self._schema is None else {"schema": self._schema}
         names = [word.partition(":") for word in self._keys.split() or self.__dataclass_fields__]
         return head | {key: getattr(self, name or key) for key, _, name in names}
 
     def to_json(self) -> str:
-        """JSON text of the summary."""
+        """Write the summary as JSON text."""
         return json_text(self.summary())
 
 
 def plain(value: Any) -> Any:
-    """Convert `value` to types of JSON: mappings, lists, texts, finite numbers; null for nan and infinity.
+    """Convert `value` to types of JSON: mappings, lists, texts and finite numbers.
 
-    Results become their summaries, other dataclasses mappings of their fields, arrays lists,
-    anything else its text.
+    nan and infinity become null. A Result becomes its summary, another dataclass a mapping of its
+    fields, an array a list, and any other object its text.
     """
     if isinstance(value, Result):
         return plain(value.summary())
@@ -65,7 +67,10 @@ def plain(value: Any) -> Any:
 
 
 def json_text(value: Any) -> str:
-    """`plain(value)` as JSON, indented by two, lists of scalars on one line, with a final newline."""
+    """Write a value as JSON text, indented by two spaces, with lists of scalars on one line.
+
+    The value is first converted by `plain`; the text ends with a newline.
+    """
     return encodable(_render(plain(value), "")) + "\n"
 
 

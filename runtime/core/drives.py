@@ -1,11 +1,13 @@
-"""Motor side and joint side, by one matrix for both directions (chapter 4.2.1: Gamma_a = N K_T I):
+"""Drives: conversion of positions and torques between motors and joints (section 4.2.1).
+
+One matrix R serves both directions, so that the power tau' qd is that of the motors:
 
     qm  = R (q - offset)                    tau = R' (torque_constant * u)
 
-so that the power tau' qd is that of the motors. Off-diagonal elements of R are couplings: motor 6
-of a wrist also turns with joint 5. Leaving them out of the position, the torque or both changes the
-total error of a fit little and ruins the joints concerned, hence `decoupled`, for reports that
-compare.
+The chapter writes Gamma_a = N K_T I. Off-diagonal elements of R are couplings: motor 6 of a wrist
+also turns with joint 5. Without the couplings of the position, the torque or both, the total error
+of a fit changes little, but the parameters of the coupled joints are wrong. `Drives.decoupled`
+makes such drives, for reports that compare them.
 """
 
 from __future__ import annotations
@@ -31,13 +33,13 @@ class Drives:
     ratio : ndarray, shape (n, n), rad/rad, or rad/m for a prismatic joint
         R, motor turns per joint turn, signs included.
     offset : ndarray, shape (n,), rad or m
-        Joint position where the motor reads zero.
+        Joint position at which the motor position is zero.
     torque_constant : ndarray, shape (n,), N m/A or N m/V
         Motor torque per unit of u; 1 if u is a torque.
     coupling : "both", "position", "torque" or "none"
-        Where the off-diagonal elements of R count.
+        Quantities for which the off-diagonal elements of R are used.
     declared : bool
-        Whether the robot file states torque constants; currents need them.
+        Whether the robot file states torque constants, which are needed if currents are recorded.
     """
 
     ratio: Array
@@ -77,7 +79,7 @@ class Drives:
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> Drives:
-        """Read drives from the DRIVES constant of an emitted module."""
+        """Make drives from the constant DRIVES of an emitted module."""
         constant = mapping.get("torque_constant")
         return cls(
             mapping["ratio"],
@@ -92,32 +94,47 @@ class Drives:
         return len(self.ratio)
 
     def decoupled(self, coupling: Coupling) -> Drives:
-        """The same drives with the coupling applied in `both` directions, in `position` or `torque` only, or in `none`."""
+        """Return the same drives with couplings used for positions, torques, both or neither.
+
+        coupling : "position", "torque", "both" or "none".
+        """
         return replace(self, coupling=coupling)
 
     def joint_position(self, qm: Array) -> Array:
-        """q = R^-1 qm + offset; qm, shape (N, n), rad."""
+        """Compute joint positions q = R^-1 qm + offset from motor positions qm.
+
+        qm : shape (N, n), rad.
+        """
         return np.asarray(
             np.linalg.solve(self._matrix("position"), self._checked(qm).T).T + self.offset
         )
 
     def motor_position(self, q: Array) -> Array:
-        """qm = R (q - offset), rad; q, shape (N, n)."""
+        """Compute motor positions qm = R (q - offset), rad, from joint positions q.
+
+        q : shape (N, n), rad or m.
+        """
         return np.asarray((self._checked(q) - self.offset) @ self._matrix("position").T)
 
     def joint_torque(self, u: Array) -> Array:
-        """tau = R' (torque_constant u), N m or N; u, shape (N, n), A, V or N m."""
+        """Compute joint torques tau = R' (torque_constant u), N m or N, from motor commands u.
+
+        u : shape (N, n), A, V or N m.
+        """
         return np.asarray((self._checked(u) * self.torque_constant) @ self._matrix("torque"))
 
     def motor_command(self, tau: Array) -> Array:
-        """u = R'^-1 tau / torque_constant, A, V or N m; tau, shape (N, n), N m or N."""
+        """Compute motor commands u = R'^-1 tau / torque_constant from joint torques tau.
+
+        u is in A, V or N m; tau has shape (N, n), N m or N.
+        """
         return np.asarray(
             np.linalg.solve(self._matrix("torque").T, self._checked(tau).T).T / self.torque_constant
         )
 
     @property
     def motion(self) -> Array:
-        """Motor turns per joint turn, shape (n, n): R, or its diagonal if positions are decoupled."""
+        """Motor turns per joint turn, shape (n, n): R, or only its diagonal if uncoupled."""
         return self._matrix("position")
 
     def _matrix(self, quantity: str) -> Array:
@@ -134,9 +151,10 @@ class Drives:
 
 
 def encoder_drives(side: str, drives: Drives | None, section: str = "signals") -> Drives | None:
-    """Drives between the joints and the encoders; None if the encoders are at the joints.
+    """Return the drives between joints and encoders; None if the encoders are at the joints.
 
-    section : of the study, which names the side.
+    section : section of the study whose key `side` is "joint" or "motor", for messages. Raise
+    SettingsError if the encoders are at the motors and the robot has no drives.
     """
     if side == "joint":
         return None
@@ -149,7 +167,10 @@ def encoder_drives(side: str, drives: Drives | None, section: str = "signals") -
 
 
 def encoder_root(drives: Drives | None, n: int) -> Array:
-    """Joint motion per encoder motion, shape (n, n): the identity on the joint side, R^-1 on the motor side."""
+    """Compute the matrix from encoder motion to joint motion, shape (n, n).
+
+    For encoders at the joints (drives None) it is the identity, for encoders at the motors R^-1.
+    """
     if drives is None:
         return np.eye(n)
     return np.asarray(

@@ -1,8 +1,8 @@
-"""What `runtime` raises on bad input: one root, a ValueError, with the offending place as attributes.
+"""Errors that `runtime` raises on bad input: InputError, a ValueError, and its subclasses.
 
-A message says what was given, where, what was expected and what to do. Numerical outcomes (rank
-loss, no convergence) are not errors:
-they are a status of the Estimate.
+A message says what was given, where, what was expected and what to do; the place is also in the
+attributes of the error. Numerical outcomes (rank loss, no convergence) are not errors: they are a
+status of the Estimate.
 """
 
 from __future__ import annotations
@@ -14,7 +14,10 @@ LONGEST = 2000  # characters of a message: a file may hold names of any length
 
 
 def printable(text: str) -> str:
-    """`text` for a terminal: control characters as escapes, a long text without its middle."""
+    """Make a text printable on a terminal: escape control characters, shorten a long text.
+
+    A text that is too long loses its middle.
+    """
     for _ in range(2):  # spelled out, a text may be too long again
         if len(text) > LONGEST:
             text = f"{text[: LONGEST - 400]} ... {text[-300:]}"
@@ -24,17 +27,23 @@ def printable(text: str) -> str:
 
 
 def encodable(text: str) -> str:
-    """`text` with bytes that are not UTF-8 (lone surrogates of file names) as JSON escapes."""
+    """Escape the bytes of a text that are not UTF-8, for instance in the name of a file.
+
+    Python represents such bytes as lone surrogates.
+    """
     return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def first_line(error: BaseException) -> str:
-    """First line of the message of an error of another library."""
+    """Return the first line of the message of an error from another library.
+
+    If the message is empty, return the type of the error.
+    """
     return str(error).partition("\n")[0] or type(error).__name__
 
 
 class InputError(ValueError):
-    """Data or settings that cannot be used.
+    """Error: data or settings that cannot be used.
 
     Parameters
     ----------
@@ -47,7 +56,7 @@ class InputError(ValueError):
     row : str, optional
         Place in the file, such as "line 12" or "sample 40".
     remedy : mapping, optional
-        Settings of the record that are likely to cure it (`runtime.study.suggested`).
+        Settings of the record that probably cure the error (`runtime.study.suggested`).
     """
 
     def __init__(
@@ -69,7 +78,7 @@ class InputError(ValueError):
 
 
 class SettingsError(InputError):
-    """A setting that is unknown, of another type or out of range.
+    """Error: a setting that is unknown, of a wrong type or out of range.
 
     Parameters
     ----------
@@ -101,13 +110,13 @@ class SettingsError(InputError):
 
 
 class ModelError(InputError):
-    """A module that is not an emitted model, or lacks what a function needs."""
+    """Error: a module that is not an emitted model, or that lacks a function which is needed."""
 
 
 class DataUnavailableError(InputError):
-    """A dataset that is neither on this machine nor at its source.
+    """Error: a dataset that is neither on this machine nor at its source.
 
-    `tried` lists the places and the error of each.
+    `tried` lists the places that were tried, each with its error.
     """
 
     def __init__(self, message: str, *, tried: tuple[str, ...] = ()) -> None:
@@ -116,5 +125,8 @@ class DataUnavailableError(InputError):
 
 
 def instant(t: float) -> str:
-    """A time, s, for messages: six digits, or to the millisecond if it counts from an epoch."""
+    """Write a time, s, for messages: with six digits, or to the millisecond from 1e5 s on.
+
+    Time stamps that count from an epoch such as 1970 are that large.
+    """
     return f"{t:g}" if abs(t) < 1e5 else f"{t:.3f}"

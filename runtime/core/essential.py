@@ -1,10 +1,10 @@
-"""Essential parameters: the few that carry the model (chapter 4.1.1).
+"""Essential parameters: the few that explain the torques nearly as well as all (section 4.1.1).
 
-The parameter of largest %sigma, eq. (11), is removed and the rest fitted again, as long as
-sigma_rho, eq. (9), stays below threshold times its first value. Removing column k deletes a column
-of the triangular factor and makes its trailing block triangular again; W is not touched. The same
-trail, followed to its end, gives the count for every other threshold. With weights, the weights of
-the first fit stay.
+The parameter with the largest %sigma, eq. (11), is removed and the rest is fitted again, as long as
+sigma_rho, eq. (9), stays below threshold times its first value. To remove a parameter, its column
+is deleted from the triangular factor of W, and the trailing block is made triangular again; W is
+not used. The same sequence of removals, continued to its end, gives the number of parameters for
+every other threshold. With weights, the weights of the first fit stay.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ THRESHOLDS = (1.02, 1.03, 1.04, 1.05, 1.06, 1.07, 1.08, 1.09, 1.10)
 
 @dataclass(frozen=True)
 class Removal:
-    """Test of one parameter during the elimination.
+    """One step of the elimination: the parameter of the largest %sigma, and whether it was removed.
 
     Attributes
     ----------
     name : str
-        Parameter of the largest %sigma.
+        Parameter with the largest %sigma.
     relative_sigma : float, %
         Its %sigma.
     ratio : float
-        sigma_rho without it over the first sigma_rho.
+        sigma_rho without this parameter over the first sigma_rho.
     removed : bool
-        Whether it was removed.
+        Whether the parameter was removed.
     """
 
     name: str
@@ -57,17 +57,17 @@ class Essential(Result):
     Attributes
     ----------
     names : tuple of str
-        Parameters kept, in column order.
+        Parameters that were not removed, in column order.
     estimate : Estimate
-        Fit with these alone.
+        Fit with the essential parameters alone.
     all_parameters : Estimate
-        The first fit.
+        Fit with all parameters.
     trail : tuple of Removal
-        The steps; the last one is the first refused, or the last parameter.
+        Steps of the elimination. The last one is the first refused step, if a step was refused.
     threshold : float
         Largest ratio of sigma_rho to its first value.
     counts : mapping of float to int
-        Number of parameters kept, by threshold.
+        Number of parameters left, by threshold.
     further : tuple of Removal
         The next steps, up to the largest threshold.
     """
@@ -86,7 +86,7 @@ class Essential(Result):
         return tuple(step.name for step in self.trail if step.removed)
 
     def to_table(self) -> str:
-        """Table of the removals, then the number of parameters for each threshold."""
+        """Write the removals as a table, then the number of parameters for each threshold."""
         first = len(self.all_parameters.names)
         lines: list[Sequence[str]] = [("removed", "left", "%sigma", "sigma_rho ratio")]
         for k, step in enumerate(self.trail):
@@ -106,7 +106,7 @@ class Essential(Result):
         )
 
     def summary(self) -> dict[str, Any]:
-        """The content of `to_json` as a mapping."""
+        """Return the content of `to_json` as a mapping."""
         return {
             "schema": 1,
             "names": self.names,
@@ -134,9 +134,9 @@ def essential_of(
     settings : EssentialSettings, optional
         Threshold on sigma_rho.
     estimate : EstimateSettings, optional
-        A method that is one linear system.
+        A method that solves one linear system.
     model : GeneratedModel, optional
-        Gives units, joint numbers and the hash of the robot file.
+        Model that gives units, joint numbers and the hash of the robot file.
     provenance : mapping, optional
         Further entries for Estimate.provenance.
     """
@@ -162,12 +162,16 @@ def essential_of(
 
 
 def _removals(steps: Sequence[Removal], threshold: float) -> int:
-    """Removals before the first whose ratio reaches the threshold."""
+    """Count the removals before the first step whose ratio of sigma_rho reaches the threshold."""
     return next((k for k, step in enumerate(steps) if not step.ratio < threshold), len(steps))
 
 
 def _trail(system: System, threshold: float) -> list[Removal]:
-    """%sigma before a parameter goes, sigma_rho ratio after, until the ratio reaches `threshold` or one parameter is left."""
+    """Remove the parameter with the largest %sigma, again and again, and return these steps.
+
+    The steps end when the ratio of sigma_rho to its first value reaches `threshold`, or with one
+    parameter left. A step holds %sigma before its removal and the ratio after its removal.
+    """
     steps: list[Removal] = []
     fit = system.solve()
     first, C = standard_deviations(system, fit)
@@ -185,7 +189,10 @@ def _trail(system: System, threshold: float) -> list[Removal]:
 
 
 def _relative(C: np.ndarray, X: np.ndarray) -> np.ndarray:
-    """%sigma, shape (b,); inf if the record does not determine the parameter, which therefore goes first."""
+    """Compute %sigma of each parameter, shape (b,), from the covariance C and the values X.
+
+    %sigma is inf if the record does not determine the parameter, which is therefore removed first.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         relative = 100 * np.sqrt(np.diag(C)) / np.abs(X)
     return np.where(np.isnan(relative), np.inf, relative)

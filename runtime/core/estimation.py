@@ -1,7 +1,6 @@
-"""From a prepared problem to its rows Y = W X + rho and to X: eqs. (6) to (11), essential parameters (section 4.1.1).
+"""Estimation of X from the rows Y = W X + rho of a prepared problem, by eqs. (6) to (11).
 
-rows = observed(problem)
-fit  = estimated(problem, rows)
+rows = observe_rows(problem) fit  = estimated(problem, rows)
 """
 
 from __future__ import annotations
@@ -27,12 +26,12 @@ Array = np.ndarray
 
 
 def observe_rows(problem: Problem) -> Observation:
-    """Rows of the fitted records, in the form that the method of the settings needs.
+    """Build the rows Y = W X + rho of the fitted records, as the estimation method needs them.
 
     Parameters
     ----------
     problem : Problem
-        Prepared.
+        A prepared problem.
 
     Returns
     -------
@@ -42,7 +41,7 @@ def observe_rows(problem: Problem) -> Observation:
     Raises
     ------
     InputError
-        No record, or one of which no row is left.
+        There is no record, or no row of a record is left.
     """
     method = problem.method
     return (
@@ -53,7 +52,7 @@ def observe_rows(problem: Problem) -> Observation:
 
 
 def observed_unseen(problem: Problem, k: int) -> Observation:
-    """Rows of the k-th record outside the fit, k from 0."""
+    """Build the rows Y = W X + rho of the k-th record that is not fitted, k from 0."""
     alone = problem.changed(records=(problem.unseen[k],), unseen=())
     if "prepared_unseen" in vars(problem):
         alone.prepared[0].take_states(problem.prepared_unseen[k])
@@ -66,7 +65,10 @@ def estimated(
     settings: EstimateSettings | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Estimate:
-    """Estimate the parameters from rows of a problem by `settings`; default: those of the problem."""
+    """Estimate the parameters from the rows of a problem.
+
+    settings : method of estimation; default: the settings of the problem.
+    """
     settings = settings or problem.settings.estimate
     return estimate_of(rows, settings, problem.methods, model=problem.model, provenance=provenance)
 
@@ -79,7 +81,8 @@ def estimate(problem: Problem) -> Estimate:
 def essential(problem: Problem) -> Essential:
     """Find the essential parameters of a prepared problem.
 
-    The method is that of the problem, or its linear companion.
+    A method of estimation that is not linear is replaced by least squares with the same weights
+    (`linear_companion`).
     """
     settings = problem.settings
     return essential_of(
@@ -108,8 +111,9 @@ def estimate_of(
     settings : EstimateSettings
         Method, weights, columns, options.
     methods : mapping of str to Method
+        All methods, by name.
     model : GeneratedModel, optional
-        Gives units, joint numbers and the hash of the robot file.
+        Model that gives units, joint numbers and the hash of the robot file.
     provenance : mapping, optional
         Further entries for Estimate.provenance (a seed, the study file).
     """
@@ -134,7 +138,7 @@ def estimate_of(
 
 
 def method_of(settings: EstimateSettings, methods: Mapping[str, Method]) -> Method:
-    """The method that `settings` names."""
+    """Return the method of estimation that `settings` names; SettingsError if it is unknown."""
     if settings.method not in methods:
         raise SettingsError(
             f"{settings.method!r}; expected {' or '.join(methods)}", path=("estimate", "method")
@@ -143,6 +147,9 @@ def method_of(settings: EstimateSettings, methods: Mapping[str, Method]) -> Meth
 
 
 def point_estimate(settings: EstimateSettings, methods: Mapping[str, Method]) -> EstimateSettings:
-    """Settings for values only: deviations and explanations are not computed."""
+    """Return settings that estimate the values only, without standard deviations, to save time.
+
+    Methods that have no such options use the settings unchanged.
+    """
     brief = method_of(settings, methods).brief
     return replace(settings, options={**settings.options, **brief}) if brief else settings

@@ -1,4 +1,4 @@
-"""Fits of all rows: all parameters, the essential ones, the nested sets; and what each predicts of rows that did not give it."""
+"""Fits of all rows with all, the essential and the physical parameters, and their validation."""
 
 from __future__ import annotations
 
@@ -30,18 +30,19 @@ from runtime.core.validation import CrossValidation, cross_validation, split_val
 
 @dataclass(frozen=True)
 class Fits:
-    """Estimates from all rows.
+    """Estimates from all rows of the records, one for each set of parameters.
 
     Attributes
     ----------
     estimate : Estimate
         All parameters, by the method of the study.
     reduced : Essential
-        By its linear companion.
+        The essential parameters, by the linear companion of that method.
     sets : mapping of str to Estimate
-        The nested sets, the feasible one if it was asked; empty if the method is not linear.
+        Estimates of the sets "essential" and "all", and of "feasible" if it was fitted; empty if
+        the method is not linear.
     settings : mapping of str to EstimateSettings
-        Settings that give each set from parts of the rows.
+        Settings that fit each set from parts of the rows.
     """
 
     estimate: Estimate
@@ -50,13 +51,16 @@ class Fits:
     settings: Mapping[Any, EstimateSettings]
 
     def best(self, validation: Sequence[CrossValidation], study: Study) -> Estimate:
-        """The estimate of the set that predicts best."""
+        """Return the estimate of the set of parameters that predicts unseen data best.
+
+        If the method is not linear, return the estimate of all parameters.
+        """
         errors = validation[-1].errors() if validation and self.sets else {}
         return self.sets.get(best_set(errors, study.essential.first), self.estimate)
 
 
 def fit_problem(problem: Problem, observation: Observation, provenance: Mapping[str, Any]) -> Fits:
-    """Fit all parameters, then the essential ones."""
+    """Fit all parameters to the rows of a problem, then the essential ones."""
     study, model = problem.settings, problem.model
     at("least squares, essential parameters")
     reduced = essential_of(
@@ -85,11 +89,12 @@ def validated(
     unseen: Mapping[str, Observation],
     name: str,
 ) -> tuple[Fits, tuple[CrossValidation, ...], tuple[str, ...]]:
-    """Predict data outside the fit: windows or fifths of the records, then further records.
+    """Predict data that were not fitted: windows or fifths of the records, then further records.
 
-    Fifths are used if halves prefer all parameters to the physical ones. Returns the fits (with the
-    physical set if it may be used), the predictions, and sentences on what failed. Nothing is
-    predicted if the method did not converge, because each prediction would simulate a wrong loop.
+    Return three values: the fits, with the physical set if it may be used; the predictions; and
+    sentences on the predictions or fits that failed. Fifths of the records are used if their halves
+    prefer all parameters to the physical ones. Nothing is predicted if a nonlinear method did not
+    converge, because each prediction would simulate a wrong loop.
     """
     study = problem.settings
     method, status = study.estimate.method, fits.estimate.status
@@ -129,7 +134,11 @@ def _validation(
     choices: Mapping[Any, EstimateSettings],
     known: Mapping[Any, Estimate],
 ) -> tuple[tuple[CrossValidation, ...], tuple[str, ...]]:
-    """The sets `choices` between windows of the records, then those `known` of all rows on further records; and what could not be done."""
+    """Validate sets of parameters between windows of the records, then on further records.
+
+    Between windows, the sets `choices` are fitted again; on further records the estimates `known`,
+    from all rows, are used. Return the validations, and sentences on those that failed.
+    """
     validation, missing = [], []
     try:
         windows = problem.settings.validate.split or halves(*observation.span)

@@ -1,4 +1,4 @@
-"""Settings that earlier versions read, or that belong elsewhere, each with the sentence that names what to use instead."""
+"""Settings of earlier versions, or at a wrong place, each with a sentence on the replacement."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ WENT: Mapping[str, str] = {
 
 
 def gone(path: tuple[str | int, ...], value: Any) -> str | None:
-    """Sentence about a setting of former versions that is no longer read; None for any other setting.
+    """Return the sentence on a setting that is no longer used; None for any other setting.
 
     Parameters
     ----------
     path : tuple of str and int
         Keys that lead to the setting in a study.
     value : object
-        What it is set to.
+        Value of the setting.
     """
     key = ".".join(name for name in path if isinstance(name, str))
     return WENT.get(key) or WENT.get(f"{key}: {value}")

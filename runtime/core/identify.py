@@ -1,8 +1,8 @@
 """The identification of one robot from the records of a prepared problem.
 
 problem -> Y = W X + rho -> all parameters, eqs. (7)-(11), and the essential ones
-        -> measured and predicted torques, windows of the records against each other, parameters that trade
-        -> parts: what else is asked of the records, each by an Extra
+        -> measured and predicted torques, cross-validation, correlated parameters
+        -> parts: the results of further analyses, each made by an Extra
 """
 
 from __future__ import annotations
@@ -32,16 +32,19 @@ class OnRequest:
     Attributes
     ----------
     keyword : str
-        By which it is asked for.
+        Name by which the user requests the analysis.
     label : str
-        The same in words.
+        Name of the analysis in messages.
     make : function of Identification and options
+        Makes the Part.
     otherwise : Extra or None
-        What stands for it if it is not asked for, or cannot be made: the question that stays open.
+        Makes a Part in place of the analysis if it was not requested or failed, with the question
+        that stays open.
     options : mapping
-        What it is asked for with.
+        Options of the request.
     attempted : bool
-        Whether a setting that does not suit it is named in `missing`, as a record is; it is an error where it was asked for by name.
+        Whether a setting that does not suit the analysis is named in `missing`, as for a record
+        that does not suit. False: such a setting is an error.
     """
 
     keyword: str
@@ -67,18 +70,19 @@ def identify(
     Parameters
     ----------
     problem : Problem
-        Prepared.
+        A prepared problem.
     extras : sequence of Extra
-        What else is asked of the records, in this order.
+        Further analyses, made in this order.
     provenance : mapping, optional
-        What else reproduces the result; names of the records, hashes and versions are added.
+        Further entries that help to reproduce the result; names of the records, hashes and versions
+        are added.
     progress : function of str
         Called with the label of every OnRequest before it is made.
 
     Returns
     -------
     Identification
-        `missing` holds what was asked for and cannot be made, each with its reason.
+        `missing` holds the analyses that failed, each with its reason.
 
     Raises
     ------
@@ -121,7 +125,10 @@ def with_parts(
     extras: Sequence[Extra],
     progress: Callable[[str], None] = lambda label: None,
 ) -> Identification:
-    """Add the parts of further analyses; each analysis sees the identification without the new parts."""
+    """Make further analyses of an identification, and add their results as parts.
+
+    Each analysis uses the identification without the new parts.
+    """
     parts = list(result.parts)
     missing = list(result.missing)
     for extra in extras:

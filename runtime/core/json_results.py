@@ -1,6 +1,8 @@
-"""JSON results read back, every value checked.
+"""Reading of results from JSON, with a check of every value.
 
-A result has its kind and version in the key `schema`. Another kind, another version and damage are each one clear error. A reader leaves out keys that it does not know, so that keys can be added under the same version.
+A result has its kind and version in the key `schema`. Another kind, another version and a damaged
+file each raise one clear error. Unknown keys are ignored, so that a later version can add keys
+under the same `schema`.
 """
 
 from __future__ import annotations
@@ -21,12 +23,12 @@ T = TypeVar("T")
 
 
 class Numbers:
-    """Annotation of an array of floats: nested lists of numbers in JSON, with null for nan.
+    """Annotation for pydantic: an array of floats, in JSON nested lists with null for nan.
 
     Parameters
     ----------
     kind : type
-        The nested lists.
+        Type of the nested lists.
     """
 
     def __init__(self, kind: Any) -> None:
@@ -38,7 +40,7 @@ class Numbers:
         )
 
     def array(self, rows: list[Any]) -> np.ndarray:
-        """Array of nested lists; shape (0, 0) for a matrix without rows."""
+        """Convert nested lists to an array of floats; a matrix without rows has shape (0, 0)."""
         return (
             np.array(rows, dtype=float) if rows or self.kind == list[Number] else np.empty((0, 0))
         )
@@ -67,6 +69,8 @@ def from_text(kind: type[T], text: str, schema: str, file: str) -> T:
     ----------
     kind : type
         Dataclass whose fields are keys of the result.
+    text : str
+        The JSON text.
     schema : str
         Kind and version, such as "symgen-estimate/1".
     file : str
@@ -75,7 +79,7 @@ def from_text(kind: type[T], text: str, schema: str, file: str) -> T:
     Raises
     ------
     InputError
-        Where the text is no JSON, of another kind or version, incomplete, or holds other values.
+        The text is not JSON, has another kind or version, is incomplete, or holds wrong values.
     """
     try:
         data = json.loads(text, parse_constant=_refuse_constant)

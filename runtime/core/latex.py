@@ -1,7 +1,7 @@
-r"""An Estimate as the chapter's Table 2, in LaTeX, for \usepackage{booktabs}.
+r"""LaTeX of an Estimate in the form of the chapter's Table 2, for \usepackage{booktabs}.
 
-No name, unit or label is read as LaTeX: texts that have none of the forms known below are escaped,
-character by character.
+No name, unit or label is interpreted as LaTeX: a text without one of the known forms below is
+escaped, character by character.
 """
 
 from __future__ import annotations
@@ -29,14 +29,17 @@ NAME = re.compile(r"([A-Za-z]+)(\d[0-9_]*R?)")
 
 
 def escaped(text: str) -> str:
-    """Any text as one line of LaTeX that prints it; unprintable characters become ?."""
+    """Escape a text so that LaTeX prints it on one line; unprintable characters become "?"."""
     return "".join(
         SPECIAL.get(c, c if c.isprintable() else " " if c.isspace() else "?") for c in text
     )
 
 
 def name_cell(name: str) -> str:
-    """ZZ1R as ZZ with the subscript 1R; any other text unchanged."""
+    """Write the name of a parameter in LaTeX: ZZ1R becomes ZZ with the subscript 1R.
+
+    A text of another form is escaped.
+    """
     parts = NAME.fullmatch(name)
     return (
         escaped(name)
@@ -46,7 +49,7 @@ def name_cell(name: str) -> str:
 
 
 def unit_cell(unit: str) -> str:
-    """Unit in brackets, (kg m^2), to follow a name; empty for no unit."""
+    """Write a unit in brackets, such as (kg m^2), to follow a name; "" if there is no unit."""
     if not unit:
         return ""
     if not UNIT.fullmatch(unit):
@@ -56,7 +59,7 @@ def unit_cell(unit: str) -> str:
 
 
 def number_cell(value: float, form: str = ".4g") -> str:
-    """A number in LaTeX mathematics, with powers of ten; -- for no number."""
+    """Write a number in LaTeX, with a power of ten if needed; "--" if it is not finite."""
     if not math.isfinite(value):
         return "--"
     digits, _, power = format(value, form).partition("e")
@@ -71,18 +74,19 @@ def parameter_table(
     *,
     blocks: int = 1,
 ) -> str:
-    """Table 2 of the chapter: name (unit), value, %sigma.
+    """Write the parameters in LaTeX as in Table 2 of the chapter: name (unit), value, %sigma.
 
     Parameters
     ----------
     X : ndarray, shape (b,), SI
         Values.
     relative_sigma : ndarray, shape (b,), %
-        Relative deviations.
+        Relative standard deviations.
     units : mapping of str
         Units by name.
     blocks : int
-        Number of blocks side by side, each with the three columns; 60 parameters fit a page in two.
+        Number of blocks side by side, each with the three columns; with two blocks, 60 parameters
+        fit on a page.
     """
     lines = [
         (name_cell(name) + unit_cell(units.get(name, "")), number_cell(x), number_cell(s, ".3f"))

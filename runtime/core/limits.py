@@ -1,5 +1,6 @@
-"""Limits and thresholds of judgement, in one table: runtime/core/limits.toml says of each its value,
-its unit, what it means, and where it was measured.
+"""Limits and thresholds of all checks, in one table: runtime/core/limits.toml.
+
+For each limit, the table gives the value, the unit, the meaning, and where it was measured.
 
     LIMIT.DECISIVE           the value
 """
@@ -18,7 +19,7 @@ ENTRIES: dict[str, dict[str, Any]] = {
 
 
 class LimitValues:
-    """Values of the thresholds in ENTRIES, by name."""
+    """Values of all limits as attributes, for instance LIMIT.DECISIVE."""
 
     def __init__(self) -> None:
         self.__dict__.update({name: limit["value"] for name, limit in ENTRIES.items()})

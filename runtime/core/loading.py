@@ -1,11 +1,13 @@
-"""Emitted files as modules: a module is code, and runs with every right of who runs it.
+"""Loading of emitted files as Python modules, only if they can be trusted.
 
     generated/tx40.py
-            runs where this installation has emitted and certified it, or where its reader trusts it
 
-symgen keeps each text that it emits and certifies in a cache by content: `cache_folder("modules")`
-holds a folder of the first 32 digits of the SHA-256 of the text. What runs is the text that was
-looked up: it is read once, and nothing of it is kept.
+A module is code, and runs with all rights of its user. An emitted file therefore runs only if this
+installation has emitted and certified it, or if the user trusts it.
+
+symgen caches each text that it emits and certifies, by content: `cache_folder("modules")` holds a
+folder whose name is the first 32 digits of the SHA-256 of the text. The file is read once, so that
+the text which runs is the text that was checked; no compiled copy is stored.
 """
 
 from __future__ import annotations
@@ -26,7 +28,10 @@ UNTRUSTED = "is code that this installation has not emitted and certified; pass 
 
 
 def cache_folder(of: str) -> Path:
-    """Cache folder `of` ("modules", "compiled") in SYMGEN_CACHE, or in the cache folder of the platform."""
+    """Return the path of the cache folder `of`, such as "modules" or "compiled".
+
+    The folder is in SYMGEN_CACHE, if set, or in the cache folder of the platform.
+    """
     if given := os.environ.get("SYMGEN_CACHE"):
         return Path(given) / of
     if sys.platform == "win32":
@@ -39,7 +44,7 @@ def cache_folder(of: str) -> Path:
 
 
 def is_writable_by_others(folder: Path) -> bool:
-    """Whether another user can change the folder or replace it, so that its content proves nothing."""
+    """Whether another user can change or replace the folder; its content is then no proof."""
     if os.name != "posix":
         return False
     for place in (folder, *folder.absolute().parents):
@@ -56,7 +61,7 @@ def is_writable_by_others(folder: Path) -> bool:
 
 
 def is_emitted(text: bytes) -> bool:
-    """Whether this installation has emitted and certified the text."""
+    """Whether this installation has emitted and certified the text of a module."""
     try:
         folder = cache_folder("modules")
         return (folder / sha256(text).hexdigest()[:KEY]).is_dir() and not is_writable_by_others(
@@ -67,7 +72,7 @@ def is_emitted(text: bytes) -> bool:
 
 
 class _Text(importlib.abc.InspectLoader):
-    """Loader of a text."""
+    """Import loader of a module whose source text is given, not read from a file."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -77,7 +82,10 @@ class _Text(importlib.abc.InspectLoader):
 
 
 def module_of(path: Path, *, trust: bool = False) -> ModuleType:
-    """Load the module of an emitted file; ModelError if this installation has not emitted it, unless `trust`."""
+    """Load the module of an emitted file.
+
+    Raise ModelError if this installation has not emitted the file, unless `trust` is true.
+    """
     try:
         data = path.read_bytes()
         text = data.decode("utf-8")
@@ -89,7 +97,7 @@ def module_of(path: Path, *, trust: bool = False) -> ModuleType:
 
 
 def run(text: str, path: Path) -> ModuleType:
-    """Run the text of a module; `path` is the name of its file."""
+    """Execute the text of a module and return the module; `path` is the name of its file."""
     name = f"generated_{path.stem}"
     loader = _Text(text)
     module = importlib.util.module_from_spec(ModuleSpec(name, loader, origin=str(path)))

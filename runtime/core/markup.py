@@ -1,7 +1,8 @@
-"""Names, formulas and numbers as people write them: ZZ1R is ZZ with the index 1R, `D3**2*(M3 + M4)` has a square and no star.
+"""Names, formulas and numbers in HTML, as people write them.
 
-Every piece is made by `element`, which escapes whatever is not Markup already: no name and no
-formula can bring in markup.
+The parameter ZZ1R is printed as ZZ with the index 1R, and `D3**2*(M3 + M4)` with an exponent and no
+star. Every text passes through `element`, which escapes whatever is not Markup already: no name and
+no formula can insert markup.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ UPRIGHT = {"sin", "cos", "tan", "sqrt", "pi"}
 
 
 class Markup(str):
-    """Complete, escaped HTML; templates do not escape it again."""
+    """A text of complete, escaped HTML, which templates do not escape again."""
 
     __slots__ = ()
 
@@ -34,7 +35,7 @@ class Markup(str):
 
 
 def element(tag: str, *children: str, **attributes: str) -> Markup:
-    """<tag attributes>children</tag> with escaped texts and attribute values.
+    """Make the HTML <tag attributes>children</tag>, with escaped texts and attribute values.
 
     `class_` becomes class, `aria_label` becomes aria-label.
     """
@@ -47,7 +48,10 @@ def element(tag: str, *children: str, **attributes: str) -> Markup:
 
 
 def split(name: str) -> tuple[str, str]:
-    """Letter and subscript of a parameter or constant; the subscript may be empty."""
+    """Split the name of a parameter or constant into its letters and its subscript.
+
+    For instance, ZZ1R gives "ZZ" and "1R"; the subscript may be empty.
+    """
     match = re.fullmatch(r"(.*?[^\d_])_?(\d*(?:_\d+)*)(R?)", name)
     if match is None or not (match[2] or match[1] in FAMILIES):
         return name, ""
@@ -56,13 +60,16 @@ def split(name: str) -> tuple[str, str]:
 
 
 def symbol(name: str) -> Markup:
-    """A parameter with its subscript, in HTML that copies as one word."""
+    """Write a parameter in HTML with its subscript; a copy of this text is the name in one word."""
     letter, subscript = split(name)
     return element("var", letter, *([element("sub", subscript)] if subscript else []))
 
 
 def formula(text: str) -> Markup:
-    """A flat formula with + - * ** ( ) and functions in HTML: subscripts, exponents, thin spaces for products."""
+    """Write a formula in HTML, with subscripts, exponents, and thin spaces for products.
+
+    The formula may have + - * ** ( ) and functions.
+    """
     pieces: list[str] = []
     for token in TOKEN.finditer(text):
         kind, piece = token.lastgroup, token[0]
@@ -80,10 +87,10 @@ def formula(text: str) -> Markup:
 
 
 def unit(text: str) -> str:
-    """A unit for people: kg*m**2 becomes kg m², N*m*s/rad becomes N m s/rad."""
+    """Write a unit as people do: kg*m**2 becomes kg m², N*m*s/rad becomes N m s/rad."""
     return text.replace("**2", "²").replace("*", "\u00a0")
 
 
 def number(value: float, form: str = ".4g") -> str:
-    """A number for people; - for no number."""
+    """Write a number as text, with four digits by default; "-" if it is not finite."""
     return format(value, form) if math.isfinite(value) else "-"

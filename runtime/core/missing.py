@@ -1,4 +1,7 @@
-"""Positions that a record does not hold: where they were measured, and at which encoders they are missing (`signals.reader: counts` takes them)."""
+"""Missing positions of a record: at which samples, and for which joints and encoders.
+
+The setting `signals.reader: counts` accepts records with such samples.
+"""
 
 from __future__ import annotations
 
@@ -19,37 +22,42 @@ COUNTS = (
 
 @dataclass(frozen=True, eq=False)
 class Missing:
-    """Samples of a record without a position, for each recorded column.
+    """Marks of the samples of a record that have no position, for each recorded column.
 
     Attributes
     ----------
     samples : ndarray of bool, shape (N, n)
-        True: the column holds no position there. The record holds a straight line between its
-        neighbours.
+        True: the column has no position at this sample. The record holds there a straight line
+        between the neighbouring positions.
     follows : ndarray of bool, shape (n, n), or None
-        Joint j follows from column i (R^-1 of the drives is not zero there); None: columns are
-        joints.
+        True: the position of joint j depends on column i, because R^-1 of the drives is not zero
+        there. None: the columns are joints.
     """
 
     samples: Array
     follows: Array | None = None
 
     def at_joints(self) -> Array:
-        """Joints with unknown position, bool, shape (N, n)."""
+        """Return the samples and joints with unknown position, bool, shape (N, n)."""
         return self.samples if self.follows is None else self.samples @ self.follows.T
 
     def at_encoders(self, drives: Drives | None) -> Array:
-        """Encoders without a count, bool, shape (N, n), at the joints (None) or at the motors of `drives`.
+        """Return the samples and encoders without a count, bool, shape (N, n).
 
-        A motor that turns with two joints has no count if either joint has none. If motors were
-        recorded, each motor has its own.
+        The encoders are at the joints if `drives` is None, else at the motors of `drives`. A motor
+        that turns with two joints has no count if one of these joints has no position. If motor
+        positions were recorded, each motor has its own marks.
         """
         if drives is None:
             return self.at_joints()
         return self.samples if self.follows is not None else self.samples @ (drives.motion != 0).T
 
     def near_gaps(self, longest: int, reach: int) -> Array:
-        """Samples in or within `reach` samples of gaps of more than `longest` samples, bool, shape (N,)."""
+        """Return the samples in or near long gaps, bool, shape (N,).
+
+        A gap is long if it has more than `longest` samples; near means at most `reach` samples
+        away.
+        """
         ends = np.flatnonzero(
             np.diff(self.at_joints().any(axis=1), prepend=False, append=False)
         ).reshape(-1, 2)
@@ -60,11 +68,12 @@ class Missing:
 
 
 def held_samples(q: Array) -> Array:
-    """Samples at which a controller repeated the positions of the previous sample, bool, shape (N,).
+    """Find the samples at which a controller repeated all positions of the previous sample.
 
-    All joints repeat their positions although one of them moves before and after. The next step
-    makes up for the repetition: it is the neighbouring step times the number of samples, within 0.4.
-    A joint between two counts of a coarse encoder, or at rest, makes up for nothing.
+    Return bool, shape (N,). Although one joint moves before and after, all positions repeat, and
+    the next step makes up for the repetition: it is the neighbouring step times the number of
+    samples, within a factor of 1 +- 0.4. A joint at rest, or between two counts of a coarse
+    encoder, shows no such step.
     """
     steps = np.abs(np.diff(q, axis=0))
     same = ~steps.any(axis=1)
@@ -83,7 +92,11 @@ def held_samples(q: Array) -> Array:
 
 
 def bridged(q: Array, missing: Array) -> Array:
-    """q, shape (N, n), with straight lines over missing samples, and constant values at the ends."""
+    """Replace missing positions in q, shape (N, n), by straight lines between their neighbours.
+
+    At the ends of the record, the nearest position is repeated; a column without any position
+    becomes 0.
+    """
     q, at = np.array(q), np.arange(len(q))
     for j in np.flatnonzero(missing.any(axis=0)):
         known = np.flatnonzero(~missing[:, j])
@@ -95,7 +108,10 @@ def bridged(q: Array, missing: Array) -> Array:
 
 
 def require_positions(missing: Missing | None, who: str, file: str, hint: str = "") -> None:
-    """Raise InputError if positions are missing that `who` needs; hint : another remedy."""
+    """Raise InputError if positions are missing in a record.
+
+    who : name of the function that needs all positions. hint : another remedy, for the message.
+    """
     if missing is not None and missing.samples.any():
         i, j = np.argwhere(missing.samples)[0]
         raise InputError(

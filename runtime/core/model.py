@@ -1,7 +1,7 @@
-"""The border to emitted modules: their functions, loading and checking one, and checks of the states given to it.
+"""The interface to emitted models: loading, checks, and tables such as joint units and elements.
 
-A model is a plain Python module written by the generator (NumPy only): `load_model("tx40")` reads
-generated/tx40.py of the current folder. A module is code: a file runs where this installation has
+A model is a plain Python module written by the generator (NumPy only): `load_model("tx40")` loads
+generated/tx40.py of the current folder. A module is code: a file runs only if this installation has
 emitted and certified it, or with trust=True (`runtime.core.loading`).
 """
 
@@ -48,9 +48,9 @@ FUNCTIONS = (
 
 
 class GeneratedModel(Protocol):
-    """Interface of an emitted module with n joints and b base parameters, as `runtime` uses it.
+    """Interface of an emitted model with n joints and b base parameters, as `runtime` uses it.
 
-    q, qd, qdd have shape (N, n). `require` checks the dynamics before use.
+    q, qd, qdd have shape (N, n). `require` checks that the functions of the dynamics exist.
     """
 
     NAME: str
@@ -69,36 +69,41 @@ class GeneratedModel(Protocol):
     casadi: Callable[..., Any]  # casadi.Function of a function of the module, by name
 
     def store(self, N: int) -> Array:
-        """Workspace of shape (b, n, N) for `out`, with zeros in the entries that are always zero."""
+        """Make a workspace of shape (b, n, N) for `out`, zero where an entry is always zero."""
 
     def regressor(
         self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float
     ) -> Array:
-        """D, shape (N, n, b), eq. (5)."""
+        """Compute the regressor D, shape (N, n, b), eq. (5)."""
 
     def observation_matrix(
         self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float
     ) -> Array:
-        """W, shape (n*N, b), rows joint-major, Fortran order, eq. (6)."""
+        """Compute the observation matrix W, shape (n*N, b), eq. (6).
+
+        Rows are joint-major: first all samples of joint 1. The array is in Fortran order.
+        """
 
 
 def load_model(
     model: str | Path | ModuleType, *, folder: str | Path | None = None, trust: bool = False
 ) -> GeneratedModel:
-    """Load and check an emitted model: a name (generated/NAME.py), a path to a .py file, or an imported module.
+    """Load an emitted model and check it.
 
     Parameters
     ----------
     model : str, Path or module
+        A name (for generated/NAME.py), the path of a .py file, or an imported module.
     folder : str or Path, optional
-        Where names are looked up; default: ./generated.
+        Folder of the files for names; default: ./generated.
     trust : bool
-        Run a file that this installation has not emitted and certified: a module is code (`runtime.core.loading`).
+        Whether to run a file that this installation has not emitted and certified: a module is code
+        (`runtime.core.loading`).
 
     Raises
     ------
     ModelError
-        No such file, one that was not emitted here, or no such model.
+        There is no such file, it was not emitted here, or it is not a model.
     """
     if isinstance(model, ModuleType):
         return checked_model(model)
@@ -131,9 +136,10 @@ def require_emitted(model: Any) -> None:
 
 
 def _reduced(module: ModuleType) -> tuple[Callable[..., ModuleType], tuple[Any, ...]]:
-    """How modules are pickled: an emitted one as text, since the process that receives it trusts the one that sends it.
+    """Return how pickle rebuilds a module in another process: an emitted one from its text.
 
-    Any other by name. InputError for an emitted one without a file.
+    The receiving process trusts the sending one. Any other module is imported by its name. Raise
+    InputError for an emitted module without a file.
     """
     if not hasattr(module, "SOURCE_SHA256"):
         return import_module, (module.__name__,)
@@ -151,7 +157,11 @@ copyreg.pickle(ModuleType, _reduced)
 
 
 def checked_model(module: ModuleType) -> GeneratedModel:
-    """Return the module if it is an emitted model with consistent n, b and shapes; raise ModelError otherwise."""
+    """Return the module if it is a consistent emitted model; raise ModelError otherwise.
+
+    Checked are its functions and names, the numbers n of joints and b of base parameters, and the
+    shapes of its arrays.
+    """
     label = module.__name__
     missing = [name for name in (*CONSTANTS, *FUNCTIONS) if not hasattr(module, name)]
     if missing:
@@ -208,14 +218,15 @@ def require(model: GeneratedModel, *functions: str) -> None:
 
 
 def drives_of(model: GeneratedModel) -> Drives | None:
-    """Drives of a model; None if it has none."""
+    """Return the drives of a model; None if it has none."""
     return None if model.DRIVES is None else Drives.from_mapping(model.DRIVES)
 
 
 def constants_of(model: GeneratedModel, constants: Mapping[str, float]) -> dict[str, float]:
-    """Values of geometry and gravity in the order of CONSTANTS; `constants` replaces those of the robot file.
+    """Return the constants of a model (geometry and gravity) with new values for some of them.
 
-    InputError for names that the model does not have.
+    Constants that are not in `constants` have the value of the robot file. Raise InputError for a
+    name that the model does not have.
     """
     if unknown := sorted(constants.keys() - model.CONSTANTS.keys()):
         raise InputError(
@@ -226,12 +237,19 @@ def constants_of(model: GeneratedModel, constants: Mapping[str, float]) -> dict[
 
 
 def channels_of(model: GeneratedModel) -> Mapping[str, tuple[str, ...]]:
-    """Base parameters whose columns read each channel (a constant that is a function of time), by channel."""
+    """Return the base parameters that depend on each channel, by name of the channel.
+
+    A channel is a measured quantity in a law of the robot file, such as a temperature: a constant
+    that is a function of time.
+    """
     return cast(Mapping[str, tuple[str, ...]], getattr(model, "CHANNELS", {}))
 
 
 def require_no_channels(model: GeneratedModel, what: str) -> None:
-    """Raise InputError if laws of the model read channels, which `what` does not have."""
+    """Raise InputError if laws of the model use channels, because `what` does not provide them.
+
+    A channel is a measured quantity in a law, such as a temperature. what : name of the caller.
+    """
     if channels := channels_of(model):
         names = sorted({name for own in channels.values() for name in own})
         raise InputError(
@@ -241,9 +259,9 @@ def require_no_channels(model: GeneratedModel, what: str) -> None:
 
 
 def joint_labels(model: GeneratedModel) -> tuple[str, ...]:
-    """Labels of the joints in results: the number, and the name of the robot file if it says more.
+    """Return the labels of the joints in results: the number, and the name if it adds something.
 
-    "2 elbow", but "2" if the name is "joint_2".
+    For instance "2 elbow", but "2" if the robot file names the joint "joint_2".
     """
     names = getattr(model, "LABELS", {})
     more = {
@@ -262,13 +280,16 @@ def is_axis(joint: int | str) -> bool:
 def elements_of(
     model: GeneratedModel, constants: Mapping[str, float] | None = None
 ) -> Mapping[str, Any]:
-    """Elements of a model (friction, inertia, springs): kind and direction of motion of each parameter, by joint.
+    """Return the elements of a model (friction, inertia, springs), by name of the parameter.
+
+    An element gives the kind of its parameter, and the direction of motion on which it acts, by
+    joint.
 
     Parameters
     ----------
     model : GeneratedModel
     constants : mapping, optional
-        Values in place of the robot file's.
+        Values in place of those of the robot file.
 
     Raises
     ------
@@ -291,9 +312,10 @@ def elements_of(
 def base_columns(
     model: GeneratedModel, names: str | Sequence[str], essential: Sequence[str], *path: str
 ) -> tuple[str, ...]:
-    """Columns of the setting at `path`: the `essential` ones, "all", or names.
+    """Return the parameters that a setting selects: the `essential` ones, all, or those it names.
 
-    SettingsError for a name that is no base parameter.
+    names : value of the setting: "essential", "all" or names. path : keys of the setting. Raise
+    SettingsError for a name that is not a base parameter.
     """
     wanted = (
         {"essential": essential, "all": model.BASE_PARAMETERS}[names]
@@ -312,11 +334,12 @@ def base_columns(
 
 
 def joint_units(model: GeneratedModel) -> tuple[str, ...]:
-    """Unit of each joint position, "rad" or "m", in the order of JOINTS.
+    """Return the unit of each joint position, "rad" or "m", in the order of JOINTS.
 
-    A joint is prismatic if an element along it alone (friction, spring, motor inertia) has the unit
-    of a prismatic joint. Without such elements it is prismatic if no moment of inertia acts on it,
-    since a force depends on masses and first moments only. Units of user-defined columns are not used.
+    A joint is prismatic if an element of this joint alone (friction, spring, motor inertia) has the
+    unit of a prismatic joint. A joint without such elements is prismatic if no moment of inertia
+    acts on it, since a force depends on masses and first moments only. Units of user-defined
+    columns are not used.
     """
     units, elements = getattr(model, "UNITS", {}), getattr(model, "ELEMENTS", {})
     result = []
@@ -336,7 +359,10 @@ def joint_units(model: GeneratedModel) -> tuple[str, ...]:
 
 
 def _check_names(model: GeneratedModel, label: str) -> None:
-    """Names enter messages, tables, file names and symbols of compiled files: identifiers, and joints whole numbers."""
+    """Raise ModelError unless all names of the model are identifiers and all joints whole numbers.
+
+    These names are used in messages, tables, file names and symbols of compiled files.
+    """
     names = (model.NAME, *model.BASE_PARAMETERS)
     if wrong := [
         name
@@ -351,7 +377,10 @@ def _check_names(model: GeneratedModel, label: str) -> None:
 
 
 def _check_store(model: GeneratedModel, b: int, n: int, label: str) -> None:
-    """Two samples at rest through `store` and `observation_matrix`, general loops at their start."""
+    """Evaluate the model for two samples at rest; raise ModelError if an array has a wrong shape.
+
+    A robot with closed loops is evaluated at the start position of its loops.
+    """
     N = 2
     rest = np.zeros((N, n))
     q = rest + getattr(model, "_START", rest[0])[:n]
@@ -379,7 +408,10 @@ def _check_store(model: GeneratedModel, b: int, n: int, label: str) -> None:
 
 
 def check_states(model: GeneratedModel, **states: Array) -> None:
-    """Raise ValueError unless all states are real arrays of one shape, (N, n) or (n,), with n the joints of the model."""
+    """Raise InputError unless all states are real arrays of the same shape, (N, n) or (n,).
+
+    n is the number of joints of the model.
+    """
     n = len(model.JOINTS)
     first, shape = next((name, np.shape(x)) for name, x in states.items())
     for name, x in states.items():

@@ -1,24 +1,24 @@
-"""Nested sets of parameters of one robot: essential, feasible, all. Which predicts data it has not
-seen best?
+"""Sets of parameters of one robot: essential, feasible, all. Which set predicts unseen data best?
 
     essential    fewest columns, the others zero
-    feasible     all columns, among physical robots, pulled to the values of the robot file if
-                 there are any
+    feasible     all columns; values of a physically possible robot, close to the values of the
+                 robot file if there are any
     all          least squares
 
-The feasible set is used and is printed first, unless all parameters predict unseen
-data better by more than LIMIT.PREFERRED_SET: the validation records, else the second half of the
-record and the fifths of `held_out_validation` too. Half a record may leave friction
-open, where a joint moves one way; then both sets fail on the other half, and which fails less
-means nothing. The feasible set needs semidefinite programs: it is fitted only if it may be used
-(`physical_asked`), or if the essential set is used and a program needs all parameters. All rows
-decide the weight of its prior and the bounds by reach, which fits of parts of the rows then use.
+The feasible set is used and is printed first, unless all parameters predict unseen data better by
+more than LIMIT.PREFERRED_SET. Unseen data are the validation records. Without them, they are the
+second half of the record, and also the fifths of `held_out_validation`: half a record may not
+determine friction, if a joint moves one way only. Then both sets fail on the other half, and their
+order means nothing. The feasible set needs semidefinite programs: it is fitted only if it may be
+used (`physical_asked`), or if the essential set is used and a program needs all parameters. The
+weight of its prior and its bounds by reach are found from all rows; fits of parts of the rows then
+use these values.
 
-The essential set is an aid to reading: which parameters carry the model. Its deviations take the
-parameters that were removed as zero, and what they are in truth moves those that stay: 95 %
-intervals hold 67 to 74 % of the true values (benchmarks/truth.md). With essential: {first: true}, the
-choice of the chapter, it is used if it predicts as well as all; the feasible set is
-then not asked.
+The essential set shows which parameters explain the torques. Its standard deviations assume that
+the removed parameters are zero, but their true values bias the others: 95 % intervals hold 67 to 74
+% of the true values (benchmarks/truth.md). With essential: {first: true}, the choice of the
+chapter, the essential set is used if it predicts as well as all; the feasible set is then not
+fitted.
 """
 
 from __future__ import annotations
@@ -47,19 +47,23 @@ ORDER: tuple[SetName, ...] = ("essential", "feasible", "all")
 def least_squares_sets(
     settings: EstimateSettings, reduced: Essential
 ) -> tuple[dict[SetName, Estimate], dict[SetName, EstimateSettings]]:
-    """The essential parameters and all parameters by a linear method, and the settings of each."""
+    """Return the estimates of the essential and of all parameters, and the settings of both sets.
+
+    The method of estimation is linear.
+    """
     essential = EstimateSettings(settings.method, settings.weights, reduced.names, settings.options)
     sets: dict[SetName, Estimate] = {"essential": reduced.estimate, "all": reduced.all_parameters}
     return sets, {"essential": essential, "all": settings}
 
 
 def physical_asked(errors: Mapping[Any, float], first: bool) -> bool:
-    """Whether the physical set may be the one that is used.
+    """Whether the physical set may be the set that is used, so that it has to be fitted.
 
     Parameters
     ----------
     errors : mapping of float, %
-        Of the essential parameters and of all on unseen data; empty if nothing was predicted.
+        Errors of the essential parameters and of all parameters on unseen data; empty if nothing
+        was predicted.
     first : bool
         essential.first of the study.
     """
@@ -69,15 +73,19 @@ def physical_asked(errors: Mapping[Any, float], first: bool) -> bool:
 
 
 def physical_possible(observation: Observation, settings: EstimateSettings, fit: Estimate) -> bool:
-    """Whether a physical set can be fitted besides `fit`, all parameters by a linear method."""
+    """Whether the physical set can be fitted in addition to `fit`, the fit of all parameters.
+
+    This needs all columns, a fit with status ok, and weights other than "covariance".
+    """
     whole = settings.columns == "all" and fit.status == "ok"
     return whole and settings.weights != "covariance"
 
 
 def physical_set(problem: Problem, observation: Observation) -> tuple[Estimate, EstimateSettings]:
-    """The physical parameters from all rows, and the settings for fits of parts of the rows.
+    """Fit the physical parameters to all rows; return this fit, and settings for later fits.
 
-    These settings have the prior, its weight and the bounds by reach from all rows.
+    The settings are for fits of parts of the rows: they fix the prior, its weight and the bounds by
+    reach as found from all rows.
     """
     at("physical parameters")
     settings = problem.settings.estimate
@@ -96,7 +104,7 @@ def physical_set(problem: Problem, observation: Observation) -> tuple[Estimate, 
 def held_out_validation(
     problem: Problem, observation: Observation, choices: Mapping[Any, EstimateSettings]
 ) -> CrossValidation:
-    """`cross_validation` of each of LIMIT.HELD_OUT_PARTS parts of the record from the other parts."""
+    """Divide the record into LIMIT.HELD_OUT_PARTS parts, and predict each part from the others."""
     number, folds = observation.equal_parts(LIMIT.HELD_OUT_PARTS), []
     for p in np.unique(number):
         part = observation.where(number == p)
@@ -109,9 +117,11 @@ def held_out_validation(
 
 
 def best_set(errors: Mapping[Any, float], essential: bool = False) -> SetName:
-    """Name of the set with the smallest error on unseen data, %.
+    """Return the name of the set of parameters with the smallest error on unseen data.
 
-    Without known errors: all parameters, or the essential ones if they may be used.
+    errors : by set, %. essential : whether the essential set may be used. A smaller set is
+    preferred if its error is nearly the smallest (LIMIT.PREFERRED_SET). Without known errors:
+    "essential" if it may be used, else "all".
     """
     candidates = ORDER if essential else ORDER[1:]
     known = {name: errors[name] for name in candidates if np.isfinite(errors.get(name, np.nan))}
@@ -122,9 +132,10 @@ def best_set(errors: Mapping[Any, float], essential: bool = False) -> SetName:
 
 
 def whole_set(names: Collection[SetName], model_columns: SetName) -> SetName:
-    """Name of the set with all base parameters, for a robot file or a program.
+    """Return the name of a set with all base parameters, for a robot file or a program.
 
-    It is `model_columns`; if that is the essential set, the physical set if `names` has it.
+    This is `model_columns`, the set that is used. If that is the essential set, it is the physical
+    set if `names` has it, else "all".
     """
     if model_columns != "essential":
         return model_columns
@@ -132,7 +143,10 @@ def whole_set(names: Collection[SetName], model_columns: SetName) -> SetName:
 
 
 def ranking_text(errors: Mapping[SetName, float], counts: Mapping[SetName, int], where: str) -> str:
-    """The sets in the order of their errors on unseen data, in one sentence."""
+    """Write the sets in the order of their errors on unseen data, in one sentence.
+
+    counts : number of parameters of each set. where : name of the unseen data.
+    """
     ranked = sorted((error, name) for name, error in errors.items() if np.isfinite(error))
     parts = [f"{name} ({counts[name]}) {error:.1f} %" for error, name in ranked]
     return (

@@ -1,6 +1,7 @@
-"""What is found in an identification besides its parameters: a Part carries its own words, tables, figures, questions and JSON.
+"""Results of further analyses of an identification: parts with texts, tables, figures and checks.
 
-Whoever prints, judges, exports or reports an identification goes through its parts and knows none by name. An Extra makes a Part of an Identification (`runtime.core.identify`).
+Code that prints, judges, exports or reports an identification uses all its parts alike, and no part
+by name. An Extra makes a Part of an Identification (`runtime.core.identify`).
 """
 
 from __future__ import annotations
@@ -35,19 +36,21 @@ class Figure:
     ----------
     caption : str
     alt : str
-        What the figure shows, for those who do not see it.
+        What the figure shows, in words, for readers who do not see the figure.
     panels : sequence of functions of Matplotlib Axes
-        Each fills one panel.
+        Each function fills one panel.
     name : str
-        Of its files next to the page, PNG and SVG; "": the page alone has it.
+        Name of the PNG and SVG files next to the page; "": the figure is on the page only.
     columns : int
         Largest number of panels in a row.
     cell : (float, float), inch
-        Width and height of a panel; `extra` is added to the height of all, and the whole is at least `least` wide.
+        Width and height of a panel; `extra` is added to the height of all, and the whole is at least
+        `least` wide.
     legend : int
-        Columns of the one legend above the panels, in letters of `letters` points; 0: none.
+        Number of columns of the common legend above the panels, whose letters have `letters` points;
+        0: no legend.
     logarithmic : bool
-        Both axes of every panel.
+        Whether both axes of every panel are logarithmic.
     x, y : str
         Labels of all panels together; numbers are then at the outer panels only.
     """
@@ -68,16 +71,19 @@ class Figure:
 
 
 class Part:
-    """Result of one analysis with its texts, tables, figures and checks; a subclass overrides what it has.
+    """Result of one analysis, with its texts, tables, figures and checks.
+
+    A subclass overrides the methods for the items that it has.
 
     Attributes
     ----------
     name : str
-        By which `Identification.part` finds it, and its key in estimate.json.
+        Name by which `Identification.part` finds the part, and its key in estimate.json.
     title : str
         Heading of its section.
     about : "record", "prediction" or "values"
-        What its questions are about: those of the record stand first in a verdict, since what is wrong there is the cause of what follows.
+        Subject of its questions. Questions about the record are the first in a verdict, because an
+        error of the record causes later errors.
     """
 
     name: str
@@ -86,7 +92,7 @@ class Part:
 
     @property
     def expected_error(self) -> float:
-        """Expected error of predictions of other motions, %, for the verdict; nan if the part has none."""
+        """Expected error of predictions of other motions, %, for the verdict; nan if unknown."""
         return float("nan")
 
     @property
@@ -95,49 +101,49 @@ class Part:
         return False
 
     def text(self) -> str:
-        """Paragraphs of text, one a line."""
+        """Return paragraphs of text, one per line."""
         return ""
 
     def brief(self) -> str:
-        """Short text for a short print."""
+        """Return a short text for a short print."""
         return ""
 
     def warnings(self) -> Sequence[str]:
-        """Sentences to read before the values are used."""
+        """Return sentences that the user should read before the values are used."""
         return ()
 
     def tables(self) -> Sequence[Table]:
-        """Tables, printed after the text."""
+        """Return tables, which are printed after the text."""
         return ()
 
     def figures(self) -> Sequence[Figure]:
-        """Figures for a report."""
+        """Return figures for a report."""
         return ()
 
     def checks(self) -> Sequence[Check]:
-        """Checks for the verdict."""
+        """Return checks for the verdict."""
         return ()
 
     def summary(self) -> Any:
-        """The part as a mapping for JSON."""
+        """Return the part as a mapping for JSON; None if it has no entry there."""
         return None
 
     def entries(self) -> Mapping[str, Any]:
-        """Entries of estimate.json by key: the summary, if there is one."""
+        """Return the entries of estimate.json by key: the summary, if there is one."""
         summary = self.summary()
         return {} if summary is None else {self.name: summary}
 
     def files(self) -> Mapping[str, str]:
-        """Texts of further files, by file name."""
+        """Return the texts of further files, by file name."""
         return {}
 
     def arrays(self) -> Mapping[str, Mapping[str, np.ndarray]]:
-        """Arrays of NPZ and MAT files, by file name without its ending."""
+        """Return the arrays of NPZ and MAT files, by file name without its ending."""
         return {}
 
 
 def printed(part: Part) -> str:
-    """Title, text and tables of a part; "" if it has neither text nor table."""
+    """Write the title, the text and the tables of a part; "" if it has neither text nor table."""
     tables = [table.to_text() for table in part.tables()]
     shown = "\n\n".join(text for text in (part.text(), *tables) if text)
     return f"{part.title}\n{shown}" if shown else ""

@@ -1,8 +1,9 @@
-"""What is identified: a model, records and settings. A Step changes the problem before rows are made of it.
+"""A problem: the model, the records and the settings of one identification.
 
     problem = prepared(Problem(model, records, unseen, settings, reader), steps)
 
-Every entry point works on a prepared problem, so that all of them use the model, the rows and the torques of one another.
+A Step changes the problem before rows are made of it. Every analysis starts from a prepared
+problem, so that all analyses use the same model, rows and torques.
 """
 
 from __future__ import annotations
@@ -36,13 +37,13 @@ class Note:
     Attributes
     ----------
     kind : str
-        What it is about, by which code asks for it; no code reads the text.
+        Subject of the note, by which code finds it; no code interprets the text.
     text : str
-        Sentences for people; "" if there are data alone.
+        Sentences for people; "" if the note has data only.
     data : mapping
         Entries of the provenance, JSON values.
     result : object
-        What the step found, for the part that reports it.
+        Result of the step, for the part that reports it.
     """
 
     kind: str
@@ -62,14 +63,14 @@ class Problem:
     records : tuple of Record
         Joint side, SI; fitted together.
     unseen : tuple of Record
-        Records that the parameters predict.
+        Records that are not fitted but predicted.
     settings : Study
     reader : Reader
-        States q, qd, qdd of a record; that of settings.signals.reader.
+        Computes the states q, qd, qdd of a record, as settings.signals.reader names it.
     methods : mapping of str to Method
-        Methods of estimation by name, that of settings.estimate.method among them.
+        Methods of estimation by name; settings.estimate.method is one of the names.
     notes : tuple of Note
-        What the steps have to say.
+        Messages of the steps.
     """
 
     model: GeneratedModel
@@ -93,16 +94,19 @@ class Problem:
 
     @cached_property
     def prepared(self) -> tuple[Prepared, ...]:
-        """The fitted records with their filtered states, which are computed once."""
+        """The fitted records with their filtered states q, qd, qdd, computed only once."""
         return tuple(self.reading(record) for record in self.records)
 
     @cached_property
     def prepared_unseen(self) -> tuple[Prepared, ...]:
-        """The same for the records outside the fit."""
+        """The records that are not fitted, with their filtered states q, qd, qdd."""
         return tuple(self.reading(record) for record in self.unseen)
 
     def reading(self, record: Record) -> Prepared:
-        """Prepare one record by the settings."""
+        """Prepare one record for filtering by the settings.
+
+        A record without drives gets those of the model.
+        """
         drives = drives_of(self.model)
         if record.origin.drives is None and drives is not None:
             record = replace(record, origin=replace(record.origin, drives=drives))
@@ -110,7 +114,7 @@ class Problem:
 
     @property
     def method(self) -> Method:
-        """Method of settings.estimate."""
+        """Method of estimation that settings.estimate names."""
         return self.methods[self.settings.estimate.method]
 
     def noted(self, kind: str) -> Note | None:
@@ -127,9 +131,9 @@ class Problem:
         return entries
 
     def changed(self, *notes: Note, **changes: Any) -> Problem:
-        """Copy of the problem with other fields and further notes.
+        """Copy the problem with other fields and further notes.
 
-        Computed states are kept for records whose positions and signals do not change.
+        Filtered states are reused for records whose positions and signals do not change.
         """
         other = replace(self, **changes, notes=(*self.notes, *notes))
         for made in ("prepared", "prepared_unseen"):
@@ -144,7 +148,7 @@ Step: TypeAlias = Callable[[Problem], Problem]
 
 
 def prepared(problem: Problem, steps: Iterable[Step]) -> Problem:
-    """Apply all steps to the problem."""
+    """Apply all steps to the problem, in their order, and return the changed problem."""
     for step in steps:
         problem = step(problem)
     return problem

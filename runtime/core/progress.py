@@ -1,8 +1,8 @@
-"""What long work is at: sentences for whoever asked, by `logging`, logger "runtime.core.progress", level INFO.
+"""Messages about the progress of long work, by the logger "runtime.core.progress", level INFO.
 
 logging.getLogger("runtime.core.progress").setLevel(logging.INFO)
 
-and a handler: `symgen` prints them after two seconds
+A handler is needed too; `symgen` has one, which prints the messages after two seconds.
 """
 
 from __future__ import annotations
@@ -13,5 +13,5 @@ LOGGER = logging.getLogger("runtime.core.progress")
 
 
 def at(part: str) -> None:
-    """Report the start of a phase to the progress callback, if one is set."""
+    """Report the start of a phase of the work to the logger of this module."""
     LOGGER.info("%s", part)

@@ -1,4 +1,4 @@
-"""Where results come from: the names of the records, their time stamps, and whether anything was measured."""
+"""Provenance of results: names and time stamps of the records, and whether they were measured."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from runtime.core.record import Record
 
 
 def record_names(records: Sequence[Record]) -> tuple[str, ...]:
-    """A unique name for each record; of two equal names the second becomes "name (2)"."""
+    """Give each record a unique name: of two equal names, the second becomes "name (2)"."""
     names: list[str] = []
     for record in records:
         name, k = record.name, 1
@@ -23,7 +23,10 @@ def record_names(records: Sequence[Record]) -> tuple[str, ...]:
 
 
 def origin(records: Sequence[Record]) -> dict[str, Any]:
-    """Provenance of a result: names of its records, whether one was simulated, and their time stamps in words."""
+    """Return the provenance of a result: names and time stamps of its records, whether simulated.
+
+    Texts about subtracted known torques are included.
+    """
     names = record_names(records)
     simulated = any(record.origin.simulated for record in records)
     note = {"note": "SIMULATED record: nothing was measured"} if simulated else {}
@@ -41,13 +44,13 @@ def origin(records: Sequence[Record]) -> dict[str, Any]:
 
 
 def processor() -> str:
-    """Machine and processor name, if the system gives them; the last bits of results depend on them."""
+    """Return the name of the machine and the processor; the last bits of results depend on them."""
     name = cpuinfo("model name").partition(":")[2].strip() or platform.processor()
     return f"{platform.machine()} {name}".strip()
 
 
 def cpuinfo(*starts: str) -> str:
-    """First line of the processor information with one of these starts; "" if there is none."""
+    """Return the first line of the processor information with one of these starts; "" if none."""
     info = Path("/proc/cpuinfo")
     text = info.read_text(errors="replace") if info.is_file() else platform.processor()
     return next((line for line in text.splitlines() if line.startswith(starts)), "")

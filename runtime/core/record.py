@@ -1,6 +1,7 @@
 """A measured record: time, joint positions and joint torques, joint side, SI, uniformly sampled.
 
-`runtime.reading.records` makes records of files; a record made of arrays is checked alike.
+`runtime.reading.records` makes records from files. A record made from arrays passes the same
+checks.
 """
 
 from __future__ import annotations
@@ -42,24 +43,23 @@ class Origin:
     files : mapping of str to str
         SHA-256 of the uncompressed bytes, by file name.
     time : str
-        What the time stamps were like and what was done about them, a sentence; "" if there were
-        none.
+        Sentence on the time stamps of the file and on their correction; "" if there were none.
     jitter : float
-        Largest deviation of the stamps from a uniform grid, sampling periods.
+        Largest difference of the stamps from a uniform grid, sampling periods.
     drives : Drives or None
-        Drives of the robot with the coupling by which the record was read; None: those of the
-        model.
+        Drives of the robot, with the coupling that was used when the file was read; None: the
+        drives of the model.
     torque_constant : ndarray, shape (n,), N m/A or N m/V, or None
-        By which currents or voltages became torques; None: torques were measured, or the constants
-        are those of the robot file.
+        Constants that converted currents or voltages to torques; None: torques were measured, or
+        the constants are those of the robot file.
     joints : tuple of str
-        What results call the joints; none: by their place, from 1.
+        Names of the joints in results; empty: the numbers of the joints, from 1.
     whole : str
-        Name of the record that was split at gaps and this is a piece of; "": it is whole.
+        Name of the whole record, if this is one piece of a record that was split at gaps; else "".
     simulated : bool
-        Whether nothing was measured.
+        Whether the record was simulated, not measured.
     by_law : bool
-        Whether the torque is that of a controller's law.
+        Whether the torque was computed by the law of a controller.
     """
 
     files: Mapping[str, str] = field(default_factory=dict)
@@ -88,23 +88,24 @@ class Record:
     rate : float, Hz, optional
         Checked against t. Default: (N - 1)/(t[-1] - t[0]).
     name : str
-        How results call the record.
+        Name of the record in results.
     tau_known : array_like, shape (N, n), N m or N, optional
         Torques of the drives that do not come from the model, such as that of a counterbalance:
         `torque` is tau without them.
     missing : array_like of bool, shape (N, n) or (N,), or Missing, optional
-        Samples of q that hold no position, where `signals.reader` is counts: np.isnan(q). There q
-        becomes a straight line between its neighbours, for what looks at positions as they are; the
-        reader takes no notice of it.
+        Samples of q without a position, if `signals.reader` is counts: np.isnan(q). There q becomes
+        a straight line between its neighbours, for functions that need all positions; the reader
+        does not use this line.
     channels : mapping of str to array_like, optional
-        What else was measured, shape (N, k) by name. An array that cannot be written is taken as it
-        is, others are copied.
+        Further measured signals, shape (N, k) by name. A read-only array is used as it is, others
+        are copied.
     origin : Origin
         Files, clock and drives by which the record was read.
     **named : array_like or None, shape (N, n)
-        Channels of the joints: q_r, what the controller followed, rad or m; tau_ff, feed-forward
-        torques that it added, N m or N; qd and qd_ref, velocities and their reference; q_link,
-        positions behind the gears, nan on joints without an encoder there. None: without it.
+        Channels of the joints: q_r, reference positions of the controller, rad or m; tau_ff,
+        feed-forward torques that it added, N m or N; qd and qd_ref, velocities and their reference;
+        q_link, positions behind the gears, nan on joints without an encoder there. None: not
+        recorded.
 
     Raises
     ------
@@ -195,7 +196,7 @@ class Record:
 
     @property
     def measured(self) -> frozenset[str]:
-        """Names of the recorded channels."""
+        """Names of the recorded channels: the signals besides time, positions and torques."""
         return frozenset(self.channels)
 
     @property
@@ -214,7 +215,10 @@ class Record:
         return self.tau if self.tau_known is None else self.tau - self.tau_known
 
     def moved(self, q: Array, **changes: Any) -> Record:
-        """The record with other positions, hence without recorded velocities; changes : other fields."""
+        """Copy the record with other positions, and therefore without its recorded velocities.
+
+        changes : new values of other fields.
+        """
         others = {key: x for key, x in self.channels.items() if key != "qd"}
         return replace(self, q=q, channels=others, **changes)
 
@@ -231,7 +235,7 @@ class Record:
 
     @property
     def file(self) -> str:
-        """Name for messages: its files, or the name of the record if it was made of arrays."""
+        """Name of the record in messages: its files, or its own name if it was made from arrays."""
         return ", ".join(self.files) or self.name
 
     @property
@@ -243,18 +247,24 @@ class Record:
         return len(self.t)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Records travel to other processes without what was computed from them."""
+        """Return how pickle rebuilds the record in another process: from its fields only.
+
+        Values computed from the fields are not sent.
+        """
         return partial(Record, **{f.name: getattr(self, f.name) for f in fields(self)}), ()
 
 
 def _array(x: ArrayLike | None, label: str, file: str) -> Array:
-    """The numbers of x: a copy, or x itself if it cannot be written."""
+    """Convert x to numbers: a copy, or x itself if it is a read-only array of floats."""
     array = real(x, label, file)
     return array.copy() if array.flags.writeable else array
 
 
 def _channel(label: str, x: ArrayLike, shape: tuple[int, ...], file: str) -> Array:
-    """A channel of a record of positions of that shape, read-only."""
+    """Check a channel of a record and make it read-only.
+
+    shape : that of the positions, (N, n).
+    """
     require_kind(label, str, "a name of channels", "a text")
     array = _array(x, label, file)
     array = array[:, None] if array.ndim == 1 else array
@@ -270,7 +280,10 @@ def _channel(label: str, x: ArrayLike, shape: tuple[int, ...], file: str) -> Arr
 def _missing(
     missing: ArrayLike | Missing | None, shape: tuple[int, ...], file: str
 ) -> Missing | None:
-    """Missing samples of a record of positions of that shape; None if none is."""
+    """Convert the marks of missing positions to a Missing; None if no position is missing.
+
+    shape : that of the positions, (N, n).
+    """
     if missing is None:
         return None
     if not isinstance(missing, Missing):
@@ -285,7 +298,7 @@ def _missing(
 
 
 def _marks(missing: Any, file: str) -> Array:
-    """Marks of samples as an array, of whatever dtype."""
+    """Convert the marks of missing positions to an array, of any dtype."""
     try:
         return np.array(missing)
     except Exception as e:  # ragged
@@ -293,7 +306,10 @@ def _marks(missing: Any, file: str) -> Array:
 
 
 def known_text(largest: Array | None, joints: Sequence[str]) -> str:
-    """Sentence about subtracted known torques of this size, shape (n,); "" for None."""
+    """Write a sentence on the known torques that are subtracted from tau; "" for None.
+
+    largest : their largest absolute values, shape (n,).
+    """
     if largest is None:
         return ""
     names = joints or range(1, len(largest) + 1)
@@ -310,7 +326,7 @@ def require_finite(
     hint: str = "",
     largest: float = FINITE,
 ) -> Array:
-    """Raise InputError if x, shape (N, k), has nan, infinity or a number above `largest`.
+    """Return x, shape (N, k), if all its numbers are finite and at most `largest`; else InputError.
 
     row : function from a sample number to its place. hint : another remedy for nan.
     """

@@ -1,16 +1,17 @@
-"""Are the residuals white? Joint by joint, in time and in frequency.
+"""Whiteness of the residuals: are the residuals of each joint independent of each other?
 
-Eqs. (9), (10) take the residuals of a joint as independent. With rho_k their correlation at a
-distance of k rows,
+Eqs. (9), (10) assume that the residuals of a joint are independent. With rho_k, their correlation
+at a distance of k rows,
 
     Q = N (N + 2) sum_k rho_k^2 / (N - k),  k = 1 ... m
             chi^2 with m degrees of freedom if they are         Ljung and Box (1978)
     N_eff = N / (1 + 2 sum_k rho_k)
-            rows that say as much about a mean; the sum ends before the first rho_k <= 0
+            number of independent rows that give a mean of the same accuracy; the sum ends
+            before the first rho_k <= 0
 
-Rows left out and other records are gaps: a pair counts only if both its rows exist, in one
-record. The spectrum shows what is left over: a peak at the frequency
-of the motion is model error, one near the cut-off is filtered noise.
+Rows left out and the ends of records are gaps: a pair of rows counts only if both rows exist, in
+one record. The spectrum shows the cause: a peak at the frequency of the motion is model error, a
+peak near the cut-off is filtered noise.
 """
 
 from __future__ import annotations
@@ -71,17 +72,23 @@ class Whiteness:
 
     @property
     def white(self) -> bool:
-        """Whether the Ljung-Box test accepts independence at 5 %."""
+        """Whether the Ljung-Box test at 5 % accepts that the residuals are independent."""
         return bool(self.p >= LIMIT.SIGNIFICANT)
 
 
 def whiteness(comparison: Sequence[JointComparison], rate: float) -> tuple[Whiteness, ...]:
-    """Test the residuals of every joint; rate : rows per second of one joint, Hz."""
+    """Test whether the residuals of every joint are independent.
+
+    rate : rows per second of one joint, Hz.
+    """
     return tuple(joint_whiteness(joint, rate) for joint in comparison if len(joint.t))
 
 
 def joint_whiteness(joint: JointComparison, rate: float, lags: int = LIMIT.LAGS) -> Whiteness:
-    """Correlation, Ljung-Box test and spectrum of the residuals of one joint."""
+    """Compute the correlation, the Ljung-Box test and the spectrum of the residuals of one joint.
+
+    rate : rows per second, Hz. lags : largest number of correlations.
+    """
     N = len(joint.t)
     m = max(1, min(lags, N // 5))
     error = joint.error - joint.error.mean()
@@ -119,7 +126,10 @@ def joint_whiteness(joint: JointComparison, rate: float, lags: int = LIMIT.LAGS)
 
 
 def residual_correlation(residual: Array) -> Array:
-    """rho_k, k = 1 ... N - 1, of residuals, shape (N,), with equal distances."""
+    """Compute the autocorrelation rho_k, k = 1 ... N - 1, of residuals at equal distances.
+
+    residual : shape (N,).
+    """
     return correlation(
         *_lagged_sums(
             residual - residual.mean(), np.arange(len(residual)), np.empty(0, dtype=np.intp)
@@ -128,8 +138,9 @@ def residual_correlation(residual: Array) -> Array:
 
 
 def correlation(products: Array, pairs: Array) -> Array:
-    """rho_k, k = 1, 2 ..., from sums of products at the distances k = 0, 1 ... and their numbers of pairs.
+    """Compute the autocorrelation rho_k, k = 1, 2 ..., from sums of products of residuals.
 
+    products : sums at the distances k = 0, 1 ...; pairs : number of products in each sum. rho_k is
     0 for a distance without pairs.
     """
     if not products[0] > 0:
@@ -138,22 +149,31 @@ def correlation(products: Array, pairs: Array) -> Array:
 
 
 def correlation_time(rho: Array) -> float:
-    """1 + 2 sum of rho_k, k = 1, 2 ..., up to the first that is not positive, in rows; at least 1."""
+    """Compute the correlation time, in rows, from the autocorrelation rho_k, k = 1, 2 ...
+
+    It is 1 + 2 sum_k rho_k; the sum ends before the first rho_k that is not positive.
+    """
     end = np.flatnonzero(rho <= 0)
     return float(1 + 2 * rho[: end[0] if len(end) else len(rho)].sum())
 
 
 def effective_share(joints: Sequence[Whiteness]) -> float:
-    """Effective number of rows over the number of rows, all joints together; at most 1."""
+    """Return the effective number of rows divided by the number of rows, for all joints together.
+
+    The result is at most 1.
+    """
     return min(1.0, sum(w.effective_rows for w in joints) / max(sum(w.rows for w in joints), 1))
 
 
 def unseen_by_blocks(observation: Observation, fit: Estimate) -> float:
-    """Ratio of the variance of a parameter to the corrected one, which takes blocks of L seconds as independent.
+    """Compute the factor by which the corrected variance of a parameter is too small.
+
+    The corrected variance assumes that blocks of L seconds are independent. With residuals that are
+    correlated as exp(-t/tau), the factor is
 
         c = 1/(1 - (tau/L) (1 - exp(-L/tau)))
 
-    The residuals are correlated as exp(-t/tau); m = 2 tau is the correlation time of the middle joint.
+    m = 2 tau is the correlation time of the joint with the median correlation time.
     """
     predicted = observation.columns(fit.names).W @ fit.X
     joints = [
@@ -168,9 +188,10 @@ def unseen_by_blocks(observation: Observation, fit: Estimate) -> float:
 
 
 def _lagged_sums(x: Array, place: Array, starts: Array) -> tuple[Array, Array]:
-    """Sums of x_t x_(t+k), k = 0, 1 ..., and the number of pairs.
+    """Compute the sums of products x_t x_(t+k), k = 0, 1 ..., and the number of products in each.
 
-    x, shape (N,), at places on a grid. No pair spans `starts` of other records.
+    x has shape (N,), `place` its places on a uniform grid. No pair combines different records,
+    which begin at `starts`.
     """
     records = np.split(np.arange(len(x)), starts)
     longest = max(int(place[rows[-1]] - place[rows[0]]) + 1 for rows in records)
@@ -187,9 +208,10 @@ def _lagged_sums(x: Array, place: Array, starts: Array) -> tuple[Array, Array]:
 def p_value(
     squares_first: float, squares: float, terms_first: int, terms: int, count: float
 ) -> float:
-    """Probability of the F-test of a model with more terms against the first one.
+    """Compute the probability of the F-test of a model with more terms against the first model.
 
-    It uses their squared residuals, numbers of terms, and the number of independent samples.
+    squares_first, squares : sums of squared residuals of both models. terms_first, terms : numbers
+    of terms. count : number of independent samples.
     """
     if terms == terms_first or squares <= 0 or count <= terms:
         return 1.0

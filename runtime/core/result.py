@@ -1,4 +1,4 @@
-"""What `identify` returns: the parameters of one robot, and everything that its records say about them."""
+"""Result of `identify`: the parameters of one robot, and all results about its records."""
 
 from __future__ import annotations
 
@@ -61,26 +61,27 @@ class Identification:
     estimate : Estimate
         All parameters, by the method of the study.
     essential : Essential
-        The essential parameters and the elimination; by the linear companion
-        of a method that is not linear.
+        The essential parameters and the elimination; if the method is not linear, by its linear
+        companion.
     comparison : tuple of JointComparison
         Measured torques and W X by joint, of `model_estimate`.
     validation : tuple of CrossValidation
-        One part of the data predicts the others: windows of the records first, or each fifth by
-        the other four (`parameter_sets`), then further records.
+        Fits of one part of the data that predict the others: first windows of the records, or each
+        fifth from the other four (`parameter_sets`), then further records.
     correlations : WeakDirections
-        Parameters that trade against each other.
+        Parameters with correlated estimates.
     uncertainty : Uncertainty
-        Deviations without independence, whiteness of the residuals, F-tests, sets by threshold.
+        Standard deviations without the assumption of independent residuals, whiteness of the
+        residuals, F-tests, essential sets by threshold.
     sets : mapping of str to Estimate
         The essential, the feasible and all parameters (`runtime.core.parameter_sets`);
         empty if the method of the study is not linear.
     unseen_rows : mapping of str to Observation
-        Rows of the records that the parameters predict, by name.
+        Rows of the records that are predicted, not fitted, by name.
     parts : tuple of Part
-        What else was found, in the order in which it is printed.
+        Results of further analyses, in the order in which they are printed.
     missing : tuple of str
-        What was asked for and could not be done, each with its reason.
+        Analyses that were requested and failed, each with its reason.
     """
 
     problem: Problem
@@ -97,7 +98,7 @@ class Identification:
     missing: tuple[str, ...] = ()
 
     def part(self, name: str) -> Any:
-        """The part with this name; None without one."""
+        """Return the part with this name; None if there is none."""
         return next((part for part in self.parts if part.name == name), None)
 
     def with_part(self, part: Part) -> Identification:
@@ -107,7 +108,7 @@ class Identification:
 
     @property
     def model(self) -> GeneratedModel:
-        """The model with fitted scalars of laws and with axes of force sensors."""
+        """The model with fitted constants of laws, and with axes of force sensors if any."""
         return self.problem.model
 
     @property
@@ -127,12 +128,15 @@ class Identification:
 
     @property
     def name(self) -> str:
-        """Names of the records."""
+        """Names of the records, separated by commas."""
         return ", ".join(record_names(self.records))
 
     @property
     def _of_record(self) -> str:
-        """The record by its name, in a sentence; one without a name is "record" alone."""
+        """The word "record" with the names of the records, for use in a sentence.
+
+        A record without a name is "record" alone.
+        """
         return (
             "record"
             if self.name == UNNAMED
@@ -141,28 +145,31 @@ class Identification:
 
     @property
     def source(self) -> Literal["measured", "simulated"]:
-        """Source of the data, from the provenance."""
+        """Source of the data: "measured" or "simulated"."""
         return "simulated" if self.estimate.provenance.get("simulated") else "measured"
 
     @property
     def determined(self) -> bool:
-        """Whether the records determine all parameters: full rank of W."""
+        """Whether the records determine all parameters, that is, W has full rank."""
         return self.estimate.status != "rank-deficient"
 
     @property
     def usable(self) -> bool:
-        """Whether the estimator has status ok."""
+        """Whether the estimation ended with status "ok"."""
         return self.estimate.status == "ok"
 
     @property
     def set_errors(self) -> dict[SetName, float]:
-        """Largest error on unseen data, %, of each set of parameters; empty if nothing was predicted."""
+        """Largest error on unseen data, %, of each set of parameters; empty without predictions."""
         judged = self.validation[-1].errors() if self.validation else {}
         return {name: judged[name] for name in ORDER if name in judged}
 
     @property
     def unseen(self) -> str:
-        """Name of the data that compare the sets: validation records of the study, or a part of the records."""
+        """Name of the data on which the sets of parameters are compared.
+
+        These are the validation records of the study, or else a part of the records.
+        """
         parts = dict.fromkeys(
             p.part for part in self.validation[-1:] for p in part.predictions if not p.fitted
         )
@@ -170,14 +177,17 @@ class Identification:
 
     @property
     def by_records(self) -> bool:
-        """Whether separate records compare the sets, not a part of the fitted records."""
+        """Whether the sets of parameters are compared on separate records.
+
+        If not, they are compared on parts of the fitted records.
+        """
         return bool(self.validation) and self.validation[-1].further
 
     @property
     def model_columns(self) -> SetName:
-        """Name of the set of parameters that is used (`runtime.core.parameter_sets`).
+        """Name of the set of parameters that is used: "essential", "feasible" or "all".
 
-        "all" if the method of the study is not linear.
+        `runtime.core.parameter_sets` explains the choice; it is "all" if the method is not linear.
         """
         if self.study.estimate.method not in LINEAR:
             return "all"
@@ -185,14 +195,17 @@ class Identification:
 
     @property
     def model_estimate(self) -> Estimate:
-        """Estimate of the set that is used, `model_columns`; `estimate` if the method is not linear."""
+        """Estimate of the set of parameters that is used; see `model_columns`.
+
+        It is `estimate` if the method is not linear.
+        """
         return self.sets.get(self.model_columns, self.estimate)
 
     @property
     def whole_estimate(self) -> Estimate:
         """Estimate of all base parameters, for a robot file or a program.
 
-        It is `model_estimate`, or the physical set if that is the essential one.
+        It is `model_estimate`, or the physical set if the essential set is used.
         """
         return self.written_sets.get(
             whole_set(self.written_sets, self.model_columns), self.estimate
@@ -200,9 +213,9 @@ class Identification:
 
     @cached_property
     def written_sets(self) -> Mapping[SetName, Estimate]:
-        """`sets`, with the physical set added if the essential set is used.
+        """Estimates of `sets`, with the physical set added if the essential set is used.
 
-        A robot file or a program needs all parameters.
+        A robot file or a program needs all parameters, which the essential set does not have.
         """
         linear = self.study.estimate.method in LINEAR
         if self.model_columns != "essential" or "feasible" in self.sets or not linear:
@@ -217,19 +230,25 @@ class Identification:
 
     @property
     def torque_unit(self) -> str:
-        """N if all joints are prismatic by the units of the parameters, else N m."""
+        """Unit of the torques: "N" if all joints are prismatic, else "N m".
+
+        The joints are judged by the units of the parameters.
+        """
         units = set(dict(getattr(self.model, "UNITS", {})).values())
         return "N" if "N" in units and "N*m" not in units else "N m"
 
     @cached_property
     def record_errors(self) -> tuple[RecordError, ...]:
-        """Error of each record with the used parameters; empty for one record."""
+        """Error of each record with the used parameters; empty if there is one record only."""
         names = record_names(self.records)
         return record_errors(self.observation, self.model_estimate, names) if len(names) > 1 else ()
 
     @cached_property
     def time_stamps(self) -> tuple[str, ...]:
-        """Remarks on the records: time stamps, subtracted known torques, low-pass filter, findings of readers and steps."""
+        """Remarks on the records: time stamps, subtracted known torques, low-pass filter, findings.
+
+        Findings are sentences of the readers and the steps.
+        """
         texts = {
             (record.origin.whole or record.name, record.origin.time): None
             for record in self.records
@@ -245,22 +264,25 @@ class Identification:
 
     @property
     def prediction_error(self) -> float:
-        """Largest relative error, %, of `model_estimate` on data outside the fit.
+        """Largest relative error, %, of `model_estimate` on data that were not fitted.
 
-        These are the validation records, or else parts of the records; nan without such data.
+        These data are the validation records, or else parts of the records; nan without such data.
         """
         return self.set_errors.get(self.model_columns, float("nan"))
 
     @property
     def negative(self) -> tuple[str, ...]:
-        """Motor inertias and frictions of `model_estimate` that are certainly below zero."""
+        """Motor inertias and friction parameters that are certainly below zero.
+
+        They are taken from `model_estimate`.
+        """
         return negative_elements(self.model, self.model_estimate)
 
     @property
     def expected_error(self) -> float:
-        """Expected error of predictions of other motions, %, from a part.
+        """Expected error of predictions of other motions, %; nan if no analysis computed it.
 
-        nan if no part gives it; LIMIT.LARGEST_EXPECTED if the records do not determine the parameters.
+        If the records do not determine the parameters, it is LIMIT.LARGEST_EXPECTED.
         """
         if not self.determined:
             return float(LIMIT.LARGEST_EXPECTED)
@@ -269,7 +291,7 @@ class Identification:
 
     @cached_property
     def checklist(self) -> Checklist:
-        """The verdict with its checks."""
+        """The verdict on the identification, with all its checks."""
         drawn = self.uncertainty.bootstrap
         return checklist_of(
             self.estimate,
@@ -288,7 +310,10 @@ class Identification:
 
     @property
     def verdict(self) -> str:
-        """The verdict in one sentence."""
+        """Sentence on the number of parameters used and the torques that they leave unexplained, %.
+
+        If there are no usable values, the sentence gives the reason.
+        """
         if not self.determined:
             names = "; ".join(", ".join(group) for group in self.estimate.groups)
             return (
@@ -323,12 +348,16 @@ class Identification:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences to read before the values are used: `own_warnings`, then correlated parameters."""
+        """Sentences to read before the values are used, also about correlated parameters."""
         return (*self.own_warnings, *self.correlations.warnings)
 
     @property
     def own_warnings(self) -> tuple[str, ...]:
-        """Warnings: joints without rows, negative friction or motor inertia, joints that lost all parameters, and those of the parts."""
+        """Warnings about single joints and from the parts, but not about correlations.
+
+        Joints are named that have no rows, that have negative friction or motor inertia, or that
+        lost their parameters in the elimination.
+        """
         by_law = any(record.origin.by_law for record in self.records)
         signs = (
             f"{', '.join(self.negative)} below zero, which no friction and no motor inertia is: "
@@ -351,10 +380,10 @@ class Identification:
         return self.brief()
 
     def brief(self, others: int = 0) -> str:
-        """Short text: verdict, largest doubt, next step, values with 95 % intervals, errors by joint, warnings and parts.
+        """Write a short text: verdict, largest doubt, next step, values, errors and warnings.
 
-        It has at most LIMIT.LINES_PRINTED lines; `to_text` has everything.
-        others : number of lines that are printed in addition to these.
+        Values have 95 % intervals. The text is kept to about LIMIT.LINES_PRINTED lines; `to_text`
+        has everything. others : number of lines that are printed in addition to this text.
         """
         first = [f"{check.finding}." for check in self.checklist.checks if check.ahead]
         notes = [*self.observation.findings, *self.own_warnings, *self.missing]
@@ -373,8 +402,10 @@ class Identification:
         return "\n\n".join(text for text in (head, *rest) if text)
 
     def _values(self, room: int, *, known: bool) -> str:
-        """Values in at most `room` lines, the essential ones if there is no room for all, and the error of each joint.
-        known : only those that are larger than their intervals.
+        """Write the parameter values in at most `room` lines, and the error of each joint.
+
+        If there is no room for all values, only the essential ones are written. known : whether to
+        write only values that are larger than half their 95 % interval.
         """
         fit, names = self.model_estimate, list(self.model_estimate.names)
         index = {name: k for k, name in enumerate(names)}
@@ -404,7 +435,7 @@ class Identification:
         return "\n".join([head, *lines[:room], f"Unexplained by joint: {by_joint}"])
 
     def _lines(self, names: Sequence[str]) -> list[str]:
-        """Values of some of the used parameters, with intervals and units."""
+        """Write the values of these parameters with 95 % intervals and units, several per line."""
         fit = self.model_estimate
         k = [fit.names.index(name) for name in names]
         units = [fit.units.get(name, "") for name in names]
@@ -415,7 +446,7 @@ class Identification:
         return notebook([self.verdict, *self.warnings], parameters, joints)
 
     def to_text(self) -> str:
-        """Long text: parameters, removals, validation, correlated parameters, uncertainty, parts, verdict."""
+        """Write a long text: parameters, validation, correlations, uncertainty, verdict."""
         fit = self.model_estimate if self.determined else self.estimate
         trade = [f"warning: {sentence}" for sentence in self.warnings] or [
             f"no two parameters trade: no |correlation| above {self.correlations.threshold:g}"
@@ -447,7 +478,7 @@ class Identification:
 
     @property
     def ranking(self) -> str:
-        """Sentence on the set of parameters that predicts best; "" for one set."""
+        """Sentence that ranks the sets of parameters by their predictions; "" without sets."""
         return (
             ranking_text(
                 self.set_errors,
@@ -459,7 +490,10 @@ class Identification:
         )
 
     def motion_table(self) -> Table:
-        """Simulated minus measured motion of each joint, for a method that simulates the loop; else empty."""
+        """Table of the simulated minus the measured motion of each joint.
+
+        It is empty unless the method simulates the closed loop.
+        """
         rows = [
             (
                 m["joint"],
@@ -478,11 +512,11 @@ class Identification:
         return Table("Simulated minus measured motion", header, rows)
 
     def to_json(self) -> str:
-        """Text of estimate.json: the Estimate of all parameters and all other results."""
+        """Write estimate.json: the Estimate of all parameters and all other results."""
         return json_text({**json.loads(self.estimate.to_json()), **self.summary()})
 
     def summary(self) -> dict[str, Any]:
-        """Entries of estimate.json besides those of the Estimate of all parameters."""
+        """Return the entries of estimate.json besides those of the Estimate of all parameters."""
         fit = self.essential.estimate
         summary: dict[str, Any] = {
             "essential": {

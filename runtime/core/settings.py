@@ -1,4 +1,4 @@
-"""Settings as frozen dataclasses that pydantic checks: their base, the types of their fields, mappings in and out.
+"""Settings: frozen dataclasses whose values pydantic checks, and their conversion from mappings.
 
     class Lowpass(Settings):
         cutoff: Positive = 50.0
@@ -6,8 +6,8 @@
     Lowpass(cutoff=-1)                       # SettingsError: cutoff: -1; expected more than 0
     structure(Lowpass, {"cutoff": "2*50"})   # Lowpass(cutoff=100.0)
 
-A number may be an arithmetic text (`2*pi/10000`), one value means a list of one, an integer
-stands for its text.
+A number may be an arithmetic text (`2*pi/10000`). One value means a list of one. An integer is
+accepted where a text is expected.
 """
 
 from __future__ import annotations
@@ -53,12 +53,14 @@ LIMITS = {
 
 
 class Written:
-    """Annotation of a type that a file may write in another form, for its JSON Schema.
+    """Annotation of a type that a study file may write in several forms, for its JSON Schema.
+
+    For instance, a number may also be written as a text.
 
     Parameters
     ----------
     form : callable
-        From the JSON Schema of the type to that of everything a file may write.
+        Function from the JSON Schema of the type to the JSON Schema of all its forms in a file.
     """
 
     def __init__(self, form: Callable[[dict[str, Any]], dict[str, Any]]) -> None:
@@ -127,7 +129,7 @@ Many = Annotated[
 
 
 def require(ok: bool, message: str, *path: str | int) -> None:
-    """Raise SettingsError about the key at `path` unless `ok`.
+    """Raise SettingsError about the key at `path` unless `ok` is true.
 
     In __post_init__, `path` starts at the settings that call this function.
     """
@@ -152,7 +154,10 @@ Interval = Annotated[tuple[Real | None, Real | None], AfterValidator(_in_order)]
 
 
 class SettingsType(type):
-    """Metaclass of settings: an invalid value raises a SettingsError that names the key and the expected value."""
+    """Metaclass of settings: an invalid value raises a SettingsError, not an error of pydantic.
+
+    The error names the key and the expected value.
+    """
 
     def __call__(cls, *args: Any, **kwargs: Any) -> Any:
         try:
@@ -169,14 +174,14 @@ class SettingsType(type):
 @dataclass_transform(frozen_default=True, field_specifiers=(field,))
 @dataclass(frozen=True, config=CONFIG)
 class Settings(metaclass=SettingsType):
-    """Base of all settings; a subclass is a frozen dataclass with valid values only."""
+    """Base class of all settings: a subclass is a frozen dataclass with valid values only."""
 
     def __init_subclass__(cls) -> None:
         dataclass(frozen=True, config=CONFIG)(cls)
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: Any, handler: Any) -> dict[str, Any]:
-        """The JSON schema of pydantic, with the sentence of the docstring for each key."""
+        """Return the JSON Schema of pydantic, with a description of each key from the docstring."""
         made: dict[str, Any] = _with_limits(handler.resolve_ref_schema(handler(schema)))
         texts = [
             inspect.getdoc(base) or ""
@@ -215,7 +220,7 @@ class Settings(metaclass=SettingsType):
 
 
 def _with_limits(schema: Any) -> Any:
-    """A JSON Schema whose limits have the names of JSON Schema."""
+    """Rename the limits of pydantic in a JSON Schema: "ge" becomes "minimum", and so on."""
     if isinstance(schema, dict):
         return {LIMITS.get(key, key): _with_limits(value) for key, value in schema.items()}
     return [_with_limits(item) for item in schema] if isinstance(schema, list) else schema
@@ -225,14 +230,14 @@ _adapter = cache(TypeAdapter)  # what checks mappings against a class of setting
 
 
 def structure(cls: type[T], value: Any, path: Path = ()) -> T:
-    """Make settings from a mapping.
+    """Make settings from a mapping, and check every value.
 
     Parameters
     ----------
     cls : type
         A subclass of Settings.
     value : mapping
-        As read from a file.
+        The content of a file.
     path : tuple of str and int
         Keys that lead to `value` in its file.
 
@@ -250,7 +255,7 @@ def structure(cls: type[T], value: Any, path: Path = ()) -> T:
 
 
 def _value_at(path: Path, value: Any) -> Any:
-    """Value at these keys of a mapping from a file; None if it has no such keys."""
+    """Return the value at these keys of a mapping from a file; None if there is no such key."""
     for key in path:
         if isinstance(value, Mapping):
             value = (
@@ -264,8 +269,8 @@ def _value_at(path: Path, value: Any) -> Any:
 
 
 def to_mapping(settings: Any) -> dict[str, Any]:
-    """Complete plain mapping (dicts, lists, numbers, texts) of a Study or a section of it.
+    """Convert a Study, or a section of it, to a complete mapping of plain values.
 
-    study_from_mapping(to_mapping(s)) == s
+    Plain values are dicts, lists, numbers and texts. study_from_mapping(to_mapping(s)) == s
     """
     return plain(settings)  # type: ignore[no-any-return]

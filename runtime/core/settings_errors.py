@@ -1,4 +1,7 @@
-"""What pydantic finds wrong with settings or with a JSON result, as one SettingsError: the value that was given, what was expected, and the keys that lead there."""
+"""Conversion of an error of pydantic to one SettingsError: value, expected values and keys.
+
+pydantic finds such errors in settings and in JSON results.
+"""
 
 from __future__ import annotations
 
@@ -34,15 +37,16 @@ EXPECTED = {  # by the type of an error of pydantic
 
 
 def shown(value: Any) -> str:
-    """The first 80 characters of the Python text of a value, on one line."""
+    """Return the first 80 characters of the Python text of a value, on one line."""
     return " ".join(repr(value).split())[:80]
 
 
 def settings_error(error: ValidationError, given: Any, path: Path = ()) -> SettingsError:
-    """SettingsError for the first problem in the validation of `given`, whose keys are `path`.
+    """Make a SettingsError from the first problem that pydantic found in the value `given`.
 
-    Every member of a union has its own error. The member that accepts most of the value gives the
-    message; members that accept equally much are named together.
+    path : keys that lead to `given`. Every member of a union of types has its own error. The member
+    that accepts most of the value gives the message; members that accept equally much are named
+    together.
     """
     problems = [_problem(details, given) for details in error.errors(include_url=False)]
     first = problems[0][0]
@@ -56,7 +60,10 @@ def settings_error(error: ValidationError, given: Any, path: Path = ()) -> Setti
 
 
 def _problem(details: ErrorDetails, given: Any) -> tuple[Path, str]:
-    """Path and reason of one error; its `loc` also names members of unions, which are no keys."""
+    """Return the path and the reason of one error of pydantic.
+
+    The path has the keys of `loc` without the members of unions, which are not keys.
+    """
     path: Path = ()
     for key in details["loc"]:
         try:

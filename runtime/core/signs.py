@@ -1,4 +1,4 @@
-"""Estimates that no drive has: friction and motor inertia below zero."""
+"""Search for estimates that are physically impossible: friction and motor inertia below zero."""
 
 from __future__ import annotations
 
@@ -16,12 +16,19 @@ SIGNED = ("inertia", "viscous", "coulomb", "dissipative")
 
 
 def is_form(acts: Mapping[Any, float]) -> bool:
-    """Whether an element of ELEMENTS is a form q'Bq (its keys are pairs of joints), not an element along s = G q."""
+    """Whether an element of ELEMENTS is a quadratic form q'Bq, not an element along s = G q.
+
+    acts : its coefficients; those of a form have pairs of joints as keys.
+    """
     return any(isinstance(key, tuple) for key in acts)
 
 
 def negative_elements(model: GeneratedModel, fit: Estimate) -> tuple[str, ...]:
-    """Motor inertias and frictions with a column of their own that are below zero by LIMIT.CERTAIN_SIGN corrected deviations."""
+    """Return the friction parameters and motor inertias of a fit that are certainly below zero.
+
+    Certainly means by LIMIT.CERTAIN_SIGN standard deviations, of which the larger kind is used.
+    Parameters that are regrouped with others are not tested.
+    """
     elements: Mapping[str, Any] = getattr(model, "ELEMENTS", {})
     signed = {
         name for name, (kind, _, acts) in elements.items() if kind in SIGNED and not is_form(acts)

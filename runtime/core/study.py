@@ -1,4 +1,4 @@
-"""What the chapter settles about an experiment, as frozen settings.
+"""Settings of an experiment for the methods of the chapter, as frozen dataclasses.
 
     Study(signals=Signals(lowpass=Lowpass(cutoff=100)))
     to_mapping(study)                  # complete, defaults filled: written into every result
@@ -6,8 +6,8 @@
 Defaults are those of the chapter (sections 2.2.2, 2.2.3 and 4.1.1) except for the cut-off, which
 follows from the record: Butterworth of order 4 forward and backward on q and qd, central
 differences, parallel decimation by eq. (13), ordinary least squares, essential parameters by the
-threshold 1.04, five CESTAC runs.
-Units: SI, rad, Hz. Values are checked where they are made, so a Study that exists is a valid one.
+threshold 1.04, five CESTAC runs. Units: SI, rad, Hz. Values are checked when a Study is made, so
+every Study is valid.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ SCHEMA = 1
 
 
 def version(number: int) -> int:
-    """The version of a study file; SettingsError if it is not SCHEMA."""
+    """Return the version of a study file; raise SettingsError if it is not SCHEMA."""
     require(number == SCHEMA, f"schema {number}; this version reads {SCHEMA}")
     return number
 
@@ -61,8 +61,8 @@ class Lowpass(Settings):
     ----------
     cutoff : float or str, Hz
         Cutoff frequency; auto: from the motion and the noise of the records
-        (`runtime.core.signals.cutoff`), twice that for counts, 50 at most, as in the chapter, and 50
-        where no record is.
+        (`runtime.core.signals.cutoff`), twice that for counts, at most 50, as in the chapter, and 50
+        if there is no record.
     order : int
         Order of the filter.
     on : tuple of str
@@ -78,17 +78,20 @@ class Lowpass(Settings):
 
     @property
     def hertz(self) -> float:
-        """The cut-off as a number; that of the chapter if "auto" has no record."""
+        """The cut-off frequency, Hz; for "auto", which needs a record, that of the chapter."""
         return CHAPTER_CUTOFF if self.cutoff == "auto" else float(self.cutoff)
 
 
 class Decimate(Settings):
-    """Parallel decimation of Y and of every column of W: Chebyshev I of order 8, 0.05 dB, 0.8/factor, zero phase, one sample kept in `factor`.
+    """Parallel decimation of Y and of every column of W: a low-pass filter, then one sample in
+    `factor`.
+
+    The filter is Chebyshev I of order 8, 0.05 dB, 0.8/factor, zero phase.
 
     Attributes
     ----------
     factor : int or str
-        Samples for one that is kept; auto is eq. (13), n_d = 0.8 ws/(2 wf), rounded down.
+        Number of samples of which one is kept; auto is eq. (13), n_d = 0.8 ws/(2 wf), rounded down.
     phase : str
         Sample kept: the first (scipy) or the last (MATLAB's decimate).
     padding : str
@@ -115,21 +118,21 @@ class Signals(Settings):
     decimate : Decimate or None
         Decimation; null switches it off.
     reader : str
-        Ahead of the low-pass: lowpass takes positions as they are; counts takes them as counts of
-        an encoder, which bound the motion, and needs no median; static takes each row as a pose at
-        rest, with the mean of its torques: no filter, no decimation, no trim, whatever their
-        settings say.
+        Treatment of positions before the low-pass. lowpass: positions are used as they are. counts:
+        positions are counts of an encoder, which bound the motion; no median is needed. static: each
+        row is a pose at rest, with the mean of its torques; then there is no filter, no decimation
+        and no trim, whatever their settings are.
     step : float or tuple of float or None, rad or m
         Step of the encoders, for counts; null: from the record.
     side : str
         Side of the encoders, for counts: joint, or motor by the drives of the robot.
     velocity : str or float or tuple of float, Hz
-        Where record.columns.qd are velocities that were recorded: from which frequency on they
-        replace differences of q; auto: where the noise of both is alike, and not where they
-        disagree with the positions; differences: they are not used. For reader lowpass.
+        Use of recorded velocities (record.columns.qd), for reader lowpass: the frequency from which
+        they replace differences of q. auto: the frequency at which both have the same noise; they are
+        not used if they disagree with the positions. differences: they are not used.
     torque_median : int or str
-        Window of the median filter on torques; auto: as on positions, but none if it would take
-        torque that goes with the motion, as from a controller that answers every count
+        Window of the median filter on torques; auto: as on positions, but no filter if it would
+        remove torque that belongs to the motion, as from a controller that answers every count
         (`runtime.median`).
     options : mapping
         Options of the reader.
@@ -163,12 +166,12 @@ class Signals(Settings):
 
     @property
     def window_of_torques(self) -> int:
-        """Window of the median filter on torques; that of positions if "auto" has no record."""
+        """Window of the median filter on torques, in samples; for "auto", that on positions."""
         return self.median if isinstance(self.torque_median, str) else self.torque_median
 
     @property
     def admits_missing(self) -> bool:
-        """Whether positions of a record may be missing; the counts reader bridges them."""
+        """Whether positions of a record may be missing, because the counts reader bridges them."""
         return self.reader == "counts"
 
 
@@ -180,11 +183,11 @@ class Rows(Settings):
     window : pair of float or None, s
         [t0, t1], applied before the regressor is evaluated; null leaves an end open.
     trim : int or str
-        Decimated samples left out at each end of the window, where the filters start; auto: 3, and
-        ahead of the decimation the samples within 3/cutoff of an end of the record, at most a
+        Decimated samples left out at each end of the window, where the filters start. auto: 3, and
+        before the decimation also the samples within 3/cutoff of an end of the record, at most a
         tenth of it.
     low_speed : float or tuple of float, rad/s or m/s
-        Rows of joint j with |qd_j| below it are left out: sign(qd) is noise in them.
+        Rows of joint j with |qd_j| below this speed are left out, because sign(qd) is noise there.
     """
 
     window: Interval = (None, None)
@@ -193,12 +196,12 @@ class Rows(Settings):
 
 
 class EstimateSettings(Settings):
-    """Estimator and columns.
+    """Method of estimation, weights and columns.
 
     Attributes
     ----------
     method : str
-        Estimator.
+        Method of estimation.
     weights : str
         Weights of the rows by joint.
     columns : str or tuple of str
@@ -214,15 +217,16 @@ class EstimateSettings(Settings):
 
 
 class EssentialSettings(Settings):
-    """Elimination of parameters while sigma_rho stays below a threshold (section 4.1.1 of the chapter).
+    """Elimination of parameters while sigma_rho stays below a threshold (section 4.1.1 of the
+    chapter).
 
     Attributes
     ----------
     threshold : float
         Largest ratio of sigma_rho to its first value.
     first : bool
-        Whether the essential parameters may be used, as in the chapter; their
-        deviations take those that were removed as zero. Default: physical or all parameters.
+        Whether the essential parameters may be used, as in the chapter; their standard deviations
+        assume that the removed parameters are zero. Default: physical or all parameters.
     """
 
     threshold: Annotated[Real, Field(gt=1)] = 1.04
@@ -237,8 +241,8 @@ class ValidateSettings(Settings):
     split : tuple of pairs of float or None, s
         Windows: the first is fitted, the others are predicted.
     values : bool
-        Whether parameters are to be used one by one: the verdict then asks for small deviations and
-        for parameters that can be separated.
+        Whether parameters are to be used one by one: the verdict then needs small standard
+        deviations, and parameters that can be separated.
     """
 
     split: tuple[Interval, ...] = ()
@@ -263,10 +267,10 @@ class CestacSettings(Settings):
         Law of the perturbations; phase is that of a real encoder: counts of steps whose phase is
         random by joint and run.
     uneven : float
-        Deviation of the lines of law phase from even spacing, in steps.
+        Standard deviation of the lines of law phase from even spacing, in steps.
     place : str
-        What is rounded: the positions of the record, or, in the closed loop of study.controller
-        simulated anew in every run, its encoder.
+        Signal that is rounded. record: the positions of the record. loop: the encoder in the closed
+        loop of study.controller, which is simulated again in every run.
     delta : tuple of float, rad or m
         Steps of the perturbed position.
     runs : int
@@ -274,14 +278,15 @@ class CestacSettings(Settings):
     seed : int
         Seed of the random numbers.
     columns : str or tuple of str
-        essential; all; or names that are judged, in the fit of these and the essential ones.
+        Parameters that are judged: essential; all; or names, which are fitted together with the
+        essential ones.
     torque : tuple of float or None, N m or N
         Steps of the perturbed motor torque (Table 4); null: none.
     common : bool
         The same random numbers for every delta.
     median : int
         Window of the median filter on the rounded positions, 1 for none: a median enlarges the
-        bias. The estimate that runs are compared with has that of signals.
+        bias. The estimate that runs are compared with has the median of signals.
     """
 
     side: Literal["joint", "motor"] = "joint"
@@ -326,7 +331,7 @@ class CestacSettings(Settings):
 
 
 class Study(Settings):
-    """Settings of the chapter's methods; features add sections (`runtime.study`).
+    """Settings of the chapter's methods; other modules add sections (`runtime.study`).
 
     Attributes
     ----------

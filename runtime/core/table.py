@@ -1,4 +1,5 @@
-"""A table of texts, made once per result and printed as aligned text, as HTML of a notebook, or on the page of a report."""
+"""A table of texts, for print as aligned text, in a notebook as HTML, or on the page of a report.
+"""
 
 from __future__ import annotations
 
@@ -29,11 +30,11 @@ class Table:
     wide : sequence of int
         Numbers, from 0, of columns of words, which are aligned left.
     sortable : bool
-        By any column, where scripts run.
+        Whether a page sorts the rows by any column, if scripts run.
     stacked : bool
-        On a narrow screen every row is a block of lines.
+        Whether every row becomes a block of lines on a narrow screen.
     symbols : bool
-        The first cells are names of parameters, which HTML prints with their subscripts.
+        Whether the first cells are names of parameters, which HTML prints with their subscripts.
     """
 
     caption: str
@@ -54,11 +55,11 @@ class Table:
             )
 
     def to_text(self) -> str:
-        """Plain text: columns under the header, without the caption."""
+        """Write the table as plain text, with the header and without the caption."""
         return aligned([self.header, *self.rows])
 
     def to_html(self) -> Markup:
-        """HTML table element that needs no style sheet."""
+        """Write the table as an HTML element that needs no style sheet."""
         written = [
             symbol if k == 0 and self.symbols else unit if name == "unit" else str
             for k, name in enumerate(self.header)
@@ -85,7 +86,7 @@ class Table:
 
 
 def aligned(lines: Sequence[Sequence[str]]) -> str:
-    """Columns of text under a header: the first column aligned left, numbers right."""
+    """Write cells as aligned columns of text: the first column aligned left, the others right."""
     widths = [max(len(cell) for cell in column) for column in zip(*lines, strict=True)]
     text = []
     for line in lines:
@@ -98,7 +99,7 @@ def aligned(lines: Sequence[Sequence[str]]) -> str:
 
 
 def in_lines(cells: Sequence[str]) -> list[str]:
-    """Cells of equal width, with as many in a line as LINE characters allow."""
+    """Pad the cells to equal width, and join as many per line as LINE characters allow."""
     width = max(map(len, cells), default=0) + 2
     many = max((LINE + 2) // width, 1)
     rows = [cells[k : k + many] for k in range(0, len(cells), many)]
@@ -111,7 +112,12 @@ def with_intervals(
     sigma: Iterable[float],
     units: Sequence[str] = (),
 ) -> list[str]:
-    """Aligned cells: name, value, half of its 95 % interval, unit, with digits up to the second one of the interval.
+    """Write name, value, half of the 95 % interval and unit of each parameter, in aligned cells.
+
+    Digits end at the second digit of the interval.
+
+    >>> with_intervals(["ZZ1R", "FV1"], [1.79263, 8.0], [0.0104, 0.2], ["kg*m**2", "N*m*s/rad"])
+    ['ZZ1R  1.793 +- 0.020  kg*m**2', 'FV1   8.00  +- 0.39   N*m*s/rad']
 
     >>> with_intervals(["ZZ1R", "FV1"], [1.79263, 8.0], [0.0104, 0.2], ["kg*m**2", "N*m*s/rad"])
     ['ZZ1R  1.793 +- 0.020  kg*m**2', 'FV1   8.00  +- 0.39   N*m*s/rad']
@@ -130,7 +136,8 @@ def with_intervals(
 
 
 def interval(value: float, half: float) -> tuple[str, str]:
-    """A value and half of its interval as text, both up to the second digit of the interval."""
+    """Write a value and half of its interval as text, both up to the second digit of the interval.
+    """
     if not (isfinite(half) and half > 0 and isfinite(value)):
         return f"{value:.4g}", f"{half:.2g}"
     place = floor(log10(half)) - 1
@@ -141,14 +148,17 @@ def interval(value: float, half: float) -> tuple[str, str]:
 
 
 def csv_text(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    """Comma-separated values under a header; numbers with every bit, empty for None."""
+    """Write comma-separated values under a header; numbers keep all digits, None becomes empty."""
     stream = StringIO()
     csv.writer(stream, lineterminator="\n").writerows([header, *rows])
     return stream.getvalue()
 
 
 def notebook(paragraphs: Sequence[str], *tables: Table) -> Markup:
-    """HTML of a result for a notebook: paragraphs, the first table, and further tables folded. Every text is escaped."""
+    """Write a result as HTML for a notebook: paragraphs, the first table, then folded tables.
+
+    Every text is escaped.
+    """
     folds = [
         element("details", element("summary", table.caption), table.to_html())
         for table in tables[1:]

@@ -1,17 +1,17 @@
-"""What eqs. (9)-(11) and the threshold 1.04 take for granted, checked on the record.
+"""Tests of the assumptions behind eqs. (9)-(11) and behind the threshold 1.04, on the record.
 
-    bootstrap     blocks of time drawn again with replacement, least squares each time: deviations
-                  without the assumption of independent residuals,
-                  beside sigma (10) and the corrected one
+    bootstrap     blocks of time are drawn again with replacement, least squares each time: this
+                  gives standard deviations without the assumption of independent residuals, to
+                  compare with sigma (10) and the corrected one
     whiteness     are the residuals of every joint independent (`runtime.core.residuals`)?
-    F-test        does a parameter that was removed carry something? Removing q of b raises the
+    F-test        does a removed parameter have an effect? Removing q of b parameters raises the
                   squared residual norm S from S_0 to S_q:
                   F = (S_q - S_0)/q / (S_0/(r - b)), F(q, r - b) without effect; r counts only the
                   effective number of rows (N_eff)
-    sensitivity   which parameters come and go when the threshold on sigma_rho moves
+    sensitivity   which parameters are added or removed if the threshold on sigma_rho changes?
 
-S_q = ratio^2 (r - b + q) S_0/(r - b), with the ratio of sigma_rho that the trail of
-`runtime.core.essential` holds.
+S_q = ratio^2 (r - b + q) S_0/(r - b), with the ratio of sigma_rho from the steps of the elimination
+(`runtime.core.essential`).
 
 References: Seber and Lee (2003), section 4.3, for F.
 """
@@ -55,7 +55,7 @@ class BlockBootstrap:
     corrected : ndarray, shape (b,), SI
         Jackknife over blocks of time.
     drawn : ndarray, shape (b,), SI
-        Blocks of time drawn again with replacement.
+        Bootstrap: blocks of time drawn again with replacement.
     blocks : int
         Number of blocks.
     length : float, s
@@ -75,7 +75,7 @@ class BlockBootstrap:
 
     @property
     def ratio(self) -> Array:
-        """Deviation of the drawn blocks over that of eq. (10), shape (b,)."""
+        """Standard deviation of the bootstrap divided by that of eq. (10), shape (b,)."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(self.drawn / self.sigma)
 
@@ -93,9 +93,9 @@ class FTest:
     F, p : float
         Statistic and probability of all removals up to this one.
     F_step, p_step : float
-        Those of this removal against the step before.
+        Statistic and probability of this removal against the step before.
     removed : bool
-        Whether the threshold allowed it.
+        Whether the threshold allowed the removal.
     """
 
     name: str
@@ -108,29 +108,29 @@ class FTest:
 
     @property
     def significant(self) -> bool:
-        """Whether p is below 5 %: at least one of the removed parameters has an effect."""
+        """Whether p is below 5 %: at least one of the parameters removed so far has an effect."""
         return bool(self.p < LIMIT.SIGNIFICANT)
 
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty(Result):
-    """Checks of the essential parameters of one identification.
+    """Tests of the essential parameters of one identification: bootstrap, whiteness, F-tests.
 
     Attributes
     ----------
     bootstrap : BlockBootstrap
-        Deviations three ways.
+        Standard deviations by three methods.
     whiteness : tuple of Whiteness
         Residuals by joint.
     f_tests : tuple of FTest
         Steps of the elimination.
     sets : tuple of (float, int, tuple of str)
-        By threshold: count, and names that differ from the set used ("-": removed besides, "+":
-        kept besides).
+        For each threshold: the threshold, the number of parameters left, and the names that differ
+        from the set used ("-": removed in addition, "+": not removed).
     all_count : int
         Number of all parameters.
     memory : float, s
-        How long the residuals remember: rows over those that count, in time.
+        Correlation time of the residuals: rows divided by effective rows, in time.
     """
 
     bootstrap: BlockBootstrap
@@ -142,14 +142,14 @@ class Uncertainty(Result):
 
     @property
     def kept_by_f_test(self) -> int:
-        """Parameters that remain before the first significant removal."""
+        """Number of parameters left before the first significant removal."""
         return self.all_count - next(
             (k for k, test in enumerate(self.f_tests) if test.significant), len(self.f_tests)
         )
 
     @property
     def verdict(self) -> tuple[str, ...]:
-        """One sentence for each check."""
+        """The results of the tests, one sentence for each test."""
         ratio = self.bootstrap.ratio[np.isfinite(self.bootstrap.ratio)]
         spread = (
             f"from {ratio.min():.1f} to {ratio.max():.1f}, median {np.median(ratio):.1f}"
@@ -180,7 +180,7 @@ class Uncertainty(Result):
 
     @property
     def too_short(self) -> str:
-        """Sentence if the residuals are correlated for longer than a block; else ""."""
+        """Sentence that the residuals are correlated for longer than a block, and a remedy."""
         return (
             f"The residuals remember {self.memory:.2g} s, the blocks last "
             f"{self.bootstrap.length:.2g} s: the corrected deviations may be too small. Find what "
@@ -189,15 +189,15 @@ class Uncertainty(Result):
         )
 
     def to_table(self) -> str:
-        """The verdict, then every table."""
+        """Write the sentences of the verdict, then all tables."""
         return "\n\n".join(["\n".join(self.verdict), *(own.to_text() for own in self.tables())])
 
     def to_text(self) -> str:
-        """Text of the verdict, the deviations and the residuals."""
+        """Write the verdict, the standard deviations and the residuals by joint."""
         return "\n\n".join(["\n".join(self.verdict), *(own.to_text() for own in self.tables()[:2])])
 
     def tables(self) -> tuple[Table, ...]:
-        """Tables: deviations, residuals by joint, F-tests of the removals, sets for each threshold."""
+        """Return four tables: standard deviations, residuals, F-tests and sets by threshold."""
         drawn = self.bootstrap
         deviations = (drawn.sigma, drawn.corrected, drawn.drawn)
         columns = [[f"{x:.3g}" for x in own] for own in deviations]
@@ -247,7 +247,7 @@ class Uncertainty(Result):
         )
 
     def summary(self) -> dict[str, Any]:
-        """The checks as a mapping for JSON."""
+        """Return the results of the tests as a mapping for JSON."""
         return {
             "verdict": self.verdict,
             "scatter": {**vars(self.bootstrap), "ratio": self.bootstrap.ratio},
@@ -267,14 +267,14 @@ def uncertainty(
     essential: Essential,
     comparison: Sequence[JointComparison],
 ) -> Uncertainty:
-    """Checks of the essential parameters of an observation.
+    """Test the essential parameters of an observation: bootstrap, whiteness, F-tests, thresholds.
 
     Parameters
     ----------
     observation : Observation
-        Rows that gave them.
+        Rows from which the parameters were estimated.
     settings : EstimateSettings
-        Method of the study; the checks are those of its linear companion.
+        Method of the study; the tests use its linear companion.
     essential : Essential
         Parameters, and their elimination.
     comparison : sequence of JointComparison
@@ -300,7 +300,10 @@ def block_bootstrap(
     runs: int = LIMIT.BOOTSTRAP_RUNS,
     seed: int = SEED,
 ) -> BlockBootstrap:
-    """Deviations of `fit` from `runs` draws of its blocks of residuals; the weights do not change."""
+    """Compute standard deviations of `fit` by a bootstrap over blocks of time.
+
+    runs : number of draws. The weights of the rows do not change.
+    """
     system = linear_system(observation, linear_companion(settings)).select(fit.names)
     blocks, drawn = list(system.block_rows()), np.full(len(fit.names), np.nan)
     if len(blocks) > 1 and fit.status == "ok":
@@ -312,9 +315,10 @@ def block_bootstrap(
 
 
 def f_tests(essential: Essential, share: float = 1.0) -> tuple[FTest, ...]:
-    """F-tests of the removed parameters; none without more rows than parameters.
+    """Test by F-tests whether the removed parameters have an effect.
 
-    share : effective number of rows over the number of rows.
+    There are no tests without more rows than parameters. share : effective number of rows divided
+    by the number of rows.
     """
     r, b = essential.all_parameters.rows, len(essential.all_parameters.names)
     if r <= b:
@@ -341,7 +345,11 @@ def f_tests(essential: Essential, share: float = 1.0) -> tuple[FTest, ...]:
 
 
 def sets(essential: Essential) -> tuple[tuple[float, int, tuple[str, ...]], ...]:
-    """For each threshold: number of parameters, and the differences from the used set."""
+    """Return three values for each elimination threshold: itself, a count and a difference.
+
+    The count is the number of parameters left. The difference has the names that were removed in
+    addition to those of the used set ("-"), or not removed ("+").
+    """
     steps = [*essential.trail, *essential.further]
     names = essential.all_parameters.names
     by_threshold = []

@@ -1,12 +1,13 @@
-"""Does the model predict, and which parameters trade against each other?
+"""Validation: does the model predict other data, and which parameters have correlated estimates?
 
     direct comparison    measured Y and W X, joint by joint (chapter, Fig. 4)
     cross-validation     fit on one part of the data, predict the others: 100 ||Y_j - W_j X|| /
                          ||Y_j|| for every joint
-    weak directions      parameters whose errors are correlated, eq. (10), and the combinations that
-                         W hardly sees
+    weak directions      parameters whose errors are correlated, eq. (10), and the combinations
+                         that hardly change W X
 
-Errors are reported per joint since a wrong wrist hides in a total that the shoulder dominates.
+Errors are reported per joint, because the total error is dominated by the shoulder and hides a
+wrong wrist.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class JointComparison:
-    """Measured and predicted torque of one joint.
+    """Measured and predicted torques of one joint.
 
     Attributes
     ----------
@@ -56,17 +57,17 @@ class JointComparison:
 
     @property
     def error(self) -> Array:
-        """Measured minus predicted, shape (N_j,)."""
+        """Measured minus predicted torque, N m or N, shape (N_j,)."""
         return np.asarray(self.measured - self.predicted)
 
     @property
     def relative_error(self) -> float:
-        """100 ||measured - predicted|| / ||measured||, in %."""
+        """Relative error of the prediction, 100 ||measured - predicted|| / ||measured||, in %."""
         return percent(self.error, self.measured)
 
 
 def direct_comparison(observation: Observation, fit: Estimate) -> tuple[JointComparison, ...]:
-    """Measured torques and W X of the Estimate, joint by joint, at the instants of the observation."""
+    """Compare the measured torques with W X of the Estimate, for each joint, row by row."""
     missing = [name for name in fit.names if name not in observation.names]
     if missing:
         raise InputError(
@@ -98,7 +99,7 @@ class Prediction:
     count : int
         Number of columns.
     fitted : bool
-        Whether this part gave the parameters.
+        Whether the parameters were fitted to this part.
     relative_error : float, %
         100 ||Y - W X|| / ||Y||.
     per_joint : tuple of float, %
@@ -117,7 +118,8 @@ class Prediction:
 class CrossValidation(Result):
     """Errors of every set of columns on every part of the data.
 
-    missing : sets that could not be fitted. further : whether the predicted parts are separate records.
+    missing : sentences on the sets that could not be fitted. further : whether the predicted parts
+    are separate records.
     """
 
     joints: tuple[str, ...]
@@ -126,7 +128,7 @@ class CrossValidation(Result):
     further: bool = False
 
     def errors(self) -> dict[str, float]:
-        """Largest relative error on unseen data, %, of each set of columns."""
+        """Return the largest relative error on unseen data, %, of each set of columns."""
         unseen = [p for p in self.predictions if not p.fitted]
         return {
             columns: max(p.relative_error for p in unseen if p.columns == columns)
@@ -134,14 +136,14 @@ class CrossValidation(Result):
         }
 
     def beside(self, other: CrossValidation) -> CrossValidation:
-        """Combine the predictions of both, which are for the same parts of the data."""
+        """Combine two validations on the same parts of the data into one."""
         predictions = (*self.predictions, *other.predictions)
         joints = self.joints or other.joints
         missing = (*self.missing, *other.missing)
         return CrossValidation(joints, predictions, missing, self.further)
 
     def table(self, form: str = ".3f") -> Table:
-        """Table of errors in %, one line for each part and set of columns."""
+        """Make a table of the errors in %, one line for each part and set of columns."""
         return Table(
             "Relative error, %",
             ("part", "parameters", "use", "total", *(f"joint {j}" for j in self.joints)),
@@ -155,11 +157,11 @@ class CrossValidation(Result):
         )
 
     def to_table(self) -> str:
-        """The table, then the sets that could not be fitted."""
+        """Write the table of errors, then sentences on the sets that could not be fitted."""
         return "\n".join([self.table().caption, self.table().to_text(), *self.missing])
 
     def summary(self) -> dict[str, Any]:
-        """The content of `to_json` as a mapping."""
+        """Return the content of `to_json` as a mapping."""
         return {
             "schema": 1,
             "joints": self.joints,
@@ -169,7 +171,7 @@ class CrossValidation(Result):
 
 
 def prediction_errors(observation: Observation, fit: Estimate) -> tuple[float, tuple[float, ...]]:
-    """100 ||Y - W X|| / ||Y||, in %, over all joints and by joint."""
+    """Compute the relative error 100 ||Y - W X|| / ||Y||, in %, over all joints and by joint."""
     residual, measured = observation.norms(fit.names, fit.X)
     return percent(residual, measured), tuple(
         percent(e, m) for e, m in zip(residual, measured, strict=True)
@@ -178,14 +180,14 @@ def prediction_errors(observation: Observation, fit: Estimate) -> tuple[float, t
 
 @dataclass(frozen=True)
 class RecordError:
-    """Error of one record in the common fit.
+    """Error of one record in the common fit of several records.
 
     Attributes
     ----------
     name : str
         Name of the record.
     rows : int
-        Rows of W that it gave.
+        Rows of W from this record.
     relative_error : float, %
         100 ||Y_k - W_k X|| / ||Y_k||.
     per_joint : tuple of float, %
@@ -201,7 +203,10 @@ class RecordError:
 def record_errors(
     observation: Observation, fit: Estimate, names: Sequence[str]
 ) -> tuple[RecordError, ...]:
-    """Error of each record with the parameters of `fit`; `names` has the order of `observation`."""
+    """Compute the error of each record with the parameters of `fit`.
+
+    names : names of the records, in the order of `observation`.
+    """
     parts = [observation.of_record(k) for k in range(len(names))]
     return tuple(
         RecordError(name, sum(part.rows), *prediction_errors(part, fit))
@@ -219,12 +224,14 @@ def cross_validation(
     fitted: Mapping[Any, Estimate] | None = None,
     further: bool = False,
 ) -> CrossValidation:
-    """Fit every set of columns on one observation and predict others; a set whose fit fails is left out and named.
+    """Fit every set of columns to one observation, and predict other observations.
+
+    A set whose fit fails is left out, with a sentence in `missing`.
 
     Parameters
     ----------
     fit : Observation
-        Rows that give the parameters.
+        Rows to which the parameters are fitted.
     predict : mapping of str to Observation
         Other rows, by label.
     choices : mapping of str to EstimateSettings
@@ -232,9 +239,9 @@ def cross_validation(
     name : str
         Label of `fit`.
     fitted : mapping of str to Estimate
-        Estimates of `fit` that exist already, by set.
+        Estimates from `fit` that exist already, by set.
     further : bool
-        Whether `predict` are records of their own, not parts of those of `fit`.
+        Whether `predict` are separate records, not parts of the records of `fit`.
     """
     predictions = []
     missing: list[str] = []
@@ -265,7 +272,7 @@ def split_validation(
     windows: Sequence[Window],
     choices: Mapping[Any, EstimateSettings],
 ) -> CrossValidation:
-    """`cross_validation` between windows, s, of one record: the first is fitted, the others are predicted."""
+    """Fit the first time window, s, of the records, and predict the other windows."""
     if len(windows) < 2:
         raise InputError(
             f"{len(windows)} window; expected at least two, the first to fit, the others to "
@@ -293,7 +300,7 @@ class Pair:
 
 @dataclass(frozen=True)
 class Direction:
-    """A combination of parameters that moves W X little.
+    """A combination of parameters that hardly changes W X, so that the record determines it badly.
 
     Attributes
     ----------
@@ -309,7 +316,11 @@ class Direction:
 
 @dataclass(frozen=True)
 class WeakDirections(Result, keys="threshold pairs groups directions", schema=1):
-    """Parameters that the record separates badly: correlated pairs, their groups, the smallest singular directions."""
+    """Parameters that the record separates badly.
+
+    They are given as correlated pairs, as groups of such pairs, and as the directions of the
+    smallest singular values of W with unit columns.
+    """
 
     pairs: tuple[Pair, ...]
     groups: tuple[tuple[str, ...], ...]
@@ -318,7 +329,7 @@ class WeakDirections(Result, keys="threshold pairs groups directions", schema=1)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """One sentence for each group: the correlated parameters, how strongly, and what to do."""
+        """One sentence for each group of correlated parameters: their correlation and a remedy."""
         sentences = []
         for group in self.groups:
             pairs = [p for p in self.pairs if p.first in group]
@@ -333,7 +344,10 @@ class WeakDirections(Result, keys="threshold pairs groups directions", schema=1)
         return tuple(sentences)
 
     def tables(self, name: Callable[[str], str] = str) -> list[Table]:
-        """Tables of pairs (if any) and of directions; name : function that writes a parameter."""
+        """Return a table of the correlated pairs (if any) and a table of the weak directions.
+
+        name : function that writes the name of a parameter.
+        """
         pairs = Table(
             f"Pairs with |correlation| above {self.threshold:g}, all parameters fitted",
             ("first", "second", "correlation"),
@@ -351,7 +365,7 @@ class WeakDirections(Result, keys="threshold pairs groups directions", schema=1)
         return [pairs, directions] if self.pairs else [directions]
 
     def to_table(self) -> str:
-        """The groups, then the tables with their captions."""
+        """Write the groups of correlated parameters, then the tables with their captions."""
         groups = f"groups: {'; '.join(', '.join(group) for group in self.groups) or 'none'}"
         tables = (f"{own.caption}\n{own.to_text()}" for own in self.tables())
         return "\n\n".join([groups, *tables])
@@ -363,7 +377,7 @@ def weak_directions(
     *,
     threshold: float = LIMIT.CORRELATION,
 ) -> WeakDirections:
-    """Correlated parameters, and the three directions that change W X least.
+    """Find pairs of correlated parameters, and the three directions that change W X least.
 
     threshold : smallest |correlation| that is reported.
     """
@@ -394,7 +408,10 @@ def weak_directions(
 
 
 def _named_entries(v: Array, names: Sequence[str]) -> dict[str, float]:
-    """Largest entries of a singular vector by name, in descending order; the largest is positive."""
+    """Return the largest entries of a singular vector by name of the parameter, largest first.
+
+    The sign is chosen so that the largest entry is positive.
+    """
     order = np.argsort(-np.abs(v), kind="stable")
     v = v * np.sign(v[order[0]])
     return {

@@ -1,1 +1,1 @@
-"""Encoder counts read as counts."""
+"""Joint motion estimated from encoder counts, each of which bounds the position."""

@@ -1,4 +1,6 @@
-"""Expectation propagation between the bounds that counts are, and the errors that counts and time stamps have, by its evidence.
+"""Expectation propagation: estimation of a motion from the bounds that counts give at each sample.
+
+The errors of counts and time stamps are those with the most evidence.
 
     tilted law of a sample    N(x; m, v) [Phi((hi - x)/e) - Phi((lo - x)/e)]
                               m, v without this sample; e^2 = count^2 + (time qd Ts)^2
@@ -8,9 +10,9 @@
     evidence    log Z = sum_k log C_k + sum_k nu_k x_k/2 - log|A|/2 - sum_i log(r_i h^5)/2
         C_k the factor that gives the site the mass of the tilted law; a constant is left out
 
-Sites are updated all at once, damped; more so where precisions change by more than the time before.
-Errors are compared from wide ones down: wide boxes settle in a few passes, and boxes that are too
-narrow for their counts lose evidence before they no longer settle.
+Sites are updated all at once, with damping, which is stronger if precisions change more than
+before. Errors are tried from large to small ones: wide bounds settle in a few passes, and bounds
+that are too narrow for their counts lose evidence before they no longer settle.
 
 References: Minka (2001); Cunningham, Hennig and Lacoste-Julien (2011), boxes; MacKay (1992),
 evidence; docs/theory/counts.md.
@@ -64,28 +66,31 @@ determined jerks; the least share of a window's density in that of the record.
 
 @dataclass(frozen=True)
 class Errors:
-    """Errors of an encoder besides rounding: of counts, in steps, and of time stamps, in sampling periods; rms."""
+    """Errors of an encoder besides rounding, as rms values.
+
+    `count` is the error of a count in steps, `time` the error of a time stamp in sampling periods.
+    """
 
     count: float
     time: float = 0.0
 
     def variance(self, speed: Array) -> Array:
-        """Variance of the errors at speeds in steps per sample."""
+        """Compute the variance of the errors, in steps^2, at speeds in steps per sample."""
         return np.asarray(self.count**2 + (self.time * speed) ** 2)
 
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """A motion at S samples that is known by sites: Gaussian factors in place of the bounds of counts.
+    """A motion estimated from the bounds of S counts, each replaced by a normal law, its site.
 
-    c : coefficients, shape (P,).
-    density : r, shape (M,).
-    tau, nu : of the sites, shape (S,).
-    Z, factor : covariances, shape (4, P), and the factor of A.
-    errors : of the counts, as taken.
-    evidence : log Z; minus infinity where the sites have not settled.
-    without : mean and variance of the position at each site without it, and its speed, steps a
-    sample; shape (3, S).
+    c : coefficients of the spline, shape (P,).
+    density : density r of the jerk, shape (M,).
+    tau, nu : precision of each site, and precision times mean, shape (S,).
+    Z, factor : covariances, shape (4, P), and the Cholesky factor of A.
+    errors : errors of the counts that were assumed.
+    evidence : log Z; minus infinity if the sites have not settled.
+    without : for each site, mean and variance of the position estimated without it, and the speed
+        in steps per sample; shape (3, S).
     """
 
     c: Array
@@ -106,12 +111,12 @@ class Posterior:
 
 @dataclass(frozen=True, eq=False)
 class Boxes:
-    """Bounds of one encoder.
+    """Bounds of the positions of one encoder, given by its counts.
 
     y : counts, shape (m M,).
-    measured : samples that have one, ascending.
-    sites : those whose bounds count, ascending.
-    low, high : bounds of the sites, steps.
+    measured : samples that have a count, ascending.
+    sites : samples whose bounds are used, ascending.
+    low, high : bounds at the sites, steps.
     rest : precision of missing samples, shape (m M,).
     """
 
@@ -125,7 +130,11 @@ class Boxes:
 
     @np.errstate(divide="ignore", invalid="ignore")  # sites that do not settle
     def posterior(self, errors: Errors, c: Array, density: Array, t: Array, u: Array) -> Posterior:
-        """Fit the sites by expectation propagation until precisions t and pulls u no longer change."""
+        """Estimate the motion by expectation propagation with the given errors.
+
+        Starts from the coefficients c and the sites (t, u), their precision and precision times
+        mean, and stops when the sites no longer change.
+        """
         basis, gaps = self.basis, np.flatnonzero(self.rest)
         tau, pull = self.rest.copy(), np.zeros(len(self.rest))
         x, change, damping = basis.at_samples(c), np.inf, DAMPING
@@ -158,13 +167,13 @@ class Boxes:
         return Posterior(c, used, t, u, Z, factor, errors, likely, without)
 
     def again(self, errors: Errors, start: Posterior) -> Posterior:
-        """The posterior with other errors, started from the sites of `start`."""
+        """Estimate the motion with other errors, starting from the sites of `start`."""
         return self.posterior(errors, start.c, start.density, start.tau, start.nu)
 
     def promised(self, errors: Errors, read: Posterior) -> float:
-        """Rise of the evidence with other errors, to first order.
+        """Predict the rise of the evidence with other errors, to first order.
 
-        Once the sites have settled they need no change. The sum runs over every few sites only.
+        To this order, settled sites need no change. Only some of the sites are used in the sum.
         """
         some = slice(None, None, 1 + 2 * (len(self.sites) // (2 * TELLING)))  # odd: they are pairs
         boxes = replace(self, low=self.low[some], high=self.high[some])
@@ -173,7 +182,10 @@ class Boxes:
         return float(np.mean(mass - own) * len(self.sites))
 
     def agrees(self, read: Posterior) -> bool:
-        """Whether the sites have settled and the motion stays within FAR deviations of every interval."""
+        """Whether the sites have settled and the motion agrees with the interval of every count.
+
+        A distance of FAR standard deviations from an interval is allowed.
+        """
         x, v = self.basis.at_samples(read.c), self.basis.variances(read.Z)
         e2 = read.errors.variance(self.basis.at_samples(read.c, 1) * self.basis.Ts)
         outside = np.abs(x - self.y)[self.measured] - 0.5
@@ -181,10 +193,10 @@ class Boxes:
         return read.settled and bool(near.all())
 
     def suspects(self, read: Posterior) -> Array:
-        """Samples at which the counts may jump.
+        """Find the samples at which the counts may jump.
 
-        These are the sample at which the density of the jerk is largest, and the middles of the SUSPECTS windows of time
-        whose counts the other windows predict worst.
+        They are the sample with the largest density of the jerk, and the middles of the SUSPECTS
+        windows of time whose counts the other windows predict worst.
         """
         m, v, speed = read.without
         off = (m - (self.low + self.high) / 2) ** 2 / (v + read.errors.variance(speed) + 1 / 12)
@@ -194,7 +206,10 @@ class Boxes:
         return np.append(worst, np.argmax(read.density) * self.basis.m)[::-1]
 
     def around(self, middle: int, read: Posterior) -> tuple[int, Boxes, Posterior]:
-        """Bounds and motion of the BESIDE samples on either side of a sample, and the first of them."""
+        """Estimate the motion in the BESIDE samples on either side of the sample `middle` alone.
+
+        Returns the first sample of this part, its bounds and its motion.
+        """
         m, end = self.basis.m, min(middle + BESIDE, self.basis.N)
         first = max(0, middle - BESIDE) // m
         begin = first * m
@@ -211,7 +226,7 @@ class Boxes:
     def jump(self, near: int, read: Posterior) -> tuple[int, float, float]:
         """Find the sample near `near` from which all counts are most likely off by one number.
 
-        Returns the sample, the number, and by how many nats correcting it raises the posterior.
+        Returns the sample, the number, and the rise of the posterior, in nats, if it is corrected.
 
         The slope of the log posterior by that number is g = sum (nu - tau x) over the later sites,
         its curvature sum tau - (B tau)' A^-1 (B tau).
@@ -229,14 +244,21 @@ class Boxes:
         return int(self.sites[at[best]]), float(number[best]), float(0.5 * g[best] * number[best])
 
     def later(self, at: int, counts: int, read: Posterior) -> tuple[Boxes, Posterior]:
-        """Bounds and motion if all counts from one sample on are larger by a constant."""
+        """Estimate the motion if all counts from sample `at` on are larger by `counts`.
+
+        Returns the new bounds and the motion.
+        """
         moved = np.where(self.sites >= at, counts, 0)
         boxes = replace(self, low=self.low + moved, high=self.high + moved)
         nu = read.nu + read.tau * moved
         return boxes, boxes.posterior(read.errors, read.c, read.density, read.tau, nu)
 
     def _tilted(self, m: Array, v: Array, e2: Array) -> tuple[Array, Array, Array]:
-        """Logarithm of the mass of every tilted distribution, and the site that reproduces its moments."""
+        """Compute the tilted law of every site, which combines its bounds with the other sites.
+
+        Returns the logarithm of its mass, and the precision and precision times mean of the site
+        that reproduces its mean and variance.
+        """
         s = np.sqrt(v + e2)
         a, b = (self.low - m) / s, (self.high - m) / s
         near = np.flatnonzero(np.minimum(-a, b) < FAR)
@@ -250,7 +272,11 @@ class Boxes:
 def of_most_evidence(
     boxes: Boxes, sizes: Sequence[float], start: Posterior, moves: Sequence[tuple[int, int]] = MOVES
 ) -> Posterior:
-    """The motion with those errors, of `sizes` and CLOCK_ERRORS, whose evidence no neighbour clearly exceeds."""
+    """Find the errors of the counts and of the clock that have the most evidence, and their motion.
+
+    The search starts from `start` and changes the errors by one element of `sizes` or CLOCK_ERRORS
+    at a time, in the directions `moves`, as long as the evidence clearly rises.
+    """
     best, place = start, (sizes.index(start.errors.count), CLOCK_ERRORS.index(start.errors.time))
     tried = {place}
     for move in moves:
@@ -269,8 +295,10 @@ def of_most_evidence(
 
 
 def box_moments(a: Array, b: Array) -> tuple[Array, Array, Array]:
-    """log Z, g and H of a unit normal between a < b, one of them within some deviations of zero:
-    g = d log Z/dm, H = -d^2 log Z/dm^2, Z = Phi(b) - Phi(a), at mean m = 0 of unit variance.
+    """Compute log Z of a unit normal law between bounds a < b, and its derivatives g and H.
+
+    The law has mean m = 0 and unit variance: g = d log Z/dm, H = -d^2 log Z/dm^2, Z = Phi(b) -
+    Phi(a). One of the bounds is within a few standard deviations of zero.
     """
     middle, half = np.abs(a + b) / 2, (b - a) / 2  # the side that is nearer to the mean first
     low, high = middle - half, middle + half
@@ -284,11 +312,9 @@ def box_moments(a: Array, b: Array) -> tuple[Array, Array, Array]:
 
 
 def jerk_density(basis: Basis, c: Array, Z: Array, density: Array) -> Array:
-    """Estimate the density of the jerk in windows of time by MacKay's rule.
+    """Estimate the density of the jerk in windows of time by MacKay's rule, shape (M,).
 
-    The whole record counts as a window with OF_RECORD determined jerks.
-
-    Shape (M,).
+    The whole record has the weight of OF_RECORD determined jerks in every window.
     """
     squares, determined = (
         basis.jerk(c) ** 2 * basis.h,

@@ -1,8 +1,8 @@
-"""Whether reading counts would help a record whose positions are taken as they are: one sentence for identify and report.
+"""Advice to estimate the motion from encoder counts, if a record uses its positions as measured.
 
-Positions taken as they are carry an error of variance step^2/12. Through the filters of the study
-it becomes an error of qdd of variance v; the columns of W are attenuated by about v over the mean
-square of qdd. Above HELPS that is a bias that justifies another reader.
+A position used as measured has an error of variance step^2/12. Through the filters of the study it
+becomes an error of qdd of variance v. The columns of W are then too small by about v divided by the
+mean square of qdd. If this share is above HELPS, the bias justifies `reader: counts`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,10 @@ LOOKED_AT = 2**16
 
 @dataclass(frozen=True, eq=False)
 class EncoderSteps(Part):
-    """Records whose positions would be read better as counts; computed when first asked for."""
+    """Advice on the records whose motion should be estimated from encoder counts.
+
+    It is computed when it is first needed.
+    """
 
     result: Identification
 
@@ -40,7 +43,7 @@ class EncoderSteps(Part):
     title = "Steps of the encoders"
 
     def text(self) -> str:
-        """One sentence for each record."""
+        """Write one sentence for each record that the counts would improve."""
         readings = [r for r in self.result.prepared if r.study.signals.reader == "lowpass"]
         sentences = [
             sentence
@@ -51,11 +54,10 @@ class EncoderSteps(Part):
 
 
 def visible_steps(result: Identification) -> tuple[str, float]:
-    """Describe the steps that the positions show, and the largest share of an acceleration they cause.
+    """Describe the encoder steps visible in the positions, and the acceleration error they cause.
 
-    The share is that of the mean square.
-
-    "" if none are seen.
+    The error is the largest share of the mean square of an acceleration. The text is empty if no
+    steps are found.
     """
     said, most = "", -1.0
     for one in result.prepared:
@@ -70,9 +72,10 @@ def visible_steps(result: Identification) -> tuple[str, float]:
 def encoder_sentences(
     record: Record, states: States, signals: Signals, drives: Drives | None
 ) -> tuple[str, ...]:
-    """Say for each record where reading its positions as counts would help.
+    """Write the advice to use the counts of a record, if its encoder steps disturb an acceleration.
 
-    states : of the record, through the filters.   drives : motor side; None if there is none.
+    states : filtered states of the record.
+    drives : drives to the motor side; None if there is none.
     """
     found = _steps(record, states, signals, drives)
     if found is None or (share := found[1].max()) < HELPS:
@@ -88,9 +91,9 @@ def encoder_sentences(
 def acceleration_error(
     record: Record, states: States, signals: Signals, drives: Drives | None
 ) -> float:
-    """Largest share of the mean square of a filtered acceleration that the steps cause.
+    """Compute the largest share of a mean squared acceleration that encoder steps cause.
 
-    0 if positions show no steps.
+    The accelerations are filtered. 0 if the positions show no steps.
     """
     found = _steps(record, states, signals, drives)
     return 0.0 if found is None else float(found[1].max())
@@ -99,7 +102,10 @@ def acceleration_error(
 def _steps(
     record: Record, states: States, signals: Signals, motors: Drives | None
 ) -> tuple[Array, Array, str] | None:
-    """Steps of the positions, shares of the accelerations that they make, and their side."""
+    """Find the encoder steps of the positions, and the share of each acceleration that they cause.
+
+    Returns the steps, the shares and the side, joint or motor; None if no steps are found.
+    """
     q, motion = record.q[:LOOKED_AT], np.mean(states.qdd[:LOOKED_AT] ** 2, axis=0)
     for side, drives in (("joint", None), ("motor", motors)):
         if side == "motor" and drives is None:
@@ -122,7 +128,7 @@ def _range(steps: Array) -> str:
 def _attenuation(
     rate: float, signals: Signals, motion: Array, found: Lattice, drives: Drives | None
 ) -> Array:
-    """Variance of the error of qdd divided by its mean square `motion`, by joint; shape (n,)."""
+    """Compute the variance of the error of qdd divided by its mean square `motion`, shape (n,)."""
     n = len(motion)
     gain = bandwidth(replace(signals, median=1), rate).before[2, 2]
     error = gain * (encoder_root(drives, n) * found.step) ** 2 @ np.full(n, 1 / 12)

@@ -1,8 +1,8 @@
-"""Positions of an encoder as counts: position = count step + phase, with what contradicts that said or refused.
+"""Encoder positions as counts: position = count step + phase.
 
-The step comes from a data sheet or from the record, the phase from the record alone. Floor against
-round in a driver, and an offset of up to half a step of the zero of the joint, cannot be distinguished from
-counts.
+Contradictions in the record are reported or refused. The step comes from a data sheet or from the
+record, the phase from the record alone. Counts cannot show whether a driver truncates or rounds,
+nor an offset of the joint zero of up to half a step.
 """
 
 from __future__ import annotations
@@ -46,15 +46,17 @@ or two where a joint turns back near a line.
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """Counts of n encoders.
+    """The lattice of the positions of n encoders, position = count step + phase.
 
     Attributes
     ----------
     step, phase : ndarray, shape (n,), rad or m
     findings : tuple of str
-        Sentences about them.
+        Sentences about the steps and the motion.
     counted : tuple of tuple of int
-        Counts of the device that one step may be, by encoder.
+        For each encoder: how many counts of the device one step may be.
+    rounded : bool
+        Whether positions are off the lattice a little, as if rounded to few digits.
     """
 
     step: Array
@@ -64,11 +66,11 @@ class Lattice:
     rounded: bool = False
 
     def counts(self, position: Array) -> Array:
-        """Counts, shape (N, n), as floats; nan if the position is missing."""
+        """Convert positions to counts, shape (N, n), as floats; nan if the position is missing."""
         return np.asarray(np.round((position - self.phase) / self.step))
 
     def position(self, counts: Array) -> Array:
-        """Positions of counts, shape (N, n)."""
+        """Convert counts to positions, shape (N, n), in rad or m."""
         return np.asarray(counts * self.step + self.phase)
 
 
@@ -78,12 +80,12 @@ def lattice(
     *,
     name: str = "record",
 ) -> Lattice:
-    """The lattice of positions, shape (N, n), at the encoder side.
+    """Find the lattice of positions, shape (N, n), measured at the encoder side.
 
-    step : rad or m, one or one for each encoder; default: from the record.
+    step : step in rad or m, for all encoders or for each; default: from the record.
 
-    Raises InputError if a step is not positive, is larger than the motion, or positions do not
-    lie on its lattice.
+    Raises InputError if a step is not positive or is larger than the motion, or if the positions
+    are not multiples of the step.
     """
     n = position.shape[1]
     if step is not None:
@@ -148,9 +150,9 @@ def lattice(
 
 
 def smallest_step(x: Array) -> float:
-    """The step of the lattice that distinct positions x, shape (N,), suggest.
+    """Estimate the step of the lattice from distinct positions x, shape (N,).
 
-    0 if they never change.
+    0 if the positions never change.
     """
     values = np.unique(x)
     gaps = np.diff(values)
@@ -165,13 +167,11 @@ def smallest_step(x: Array) -> float:
 
 
 def to_and_fro(counts: Array) -> Array:
-    """Find passages to and fro: three changes in a row over one line, shape (m, 2).
+    """Find the places where counts cross one encoder line three times in a row, shape (m, 2).
 
-    Returns the sample before the first change and the one behind the last.
-
-    counts, shape (N,), none missing.
-
-    A smooth motion crosses a line once, and twice where it turns back between two lines.
+    Returns the sample before the first change and the sample behind the last. The counts have shape
+    (N,), none missing. A smooth motion crosses a line once, or twice if it turns back between two
+    lines.
     """
     change = np.diff(counts)
     at = np.flatnonzero(change)
@@ -181,7 +181,10 @@ def to_and_fro(counts: Array) -> Array:
 
 
 def shaken_share(counts: Array) -> float:
-    """Passages to and fro over one line, as a share of all changes of the counts."""
+    """Compute the share of the changes of the counts that cross one line the third time in a row.
+
+    A large share shows that the motion shakes.
+    """
     return len(to_and_fro(counts)) / max(int(np.count_nonzero(np.diff(counts))), FEWEST)
 
 
@@ -191,8 +194,10 @@ def unwrapped_counts(
     *,
     name: str = "record",
 ) -> tuple[Lattice, Array, tuple[str, ...]]:
-    """The lattice of positions (see `lattice`), their counts without wraps of counters of WRAPS bits, shape (N, n), and what wrapped, a sentence for each encoder.
-    InputError if counts jump otherwise.
+    """Convert positions to counts, and undo the wraps of counters of WRAPS bits.
+
+    Returns the lattice of the positions (see `lattice`), the counts, shape (N, n), and a sentence
+    for each encoder that wrapped. Raises InputError if counts jump otherwise.
     """
     lattice_of_all = lattice(position, step, name=name)
     counts = lattice_of_all.counts(position)
@@ -274,7 +279,7 @@ def _distance(x: Array, step: float, phase: float) -> float:
 
 
 def _off(x: Array, off: float, step: float, own: bool) -> str:
-    """Message for positions that are `off` steps (rms) off their lattice, with a remedy."""
+    """Write the error message for positions `off` steps (rms) off their lattice, with a remedy."""
     text = f"positions lie {off:.2g} steps (rms) off the lattice of step {step:.6g}"
     suggested = 0.0 if own else smallest_step(x)
     if suggested and _distance(x, suggested, _phase(x, suggested)) < OFF / 5:

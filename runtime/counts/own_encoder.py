@@ -1,15 +1,18 @@
-"""The encoder that made a record, and what it allows to say of coarser ones by law phase.
+"""The encoder of a record, and the coarser encoders that the record can simulate.
+
+The study simulates encoders of step Delta (`rounding: phase` of CESTAC): the positions are
+quantised again, with a random phase in every run.
 
     Delta >= 5 own steps        the positions are taken as exact and quantised
     own step < Delta
             positions drawn from the posterior of the record's own counts are quantised, another
             draw in every run
     Delta <= own step
-            refused: counts rounded at their own step are only shifted, and runs that agree so well
-            would say nothing
+            refused: the counts would only be shifted, and the good agreement between the runs
+            would have no meaning
 
-A record whose positions lie on no lattice (floats of a simulation, positions that a driver
-averaged) has a step of its own near zero.
+A record whose positions are no multiples of a step (floats of a simulation, positions averaged by a
+driver) has an own step near zero.
 """
 
 from __future__ import annotations
@@ -37,11 +40,12 @@ class OwnEncoder:
     Attributes
     ----------
     step : ndarray, shape (n,), rad or m
-        Its steps, on the side study.cestac.side.
+        Steps of the encoder, on the side study.cestac.side.
     reading : Reading or None
-        What its counts say; None if every Delta of the study is coarse compared with it.
+        Motion estimated from the counts; None if every Delta of the study is coarse compared with
+        the own step.
     drives : Drives or None
-        Between the joints and the encoders of `reading`; None: encoders at the joints.
+        Drives between the joints and the encoders of `reading`; None for encoders at the joints.
     """
 
     step: Array
@@ -50,11 +54,14 @@ class OwnEncoder:
 
     @property
     def read(self) -> bool:
-        """Whether its counts have been read."""
+        """Whether the motion has been estimated from the counts of the record."""
         return self.reading is not None
 
     def positions(self, q: Array, delta: float, rng: np.random.Generator) -> Array:
-        """Joint positions, shape (N, n), that an encoder of step delta may be judged on: q as measured, or a draw."""
+        """Return joint positions, shape (N, n), for a simulated encoder of step delta to quantise.
+
+        They are the measured positions q if delta is coarse, else a draw from the posterior.
+        """
         if self.reading is None or delta >= (1 - 1e-9) * LIMIT.EXACT_FROM * self.step.max():
             return q
         drawn = self.reading.draw(rng)
@@ -62,16 +69,16 @@ class OwnEncoder:
 
 
 def own_encoder(record: Record, study: Study, drives: Drives | None) -> OwnEncoder | None:
-    """The encoder of a record under law phase.
+    """Find the encoder of a record, for a study with `rounding: phase`.
 
-    None for other laws, which take every position as exact.
+    None for other kinds of rounding, which take every position as exact.
 
     Raises
     ------
     SettingsError
-        A Delta that is not above the own step.
+        If a Delta is not above the own step.
     InputError
-        Positions too coarse for one Delta of which the counts cannot be read.
+        If a Delta is less than five own steps and no motion can be estimated from the counts.
     """
     settings, signals = study.cestac, study.signals
     if settings.rounding != "phase" or settings.place == "loop":

@@ -1,4 +1,8 @@
-"""Reader `counts`: positions as counts of encoders (`runtime.counts.reading`), whose posterior mean goes through the filters of the study; errors of the velocities are known."""
+"""Reader `counts`: joint motion estimated from encoder counts (`runtime.counts.reading`).
+
+The posterior mean of the positions goes through the filters of the study; errors of the velocities
+are known.
+"""
 
 from __future__ import annotations
 
@@ -18,12 +22,15 @@ Array = np.ndarray
 
 
 def counted(record: Record, signals: Signals) -> States:
-    """Reader `counts`: positions as counts of encoders, whose posterior mean goes through the filters of the study.
+    """Estimate the joint states from encoder counts (reader `counts`).
+
+    The posterior mean of the positions is filtered as the study specifies. The standard deviations
+    of the velocities are kept as errors of the states.
 
     Raises
     ------
     InputError
-        Positions that are no counts (`runtime.counts.reading.read_counts`).
+        If the positions are not encoder counts (`runtime.counts.reading.read_counts`).
     """
     drives = encoder_drives(signals.side, record.origin.drives)
     position = encoder_position(record.q, drives, record.missing)
@@ -38,9 +45,10 @@ def counted(record: Record, signals: Signals) -> States:
 
 
 def unwrapped(record: Record, signals: Signals, drives: Drives | None = None) -> Record:
-    """The record as reader counts takes it: counts that start anew after a turn of the counter go on.
+    """Return the record with positions that continue when the counter of an encoder wraps around.
 
-    Another reader leaves it as it is. drives : of the robot, for encoders on the motor side.
+    Any reader except `counts` leaves the record unchanged. `drives` are the drives of the robot,
+    for encoders on the motor side.
     """
     if signals.reader != "counts":
         return record
@@ -54,6 +62,6 @@ def unwrapped(record: Record, signals: Signals, drives: Drives | None = None) ->
 
 
 def encoder_position(q: Array, drives: Drives | None, missing: Missing | None = None) -> Array:
-    """Positions at the encoders, shape (N, n), of joint positions q; nan if they are missing."""
+    """Convert joint positions q to encoder positions, shape (N, n); nan if missing."""
     x = q.copy() if drives is None else drives.motor_position(q)
     return x if missing is None else np.where(missing.at_encoders(drives), np.nan, x)

@@ -1,12 +1,12 @@
-"""From the counts of encoders to positions, velocities and accelerations with their deviations (docs/theory/counts.md).
+"""Positions, velocities and accelerations from encoder counts, with standard deviations.
 
     reading = read_counts(position, rate, step)        encoder side, shape (N, n)
     reading.q, reading.s_q, reading.findings
 
-Records longer than STRETCH samples are read in stretches that overlap by MARGIN samples on either
-side: memory and time are linear in their length.
-Samples without a count follow from their neighbours by the posterior; in gaps where it does not
-tell the position to half a step the state is unknown.
+The theory is in docs/theory/counts.md. Records longer than STRETCH samples are processed in
+stretches that overlap by MARGIN samples on either side, so memory and time are linear in their
+length. A missing sample follows from its neighbours by the posterior. In a gap in which the
+posterior does not determine the position to half a step, the state is unknown.
 """
 
 from __future__ import annotations
@@ -48,23 +48,25 @@ STANDS, LONG = 0.1, 2.0
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """Motion that counts show; arrays of shape (N, n) at the encoder side, rad or m, per s, per s^2.
+    """The motion estimated from encoder counts, at the encoder side.
+
+    All arrays have shape (N, n), in rad or m, per s, per s^2.
 
     Attributes
     ----------
     q, qd, qdd : ndarray, shape (N, n)
         Means of the posterior.
     s_q, s_qd, s_qdd : ndarray, shape (N, n)
-        Its deviations.
+        Standard deviations of the posterior.
     jerk_density : ndarray, shape (n,), rad/s^3/sqrt(Hz) or m/s^3/sqrt(Hz)
         Root of the mean density r of the white jerk.
     unknown : ndarray of bool, shape (N, n)
-        Gaps in which the counts around them do not tell the state, and the samples that filters
-        bring it to.
+        Gaps in which the counts around do not determine the state, and the samples near these gaps
+        that filters spoil.
     step, phase : ndarray, shape (n,), rad or m
         Lattice of the encoders.
     findings : tuple of str
-        What the record shows of its encoders, a sentence each.
+        Properties of the encoders that the record shows, one sentence each.
     """
 
     q: Array
@@ -82,12 +84,18 @@ class Reading:
 
     @property
     def motion(self) -> tuple[Array, Array]:
-        """q, and s_qd, infinite if the state is unknown."""
+        """Joint positions q, and the standard deviations of the velocities.
+
+        The standard deviations are infinite if the state is unknown.
+        """
         return self.q, np.where(self.unknown, np.inf, self.s_qd)
 
     @property
     def starts(self) -> Starts:
-        """Start of the search for this motion with other phases of its encoders."""
+        """Starting values to estimate the same motion with other phases of the encoders.
+
+        They are listed by the first sample of a stretch and the encoder, from 0.
+        """
         return {
             (part.begin, j): SearchStart(each.read.errors, each.basis.m, each.read.density)
             for part in self.parts
@@ -95,7 +103,7 @@ class Reading:
         }
 
     def draw(self, rng: np.random.Generator) -> Array:
-        """Positions drawn from the posterior, shape (N, n)."""
+        """Draw positions from the posterior, shape (N, n), in rad or m."""
         x = np.array(self.q)
         for part in self.parts:
             drawn = np.stack([each.draw(rng) for each in part.smoothed], axis=1)
@@ -113,8 +121,10 @@ class Reading:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A stretch: its samples start at `begin`, those that count are [first, stop).   moving :
-    encoders whose counts change in it.
+    """One stretch of the record, starting at sample `begin`.
+
+    Only its samples [first, stop) are used in the result. `moving` lists the encoders whose counts
+    change in the stretch.
     """
 
     smoothed: tuple[Smoothed, ...]
@@ -125,7 +135,7 @@ class Part:
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """Sentences about the lines of the encoders of this part."""
+        """Sentences about the errors of the counts in this stretch, with the encoder number."""
         return tuple(
             f"encoder {j + 1}: {said}"
             for j, said in zip(self.moving, (each.said for each in self.smoothed), strict=True)
@@ -142,34 +152,36 @@ def read_counts(
     name: str = "record",
     starts: Starts | None = None,
 ) -> Reading:
-    """Positions, velocities and accelerations from counts, with deviations.
+    """Estimate positions, velocities and accelerations from encoder counts.
 
     Parameters
     ----------
     position : ndarray, shape (N, n), rad or m
-        At the encoder side: counts times step plus phase. nan: a sample that is missing.
+        Positions at the encoder side: counts times step plus phase; nan if a sample is missing.
     rate : float, Hz
         Sampling rate.
     step : float or ndarray, shape (n,), rad or m, optional
         Step of the encoders; default: from the record.
     uneven : float, optional, steps
-        Deviation of lines at unequal distances, by which bounds are widened; default: as detected.
+        Standard deviation of the encoder lines from even spacing, by which bounds are widened;
+        default: estimated.
     name : str
-        What errors call the record.
+        Name of the record in error messages.
     starts : mapping, optional
-        Reading.starts of the same motion at other phases of encoders of the same steps: errors of
-        counts, knots and first density of the jerk are these, in a tenth to a quarter of the time,
-        and sought anew where the counts contradict them.
+        Reading.starts of the same motion at other phases of encoders of the same steps. The errors
+        of the counts, the knots and the first density of the jerk are copied from it, which saves
+        three quarters of the time or more. They are searched anew if the counts contradict them.
 
     Returns
     -------
     Reading
+        The motion, with standard deviations.
 
     Raises
     ------
     InputError
-        No count changes; a step that is not positive or larger than the motion; positions off the
-        lattice; counts that jump.
+        If no count changes, a step is not positive or larger than the motion, positions are off the
+        lattice, or counts jump.
     """
     known, counts, wraps = unwrapped_counts(position, step, name=name)
     return _reading(counts, rate, known, uneven, wraps, starts or {})
@@ -217,14 +229,15 @@ def read_stretch(
     rest: Array,
     starts: Mapping[int, SearchStart] | None = None,
 ) -> tuple[Part | None, list[Array], Array]:
-    """Posterior of the counts of a stretch, shape (N, n); None if no joint moves.
+    """Estimate the motion from the counts of one stretch, shape (N, n).
 
-    q, qd, qdd, s_q, s_qd, s_qdd in steps, and where the state is unknown, (N, n) each.
+    Returns the stretch (None if no joint moves), the list [q, qd, qdd, s_q, s_qd, s_qdd] in steps,
+    and a mask of the samples with unknown state, shape (N, n) each.
 
-    An encoder whose count never changes rests in the middle of its interval, one without a count at
-    `rest`, shape (n,); `starts` by encoder. Where one count goes to and fro
-    the lines of all encoders are widened, since joints share a controller, and directions near such
-    passages are uncertain.
+    If the count of an encoder never changes, the joint rests in the middle of its interval; an
+    encoder without a count is at `rest`, shape (n,). `starts` holds the starts of the search by
+    encoder. If one count goes to and fro, the lines of all encoders are widened, since joints share
+    a controller, and the directions near such passages are uncertain.
     """
     N, n = counts.shape
     k = np.ascontiguousarray(counts.T)
@@ -255,7 +268,10 @@ def _positions_of_counts(
     uneven: float | None,
     starts: Mapping[int, SearchStart],
 ) -> Part:
-    """Posterior of the encoders that move, of counts k, shape (n, N), and their columns of the states."""
+    """Estimate the motion of the encoders that move, from counts k, shape (n, N).
+
+    The columns of the moving encoders are written into `states`.
+    """
     N = k.shape[1]
     known = [np.flatnonzero(np.isfinite(k[j])) for j in moving]
     shaken = (
@@ -282,19 +298,25 @@ def _positions_of_counts(
 
 
 class Gaps:
-    """Samples at which an encoder has no count."""
+    """Counts of the samples that have no encoder count, by encoder."""
 
     def __init__(self, n: int) -> None:
         self.samples, self.unknown, self.run, self.longest = np.zeros((4, n), dtype=int)
         self.last = np.full(n, np.nan)  # last count known
 
     def rest(self, counts: Array) -> Array:
-        """The last known counts, shape (n,); before the record, the first of `counts`, shape (N, n)."""
+        """Return the last known counts of the encoders, shape (n,).
+
+        If an encoder had no count before, its first known count in `counts`, shape (N, n), is used.
+        """
         first = counts[np.isfinite(counts).argmax(axis=0), np.arange(counts.shape[1])]
         return np.where(np.isnan(self.last), first, self.last)
 
     def take(self, counts: Array, unknown: Array) -> None:
-        """Take the next counts, and mark where the state is unknown; shape (B, n) each."""
+        """Process the next counts of the record: count missing samples and unknown states.
+
+        Both arrays have shape (B, n).
+        """
         missing = np.isnan(counts)
         self.samples += missing.sum(axis=0)
         self.unknown += unknown.sum(axis=0)
@@ -306,7 +328,10 @@ class Gaps:
             self.last[j] = counts[known[-1], j] if len(known) else self.last[j]
 
     def findings(self, rate: float) -> tuple[str, ...]:
-        """How many samples are missing and what became of them, a sentence for each encoder that misses any."""
+        """Write a sentence for each encoder with missing samples.
+
+        It gives their number and how they were treated.
+        """
         return tuple(
             (
                 f"encoder {j + 1}: {self.samples[j]} samples are missing, at most "
@@ -325,9 +350,9 @@ class Gaps:
 
 
 def stretches(N: int) -> list[tuple[int, int, int, int]]:
-    """Split a record into stretches (begin, first, stop, end).
+    """Split a record of N samples into stretches (begin, first, stop, end).
 
-    Samples [begin, end) are read in order to know [first, stop).
+    The samples [begin, end) are processed in order to find the motion in [first, stop).
     """
     count = max(1, round(N / STRETCH))
     cuts = [*(STRETCH * i for i in range(count)), N]

@@ -1,13 +1,15 @@
-"""A motion between the bounds that counts are: expectation propagation under a white-jerk prior, one law for all speeds.
+"""Estimation of a motion from encoder counts, each of which bounds the position at one sample.
 
     lo_k <= x(t_k) <= hi_k,   lo_k = count_k - 1/2, hi_k = count_k + 1/2
                               in steps of the encoder; at every sample
 
-A change of the count is what two neighbouring intervals say together. Sites start from the changes
-(position (k + 1/2), error qd Ts/sqrt(12)); `runtime.counts.boxes` then updates them, and
-judges the errors that counts and time stamps have. The jerk density is the fixed point of MacKay's
-rule, the sum of squared jerks over the number of jerks that the record determines, in windows of
-time with the whole record as prior. Counts that were lost are found and taken out here.
+The motion has a white jerk as prior, and its posterior is found by expectation propagation, in the
+same way at all speeds. A site is a sample whose bounds are used; a normal law replaces the bounds.
+The first sites come from the changes of the count: two neighbouring intervals give the position (k
++ 1/2) with the error qd Ts/sqrt(12). `runtime.counts.boxes` then updates the sites, and finds the
+errors of counts and time stamps. The density of the jerk follows from MacKay's rule: the sum of
+squared jerks over the number of jerks that the record determines, in windows of time with the whole
+record as prior. Lost counts are found and corrected here.
 
 Reference: MacKay (1992), evidence; docs/theory/counts.md.
 """
@@ -71,11 +73,11 @@ SPACING = 0.3
 
 
 class SearchStart(NamedTuple):
-    """Start of the search for a known motion with another phase of its encoder.
+    """Start of the search for a motion that is already known, with another phase of its encoder.
 
-    errors : of the counts.
-    m : samples from knot to knot.
-    density : of the jerk, steps^2/s^5, shape (M,).
+    errors : errors of the counts.
+    m : samples from knot to knot of the spline.
+    density : density of the jerk, steps^2/s^5, shape (M,).
     """
 
     errors: Errors
@@ -85,9 +87,9 @@ class SearchStart(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """Posterior of one encoder, in steps, about `origin`.
+    """Posterior motion of one encoder, in steps of the encoder relative to `origin`.
 
-    said : a sentence about the errors of its counts, or none.
+    said : sentence about the errors of the counts, or empty.
     """
 
     basis: Basis
@@ -101,14 +103,17 @@ class Smoothed:
         return float(self.read.density.mean())
 
     def state(self, order: int) -> tuple[Array, Array]:
-        """Mean and deviation of the position, or of its derivative of that order, shape (N,) each."""
+        """Return the mean and standard deviation of the position, or of a derivative.
+
+        `order` is the order of the derivative, 0 for the position; shape (N,) each.
+        """
         N = self.basis.N
         mean = self.basis.at_samples(self.read.c, order)[:N]
         variance = self.basis.variances(self.read.Z, order)[:N]
         return mean + self.origin * (order == 0), np.sqrt(np.maximum(variance, 0))
 
     def draw(self, rng: np.random.Generator) -> Array:
-        """Positions drawn from the posterior, shape (N,)."""
+        """Draw positions from the posterior, shape (N,)."""
         drawn = self.basis.at_samples(self.read.c + self.read.factor.draw(rng))
         return np.asarray(drawn[: self.basis.N] + self.origin)
 
@@ -116,12 +121,13 @@ class Smoothed:
 def smoothed(
     counts: Array, Ts: float, *, uneven: float | None = None, start: SearchStart | None = None
 ) -> Smoothed:
-    """Posterior of the counts of one encoder, shape (N,); nan: a sample that is missing.
+    """Estimate the motion of one encoder from its counts, shape (N,); nan if a sample is missing.
 
-    uneven : deviation of the lines in steps, less than which is not taken; None: it is detected.
-    start : what the same motion told at another phase; default: all is sought.
+    uneven : standard deviation of the encoder lines from even spacing, in steps, used as a lower
+        limit; None: estimated.
+    start : results for the same motion at another phase; default: everything is searched.
 
-    InputError if no motion goes with the counts.
+    Raises InputError if no motion agrees with the counts.
     """
     known = np.flatnonzero(np.isfinite(counts))
     origin = float(np.round(counts[known].mean()))
@@ -151,7 +157,11 @@ def smoothed(
 
 @dataclass(frozen=True, eq=False)
 class Counts:
-    """Counts of one encoder: y, shape (N,), at the samples `measured`, and the precision `rest` of the other samples."""
+    """Counts y of one encoder, shape (N,).
+
+    `measured` lists the samples that have a count; `rest` is the small precision given to the other
+    samples.
+    """
 
     y: Array
     measured: Array
@@ -161,9 +171,11 @@ class Counts:
     def read(
         self, sizes: Sequence[float], start: SearchStart | None = None
     ) -> tuple[Boxes, Posterior]:
-        """The motion between the bounds, with the errors of most evidence, or wider ones with which it agrees with every count.
-        Errors of a long record are those of its liveliest part, those of a motion read before are
-        known, or they are wider ones that make the whole more likely.
+        """Find the motion that agrees with all counts, and the most likely errors of the counts.
+
+        The errors of a long record are searched in its liveliest part, and those in `start` are
+        known already. If the motion does not agree with every count, larger errors are tried.
+        Raises InputError if no motion agrees with the counts.
         """
         start = start if start and start.errors.count in sizes else None
         if start or len(self.y) > 4 * LIVELIEST:
@@ -187,7 +199,7 @@ class Counts:
         return boxes, read
 
     def liveliest(self) -> Counts:
-        """The LIVELIEST consecutive samples with the most changes of the count."""
+        """Extract the LIVELIEST consecutive samples in which the count changes most often."""
         changed = np.zeros(len(self.y))
         changed[self.measured[1:]] = np.diff(self.y[self.measured]) != 0
         total = np.cumsum(changed)
@@ -197,11 +209,10 @@ class Counts:
         return Counts(self.y[part], inside, self.rest[part], self.Ts)
 
     def searched(self, sizes: Sequence[float]) -> tuple[Boxes, Posterior]:
-        """The motion with the errors of most evidence.
+        """Find the motion and the errors of the counts that have the most evidence.
 
-        The smallest errors are taken unless those have UNEVEN nats more.
-
-        A jittering clock is thought of where errors are wide.
+        The smallest errors are used unless larger ones have UNEVEN nats more evidence. If the
+        errors of the counts are large, errors of the clock are tried too.
         """
         wide = max((x for x in sizes if x <= WIDE), default=sizes[0])
         boxes, read = self.first(Errors(wide))
@@ -218,10 +229,10 @@ class Counts:
         return boxes, read
 
     def first(self, errors: Errors, start: SearchStart | None = None) -> tuple[Boxes, Posterior]:
-        """Bounds of the counts with these errors, and the motion between them.
+        """Set up the bounds of the counts with the given errors, and estimate a first motion.
 
-        Knots are as far apart as the motion allows that passes near the changes.
-        start : of a motion read before, with whose knots and density of the jerk it begins.
+        The knots of the spline are as far apart as a motion near the changes of the count allows.
+        start : a known motion, whose knots and density of the jerk are used.
         """
         N, least = len(self.y), max(1, round(KNOTS / self.Ts))
         basis = Basis(N, start.m if start else least, self.Ts)
@@ -244,15 +255,10 @@ class Counts:
         return boxes, boxes.posterior(errors, c, density, tau[sites], nu[sites])
 
     def sites(self, density: float) -> Array:
-        """Choose the samples whose bounds count.
+        """Choose the samples whose bounds are used (the sites), in ascending order.
 
-        These are both sides of every change and gap, and samples between them, as often as the
-        motion forgets.
-
-        ascending.
-
-        Bounds of samples close together are one bound. Taken as many, each would see the others as
-        independent knowledge.
+        They are both sides of every change of the count and of every gap, and some samples between
+        them. Bounds of samples close together are not independent, so only one of them is used.
         """
         known = self.measured
         change = np.flatnonzero((np.diff(self.y[known]) != 0) | (np.diff(known) > 1))
@@ -266,9 +272,11 @@ class Counts:
         return np.asarray(known[np.unique(np.concatenate([ends.ravel(), between.astype(int)]))])
 
     def from_changes(self, errors: Errors) -> tuple[Array, Array]:
-        """First sites, precision and its product with the mean: at the two samples around a change of the count, at most KNOTS of missing samples apart.
+        """Estimate the first sites from the changes of the count.
 
-        A hundredth of an interval at every other sample, `rest` where it is missing.
+        Returns, for every sample, the precision and its product with the mean. The two samples
+        around a change have the most precision; other samples have little, missing samples `rest`.
+        A change across a gap longer than KNOTS is not used.
         """
         y, known, near = self.y, self.measured, max(1, round(KNOTS / self.Ts))
         tau = self.rest.copy()
@@ -290,13 +298,17 @@ class Counts:
         return tau, nu
 
     def without(self, at: int, jump: int) -> Counts:
-        """The counts without a jump at a sample."""
+        """Return the counts with a jump of `jump` counts at sample `at` removed."""
         y = self.y.copy()
         y[self.measured[self.measured >= at]] -= jump
         return replace(self, y=y)
 
     def leaps(self) -> list[tuple[int, int]]:
-        """Samples at which a change of the count is off the parabola through its neighbours by LEAP times what these are, and by how many counts."""
+        """Find single changes of the count that are too large for a motion.
+
+        Returns the sample and the number of counts of each. The change differs from a parabola
+        through its neighbours by more than LEAP times as much as these do.
+        """
         y, known = self.y, self.measured
         change = np.diff(y[known])
         bent = np.abs(change[1:-1] - (change[2:] + change[:-2]) / 2) > LEAP / 2
@@ -311,10 +323,11 @@ class Counts:
         return [(int(known[at[i] + 1]), round(off[i])) for i in leap]
 
     def jump(self, boxes: Boxes, read: Posterior) -> tuple[int, int] | None:
-        """Sample at which counts jump, and by how many, if the record around it is more likely without by LIKELIER nats.
+        """Find a jump of the counts, such as lost counts, that a motion cannot explain.
 
-        Not asked where counts have the least errors and the jerk is nowhere SPIKE times as dense as
-        in the mean.
+        Returns the sample and the number of counts, or None. Without the jump the record around it
+        must be more likely by LIKELIER nats. Nothing is searched if the errors of the counts are
+        the least ones and the jerk has no peak above SPIKE times its mean density.
         """
         spikes = read.density.max() > SPIKE * read.density.mean()
         if len(boxes.sites) < FEWEST or not (spikes or read.errors.count > COUNT_ERRORS[0]):
@@ -338,7 +351,10 @@ class Counts:
 
 
 def _error_notes(errors: Errors, least: float, sites: int) -> list[str]:
-    """Sentences about errors besides rounding; none if these are the smallest, or sites are too few."""
+    """Write a sentence on each error of counts or time stamps that is not the smallest.
+
+    No sentence if there are too few sites.
+    """
     said = []
     if errors.count > least and sites > FEWEST:
         said.append(
@@ -356,7 +372,10 @@ def _error_notes(errors: Errors, least: float, sites: int) -> list[str]:
 def _spline_through_sites(
     basis: Basis, tau: Array, nu: Array, density: float
 ) -> tuple[Array, Array]:
-    """The spline through Gaussian sites, and the jerk density that goes with it, shape (M,), after at most FIRST passes from `density`."""
+    """Fit a spline through Gaussian sites, and estimate the density of its jerk, shape (M,).
+
+    The density starts from `density` and is updated at most FIRST times.
+    """
     tau, nu, ones = basis.filled(tau), basis.filled(nu), np.ones(basis.M)
     samples, unit, c = basis.of_samples(tau), basis.of_prior(ones), np.zeros(basis.P)
     g = basis.gradient(nu, ones, c)
@@ -372,9 +391,9 @@ def _spline_through_sites(
 
 
 def _through(basis: Basis, tau: Array, nu: Array, density: Array, c: Array) -> tuple[Array, Factor]:
-    """The spline through Gaussian sites, shape (m M,) each, corrected once, and the factor of its precision.
+    """Fit a spline through Gaussian sites, shape (m M,) each, starting from a spline c near it.
 
-    c : one near it.
+    Returns its coefficients and the Cholesky factor of their precision.
     """
     factor = Factor.of(basis.precision(tau, density))
     for _ in range(2):

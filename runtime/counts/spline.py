@@ -1,4 +1,6 @@
-"""A position as a cubic spline with white jerk, under independent Gaussian knowledge of single samples: means, deviations, draws in linear time.
+"""A position as a cubic spline with white jerk, estimated from samples with Gaussian errors.
+
+Means, standard deviations and draws need a time linear in the number of samples.
 
     x(t) = sum_i c_i B((t - t_i)/h)
         B the cubic B-spline: between two knots the jerk j = (c_(i+3) - 3 c_(i+2) + 3 c_(i+1) -
@@ -8,10 +10,11 @@
     posterior  precision A = sum_k tau_k b_k b_k' + sum_i (h/r_i) d_i d_i',  a band of 3 beside its
     diagonal,  A c = sum_k nu_k b_k
 
-A = L L' by LAPACK. Elements of Z = A^-1 within the band follow from L backward in time (Takahashi):
-c_i given the later ones is normal, of mean l_i'(c_(i+1), c_(i+2), c_(i+3)) and variance 1/L_ii^2.
-The recursion is linear in what stands at its end, so stretches of time are passed side by side from
-an end without error, and joined afterwards; exact, with few steps of long arrays.
+A = L L' by LAPACK. The elements of Z = A^-1 within the band follow from L backward in time
+(Takahashi): c_i given the later coefficients is normal, of mean l_i'(c_(i+1), c_(i+2), c_(i+3)) and
+variance 1/L_ii^2. This recursion is linear in its end values. Stretches of time are therefore
+computed in parallel, each from an end without error, and joined afterwards; the result is exact,
+and the computation has few steps on long arrays.
 
 References: Takahashi, Fagan and Chin (1973); Wahba (1978) for splines as posteriors of integrated
 white noise.
@@ -40,10 +43,11 @@ CONDITION = 1e-9
 
 
 class Basis:
-    """Splines over N samples of period Ts, with a knot every m samples.
+    """Cubic splines over N samples of period Ts, with a knot every m samples.
 
-    Samples are padded to whole intervals: M intervals, m M samples, P = M + 3 coefficients. values
-    : (B, B', B'') at the m samples of an interval, shape (m, 4) each.
+    Samples are padded to whole intervals: M intervals, m M samples, P = M + 3 coefficients.
+
+    values : (B, B', B'') at the m samples of an interval, shape (m, 4) each.
     """
 
     def __init__(self, N: int, m: int, Ts: float) -> None:
@@ -66,38 +70,44 @@ class Basis:
         )
 
     def filled(self, x: Array) -> Array:
-        """Samples, shape (N,), and zeros up to whole intervals."""
+        """Pad samples, shape (N,), with zeros up to whole intervals, shape (m M,)."""
         return np.pad(x, (0, self.M * self.m - self.N))
 
     @property
     def least_density(self) -> float:
-        """Least density of the jerk that a Cholesky factor of A resolves, steps^2/s^5.
+        """Least density of the jerk with which A can be factored in double precision, steps^2/s^5.
 
-        Sites have a precision of 0.06 and more.
+        The precision of a site is 0.06 or more.
         """
         return CONDITION / (self.h**5 * self.m)
 
     def at_samples(self, c: Array, order: int = 0) -> Array:
-        """The spline, or its derivative of that order, shape (m M,), of coefficients (P,)."""
+        """Compute the spline of coefficients c, shape (P,), at all samples, shape (m M,).
+
+        `order` is the order of its derivative, 0 for the position.
+        """
         windows = np.lib.stride_tricks.sliding_window_view(c, 4)
         return np.asarray((windows @ self.values[order].T).ravel())
 
     def rows(self, samples: Array) -> csr_array:
-        """b_k of some samples, shape (S, P)."""
+        """Return the values b_k of the basis at some samples, shape (S, P), sparse."""
         interval, u = np.divmod(samples, self.m)
         columns = (interval[:, None] + np.arange(4)).ravel()
         ends = np.arange(0, len(columns) + 1, 4)
         return csr_array((self.values[0][u].ravel(), columns, ends), shape=(len(samples), self.P))
 
     def variances(self, Z: Array, order: int = 0) -> Array:
-        """Variances of the same, shape (m M,); Z, shape (4, P)."""
+        """Compute the variances of the spline or of a derivative at all samples, shape (m M,).
+
+        Z : covariances of its coefficients, from `Factor.inverse`, shape (4, P).
+        """
         b = self.values[order]
         squares = np.stack([(1 if i == j else 2) * b[:, i] * b[:, j] for i, j in PAIRS])
         pairs = np.stack([Z[j - i, i : i + self.M] for i, j in PAIRS])
         return np.asarray((pairs.T @ squares).ravel())
 
     def jerk(self, c: Array) -> Array:
-        """Jerk of every interval, shape (M,)."""
+        """Compute the jerk of the spline in every interval, shape (M,)."""
         return third_differences(c) / self.h**3
 
     def jerk_variances(self, Z: Array) -> Array:
@@ -108,11 +118,15 @@ class Basis:
         return np.asarray(total / self.h**6)
 
     def precision(self, tau: Array, density: Array) -> Array:
-        """A by its diagonals, shape (4, P); tau, shape (m M,), density r, shape (M,)."""
+        """Compute the precision A of the coefficients, by its diagonals, shape (4, P).
+
+        tau : precisions of the samples, shape (m M,).
+        density : density r of the jerk, shape (M,).
+        """
         return np.asarray(self.of_samples(tau) + self.of_prior(density))
 
     def of_samples(self, tau: Array) -> Array:
-        """The share of A that sites of precision tau have, sum_k tau_k b_k b_k'."""
+        """Compute the part of A that comes from the samples, sum_k tau_k b_k b_k'."""
         samples = self.products.T @ tau.reshape(-1, self.m).T
         A = np.zeros((4, self.P))
         for (i, j), of_pair in zip(PAIRS, samples, strict=True):
@@ -120,7 +134,7 @@ class Basis:
         return A
 
     def of_prior(self, density: Array) -> Array:
-        """The share of A that the prior has, sum_i (h/r_i) d_i d_i'."""
+        """Compute the part of A that comes from the prior, sum_i (h/r_i) d_i d_i'."""
         prior = 1 / (self.h**5 * density)
         A = np.zeros((4, self.P))
         for i, j in PAIRS:
@@ -128,7 +142,10 @@ class Basis:
         return A
 
     def gradient(self, pull: Array, density: Array, c: Array) -> Array:
-        """Slope of the log posterior at c, shape (P,); pull = nu - tau x(c), shape (m M,)."""
+        """Compute the gradient of the log posterior at c, shape (P,).
+
+        pull : nu - tau x(c) at all samples, shape (m M,).
+        """
         samples = self.values[0].T @ pull.reshape(-1, self.m).T
         prior = third_differences(c) / (self.h**5 * density)
         g = np.zeros(self.P)
@@ -138,19 +155,23 @@ class Basis:
 
 
 def third_differences(c: Array) -> Array:
-    """c_(i+3) - 3 c_(i+2) + 3 c_(i+1) - c_i of coefficients (P,), shape (M,)."""
+    """Compute c_(i+3) - 3 c_(i+2) + 3 c_(i+1) - c_i of the coefficients c, shape (M,)."""
     return np.asarray(c[3:] - c[:-3] + 3 * (c[1:-2] - c[2:-1]))
 
 
 @dataclass(frozen=True, eq=False)
 class Factor:
-    """Cholesky factor of A: L by its diagonals, shape (4, P)."""
+    """Cholesky factor L of the precision A, by its diagonals, shape (4, P)."""
 
     L: Array
 
     @classmethod
     def of(cls, A: Array) -> Factor:
-        """Factor of A, shape (4, P); where rounding made it indefinite, of A with a diagonal larger by the least share that helps."""
+        """Compute the Cholesky factor of A, given by its diagonals, shape (4, P).
+
+        If rounding errors made A indefinite, its diagonal is increased by the smallest share that
+        helps.
+        """
         for share in (0.0, 1e-13, 1e-11, 1e-9):
             L, info = dpbtrf(np.vstack([A[:1] * (1 + share), A[1:]]), lower=1)
             if not info:
@@ -159,20 +180,23 @@ class Factor:
 
     @property
     def log_determinant(self) -> float:
-        """log |A|."""
+        """Logarithm of the determinant of A."""
         return float(2 * np.log(self.L[0]).sum())
 
     def solve(self, g: Array) -> Array:
-        """A^-1 g, of the shape of g, (P,) or (P, k)."""
+        """Compute A^-1 g for g of shape (P,) or (P, k)."""
         return np.asarray(dpbtrs(self.L, g, lower=1)[0].reshape(g.shape))
 
     def draw(self, rng: np.random.Generator) -> Array:
-        """A draw of N(0, A^-1), shape (P,)."""
+        """Draw a vector from the normal law N(0, A^-1), shape (P,)."""
         z = rng.standard_normal((self.L.shape[1], 1))
         return np.asarray(dtbtrs(self.L, z, uplo="L", trans="T")[0].ravel())
 
     def inverse(self) -> Array:
-        """Z_(i, i + lag) of lags 0 to 3, shape (4, P)."""
+        """Compute the elements of Z = A^-1 near its diagonal, shape (4, P).
+
+        They are Z_(i, i + lag) for lags 0 to 3.
+        """
         T = self.L.shape[1]
         length = max(8, int(LENGTH * np.sqrt(T)))
         stretches = -(-T // length)
@@ -206,14 +230,16 @@ class Factor:
 
 
 def next_density(basis: Basis, samples: Array, unit: Array, g: Array, r: float) -> float:
-    """MacKay's rule for one density r of the jerk: squares of the jerk over the number of jerks that sites determine.
+    """Update the density r of the jerk by MacKay's rule, once.
 
-    samples, unit : shares of A that sites have, and the prior of density one.
-    g : slope at c = 0.
+    The new density is the sum of squared jerks over the number of jerks that the samples determine.
 
-    The number is M less the trace of A^-1 unit/r, which is the slope of log |A| by log 1/r: two
-    factors and no inverse. Never below basis.least_density: where counts tell no jerk, the rule has
-    no other fixed point than zero.
+    samples, unit : parts of A that come from the samples, and from a prior of density one.
+    g : gradient at c = 0.
+
+    The number is M less the trace of A^-1 unit/r, which is the slope of log |A| by log 1/r. This
+    needs two factors and no inverse. The density is never below basis.least_density: if the counts
+    do not determine the jerk, the rule would end at zero.
     """
     factor, beside = (Factor.of(samples + unit / x) for x in (r, r * np.exp(SLOPE)))
     determined = basis.M - (factor.log_determinant - beside.log_determinant) / SLOPE
@@ -222,10 +248,13 @@ def next_density(basis: Basis, samples: Array, unit: Array, g: Array, r: float) 
 
 
 def _joined(first: Array, through: Array) -> Array:
-    """Covariance of the three coefficients behind every stretch, shape (3, 3, stretches).
+    """Compute the covariance of the three coefficients behind every stretch of a spline.
 
-    first : that of the first three of a stretch given those behind it.
-    through : how these depend on those; shape (stretches, 3, 3) each.
+    Returns an array of shape (3, 3, stretches).
+
+    first : covariance of the first three coefficients of a stretch, given the three behind it.
+    through : matrix by which the first three depend on the three behind.
+    Both have the shape (stretches, 3, 3).
     """
     ends, S = np.empty_like(first), np.zeros((3, 3))
     for w in range(len(first) - 1, -1, -1):

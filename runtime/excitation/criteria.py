@@ -1,21 +1,21 @@
-"""How well a motion lets the parameters be identified, and the limits that it must keep (chapter, section 2.2.3).
+"""Measure how well a motion lets the parameters be identified, and check its limits.
 
-The criterion is that of the observation matrix as an estimator uses it: rows of joint j divided by
-the deviation s_j of its torque, columns multiplied by the size of their parameter, so that
-parameters are compared by their relative error.
+The measure is a criterion of the weighted observation matrix W_w (chapter, section 2.2.3): rows of
+joint j are divided by the standard deviation s_j of its torque, columns are multiplied by the size
+of their parameter, so that parameters are compared by their relative error.
 
     W_w = diag(1/s_j) W diag(|X_i|)       cond      s_max/s_min of W_w
                                           logdet    -log det W_w'W_w
                                           sigma     largest %sigma_i, the root of the diagonal of C
-                                          record  largest %sigma_i over that of the motion of a
-                                          record: sigma with the deviations there as sizes
+                                          record    largest ratio of %sigma_i to its value with
+                                                    the motion of a record
 
 %sigma is predicted by `runtime.core.rows.predicted`.
 
-W is that of the identification: the motion, sampled at the controller rate, goes through the
-filters and the decimation of the study.
-Parameters smaller than a hundredth of the largest of their unit count as if they had that size.
-`runtime.excitation.search` searches the motion.
+W is the observation matrix of the identification: the motion, sampled at the controller rate,
+passes through the filters and the decimation of the study. Parameters smaller than a hundredth of
+the largest of their unit count as if they had that size. `runtime.excitation.search` searches the
+motion.
 """
 
 from __future__ import annotations
@@ -42,12 +42,12 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class MotionLimits:
-    """Limits of a motion, shape (n,) each.
+    """Limits of position, velocity, acceleration and torque of each joint, arrays of shape (n,).
 
     Attributes
     ----------
     lower, upper : ndarray, rad or m
-        Of the position.
+        Smallest and largest position.
     qd, qdd : ndarray, rad/s or m/s, rad/s^2 or m/s^2
         Largest velocity and acceleration.
     tau : ndarray, N m or N
@@ -61,7 +61,10 @@ class MotionLimits:
     tau: Array
 
     def of(self, share: float) -> MotionLimits:
-        """The limits with `share` of each kept free; of a range, of its half width."""
+        """Return narrower limits, which leave the fraction `share` of each limit free.
+
+        The range of positions shrinks about its middle.
+        """
         middle, half = (self.lower + self.upper) / 2, (1 - share) * (self.upper - self.lower) / 2
         return MotionLimits(
             middle - half, middle + half, *((1 - share) * x for x in (self.qd, self.qdd, self.tau))
@@ -70,16 +73,16 @@ class MotionLimits:
 
 @dataclass(frozen=True)
 class Excess:
-    """A limit that a motion exceeds.
+    """One limit that a motion exceeds, with the joint, the worst value and its time.
 
     Attributes
     ----------
     what : str
-        Quantity.
+        Name of the quantity, for instance "velocity".
     joint : str
-        What results call it.
+        Label of the joint.
     value, limit : float, SI
-        Largest value, and its limit.
+        Value at the worst instant, and the limit that it exceeds.
     time : float, s
     """
 
@@ -97,9 +100,9 @@ class Excess:
 
 
 def limits_of(model: GeneratedModel, given: Mapping[str, Any]) -> MotionLimits:
-    """The limits of the robot file, changed by `given`.
+    """Combine the limits of the robot file with the limits in `given`, which replace them.
 
-    Raises SettingsError if q, qd or qdd has none.
+    Raises SettingsError if q, qd or qdd has no limit.
     """
     n = len(model.JOINTS)
     known = {**dict(getattr(model, "LIMITS", None) or {}), **given}
@@ -145,9 +148,13 @@ def weights_of(
     essential: Sequence[str] = (),
     s: Sequence[float] = (),
 ) -> Weights:
-    """Columns, deviations and sizes of the parameters, from their values X by name.
+    """Choose the columns of W and the scales of its rows and columns, from parameter values X.
 
-    `essential`, `s`: those of an estimate if there is one.
+    Rows are scaled by the standard deviations of the torques, columns by the sizes of the
+    parameters.
+
+    `essential`, `s`: essential parameters, and standard deviations of the torques, of an estimate
+    if there is one.
     """
     n = len(model.JOINTS)
     names = base_columns(model, settings.columns, essential or model.BASE_PARAMETERS, "columns")
@@ -178,7 +185,10 @@ def weights_of(
 
 
 def criterion_of(weights: Weights, observation: Observation, criterion: str) -> float:
-    """Evaluate the criterion exactly, on the rows of the identification; smaller is better."""
+    """Compute the criterion of a motion from its observation matrix W; smaller is better.
+
+    The value is exact: W has the rows that the identification will use.
+    """
     if criterion == "cond":
         return weights.condition(observation)
     if criterion in (
@@ -192,7 +202,10 @@ def criterion_of(weights: Weights, observation: Observation, criterion: str) -> 
 
 
 def plan_rows(problem: Problem, motion: Motion, rate: float) -> Observation:
-    """W of the identification that a motion sampled at `rate`, Hz, will give; Y is zero. The time window of the rows is left out."""
+    """Build the observation matrix W that a planned motion, sampled at `rate` (Hz), will give.
+
+    Y is zero. The time window of the rows is ignored.
+    """
     t, q, *_ = motion.sampled(rate)
     record = Record(t=t, q=q, tau=np.zeros_like(q), rate=rate, name="planned motion")
     settings = problem.settings
@@ -212,10 +225,11 @@ def excesses(
     X: Array,
     rate: float | None = None,
 ) -> list[Excess]:
-    """Limits that the motion exceeds on the grid of the controller: the worst instant of each joint and quantity.
-    Distances are not among them.
+    """Find the limits that a motion exceeds: the worst instant of each joint and quantity.
 
-    The rate of the torque is that without dry friction, whose jump at a reversal no motion avoids.
+    The motion is sampled at `rate`, Hz; default: the controller rate of the settings. Distances
+    between spheres are not checked. The rate of change of the torque is computed without dry
+    friction, because no motion avoids the jump of dry friction at a reversal.
     """
     require(model, "inverse_dynamics")
     t, q, qd, qdd = motion.sampled(settings.rate if rate is None else rate)
@@ -260,9 +274,10 @@ def excesses(
 def usage(
     model: GeneratedModel, motion: Motion, limits: MotionLimits, rate: float, X: Array
 ) -> dict[str, list[float]]:
-    """Largest share of each limit that the motion uses at `rate`, Hz, by quantity and joint.
+    """Compute the largest share of each limit that the motion uses, by quantity and joint.
 
-    Shares of a range are measured from its middle.
+    A share of 1 is the limit. The motion is sampled at `rate`, Hz. The share of a position range is
+    measured from the middle of the range.
     """
     _, q, qd, qdd = motion.sampled(rate)
     middle, half = (limits.lower + limits.upper) / 2, (limits.upper - limits.lower) / 2

@@ -1,14 +1,14 @@
-"""IPOPT on CasADi's functions: from a random start to a motion of small criterion within the limits.
+"""Optimise a motion within its limits, from a random start, by IPOPT on CasADi functions.
 
-From each start, first -log det(W_w'W_w) is lowered, which is smooth and does not depend on the
-scale of a column, then the criterion itself.
-Condition numbers and largest deviations are followed by the smooth bounds
+From each start, the optimiser first minimises -log det(W_w'W_w), which is smooth and does not
+depend on the scale of a column, then the criterion itself. Condition numbers and largest standard
+deviations are replaced by the smooth bounds
 
     cond^2 <= (tr A^8 tr C^8)^(1/8),     max_i C_ii <= (sum_i C_ii^8)^(1/8),
             A = W_w'W_w, C = A^-1.
 
-Limits hold at the points of the grid, with a margin. sign(qd) is tanh(qd/v0), except for the rate of
-the torque, which leaves dry friction out.
+Limits hold at the points of the grid, with a margin. tanh(qd/v0) replaces sign(qd), except for the
+rate of the torque, which leaves dry friction out.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """Data that every start needs; sent once to each process.
+    """Data that every start of the search needs, sent to the processes that run the starts.
 
     Attributes
     ----------
@@ -44,9 +44,9 @@ class Search:
     weights : Weights
     limits : MotionLimits
     X : ndarray, shape (b,)
-        All base parameters, for torques.
+        All base parameters, used to compute torques.
     smooth : ndarray, shape (b,), 0 or 1
-        0 for the parameters of dry friction.
+        0 for the parameters of dry friction, 1 for all others.
     """
 
     model: GeneratedModel
@@ -58,7 +58,7 @@ class Search:
 
 
 def one_start(search: Search, number: int) -> Start:
-    """The motion that IPOPT reaches from the random start `number`."""
+    """Optimise a motion by IPOPT from the random start `number`."""
     rng = np.random.default_rng([search.settings.seed, number])
     guess = Motion(
         tuple(Part(family, _guess(search, family, rng)) for family in search.settings.parts)
@@ -67,7 +67,7 @@ def one_start(search: Search, number: int) -> Start:
 
 
 def improve(search: Search, number: int, guess: Motion) -> Start:
-    """The motion that IPOPT reaches from `guess`."""
+    """Optimise a motion by IPOPT, beginning with the motion `guess`."""
     settings, n = search.settings, len(search.weights.s)
     model = search.model
     p = [ca.MX.sym(f"p{k}", len(family.names), n) for k, family in enumerate(settings.parts)]
@@ -94,7 +94,10 @@ def improve(search: Search, number: int, guess: Motion) -> Start:
 
 
 def _states(settings: ExcitationSettings, p: Sequence[Any]) -> tuple[Any, Any, Any]:
-    """q, qd, qdd at the points of the grid, part after part, shape (M, n)."""
+    """Write q, qd, qdd at the points of the grid as expressions of the coefficients p.
+
+    Each result has shape (M, n); the parts of the motion follow each other.
+    """
     parts = []
     for family, coefficients in zip(settings.parts, p, strict=True):
         t = np.linspace(0.0, family.duration, max(3, round(family.duration * settings.grid) + 1))
@@ -111,7 +114,10 @@ def _information(
     qd: Any,
     qdd: Any,
 ) -> Any:
-    """A = sum_j W_wj'W_wj over the grid, shape (c, c)."""
+    """Write A = sum_j W_wj'W_wj / M over the M points of the grid, shape (c, c).
+
+    W_wj holds the weighted rows of joint j.
+    """
     n, M = len(weights.s), q.shape[0]
     inputs = [ca.SX.sym(name, n) for name in ("q", "qd", "qdd")]
     D = smoothed(model.casadi("regressor"), settings.smooth)(*inputs, *model.CONSTANTS.values())
@@ -124,14 +130,17 @@ def _information(
 
 
 def _logdet(A: Any) -> Any:
-    """-log det A by an expression of its Cholesky factor."""
+    """Write -log det A as an expression of the Cholesky factor of A."""
     S = ca.SX.sym("A", A.shape[0], A.shape[0])
     R = ca.chol(S)
     return ca.Function("logdet", [S], [-2 * ca.sum1(ca.log(ca.diag(R)))])(A)
 
 
 def _spread(A: Any, criterion: str) -> Any:
-    """Logarithm of a smooth bound of the criterion: of the condition number, or of the largest deviation."""
+    """Write the logarithm of a smooth upper bound of the squared criterion.
+
+    The criterion is the condition number of W_w, or the largest standard deviation.
+    """
     C = ca.solve(A, ca.DM.eye(A.shape[0]), "qr")
     if criterion in ("sigma", "record"):
         return ca.log(ca.sum1(ca.diag(C) ** 8)) / 8
@@ -142,7 +151,10 @@ def _spread(A: Any, criterion: str) -> Any:
 def _constraints(
     model: GeneratedModel, search: Search, p: Sequence[Any], q: Any, qd: Any, qdd: Any
 ) -> tuple[Any, Array, Array]:
-    """g(p) with its bounds, each divided by its scale."""
+    """Write the constraints lower <= g(p) <= upper of the motion, each divided by its scale.
+
+    Returns g, lower and upper.
+    """
     settings, limits = search.settings, search.limits.of(search.settings.margin)
     M = q.shape[0]
     half = (limits.upper - limits.lower) / 2
@@ -183,7 +195,10 @@ def _constraints(
 def _torques(
     model: GeneratedModel, search: Search, limits: MotionLimits, q: Any, qd: Any, qdd: Any
 ) -> list[tuple[Any, float, float]]:
-    """Torques, their root mean squares and rates of change, where they are limited."""
+    """Write the constraints on torques, on their root mean squares and on their rates of change.
+
+    Returns an expression, its lower and its upper bound for each quantity that is limited.
+    """
     settings = search.settings
     limited = np.isfinite(limits.tau)
     if not (limited.any() or settings.torque_rms or settings.torque_rate):
@@ -221,7 +236,11 @@ def _torques(
 def _distances(
     model: GeneratedModel, settings: ExcitationSettings, q: Any
 ) -> list[tuple[Any, float, float]]:
-    """Squared distances of spheres that must stay apart, relative to the squares of the smallest allowed."""
+    """Write the constraints on the distances between spheres that must stay apart.
+
+    Each squared distance is divided by the square of the smallest allowed distance. Returns the
+    expression with its lower and upper bounds.
+    """
     if not settings.pairs:
         return []
     n, M = q.shape[1], q.shape[0]
@@ -268,7 +287,11 @@ def _minimised(
     range_of_g: tuple[Array, Array],
     iterations: int,
 ) -> tuple[Array, float, float, str]:
-    """Minimise the criterion; returns x, its value, the largest violation, and IPOPT's message."""
+    """Minimise the criterion of a nonlinear program by IPOPT, beginning with `guess`.
+
+    Returns x, the value of the criterion, the largest violation of a constraint, and the message of
+    IPOPT.
+    """
     options: dict[str, Any] = {
         "ipopt": {
             "hessian_approximation": "limited-memory",
@@ -298,7 +321,7 @@ def _minimised(
 
 
 def smoothed(function: Any, v0: float) -> Any:
-    """The ca.Function of scalars with tanh(u/v0) in place of every sign(u)."""
+    """Copy a CasADi function of scalars, with tanh(u/v0) in place of every sign(u)."""
     inputs = function.sx_in()
     columns = [ca.vertsplit(x) if x.numel() else [] for x in inputs]
     results = [[0.0] * function.nnz_out(k) for k in range(function.n_out())]
@@ -326,7 +349,10 @@ def smoothed(function: Any, v0: float) -> Any:
 
 
 def _at(family: Any, p: Any, t: Array) -> list[Any]:
-    """q, qd, qdd of all joints at the times t, shape (M,): (M, n) each."""
+    """Compute q, qd, qdd of all joints at the times t, shape (M,), from the coefficients p.
+
+    Each result has shape (M, n).
+    """
     joints = [family.joint(t, column, ca) for column in ca.horzsplit(p)]
     return [ca.horzcat(*(joint[k] for joint in joints)) for k in range(3)]
 

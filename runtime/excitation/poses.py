@@ -1,12 +1,12 @@
-"""Poses at rest that let the parameters of gravity be identified as well as the range of the joints allows.
+"""Search static poses that determine the gravity parameters best, within the limits of the joints.
 
-Of c parameters, W the rows of the poses over the deviations s_j of the torques, W0 those of the
-poses of a record, if there is one:
+W holds the rows of the poses, divided by the standard deviations s_j of the torques; W0 holds the
+rows of poses that were recorded already, if there are any. The search finds
 
     max log det M,  M = W0'W0 + W'W        C = M^-1, the predicted covariance
 
-by exchange: each pose in turn gives way to the one of CANDIDATES random ones that enlarges the
-determinant most, until none does; the best of several random starts.
+by exchange: each pose in turn is replaced by the one of CANDIDATES random poses that enlarges the
+determinant most, until no pose does. The result is the best of several random starts.
 
 References: Fedorov (1972), Theory of Optimal Experiments; Atkinson, Donev and Tobias (2007).
 """
@@ -37,23 +37,25 @@ LARGEST_CONDITION = 1e4  # of W; beyond, poses do not determine the parameters
 
 @dataclass(frozen=True, eq=False)
 class StaticPoses(Result, keys="poses condition sigma compared s taken_in"):
-    """Poses at rest, compared with the recorded poses, or with the same number of random ones.
+    """Static poses that the search found, compared with recorded poses or with random poses.
 
     Attributes
     ----------
     model : GeneratedModel
     poses : ndarray, shape (N, n), rad or m
     condition : pair of float
-        Of W, columns of length 1 over all candidates: with these poses (and those of the record),
-        and by what they are compared with; inf: not every parameter is determined.
+        Condition number of W, whose columns have length 1 over all candidates: with these poses
+        (and the poses of the record), and with the poses of the comparison; inf: not every
+        parameter is determined.
     sigma : dict of pairs of float, SI
-        Predicted deviations of each parameter that rest shows, alike.
+        Predicted standard deviations of each parameter that acts at rest, in the same two cases.
     compared : str
-        What they are compared with.
+        Poses of the comparison: the record alone, or as many random poses.
     s : ndarray, shape (n,), N m or N
-        Deviations of the torques.
+        Standard deviations of the torques.
     taken_in : tuple of str
-        Parameters left out, whose torques at rest are those of others, which take them in.
+        Parameters left out, because their torques at rest are combinations of the torques of
+        others.
     """
 
     model: GeneratedModel
@@ -65,7 +67,10 @@ class StaticPoses(Result, keys="poses condition sigma compared s taken_in"):
     taken_in: tuple[str, ...]
 
     def to_table(self) -> str:
-        """Condition, deviations and poses as text, and what the search did not check."""
+        """Write condition numbers, standard deviations and poses as text.
+
+        The text also says what the search did not check.
+        """
         lost = ", ".join(self.taken_in)
         sigma = Table(
             "",
@@ -90,19 +95,21 @@ class StaticPoses(Result, keys="poses condition sigma compared s taken_in"):
 
 
 def static_poses(problem: Problem) -> StaticPoses:
-    """Search poses at rest that determine the gravity parameters best, within the limits of q.
+    """Search the static poses that determine the gravity parameters best, within the limits of q.
 
-    study.excitation.poses is their number, default 20.
+    study.excitation.poses is the number of poses, default 20.
 
     Parameters
     ----------
     problem : Problem
-        Prepared; its records are poses at rest that were recorded already, which stay: the next ones are sought. Section `excitation` of the settings: poses, limits, columns, torque_sigma (default: 1), starts, seed.
+        Prepared problem. Its records are static poses that were recorded already; they stay, and
+        the search adds poses to them. Section `excitation` of the settings: poses, limits, columns,
+        torque_sigma (default: 1), starts, seed.
 
     Raises
     ------
     InputError
-        Too few poses, no parameter that acts at rest, no limits of q, a record of a motion.
+        Too few poses, no parameter that acts at rest, no limits of q, or a record of a motion.
     """
     model, settings = problem.model, cast(Any, problem.settings).excitation or ExcitationSettings()
     if problem.records and problem.settings.signals.reader != "static":
@@ -153,14 +160,20 @@ def static_poses(problem: Problem) -> StaticPoses:
 
 
 def _rows_at_rest(model: GeneratedModel, q: Array, names: Sequence[str]) -> Array:
-    """Columns `names` of the regressor in poses q, shape (K, n, c)."""
+    """Compute the regressor columns `names` at rest in the poses q, shape (K, n).
+
+    The result has shape (K, n, c).
+    """
     rest = np.zeros_like(q)
     numbers = [model.BASE_PARAMETERS.index(name) for name in names]
     return np.asarray(model.regressor(q, rest, rest))[..., numbers]
 
 
 def _acting(model: GeneratedModel, q: Array, columns: Any) -> tuple[str, ...]:
-    """The base parameters, or those of `columns`, that have a torque in poses q."""
+    """Find the base parameters among `columns` that cause a torque at rest in the poses q.
+
+    The values essential and all of `columns` mean all base parameters.
+    """
     names = tuple(model.BASE_PARAMETERS)
     size = np.abs(_rows_at_rest(model, q, names)).max(axis=(0, 1))
     acting = {name for name, x in zip(names, size, strict=True) if x > 1e-9 * size.max()}
@@ -174,12 +187,15 @@ def _acting(model: GeneratedModel, q: Array, columns: Any) -> tuple[str, ...]:
 
 
 def _sum(A: Array, M: Array, chosen: Array) -> Array:
-    """Add the rows of these poses to M; A, shape (K, n, c), holds those of all candidates."""
+    """Add W'W of the chosen poses to M.
+
+    A, shape (K, n, c), holds the rows of all candidate poses; `chosen` holds indices of poses.
+    """
     return np.asarray(M + np.einsum("kni,knj->ij", A[chosen], A[chosen]))
 
 
 def _exchanged(A: Array, M: Array, chosen: Array) -> Array:
-    """Exchange poses one by one while this helps; returns the numbers of the poses."""
+    """Exchange poses one by one while this enlarges det M; return the indices of the poses."""
     chosen, before = chosen.copy(), np.empty(0)
     while not np.array_equal(chosen, before):
         before = chosen.copy()
@@ -191,6 +207,10 @@ def _exchanged(A: Array, M: Array, chosen: Array) -> Array:
 
 
 def _quality(M: Array) -> tuple[float, Array]:
-    """Condition of W, and deviations, shape (c,); all infinite if it does not determine the parameters."""
+    """Compute the condition number of W and the standard deviations of the parameters from M = W'W.
+
+    The standard deviations have shape (c,). All results are infinite if the condition number is
+    LARGEST_CONDITION or more: then W does not determine the parameters.
+    """
     condition, sigma = float(np.sqrt(np.linalg.cond(M))), np.sqrt(np.diag(np.linalg.inv(M)))
     return (condition, sigma) if condition < LARGEST_CONDITION else (np.inf, np.inf * sigma)

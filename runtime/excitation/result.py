@@ -1,7 +1,7 @@
-"""The result of a search for an exciting motion: the motion, what it promises, how far it uses the limits.
+"""Result of a search for an exciting motion: the motion, its precision, its use of the limits.
 
-Every figure is that of the rows the identification will use, with sign(qd) itself. No CasADi here:
-pages read results without it.
+Every figure is computed from the rows that the identification will use, with the exact sign(qd).
+This module does not use CasADi: pages read results without it.
 """
 
 from __future__ import annotations
@@ -27,19 +27,20 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Result of one start.
+    """The motion that the optimiser reached from one random start.
 
     Attributes
     ----------
     number : int
+        Number of the start.
     motion : dict
-        As a mapping.
+        The motion as a mapping.
     criterion : float
-        Of the optimiser.
+        Value of the criterion in the optimiser.
     message : str
-        What the optimiser says at its end.
+        Message of the optimiser at its end.
     violation : float
-        Largest one of a constraint at the points of the grid, of its scale.
+        Largest violation of a constraint at the points of the grid, relative to its scale.
     """
 
     number: int
@@ -51,17 +52,17 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """Parameters that the search uses, and the quality of the recorded motion.
+    """Parameter values that the search uses, and the precision of the recorded motion.
 
     Attributes
     ----------
     X : ndarray, shape (b,)
         All base parameters.
     source : str
-        Where they come from.
+        Text that says where the values come from.
     weights : Weights
     condition : float or None
-        Of W_w of the records; None without records.
+        Condition number of W_w of the records; None without records.
     relative_sigma : dict
         Predicted %sigma by name on the motion of the records; empty without records.
     """
@@ -75,24 +76,25 @@ class Known:
 
 @dataclass(frozen=True, eq=False)
 class Excitation(Result):
-    """The best motion of a search.
+    """The best motion of a search, with its predicted precision.
 
     Attributes
     ----------
     model : GeneratedModel
     motion : Motion
     condition : float
-        Of W_w on the rows of the identification.
+        Condition number of W_w on the rows of the identification.
     relative_sigma : dict
         Predicted %sigma by name.
     starts : tuple of Start
-        All of them, by number.
+        All starts, by number.
     margin : float
-        Share of the limits kept free at the points of the grid, as it had to be.
+        Share of the limits left free at the points of the grid. It was enlarged if the motion
+        exceeded a limit between these points.
     settings : ExcitationSettings
     limits : MotionLimits
     known : Known
-        Parameters that the search uses.
+        Parameter values that the search uses, and the precision of the recorded motion.
     """
 
     model: GeneratedModel
@@ -106,25 +108,33 @@ class Excitation(Result):
     known: Known
 
     def sampled(self) -> tuple[Array, Array, Array, Array, Array]:
-        """t, shape (N,), and q, qd, qdd, tau, shape (N, n), at the controller rate."""
+        """Sample the motion and its torque at the controller rate.
+
+        Returns t, shape (N,), and q, qd, qdd, tau, shape (N, n); tau is the torque of the model.
+        """
         t, q, qd, qdd = self.motion.sampled(self.settings.rate)
         return t, q, qd, qdd, self.model.inverse_dynamics(q, qd, qdd, self.known.X)
 
     def to_csv(self) -> str:
-        """t, q1 ..., qd1 ..., qdd1 ... at the controller rate, SI: a reference that `simulate`
-        reads.
+        """Write the motion as CSV text, a reference file for `simulate`.
+
+        The columns are t, q1 ..., qd1 ..., qdd1 ... at the controller rate, in SI units.
         """
         t, q, qd, qdd, _ = self.sampled()
         return csv_text(t, q=q, qd=qd, qdd=qdd)
 
     @property
     def usage(self) -> dict[str, list[float]]:
-        """Largest share of each limit that the motion uses, by quantity and joint."""
+        """Largest share of each limit that the motion uses, by quantity and joint; 1: the limit."""
         return usage(self.model, self.motion, self.limits, self.settings.rate, self.known.X)
 
     @property
     def worse(self) -> dict[str, float]:
-        """Parameters that the recorded motion determines better, by name, with the ratio of %sigma, largest first."""
+        """Parameters that the recorded motion determines better than this motion.
+
+        For each name: ratio of the %sigma of this motion to the %sigma of the recorded motion,
+        largest first.
+        """
         before = self.known.relative_sigma
         ratios = {
             name: sigma / before[name]
@@ -140,7 +150,7 @@ class Excitation(Result):
 
     @property
     def comparison(self) -> str:
-        """Comparison with the motion of the record in one sentence; "" without a record."""
+        """Sentence that compares this motion with the motion of the record; "" without a record."""
         before, worse = self.known.relative_sigma, self.worse
         if not before:
             return ""
@@ -165,7 +175,7 @@ class Excitation(Result):
 
     @property
     def torques(self) -> str:
-        """A sentence that names joints without a torque limit; "" if there are none."""
+        """Sentence that names the joints without a torque limit; "" if there are none."""
         free = [
             j
             for j, limit in zip(joint_labels(self.model), self.limits.tau, strict=True)
@@ -182,9 +192,9 @@ class Excitation(Result):
 
     @property
     def verdict(self) -> str:
-        """One text: the condition number, the least certain parameter, and which limits are unknown.
+        """Text with the condition number, the least certain parameter, and the unknown limits.
 
-        It also says where the motion of the record is better.
+        It also names the parameters that the motion of the record determines better.
         """
         of_record = (
             ""
@@ -205,7 +215,7 @@ class Excitation(Result):
         )
 
     def summary(self) -> dict[str, Any]:
-        """Everything as JSON values: excitation.json."""
+        """Return all figures as JSON values, for the file excitation.json."""
         return {
             "robot": self.model.NAME,
             "parameters_from": self.known.source,
@@ -231,7 +241,10 @@ class Excitation(Result):
         }
 
     def sigma_table(self, most: int | None = None) -> Table:
-        """Predicted %sigma, and that of the recorded motion, for the `most` least certain parameters."""
+        """Make a table of the predicted %sigma of the `most` least certain parameters.
+
+        If there is a record, a second column gives the %sigma of the recorded motion.
+        """
         before = self.known.relative_sigma
         worst = sorted(self.relative_sigma.items(), key=lambda item: -item[1])[:most]
         rows = [
@@ -250,7 +263,7 @@ class Excitation(Result):
         )
 
     def usage_table(self) -> Table:
-        """Share of the limits used, by quantity and joint."""
+        """Make a table of the share of each limit that the motion uses, %, by joint."""
         rows = [(what, *(f"{100 * x:.1f}" for x in shares)) for what, shares in self.usage.items()]
         note = "At the controller rate. 100 is the limit; the optimiser keeps a margin."
         return Table(
@@ -261,7 +274,7 @@ class Excitation(Result):
         )
 
     def starts_table(self) -> Table:
-        """How every start ended."""
+        """Make a table of all starts: criterion, violation, and message of the optimiser."""
         rows = [
             (str(s.number), f"{s.criterion:.4g}", f"{s.violation:.1e}", s.message)
             for s in self.starts
@@ -269,7 +282,7 @@ class Excitation(Result):
         return Table("Starts", ("start", "criterion", "violation", "end"), rows)
 
     def to_table(self) -> str:
-        """Verdict, the least certain parameters, how far the limits are used."""
+        """Write the verdict, the least certain parameters and the use of the limits as text."""
         return "\n\n".join(
             [
                 self.verdict,

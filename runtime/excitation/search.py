@@ -1,12 +1,12 @@
-"""Exciting motions: the search from several random starts, and what its best motion promises.
+"""Search an exciting motion from random starts, and predict the precision of the best motion.
 
     excitation = excite(model, record, study)         # section `excitation` of the study
     excitation.verdict, excitation.relative_sigma     # predicted %sigma of every parameter
     t, q, qd, qdd, tau = excitation.sampled()
 
-The margin at the points of the optimiser's grid (`runtime.excitation.optimiser`) is widened until
-the limits hold at the controller rate. Every figure of the result is that of the rows the
-identification will use, with sign(qd) itself.
+The margin at the points of the optimiser's grid (`runtime.excitation.optimiser`) is enlarged until
+the motion keeps the limits at the controller rate. Every figure of the result is computed from the
+rows that the identification will use, with the exact sign(qd).
 """
 
 from __future__ import annotations
@@ -44,24 +44,26 @@ def excite(
     map: Callable[..., Iterable[Any]] = map,
     progress: Callable[[int, int], None] | None = None,
 ) -> Excitation:
-    """Search the motion with the smallest criterion, from all starts of study.excitation.
+    """Search the motion with the smallest criterion that keeps the limits at the controller rate.
 
-    It keeps the limits at the controller rate.
+    The search runs from all starts of study.excitation.
 
     Parameters
     ----------
     problem : Problem
-        Prepared. The estimate of its records gives parameters and deviations of the torques; without records, the values of the robot file serve.
+        Prepared problem. The estimate from its records gives the parameters and the standard
+        deviations of the torques; without records, the values of the robot file are used.
     map : callable, optional
-        As the built-in one, such as `runtime.parallel.processes.processes`; results do not depend on it.
+        Function like the built-in `map`, such as `runtime.parallel.processes.processes`; results do
+        not depend on it.
     progress : callable, optional
-        Called after each start with the number done and their total.
+        Function called after each start with the number of starts done and their total.
 
     Raises
     ------
     InputError
-        No start keeps the limits, with the limit that was missed most; or the parameters are known
-        neither from a record nor from the robot file.
+        No start keeps the limits (the message gives the largest violation of the best start); or
+        the parameters are known neither from a record nor from the robot file.
     """
     model = problem.model
     study: Any = problem.settings
@@ -132,11 +134,10 @@ def excite(
 def _within(
     model: GeneratedModel, search: Search, starts: Sequence[Start]
 ) -> Iterator[tuple[Motion, float]]:
-    """Select the motions that stay within the limits at the controller's rate.
+    """Yield motions that keep the limits at the controller rate, each with the margin it needed.
 
-    Each comes with the margin that this took.
-
-    None of a start where wider ones do not help.
+    If a motion exceeds a limit between grid points, it is optimised again with twice the margin, a
+    few times. A start that still exceeds a limit yields nothing.
     """
     for start in starts:
         settings = search.settings
@@ -152,7 +153,11 @@ def _within(
 
 
 def _known_estimate(problem: Problem, settings: ExcitationSettings) -> Known:
-    """Estimate, deviations, essential parameters, condition and %sigma of the records, or the values of the robot file."""
+    """Collect the parameter values that the search uses, and the precision of the recorded motion.
+
+    They come from an estimate with the records; without records, the values come from the robot
+    file.
+    """
     model, records, study = problem.model, problem.records, problem.settings
     if not records:
         X = parameters_of(model)

@@ -1,4 +1,4 @@
-"""The `excitation` section of a study: what is asked of an exciting motion."""
+"""The `excitation` section of a study: settings of the search for an exciting motion."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MOST_INSTANTS = {"grid": 2e4, "rate": 2e7}
 
 
 class Sphere(Settings):
-    """A ball that moves with a frame.
+    """A sphere fixed to a frame of the robot, used to keep links apart.
 
     Attributes
     ----------
@@ -34,53 +34,54 @@ class Sphere(Settings):
 
 
 class ExcitationSettings(Settings):
-    """The search for an exciting motion.
+    """Settings of the search for an exciting motion.
 
     Attributes
     ----------
     parts : tuple of Family
         Families in the order of the motion (`runtime.loop.trajectories`).
     poses : int or None
-        So many poses at rest are sought in place of a motion, for `signals.reader: static`
-        (`runtime.excitation.poses`); null: a motion.
+        Number of static poses to search instead of a motion, for `signals.reader: static`
+        (`runtime.excitation.poses`); null: search a motion.
     criterion : str
-        record, cond, logdet or sigma; auto: record if there is one, else cond. record is the
-        largest predicted %sigma over that of the motion of the record: below 1, every parameter is
-        told better than by it.
+        record, cond, logdet or sigma; auto: record if there is a record, else cond. record is the
+        largest ratio of the predicted %sigma of a parameter to its %sigma with the motion of the
+        record: if it is below 1, the new motion determines every parameter better.
     columns : str or tuple of str
-        essential (of an estimate), all, or names.
+        Parameters that the motion must determine: essential (of an estimate), all, or names.
     limits : mapping
-        q, qd, qdd, tau in place of those of the robot file: one value per joint, or [lower, upper]
-        for q.
+        q, qd, qdd, tau that replace the limits of the robot file: one value per joint, or
+        [lower, upper] for q.
     torque_rms : tuple of float or None, N m or N
         Largest root mean square of each torque; null: unlimited.
     torque_rate : tuple of float or None, N m/s or N/s
         Largest rate of change of each torque; null: unlimited.
     margin : float
-        Share of every limit that the optimiser keeps free between its grid points.
+        Share of every limit that the optimiser leaves free, since it checks the limits at its grid
+        points only.
     grid : float, Hz
-        Points of the optimiser.
+        Sampling rate of the motion inside the optimiser.
     rate : float, Hz
         Rate of the controller.
     begin : tuple of float or None, rad or m
         Positions at the start; null: free.
     spheres : tuple of Sphere
-        Balls on the links.
+        Spheres fixed to the links.
     apart : tuple of pairs of int or None
-        Pairs of balls, by number from 1, that stay apart; null: every pair on frames that are not
-        next to each other.
+        Pairs of spheres, numbered from 1, that must keep a distance; null: every pair whose frame
+        numbers differ by more than 1.
     gap : float, m
         Smallest distance between the surfaces of such a pair.
     smooth : float, rad/s or m/s
         v0 of tanh(qd/v0), which replaces sign(qd) inside the optimiser only.
     torque_sigma : tuple of float or None, N m or N
-        Deviation s_j of each torque; null: those of an estimate, else 1 for every joint.
+        Standard deviation s_j of each torque; null: from an estimate, else 1 for every joint.
     starts : int
-        Random starts.
+        Number of random starts.
     iterations : int
-        Iterations of the optimiser in each of its two stages.
+        Largest number of iterations of the optimiser in each of its two stages.
     seed : int
-        Seed of the starts.
+        Seed of the random starts.
     """
 
     parts: Annotated[Many[AnyFamily], Field(min_length=1)] = (
@@ -125,7 +126,7 @@ class ExcitationSettings(Settings):
 
     @property
     def pairs(self) -> tuple[tuple[int, int], ...]:
-        """Pairs of spheres that stay apart, numbered from 0."""
+        """Pairs of spheres that must keep a distance, by their indices from 0."""
         if self.apart is not None:
             return tuple((a - 1, b - 1) for a, b in self.apart)
         count = range(len(self.spheres))

@@ -1,23 +1,24 @@
-"""The friction of every joint as a curve against velocity, and which law it follows.
+"""Friction curve of each joint: friction torque against velocity, and the law that describes it.
 
     f_j = Y_j - W_j X without the friction and offset of joint j
-            (Y, W decimated, X of a fit of all parameters)
+            (Y, W decimated, X estimated for all parameters)
 
     coulomb+viscous   FS s + FV v + OFFSET                                  s = sign(v)
     asymmetric        FSP, FVP forward, FSN, FVN backward
     stribeck          FS s + FV v + OFFSET + FST s exp(-(v/VS)^2)
             FST the excess at standstill, VS its velocity
     load              FS s + FV v + OFFSET + FL s |tau_r|
-            tau_r the rigid-body torque the transmission carries
+            tau_r the rigid-body torque that the transmission transmits
     stribeck+load     both
 
-Every term is built at the rate of the record and decimated like Y, so that the filter rounds
-sign(v) on both sides alike. Every law contains the first and is linear except for VS, which is
-searched (its F-test is approximate: VS means nothing if FST = 0). Residuals are correlated:
-deviations take blocks of time as independent, and the F-test and Akaike's criterion count N/T
-samples, T the correlation time of the residual in rows. The law is chosen on blocks of time that
-did not fit it. X is held: this says what form friction has, not what the other parameters would be
-with it.
+Every term is computed at the rate of the record and decimated like Y, so that the filter rounds
+sign(v) on both sides in the same way. Every law contains the first one. All parameters are linear
+except VS, which is searched; therefore the F-test of VS is approximate (VS means nothing if FST =
+0). Residuals are correlated in time: standard deviations take blocks of time as independent, and
+the F-test and Akaike's criterion count N/T samples, with T the correlation time of the residual in
+rows. The law is chosen by its error on blocks of time that were not used in its fit. X is not
+estimated again: the curve shows the form of the friction, not how the other parameters would
+change.
 
 References: Armstrong-Helouvry, Dupont and Canudas de Wit (1994), section 2, for the laws; Hamon,
 Gautier and Garrec (2010) for friction that grows with the load.
@@ -67,7 +68,7 @@ OWN = ("viscous", "coulomb", "offset")  # kinds of elements that make the curve
 
 @dataclass(frozen=True)
 class FrictionLaw:
-    """One law fitted to one joint.
+    """One friction law fitted to one joint.
 
     Attributes
     ----------
@@ -75,15 +76,15 @@ class FrictionLaw:
     parameters : mapping of str to float
         Values by name, SI.
     sigma : mapping of str to float
-        Deviations by blocks of time.
+        Standard deviations by name, with blocks of time as independent.
     error : float, %
         100 ||f - law|| / ||f|| on all rows.
     held_out : float, %
-        The same on blocks of time that did not fit the law.
+        The same error on blocks of time that were not used in the fit.
     aic : float
         Akaike's criterion minus that of the first law.
     p_value : float
-        Of the F-test against the first law; 1 for the first law itself.
+        p-value of the F-test against the first law; 1 for the first law itself.
     """
 
     name: str
@@ -97,7 +98,7 @@ class FrictionLaw:
 
 @dataclass(frozen=True, eq=False)
 class FrictionCurve:
-    """Friction of one joint against its velocity.
+    """Friction of one joint against its velocity, with the fitted friction laws.
 
     Attributes
     ----------
@@ -111,11 +112,11 @@ class FrictionCurve:
     mean : ndarray, shape (k,), N m or N
         Mean friction of each bin.
     half : ndarray, shape (k,), N m or N
-        Half width of the 95 % interval of the mean.
+        Half width of the 95 % confidence interval of the mean.
     laws : tuple of FrictionLaw
-        The first is Coulomb and viscous.
+        The fitted laws; the first is Coulomb and viscous.
     law_name : str
-        Name of the law that predicts.
+        Name of the chosen law.
     law_torques : mapping of str to ndarray, shape (k,), N m or N
         Mean torque of each law in each bin, by name of the law.
     """
@@ -132,18 +133,18 @@ class FrictionCurve:
 
     @property
     def law(self) -> FrictionLaw:
-        """The law that predicts."""
+        """The chosen friction law."""
         return next(law for law in self.laws if law.name == self.law_name)
 
     def to_table(self) -> str:
-        """Laws line by line, then the parameters of the one that predicts."""
+        """Write a table of the laws as text, then the parameters of the chosen law and the note."""
         compared, predicting = law_tables([self])
         parts = [compared.to_text(), f"{self.label}: {predicting.rows[0][2]}", self.note]
         return "\n".join(part for part in parts if part)
 
     @property
     def label(self) -> str:
-        """Name of the law that predicts; says where its Stribeck term makes no peak."""
+        """Name of the chosen law; "(no peak)" is added if its Stribeck term FST is negative."""
         return (
             f"{self.law_name} (no peak)"
             if self.law.parameters.get("FST", 1.0) < 0
@@ -152,7 +153,7 @@ class FrictionCurve:
 
     @property
     def note(self) -> str:
-        """Meaning of the sign of FST; empty for laws without it."""
+        """Sentence that explains the sign of FST; empty for a law without FST."""
         excess = self.law.parameters.get("FST")
         if excess is None:
             return ""
@@ -161,7 +162,7 @@ class FrictionCurve:
         return "FST is negative: friction falls towards standstill, there is no Stribeck peak; the term bends the curve of viscous friction"
 
     def summary(self) -> dict[str, Any]:
-        """The curve as a mapping for JSON."""
+        """Return the curve and its laws as a mapping for JSON."""
         curve = {"velocity": self.centre, "torque": self.mean, "half_interval": self.half}
         return {
             "joint": self.joint,
@@ -174,13 +175,13 @@ class FrictionCurve:
 
 @dataclass(frozen=True, eq=False)
 class Friction(Part):
-    """Friction of the joints.
+    """Friction curves of all joints, a part of the report.
 
     Attributes
     ----------
     curves : tuple of FrictionCurve
     unit : str
-        Of the torques.
+        Unit of the torques.
     """
 
     curves: tuple[FrictionCurve, ...]
@@ -190,29 +191,32 @@ class Friction(Part):
     title = "Friction curves"
 
     def text(self) -> str:
-        """Say how a law is chosen, and what the signs of the curves mean."""
+        """Explain how a law is chosen, and what the sign of FST means for each joint."""
         notes = [f"Joint {curve.joint}: {curve.note}." for curve in self.curves if curve.note]
         return "\n".join([CHOSEN, *notes])
 
     def brief(self) -> str:
-        """Laws joint by joint."""
+        """Write the laws of every joint as tables of text."""
         return "\n\n".join(curve.to_table() for curve in self.curves)
 
     def tables(self) -> tuple[Table, Table]:
-        """The laws compared, and the parameters of those that predict."""
+        """Make a table that compares the laws, and a table of the parameters of the chosen laws."""
         return law_tables(self.curves)
 
     def figures(self) -> tuple[Figure, ...]:
-        """Friction against velocity."""
+        """Make the figure of friction torque against velocity."""
         return (friction_figure(self.curves, self.unit),)
 
     def summary(self) -> list[dict[str, Any]]:
-        """Curve by curve."""
+        """Return the curves as a list of mappings for JSON."""
         return [curve.summary() for curve in self.curves]
 
 
 def friction_figure(curves: Sequence[FrictionCurve], unit: str = "N m") -> Figure:
-    """Friction against velocity: rows in grey, bins with their 95 % intervals, the first law and the one that predicts."""
+    """Make the figure of friction torque against velocity, with one plot per joint.
+
+    It shows the rows in grey, the bins with their 95 % intervals, the first law and the chosen law.
+    """
     speed = "m/s" if unit == "N" else "rad/s"
     first: Any = {"color": BLUE, "linewidth": 1.2, "linestyle": "--"}
     bins: Any = {"fmt": "o", "color": BLACK, "markersize": 3, "linewidth": 1.0}
@@ -244,14 +248,17 @@ def friction_figure(curves: Sequence[FrictionCurve], unit: str = "N m") -> Figur
 
 
 def friction(result: Identification) -> Friction:
-    """Friction of the joints by the estimate of all parameters."""
+    """Compute the friction curves of all joints from the result of an identification."""
     if not result.determined:
         raise InputError("the record does not determine the parameters")
     return Friction(friction_curves(result.problem, result.estimate), result.torque_unit)
 
 
 def law_tables(curves: Sequence[FrictionCurve]) -> tuple[Table, Table]:
-    """The laws compared joint by joint, and the parameters of those that predict."""
+    """Make a table that compares the laws of each joint, and a table of the chosen laws.
+
+    The second table holds the parameters of each chosen law with their standard deviations.
+    """
     compared = [
         (
             *(curve.joint, law.name, number(law.error, ".2f"), number(law.held_out, ".2f")),
@@ -284,7 +291,10 @@ def law_tables(curves: Sequence[FrictionCurve]) -> tuple[Table, Table]:
 
 
 def friction_curves(problem: Problem, fit: Estimate) -> tuple[FrictionCurve, ...]:
-    """Friction against velocity, one curve per joint, from the records of a prepared problem and an estimate of all parameters."""
+    """Compute the friction curve of each joint from a prepared problem and an estimate.
+
+    The estimate must contain all parameters.
+    """
     require_motion(problem.settings.signals, "a friction curve")
     model = problem.model
     require(model, "inverse_dynamics")
@@ -311,7 +321,7 @@ def own_friction(model: GeneratedModel, j: int) -> list[int]:
 
 
 def _terms(model: GeneratedModel, record: Prepared, fit: Estimate, number: int) -> list[Terms]:
-    """Terms of every joint of one record."""
+    """Compute the friction torque and the terms of the laws of every joint of one record."""
     selection = record.certain(model)
     observation = record.observation(model)
     window = record.states[selection.samples]
@@ -403,9 +413,10 @@ def _curve(joint: str, terms: Terms) -> FrictionCurve:
 
 
 def _predicting(laws: Sequence[FrictionLaw]) -> str:
-    """Choose the law with the smallest held-out error among those whose terms are significant.
+    """Choose the law with the smallest held-out error among the significant laws.
 
-    If there is none, it is the first law.
+    A law must also predict clearly better than the first law. If no law does, the first law is
+    chosen.
     """
     first, *others = laws
     worth = [
@@ -417,7 +428,11 @@ def _predicting(laws: Sequence[FrictionLaw]) -> str:
 
 
 def _bins(terms: Terms) -> tuple[Array, Array, Array, Callable[[Array], Array]]:
-    """Centres, means and half intervals over bins of about equal numbers of rows, none across standstill; and the function that averages over them."""
+    """Average the friction torque over bins of velocity that hold about equal numbers of rows.
+
+    No bin contains both directions of motion. Returns the centres, the means, the half widths of
+    the 95 % intervals, and the function that averages any signal over the bins.
+    """
     sides = [terms.v[terms.v < 0], terms.v[terms.v >= 0]]
     shares = [max(round(LIMIT.FRICTION_BINS * len(side) / len(terms.v)), 1) for side in sides]
     inner = [

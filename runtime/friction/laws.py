@@ -1,8 +1,7 @@
-"""Laws of friction as terms of a least-squares fit.
+"""Friction laws, fitted to the friction torque of one joint by least squares.
 
-How well each predicts is asked of rows that did not fit it.
-
-Laws, signs and references: `runtime.friction.curves`.
+The prediction error of each law is measured on rows that were not used in its fit. The laws, their
+signs and references are in `runtime.friction.curves`.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """Signals of one joint at the rows of its curve.
+    """Friction torque, velocity and terms of the friction laws of one joint, row by row.
 
     Attributes
     ----------
@@ -36,9 +35,9 @@ class Terms:
     block : ndarray of int, shape (N,)
         Block of time of each row.
     linear : mapping of str to ndarray, shape (N,)
-        Terms of the laws by the name of their parameter.
+        Linear terms of the laws, by the name of their parameter.
     excess : function of float to ndarray, shape (N,), or of ndarray, shape (k,), to (k, N)
-        The term of FST for a given VS, or for several.
+        The Stribeck term, multiplied by FST, for one value of VS or for several.
     """
 
     f: Array
@@ -49,7 +48,7 @@ class Terms:
 
     @cached_property
     def grid(self) -> tuple[Array, Array]:
-        """Logarithms of the VS among which a search begins, shape (k,), and the term of FST for each, shape (k, N)."""
+        """Starting values of log(VS), shape (k,), and the Stribeck term for each, shape (k, N)."""
         x = np.log(
             np.abs(self.v).max()
             * np.geomspace(LIMIT.STRIBECK_SLOWEST, LIMIT.STRIBECK_FASTEST, LIMIT.STRIBECK_GRID)
@@ -67,7 +66,7 @@ LAWS: Mapping[str, tuple[str, ...]] = {
 
 
 def joined(parts: Sequence[Terms]) -> Terms:
-    """Join the rows of several records."""
+    """Join the rows of one joint from several records."""
     linear = {
         name: np.concatenate([part.linear[name] for part in parts]) for name in parts[0].linear
     }
@@ -79,7 +78,7 @@ def joined(parts: Sequence[Terms]) -> Terms:
 
 
 def _columns(terms: Terms, names: Sequence[str], VS: float | None) -> Array:
-    """The linear terms of a law, (N, terms)."""
+    """Build the matrix of the linear terms of a law, shape (N, terms)."""
     return np.column_stack(
         [
             terms.excess(cast(float, VS)) if name == "FST" else terms.linear[name]
@@ -90,7 +89,10 @@ def _columns(terms: Terms, names: Sequence[str], VS: float | None) -> Array:
 
 
 def fit_law(terms: Terms, names: Sequence[str], rows: Array) -> dict[str, float]:
-    """Fit a law to some rows by least squares; VS is searched on a logarithmic axis."""
+    """Fit the parameters of a friction law to some rows by least squares.
+
+    VS is searched on a logarithmic axis.
+    """
     f = terms.f[rows]
     VS = _excess_velocity(terms, names, rows) if "VS" in names else None
     x = np.linalg.lstsq(_columns(terms, names, VS)[rows], f, rcond=None)[0]
@@ -99,14 +101,21 @@ def fit_law(terms: Terms, names: Sequence[str], rows: Array) -> dict[str, float]
 
 
 def _excess_velocity(terms: Terms, names: Sequence[str], rows: Array) -> float:
-    """VS of the least squares of a law: the term of FST, made orthogonal to the others, takes (e'r)^2 / e'e from the squares of their residual r."""
+    """Find the Stribeck velocity VS with which a law has the least sum of squares.
+
+    With e the Stribeck term orthogonal to the other terms, and r the residual of the other terms,
+    it reduces the sum of squares by (e'r)^2 / e'e.
+    """
     others = _columns(terms, [name for name in names if name not in ("FST", "VS")], None)[rows]
     U, s, _ = np.linalg.svd(others, full_matrices=False)
     Q = U[:, s > s[0] * max(others.shape) * np.finfo(float).eps]
     r = terms.f[rows] - Q @ (Q.T @ terms.f[rows])
 
     def left(excess: Array) -> Array:
-        """Sum of squares that remain with an excess, minus that of r; excess has shape (..., N)."""
+        """Return the change of the sum of squares if the Stribeck term is added, zero or negative.
+
+        `excess` has shape (..., N).
+        """
         e = excess[..., rows]
         e = e - (e @ Q) @ Q.T
         length = np.sum(e**2, axis=-1)
@@ -126,7 +135,7 @@ def _excess_velocity(terms: Terms, names: Sequence[str], rows: Array) -> float:
 
 
 def law_torque(terms: Terms, law: Mapping[str, float]) -> Array:
-    """Torque of a law at the rows, shape (N,), by the values of its parameters."""
+    """Compute the torque of a law at the rows, shape (N,), from the values of its parameters."""
     names = tuple(law)
     return np.asarray(
         _columns(terms, names, law.get("VS")) @ [law[name] for name in names if name != "VS"]
@@ -134,7 +143,10 @@ def law_torque(terms: Terms, law: Mapping[str, float]) -> Array:
 
 
 def held_out_error(terms: Terms, names: Sequence[str], even: Array) -> float:
-    """Error in % of rows predicted from the other half of the blocks."""
+    """Compute the prediction error of a law, in %, on rows that were not used in its fit.
+
+    The fit to one half of the blocks of time predicts the other half.
+    """
     residual = np.empty_like(terms.f)
     for rows in (even, ~even):
         residual[~rows] = (terms.f - law_torque(terms, fit_law(terms, names, rows)))[~rows]
@@ -142,7 +154,11 @@ def held_out_error(terms: Terms, names: Sequence[str], even: Array) -> float:
 
 
 def deviations(terms: Terms, law: Mapping[str, float], residual: Array) -> dict[str, float]:
-    """Standard deviations by blocks of time; that of VS by the derivative of the law."""
+    """Compute the standard deviations of the parameters of a law, by name.
+
+    Blocks of time are taken as independent. For VS, the derivative of the law with respect to VS is
+    used as its column.
+    """
     A = _columns(terms, tuple(law), law.get("VS"))
     if "VS" in law:
         VS, h = law["VS"], 1e-4 * law["VS"]

@@ -1,1 +1,1 @@
-"""Laws of columns: their scalars fitted, the torque that a joint transmits."""
+"""Friction laws with fitted scalars, or with a column that depends on the transmitted torque."""

@@ -1,12 +1,14 @@
 """Variable projection: least squares in parameters X and in scalars a that enter W nonlinearly.
 
-The torque is linear in X and not in the scalars a of the laws (FIT of the emitted module),
-Y = W(a) X + rho. With P the projector off the columns of W, X is eliminated,
+A scalar is a constant inside a friction law, for instance the Stribeck velocity. The table FIT of
+the emitted module lists the scalars. The torque is linear in X but not in the scalars a, Y = W(a) X
++ rho. With P the projector orthogonal to the columns of W, X is eliminated,
 
     a = argmin ||P(a) Y||^2,    X = W(a)^+ Y
 
-(Golub and Pereyra 1973), by Gauss-Newton with Kaufman's Jacobian (1975), J_k = -P (dW/da_k) X.
-Columns without scalars are factored once. Every law is started from the grid of its file.
+(Golub and Pereyra 1973), by Gauss-Newton with Kaufman's Jacobian (1975), J_k = -P (dW/da_k) X. The
+columns of W without scalars are factored only once. The search for the scalars of each law starts
+from the grid given in the robot file.
 """
 
 from __future__ import annotations
@@ -30,7 +32,10 @@ SLOPE_STEP = 1e-4  # of log(a), or of the bounds: differences of columns
 
 
 class LawProblem:
-    """Rows of all records as functions of the scalars, in coordinates u: log(a) where a > 0."""
+    """The observation matrix W(u) and the torques Y of all records, as functions of the scalars.
+
+    The coordinate of a scalar a is u = log(a) if its lower bound is positive, else u = a.
+    """
 
     def __init__(
         self, model: GeneratedModel, records: Sequence[Prepared], columns: Sequence[str]
@@ -57,15 +62,15 @@ class LawProblem:
         return np.where(self.log, np.log(np.where(self.log, a, 1.0)), a)
 
     def values(self, u: Array) -> Array:
-        """a of the coordinates u."""
+        """Convert the coordinates u to the scalars a."""
         return np.where(self.log, np.exp(np.where(self.log, u, 0.0)), u)
 
     def bound(self, u: Array) -> Any:
-        """The model with the scalars at u."""
+        """Return the model whose scalars have the values at u."""
         return BoundModel(self.model, dict(zip(self.scalars, self.values(u).tolist(), strict=True)))
 
     def _varying(self) -> list[list[int]]:
-        """Columns that each scalar enters."""
+        """Find the columns of W that depend on each scalar, by changing the scalar."""
         model, rng = cast(Any, self.model), np.random.default_rng(3)
         q, qd, qdd = rng.uniform(-1, 1, (3, 200, len(model.JOINTS)))
         qd = qd * 10 ** rng.uniform(-3, 0, qd.shape)
@@ -90,7 +95,7 @@ class LawProblem:
         return [record.observation(model, columns or self.names) for record in self.records]
 
     def column(self, c: int, u: Array) -> Array:
-        """Column c of W at all rows."""
+        """Compute column c of W at all rows, for the scalars at u."""
         own = [k for k, columns in enumerate(self.varying) if c in columns]
         key = (c, *(float(u[k]) for k in own))
         if key not in self._columns:
@@ -101,7 +106,7 @@ class LawProblem:
         return self._columns[key]
 
     def slope(self, k: int, u: Array, X: Array) -> Array:
-        """(dW/du_k) X, by a central difference."""
+        """Compute (dW/du_k) X by a central difference."""
         h = SLOPE_STEP if self.log[k] else SLOPE_STEP * (self.upper[k] - self.lower[k])
         ahead, behind = u.copy(), u.copy()
         ahead[k], behind[k] = u[k] + h, u[k] - h
@@ -112,7 +117,7 @@ class LawProblem:
 
 
 class Projection:
-    """The projected problem on some rows, divided by a scale of each row."""
+    """The least-squares problem with X eliminated, on some rows, each divided by its scale."""
 
     def __init__(self, problem: LawProblem, rows: Array, scale: Array) -> None:
         self.problem, self.rows = problem, rows
@@ -125,7 +130,11 @@ class Projection:
         return np.asarray(A - self.Q @ (self.Q.T @ A))
 
     def parts(self, u: Array) -> tuple[Array, Array, Array]:
-        """P Y, the basis of the projected columns, and their coefficients."""
+        """Compute the residual P Y at u, and the fit of the columns that depend on scalars.
+
+        Returns P Y, an orthonormal basis of these columns (projected orthogonally to the fixed
+        columns), and their coefficients in X.
+        """
         p = self.problem
         V = np.column_stack([p.column(c, u)[self.rows] for c in p.moving]) / self.scale[:, None]
         V = self._off(V)
@@ -137,7 +146,7 @@ class Projection:
         return self.parts(u)[0]
 
     def jacobian(self, u: Array) -> Array:
-        """Kaufman's: -P (dW/du) X."""
+        """Compute Kaufman's Jacobian of the residual, -P (dW/du) X."""
         p = self.problem
         _, B, X = self.parts(u)
         whole = np.zeros(len(p.names))
@@ -147,7 +156,7 @@ class Projection:
         return np.asarray(B @ (B.T @ S) - S)
 
     def polished(self, u: Array) -> tuple[Array, float]:
-        """The minimum near u, and its cost."""
+        """Find the local minimum near u. Returns its coordinates and its sum of squares."""
         p = self.problem
         margin = 1e-6 * (p.upper - p.lower)
         fit = least_squares(
@@ -165,7 +174,11 @@ class Projection:
     def fitted(
         self, groups: Sequence[Sequence[int]]
     ) -> tuple[Array, float, dict[int, list[Array]]]:
-        """The best minimum over the grids of the laws, its cost, and other minima by law."""
+        """Find the best minimum over the grids of all laws; a group holds the scalars of one law.
+
+        Returns the coordinates u of the minimum, its sum of squares, and the other local minima of
+        each law, by the number of the law.
+        """
         p = self.problem
         u, seeds = p.start.copy(), {}
         for g, group in enumerate(groups):
@@ -201,7 +214,10 @@ class Projection:
 
 
 def _valleys(starts: Sequence[Array], costs: Sequence[float], counts: Sequence[int]) -> list[Array]:
-    """Starts of a grid that are lower than their neighbours, the last of `starts` aside."""
+    """Select at most four points of a grid whose cost does not exceed that of any neighbour.
+
+    The last of `starts` is no point of the grid and is ignored.
+    """
     grid = np.asarray(costs[:-1]).reshape(counts)
     found = []
     for place in np.ndindex(*counts):
@@ -212,7 +228,7 @@ def _valleys(starts: Sequence[Array], costs: Sequence[float], counts: Sequence[i
 
 
 def basis(A: Array) -> Array:
-    """Orthonormal columns of the range of A."""
+    """Compute an orthonormal basis of the range of A, as columns."""
     size = np.linalg.norm(A, axis=0)
     A = A[:, size > 0] / size[size > 0]
     Q, R = np.linalg.qr(A)

@@ -1,8 +1,9 @@
-"""Scalars inside the laws of columns, as a record gives them (`runtime.laws.projection`).
+"""Scalars of friction laws, for instance a Stribeck velocity, fitted to a record.
 
-Different minima are reported. Deviations are joint ones: those of the linear problem with the columns
-[W, (dW/da) X], by blocks of time. Whether a law earns its scalars is asked of blocks of time that
-did not fit it.
+The fit is the one of `runtime.laws.projection`; other local minima are reported. Standard
+deviations are computed for X and the scalars together, from the linear problem with the columns [W,
+(dW/da) X], with blocks of time as independent. A law is useful if it improves the prediction of
+blocks of time that were not used in the fit.
 """
 
 from __future__ import annotations
@@ -40,20 +41,20 @@ LOOSE = 0.5  # deviation of log(a), or share of the bounds, above which a is not
 
 @dataclass(frozen=True)
 class FittedScalar:
-    """One scalar of a law.
+    """One fitted scalar of a friction law.
 
     Attributes
     ----------
     name : str
-        Constant of the module.
+        Name of the constant in the module.
     parameter : str
-        The parameter whose law it is in.
+        The parameter that multiplies the law.
     value, sigma : float
-        Estimate and its deviation, jointly with X.
+        Estimate and its standard deviation, computed jointly with X.
     minima : tuple of float
-        Other local minima, the best first.
+        Values at other local minima, the best first.
     doubt : str
-        Why it is not determined; empty if it is.
+        Reason why the scalar is not determined; empty if it is.
     """
 
     name: str
@@ -66,17 +67,18 @@ class FittedScalar:
 
 @dataclass(frozen=True)
 class LawTest:
-    """Whether a law earns its column and scalars.
+    """Test of a friction law: whether its column and scalars improve the prediction of torques.
 
     Attributes
     ----------
     parameter : str
+        The parameter that multiplies the law.
     value, sigma : float
-        Of the parameter, the deviation jointly with the scalars.
+        Estimate of the parameter and its standard deviation, computed jointly with the scalars.
     p_value : float
-        Of the F-test of law and scalars on all rows.
+        p-value of the F-test of the law and its scalars on all rows.
     without, with_law : float, %
-        Errors of blocks of time that did not fit, without the law and with it.
+        Prediction errors without the law and with it, on blocks of time not used in the fit.
     """
 
     parameter: str
@@ -88,13 +90,13 @@ class LawTest:
 
     @property
     def earned(self) -> bool:
-        """Whether the record shows the law and it predicts better."""
+        """Whether the law is significant and improves the prediction of unseen data."""
         return self.p_value < SURE and self.with_law < self.without
 
 
 @dataclass(frozen=True)
 class FittedLaws(Part):
-    """The scalars of the laws of a model, fitted to records."""
+    """The scalars of the friction laws of a model, fitted to records, with tests of the laws."""
 
     scalars: tuple[FittedScalar, ...]
     tests: tuple[LawTest, ...]
@@ -104,11 +106,11 @@ class FittedLaws(Part):
 
     @property
     def constants(self) -> dict[str, float]:
-        """{scalar: value}."""
+        """Fitted values of the scalars, by name."""
         return {s.name: s.value for s in self.scalars}
 
     def tables(self) -> list[Table]:
-        """Tables of the scalars, and of the errors of the laws on unseen data."""
+        """Make the tables of the scalars, and of the prediction errors of the laws."""
         said = [
             (s.name, s.parameter, s.doubt, "")
             if s.doubt
@@ -140,11 +142,11 @@ class FittedLaws(Part):
         ]
 
     def text(self) -> str:
-        """How they were found."""
+        """Sentence that says how the scalars were estimated."""
         return "Scalars inside the laws of columns, by variable projection."
 
     def brief(self) -> str:
-        """The scalars in a line."""
+        """Write the scalars with their 95 % confidence intervals in one line."""
         said = [
             f"{s.name} {s.doubt or f'{s.value:.4g} ± {1.96 * s.sigma:.2g}'}" for s in self.scalars
         ]
@@ -153,17 +155,20 @@ class FittedLaws(Part):
         return f"Scalars of laws (± 95 %): {', '.join(said)}{worth}"
 
     def summary(self) -> dict[str, Any]:
-        """The laws as a mapping for JSON."""
+        """Return the scalars and the tests of the laws as a mapping for JSON."""
         return {"scalars": self.scalars, "tests": self.tests}
 
 
 def fitted_scalars(problem: Problem) -> Problem:
-    """The step: the model with the scalars of its laws fitted to the records (`fit:` of the robot file); the problem itself if there are none.
+    """Fit the scalars of the friction laws to the records, and set their values in the model.
+
+    A step of the identification. Without scalars (`fit:` of the robot file) or records, the problem
+    is returned unchanged.
 
     Raises
     ------
     InputError
-        A method that simulates the loop with the scalars of the file.
+        If the method simulates the loop, since it uses the scalars of the file.
     """
     if not problem.records or not hasattr(problem.model, "FIT"):
         return problem
@@ -180,7 +185,7 @@ def fitted_scalars(problem: Problem) -> Problem:
 
 
 def scalars_of_laws(result: Identification) -> FittedLaws | None:
-    """Scalars of the friction laws from the nonlinear search; None if the model has none."""
+    """Return the fitted scalars of the friction laws; None if the model has no scalars."""
     note = result.problem.noted(KIND)
     return None if note is None else note.result
 
@@ -192,24 +197,24 @@ def fit_laws(
     *,
     weights: bool = False,
 ) -> FittedLaws:
-    """The scalars of the laws of a model from records.
+    """Fit the scalars of the friction laws of a model to records.
 
     Parameters
     ----------
     model : GeneratedModel
-        A module with the table FIT.
+        A module with the table FIT of its scalars.
     records : sequence of Prepared
-        Joint side, SI.
+        Records at the joint side, in SI units.
     columns : sequence of str, optional
         Base parameters that are fitted; default: all.
     weights : bool
-        Rows of each joint divided by the deviation of its residual.
+        Whether the rows of each joint are divided by the standard deviation of its residual.
     """
     return fitted_laws(LawProblem(model, records, columns or model.BASE_PARAMETERS), weights)
 
 
 def fitted_laws(problem: LawProblem, weights: bool = False) -> FittedLaws:
-    """The same of rows that are there."""
+    """Fit the scalars of the friction laws to prepared rows W, Y; see `fit_laws`."""
     every, scale = np.ones(len(problem.Y), dtype=bool), np.ones(len(problem.Y))
     groups: dict[str, list[int]] = {}
     for k, name in enumerate(problem.scalars):
@@ -244,7 +249,10 @@ def fitted_laws(problem: LawProblem, weights: bool = False) -> FittedLaws:
 
 
 def _joint_deviations(problem: LawProblem, u: Array, scale: Array) -> tuple[Array, Array, Array]:
-    """W, X, and deviations of X and u by blocks of time."""
+    """Compute W and X for the scalars at u, and standard deviations of X and u together.
+
+    The standard deviations take blocks of time as independent.
+    """
     A = problem.W.copy()
     for c in problem.moving:
         A[:, c] = problem.column(c, u)
@@ -261,7 +269,7 @@ def _joint_deviations(problem: LawProblem, u: Array, scale: Array) -> tuple[Arra
 def _half(
     problem: LawProblem, rows: Array, scale: Array, members: Sequence[Sequence[int]], u: Array
 ) -> Array:
-    """The scalars from some rows alone."""
+    """Fit the scalars to some rows alone, starting from u."""
     return Projection(problem, rows, scale).polished(u)[0]
 
 
@@ -274,7 +282,10 @@ def _squares(A: Array, Y: Array, scale: Array) -> float:
 def _unseen(
     problem: LawProblem, halves: Sequence[tuple[Array, Array]], without: Sequence[int], scale: Array
 ) -> float:
-    """Error in % of the rows of each half, predicted by the other one, without some columns."""
+    """Compute the prediction error, in %, of the rows of each half from a fit to the other half.
+
+    `without` lists the columns of W that are left out.
+    """
     kept = [c for c in range(len(problem.names)) if c not in without]
     residual = np.zeros(len(problem.Y))
     for rows, u in halves:

@@ -1,10 +1,12 @@
-"""Laws that read the torque that the rest of the model transmits at their joint: bilinear in the parameters, since
+"""Friction laws that depend on the torque which the rest of the model transmits at their joint.
+
+Such a model is bilinear in the parameters,
 
     Y = D_r X_r + D_l(tau_m) X_l + rho,        tau_m = D_r X_r
 
-with D_l the columns of these laws and D_r all others. Least squares with tau_m of the estimate
-before, until tau_m settles. The measured torque in its place would carry the noise of Y into D_l,
-which biases X_l; tau_m has that of the estimate alone.
+with D_l the columns of these laws and D_r all other columns. The parameters are estimated by least
+squares with tau_m of the estimate before, repeated until tau_m no longer changes. The measured
+torque cannot replace tau_m: its noise would enter D_l and bias X_l.
 """
 
 from __future__ import annotations
@@ -30,12 +32,14 @@ SAME_TORQUE = 1e-6  # of the rms of tau_m, between two passes
 
 
 def transmitted_torque(problem: Problem) -> Problem:
-    """The step: records with the torque that each joint transmits, where laws of the model read it; the problem itself if none does.
+    """Add to the records the torque that each joint transmits, if friction laws depend on it.
+
+    A step of the identification. Without such laws the problem is returned unchanged.
 
     Raises
     ------
     InputError
-        A torque that does not settle.
+        If the torque does not converge.
     """
     model = problem.model
     read = {c: names for c, names in channels_of(model).items() if c.startswith(TRANSMITTED)}
@@ -68,7 +72,10 @@ def transmitted_torque(problem: Problem) -> Problem:
 
 
 def _solve(observations: Sequence[Observation], weights: bool) -> Array:
-    """Least squares of all columns, with rows of each joint divided by the deviation of its residual where `weights`."""
+    """Estimate the parameters X of all columns by least squares.
+
+    With `weights`, the rows of each joint are divided by the standard deviation of its residual.
+    """
     W = np.vstack([o.W for o in observations])
     Y = np.concatenate([o.Y for o in observations])
     X = np.linalg.lstsq(W, Y, rcond=1e-10)[0]
@@ -82,7 +89,10 @@ def _solve(observations: Sequence[Observation], weights: bool) -> Array:
 
 
 class TransmittedTorque:
-    """The torque of the columns that do not read it; `read` : {channel: parameters that do}."""
+    """Computes the transmitted torque tau_m from the columns of W that do not depend on tau_m.
+
+    `read` lists, by channel of tau_m, the parameters whose columns depend on this channel.
+    """
 
     def __init__(self, model: GeneratedModel, read: dict[str, tuple[str, ...]]) -> None:
         self.model = model
@@ -92,7 +102,7 @@ class TransmittedTorque:
         self.place = {c: model.JOINTS.index(int(c.removeprefix(TRANSMITTED))) for c in read}
 
     def given(self, record: Prepared, X: Array | None) -> Prepared:
-        """The record with tau_m of X; 0 for None."""
+        """Return the record with the channels of tau_m computed from X; zero if X is None."""
         tau = np.zeros((len(record.record), len(self.model.JOINTS)))
         if X is not None:
             s = record.states

@@ -1,9 +1,10 @@
-"""The C of CasADi functions, compiled on first use into a cache that is checked.
+"""Compile the C code of CasADi functions on first use, and keep it in a cache that is checked.
 
 The system compiler (`CC`, else cc, gcc, clang) writes a shared object into a cache folder (compiled
-in `SYMGEN_CACHE`, else that of the platform). Its name holds the SHA-256 of source, flags, compiler
-and processor, and that of its own bytes, so that a damaged file is not loaded; it is written under
-another name and moved, so that processes may compile at once.
+in `SYMGEN_CACHE`, else in the cache folder of the platform). The file name holds the SHA-256 of
+source, flags, compiler and processor, and the SHA-256 of the file itself, so that a damaged file is
+not loaded. The file is written under another name and then moved, so that several processes may
+compile at once.
 """
 
 from __future__ import annotations
@@ -32,11 +33,11 @@ UNSAFE = (
 
 
 class FallbackWarning(UserWarning):
-    """CasADi's interpreter is used instead of C; the message says why."""
+    """Warning that CasADi's interpreter runs instead of compiled C; the message says why."""
 
 
 class NotCompiledError(Exception):
-    """C could not be compiled; the message says why."""
+    """The C code could not be compiled; the message says why."""
 
 
 def shared_object(
@@ -46,27 +47,28 @@ def shared_object(
     opened: Callable[[Path], ctypes.CDLL],
     flags: Sequence[str],
 ) -> ctypes.CDLL:
-    """The shared object of a C file, from the cache or compiled.
+    """Load the shared object of a C file from the cache, or compile it.
 
-    One that does not open is compiled again, once.
+    An object that does not open is compiled again, once.
 
     Parameters
     ----------
     path : Path
-        Of the C file, for its name.
+        Path of the C file; only its name is used.
     text : bytes
-        What the file holds.
+        Content of the C file.
     folder : Path
-        The cache.
+        Folder of the cache.
     opened : callable
-        Loads and checks an object; raises NotCompiledError or OSError if it is not the one
-        wanted.
+        Function that loads and checks an object; it raises NotCompiledError or OSError if the
+        object is not the expected one.
     flags : sequence of str
+        Flags of the compiler.
 
     Raises
     ------
     NotCompiledError
-        No compiler, or one that fails; or a cache that cannot be used.
+        There is no compiler, the compiler fails, or the cache cannot be used.
     """
     command, version = compiler()
     parts = (
@@ -96,7 +98,10 @@ def shared_object(
 
 
 def _cached(folder: Path, key: str, opened: Callable[[Path], ctypes.CDLL]) -> ctypes.CDLL | None:
-    """The object of that key; files that are damaged or do not open are removed."""
+    """Open the cached object with the hash `key`; return None if there is none.
+
+    Files that are damaged or do not open are removed.
+    """
     for path in sorted(folder.glob(f"{key}-*.so")):
         if hashlib.sha256(path.read_bytes()).hexdigest()[:32] == path.stem.partition("-")[2]:
             try:
@@ -134,7 +139,10 @@ def _compiled(
 
 
 def compiler() -> tuple[tuple[str, ...], str]:
-    """Command of the C compiler and its version; raises if there is none."""
+    """Find the C compiler; return its command and its version text.
+
+    NotCompiledError if there is no compiler, or if it cannot be used.
+    """
     given = shlex.split(os.environ.get("CC", ""))
     program = (
         shutil.which(given[0])

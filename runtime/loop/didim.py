@@ -1,15 +1,15 @@
-"""DIDIM: direct and inverse dynamic identification models.
+"""Method DIDIM: direct and inverse dynamic identification models.
 
-Measured torques on the regressor of the simulated motion.
+The measured torques are fitted with the regressor of the simulated motion:
 
     X^(k+1) = argmin sum_j ||Y_j - Z_j^k X||^2 / s_j^2,
             Z^k = F_p[W(q_s, qd_s, qdd_s)] of the simulation with X^k
 
-Needs the measured torque and the reference; of the measured position only its start. Z passes the
-decimation alone: simulated states are exact. It is output error on the torque with the Jacobian of
-the loop left out (the loop holds q_s near q_r). C = (Z'VZ)^-1. The residual is that of the
-simulated motion, larger than that of IV with the same X: what moved the arm besides the model is
-not in Z.
+DIDIM needs the measured torque and the reference, and of the measured positions only the first. Z
+passes through the decimation only, because simulated states are exact. DIDIM is an output-error
+method on the torque whose Jacobian leaves out the loop (the loop holds q_s near q_r).
+C = (Z'VZ)^-1. The residual is computed with the simulated motion. It is larger than the residual of
+IV with the same X, because Z does not contain the motion that effects outside the model cause.
 
 Reference: Gautier, Janot and Vandanjon (2013).
 """
@@ -30,10 +30,10 @@ from runtime.loop.result import Simulation
 
 
 def fit(start: Beginning) -> Fitted:
-    """Fit by method didim.
+    """Fit the parameters by method didim.
 
-    `details`: list of the passes, contraction. SettingsError if no loop is attached to the
-    observation.
+    `details` holds the list of passes, and the contraction (ratio of the last two changes of X).
+    SettingsError if no loop is attached to the observation.
     """
     loop, observation = loop_of(start.observation, start.settings.method), start.observation
 

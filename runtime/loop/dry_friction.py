@@ -1,8 +1,8 @@
-"""Dry friction of coupled elements: the Coulomb columns of a model and the directions along which they act.
+"""Dry (Coulomb) friction of a model: its columns, and the directions along which it acts.
 
-Every Coulomb element acts along a row of G: slip s = G qd, force c_plus where s > 0, -c_minus where
-s < 0. Elements may outnumber the joints (the wrist FS5,
-FS6, FSM6 along q5, q6, q5 + q6). What they do at rest: `runtime.loop.stick_slip`.
+Every Coulomb element acts along a row of G. Its slip is s = G qd; its force is c_plus if s > 0 and
+-c_minus if s < 0. There may be more elements than joints (on a wrist, FS5, FS6 and FSM6 act along
+q5, q6 and q5 + q6). Forces at rest: `runtime.loop.stick_slip`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class DryFriction:
-    """Coulomb elements of a model.
+    """Coulomb friction elements of a model: their directions, and the parameters of their forces.
 
     Attributes
     ----------
@@ -28,7 +28,7 @@ class DryFriction:
     plus, minus : ndarray, shape (m, b), 0 or 1
         c_plus = plus @ X and c_minus = minus @ X, the largest forces in each direction.
     smooth : ndarray, shape (b,), 0 or 1
-        0 for the parameters of dry friction.
+        0 for the parameters of dry friction, 1 for all others.
     """
 
     G: Array
@@ -38,8 +38,10 @@ class DryFriction:
 
 
 def dry_friction(model: GeneratedModel) -> DryFriction:
-    """Coulomb columns of the regressor: of degree zero in qd, zero at rest. They are G' sign(G qd),
-    or one side of it.
+    """Find the Coulomb friction elements of a model from values of its regressor.
+
+    A column of the regressor belongs to dry friction if it is zero at rest, and if it is the same
+    at velocities qd and 2 qd. Such a column is G' sign(G qd), or one side of it.
     """
     n, b = len(model.JOINTS), len(model.BASE_PARAMETERS)
     rng = np.random.default_rng(1)

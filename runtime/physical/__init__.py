@@ -1,1 +1,1 @@
-"""Bodies that exist: conditions of a physical robot, the values nearest to them."""
+"""Conditions that the parameters of a physical robot meet, and the nearest values that do."""

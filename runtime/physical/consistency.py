@@ -1,4 +1,4 @@
-"""Whether a physical robot can have the parameters of an identification: a Part."""
+"""Part of a result that says whether a physical robot can have the identified parameters."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ CONDITIONS = "Pseudo-inertias of the links and forms of the actuators must be po
 
 @dataclass(frozen=True, eq=False)
 class Consistency(Part):
-    """Whether a physical robot can have the parameters.
+    """Part of a result: whether a physical robot can have the identified parameters.
 
     Attributes
     ----------
     estimate : Estimate
-        All parameters.
+        Estimate of all parameters.
     fit : Estimate
-        The parameters that are used.
+        Estimate of the parameters that are used.
     judged : Feasibility or None
-        Of `estimate`; None if it was not asked for.
+        Physical check of `estimate`; None if it was not requested.
     """
 
     estimate: Estimate
@@ -47,16 +47,24 @@ class Consistency(Part):
         return "standard" in self.fit.details
 
     def text(self) -> str:
-        """The conditions of a physical robot, and whether the parameters meet them."""
+        """Write whether the parameters are physical.
+
+        If `fit` was made under the conditions of a physical robot, the text also gives these
+        conditions.
+        """
         fitted = [self.fit.message, CONDITIONS] if self.fitted else []
         return "\n".join([*fitted, self.brief()]).strip()
 
     def brief(self) -> str:
-        """One sentence; "" if it was not asked for."""
+        """Write one sentence: whether the parameters are physical; "" if this was not requested."""
         return "" if self.judged is None else f"The parameters are {self.judged.text}."
 
     def tables(self) -> list[Table]:
-        """Conditions with the smallest eigenvalue of each, and the standard parameters, of an estimate that was made under them."""
+        """Make the tables of an estimate that was made under the conditions of a physical robot.
+
+        One table gives the smallest eigenvalue of each condition, the other the standard
+        parameters. For other estimates the list is empty.
+        """
         if not self.fitted:
             return []
         details = self.fit.details
@@ -72,11 +80,11 @@ class Consistency(Part):
         ]
 
     def checks(self) -> tuple[Check, ...]:
-        """Whether a physical robot can have all parameters."""
+        """Return the check whether a physical robot can have all parameters."""
         return (physical(self),)
 
     def summary(self) -> dict[str, Any] | None:
-        """The test of `judged` as a mapping for JSON."""
+        """Return the physical check as a mapping for JSON; None if it was not requested."""
         if self.judged is None:
             return None
         blocking = [{"condition": name, "margin": margin} for name, margin in self.judged.blocking]
@@ -87,7 +95,7 @@ class Consistency(Part):
         }
 
     def files(self) -> dict[str, str]:
-        """One complete set of standard parameters."""
+        """Return a CSV file with one complete set of standard parameters, if `fit` has one."""
         if not self.fitted:
             return {}
         standard = list(self.fit.details["standard"].items())
@@ -99,7 +107,7 @@ class Consistency(Part):
     "every pseudo-inertia positive semidefinite, friction and motor inertia not negative",
 )
 def physical(part: Consistency) -> Answer:
-    """Whether a physical robot can have all parameters."""
+    """Answer whether a physical robot can have all parameters."""
     if part.fitted or "standard" in part.estimate.details:
         return Answer("good", "Yes: they were fitted under these conditions")
     judged = part.judged
@@ -117,12 +125,19 @@ def physical(part: Consistency) -> Answer:
 
 
 def as_fitted(result: Identification) -> Consistency:
-    """The part without the question whether other parameters than fitted ones are physical."""
+    """Make the part of a result whose physical check was not requested.
+
+    The part still shows parameters that were fitted under the conditions of a physical robot.
+    """
     return Consistency(result.estimate, result.model_estimate)
 
 
 def consistency(result: Identification) -> Consistency:
-    """Whether a physical robot can have all parameters, or others that the record does not tell from them."""
+    """Check whether a physical robot can have all parameters of an identification.
+
+    Parameters that are not physical also pass if the record cannot distinguish them from physical
+    ones. InputError if the record does not determine all parameters.
+    """
     if not result.determined:
         groups = "; ".join(", ".join(group) for group in result.estimate.groups)
         raise InputError(f"the record does not tell apart {groups}")

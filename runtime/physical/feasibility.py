@@ -1,13 +1,13 @@
-"""Can a physical robot have these base parameters, and which standard parameters would it have?
+"""Check whether a physical robot can have given base parameters, and find its standard parameters.
 
     feasibility(X)            t* = max t: every condition of `runtime.physical.inertia` holds with
                               margin t, and K chi = X. t* < 0: no robot has X
     standard_parameters(X)    chi with K chi = X that fulfils every condition, nearest to the values
                               of the robot file (or to zero)
 
-A negative t* is blamed on the condition with the largest multiplier; that one is released and the
-rest asked again, until it holds.
-Without limits on masses chi is not unique: different chi of one X give the same torques.
+If t* is negative, the condition with the largest multiplier is blamed and released, and the problem
+is solved again, until the other conditions hold. Without limits on masses chi is not unique:
+different chi of one X give the same torques.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ TYPICAL = {
 
 
 class Ellipsoid(Settings):
-    """Ellipsoid that holds the mass of a link.
+    """Ellipsoid that contains the mass of a link.
 
     Attributes
     ----------
@@ -63,18 +63,19 @@ class Ellipsoid(Settings):
 
 
 class RobotLimits(Settings):
-    """Knowledge about the standard parameters of a robot.
+    """Known limits of the standard parameters of a robot.
 
     Attributes
     ----------
     bounds : mapping of pairs of float or None, SI
-        [lowest, highest] of standard parameters, by name.
+        [lowest, highest] value of standard parameters, by name.
     total_mass : float or pair of float or None, kg
         Mass of all links together, a number or [lowest, highest].
     centre : mapping of 3 pairs of float, m
-        Box of the centre of mass, by link, in the link frame.
+        Box that contains the centre of mass, by link, in the link frame: [lowest, highest] x, y and
+        z.
     ellipsoid : mapping of Ellipsoid
-        Ellipsoid that holds the mass, by link.
+        Ellipsoid that contains the mass, by link.
     """
 
     bounds: Mapping[Text, Bounds] = field(default_factory=dict)
@@ -87,7 +88,7 @@ class RobotLimits(Settings):
 
 @dataclass(frozen=True, eq=False)
 class Feasibility:
-    """Whether base parameters are those of a physical robot.
+    """Result of the check whether base parameters are those of a physical robot.
 
     Attributes
     ----------
@@ -95,11 +96,12 @@ class Feasibility:
         t*: a share of the link's second moment and mass in the robot file; SI if it has none,
         and of friction and actuators.
     feasible : bool
-        Whether t* >= 0, or may be for all that the record tells (`within_noise`).
+        Whether t* >= 0, or whether the noise of the record explains t* < 0 (`within_noise`).
     physical : bool
-        Whether some robot has them, whatever the limits that were given or guessed.
+        Whether some robot has these parameters, whatever the limits that were given or guessed.
     blocking : tuple of (str, float)
-        Conditions that had to be released, in order, each with the t* before; empty if feasible.
+        Conditions that had to be released, in order, each with the t* before its release; empty if
+        t* >= 0.
     chi : ndarray, shape (p,)
         Standard parameters at t*.
     """
@@ -112,7 +114,7 @@ class Feasibility:
 
     @property
     def text(self) -> str:
-        """One sentence."""
+        """Phrase that says whether the parameters are feasible, and which conditions prevent it."""
         if self.physical and not self.feasible:
             named = ", ".join(name for name, _ in self.blocking)
             return f"physically feasible, but not within the bounds of masses and centres: {named}"
@@ -140,8 +142,9 @@ def feasibility(
     *,
     blame: bool = True,
 ) -> Feasibility:
-    """Whether base parameters X, shape (len(names),), are those of a physical robot within the limits.
-    blame : all conditions in the way, not the first.
+    """Check whether base parameters X are those of a physical robot within the limits.
+
+    X has shape (len(names),). blame : find all conditions that X breaks, not only the first.
     """
     rows, space = limit_rows(physical, limits), solutions(physical.rows(names), X, units(physical))
     first = margin(physical.conditions, rows, space)
@@ -163,11 +166,13 @@ def feasibility(
 def within_noise(
     judged: Feasibility, physical: PhysicalModel, names: Sequence[str], X: Array, covariance: Array
 ) -> Feasibility:
-    """The same, feasible where a robot lies as near as noise takes an estimate from it: with C the covariance of X, shape (b, b),
+    """Accept parameters as feasible if noise explains their distance from a physical robot.
 
-        min ||X - K chi||^2_C^-1 <= the 99 % point of chi-square,
+    With C the covariance of X, shape (b, b), and chi of a physical robot, the parameters pass if
 
-    as many degrees of freedom as the conditions in the way have rows.
+        min ||X - K chi||^2_C^-1 <= the 99 % point of chi-square
+
+    The degrees of freedom are the number of rows of all conditions that X breaks.
     """
     L = np.linalg.cholesky(covariance)
     R, z = np.linalg.solve(L, physical.rows(names)), np.linalg.solve(L, X)
@@ -191,12 +196,10 @@ def within_noise(
 def standard_parameters(
     physical: PhysicalModel, names: Sequence[str], X: Array, limits: RobotLimits | None = None
 ) -> Array:
-    """chi, shape (p,), with K chi = X to rounding and every condition fulfilled.
+    """Find standard parameters chi, shape (p,), with K chi = X that fulfil every condition.
 
-    Raises InputError if X is infeasible.
-
-    Of all such chi the one nearest to the values of the robot file, or to zero if it has none,
-    in units of their size.
+    Of all such chi the result is the nearest to the values of the robot file, or to zero if it has
+    none, in units of their size. K chi = X holds to rounding. Raises InputError if X is infeasible.
     """
     answer = feasibility(physical, names, X, limits)
     if not answer.feasible:
@@ -213,7 +216,11 @@ def nearest_standard(
     start: Array,
     limits: RobotLimits | None = None,
 ) -> Array:
-    """The chi of `standard_parameters` where one that fulfils the conditions, `start`, is known."""
+    """Find the standard parameters chi with K chi = X that are nearest to the values of the robot file.
+
+    chi fulfils the conditions of a physical robot, like `start`, which is the result if the solver
+    finds nothing better.
+    """
     scale, unit = scales(physical), units(physical)
     space, rows = solutions(physical.rows(names), X, unit), limit_rows(physical, limits)
     chi0 = np.array([physical.values.get(name, 0.0) for name in physical.standard])
@@ -239,7 +246,7 @@ def nearest_standard(
 
 
 def limit_rows(physical: PhysicalModel, limits: RobotLimits | None) -> LinearBounds:
-    """The limits as rows lower <= A chi <= upper."""
+    """Write the limits of a robot as linear inequalities lower <= A chi <= upper."""
     limits = limits or RobotLimits()
     entries: list[tuple[str, dict[int, float], float, float]] = []
     for name, (low, high) in limits.bounds.items():
@@ -279,7 +286,11 @@ def limit_rows(physical: PhysicalModel, limits: RobotLimits | None) -> LinearBou
 
 
 def scales(physical: PhysicalModel) -> Array:
-    """Sizes of the standard parameters, shape (p,): those of the robot file, typical ones if it has none or zero."""
+    """Return the sizes of the standard parameters, shape (p,), to scale the unknowns.
+
+    They are the absolute values of the robot file, but at least a hundredth of a typical size; if
+    the file has no values, they are typical sizes.
+    """
     sizes = []
     for name in physical.standard:
         family = name.rstrip("0123456789")
@@ -290,7 +301,11 @@ def scales(physical: PhysicalModel) -> Array:
 
 
 def units(physical: PhysicalModel) -> Array:
-    """Units of the unknowns, shape (p,): `scales`, of a link with values those of its condition."""
+    """Return the units in which the solver counts the unknown standard parameters, shape (p,).
+
+    For a link with values in the robot file they follow from the size of its condition (second
+    moment and mass); for all others they are `scales`.
+    """
     sizes = scales(physical)
     for j, condition in zip(physical.links, physical.conditions, strict=False):
         second, mass = condition.size[0], condition.size[-1]
@@ -300,7 +315,10 @@ def units(physical: PhysicalModel) -> Array:
 
 
 def pull_to_file(physical: PhysicalModel, kind: Distance, weight: float) -> Prior | None:
-    """The pull to the values of the robot file; InputError if they are missing."""
+    """Make the prior that pulls inertial parameters towards the values of the robot file.
+
+    None if there is no prior or its weight is 0. SettingsError if the file has no values of links.
+    """
     if kind == "none" or weight == 0:
         return None
     numbers = known_inertia(physical)
@@ -314,7 +332,7 @@ def pull_to_file(physical: PhysicalModel, kind: Distance, weight: float) -> Prio
 
 
 def known_inertia(physical: PhysicalModel) -> tuple[int, ...]:
-    """Numbers of the inertial parameters of links that the robot file has values of."""
+    """Return the indices of the link inertial parameters that have values in the robot file."""
     return tuple(
         k
         for j in physical.links
@@ -324,9 +342,10 @@ def known_inertia(physical: PhysicalModel) -> tuple[int, ...]:
 
 
 def unsolved(status: str, rows: LinearBounds, attempt: Callable[[LinearBounds], Optimum]) -> str:
-    """Say what happened, the likely cause and what to try.
+    """Write why no solution was found: the likely cause, and what to try.
 
-    attempt : solves the same problem with other rows; each limit is released in turn.
+    attempt : function that solves the same problem with other limits. Each limit is left out in turn,
+    to find out which limit prevents a solution.
     """
     helps = [name for name in dict.fromkeys(rows.names) if attempt(rows.without(name)).solved]
     if helps:
@@ -347,7 +366,10 @@ def unsolved(status: str, rows: LinearBounds, attempt: Callable[[LinearBounds], 
 
 
 def _inside(e: Ellipsoid) -> Array:
-    """Q with x'Qx = 1 - (x - c)' A^-1 (x - c), A = diag(axes^2): tr(P Q) >= 0 for mass inside."""
+    """Return the matrix Q, shape (4, 4), of an ellipsoid: tr(P Q) >= 0 if the mass lies inside.
+
+    With homogeneous coordinates on the left, x'Qx = 1 - (x - c)' A^-1 (x - c), A = diag(axes^2).
+    """
     A, c = np.diag(1 / np.square(e.axes)), np.array([e.centre]).T
     return np.block([[-A, A @ c], [c.T @ A, 1 - c.T @ A @ c]])
 

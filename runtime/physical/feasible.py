@@ -1,37 +1,39 @@
-"""Feasible least squares: the parameters nearest to the record that a physical robot can have.
+"""Method feasible: least squares over the parameters that a physical robot can have.
 
     min ||R (z - K chi)||^2 + weight D(chi)      subject to
             P_j(chi) >= margin S_j, forms >= margin 1, Ia, FV, FS >= margin, limits
     X = K chi                                    R z = Q'Y, W = Q R
 
-W is factored once and b rows enter the semidefinite program (`runtime.physical.semidefinite`); the
+W is factored once, and b rows enter the semidefinite program (`runtime.physical.semidefinite`); the
 conditions are those of `runtime.physical.inertia`. All base parameters are fitted, essential or
-not: a condition ties every parameter of a link. With the columns of some parameters alone, the
-others are free to make a robot of them. `weights` weighs the rows as for ols ("none") and wls.
-Where least squares is feasible, it is the solution.
+not, because a condition connects all parameters of a link. With the columns of only some
+parameters, the others would be free to take any values that make a physical robot. `weights`
+weights the rows as for ols ("none") and wls. Without a prior, the least-squares solution is the
+result if it is feasible.
 
-options (all of `runtime.physical.feasibility.RobotLimits` too):
+options (also all options of `runtime.physical.feasibility.RobotLimits`):
     margin     smallest eigenvalue of every condition: of a link with values in the robot file as
                share of its second moment and mass there (S_j), of others in SI; 1e-6
-    prior      none | euclidean: distance D of the inertial parameters from the values of the robot file; "auto": euclidean if it has values of links, else none
-    weight     of D, a number; "held-out": that by which four fifths of the record in time predict
-               the fifth that is left out best; "auto": the
+    prior      none | euclidean: distance D of the inertial parameters from the values of the robot
+               file; "auto": euclidean if the file has values of links, else none
+    weight     weight of D, a number; "held-out": the weight with which four fifths of the record in
+               time predict the left-out fifth best; "auto": the
                largest, to half a decade, that raises the residual norm by at most 1 %
     reach      size of the robot, m, which bounds masses and their centres
-               "auto": from its frames where these say enough; null
-    explain    whether every condition in the way of least squares is named; true
-    linear     options of the least squares behind it: rank_tolerance, block
+               "auto": from its frames if these show the size; null: no such bounds
+    explain    whether to name every condition that least squares breaks; true
+    linear     options of the least squares that starts the method: rank_tolerance, block
 
-sigma and covariance are those of least squares without conditions, eq. (10): the theory of
-estimates on the boundary of a cone has no such formula. `sigma_corrected` of a parameter is
+sigma and covariance are those of least squares without conditions, eq. (10): no such formula exists
+for estimates on the boundary of a cone. `sigma_corrected` of a parameter is
 
-    sqrt(s^2 + (X - X_0)^2)       X_0, s: least squares and its deviation by blocks of time
+    sqrt(s^2 + (X - X_0)^2)       X_0, s: least squares and its standard deviation by blocks of time
 
-Conditions that hold and a prior that is right take X nearer to the truth than X_0 is, a wrong prior
-further, by X - X_0 at most. Where s is right, such an interval holds the truth at least as often
-as it says, whatever the prior. Resampled records would not tell: those that end at the same limit,
-or at the value of the file, do not scatter. A parameter held by an active condition is told by
-`details`.
+Conditions that hold and a correct prior move X nearer to the truth than X_0. A wrong prior moves it
+away from the truth, by X - X_0 at most. If s is correct, such an interval contains the truth at
+least as often as stated, whatever the prior. Resampled records would not show this: estimates that
+end at the same limit, or at the value of the file, do not scatter. `details` lists the active
+conditions.
 
 Reference: Sousa and Cortesao (2014); Wensing, Kim and Slotine (2018).
 """
@@ -73,7 +75,7 @@ DECADES = WEIGHTS[::2]  # of the search for the weight of smallest held-out erro
 
 
 class FeasibleOptions(RobotLimits):
-    """estimate.options of method feasible; those of `RobotLimits` too.
+    """estimate.options of method feasible, in addition to the options of `RobotLimits`.
 
     Attributes
     ----------
@@ -81,19 +83,21 @@ class FeasibleOptions(RobotLimits):
         Smallest eigenvalue of every condition: of a link with values in the robot file as share of
         its second moment and mass there, of others in SI.
     prior : str
-        Distance D of the inertial parameters from the values of the robot file: none or euclidean; auto: euclidean where the file has values of links, else none.
+        Distance D of the inertial parameters from the values of the robot file: none or euclidean;
+        auto: euclidean if the file has values of links, else none.
     weight : float or str
-        Weight of D; held-out: that by which four fifths of the record in time predict the fifth
-        that is left out best; auto: the largest, to half a decade, that raises the residual norm by
+        Weight of D; held-out: the weight with which four fifths of the record in time predict the
+        left-out fifth best; auto: the largest, to half a decade, that raises the residual norm by
         at most 1 %.
     reach : float, str or None, m
         Size of the robot: no centre of mass lies further from the origin of its frame, and all
-        links together weigh less than a fifth of the water in a cube of that
-        side, where `total_mass` and `bounds` say nothing. auto: from its frames, where at least two
-        links have a length and prismatic joints limits, and the record does not contradict it;
-        null: no such bounds.
+        links together weigh less than a fifth of the water in a cube of that side, unless
+        `total_mass` or `bounds` give masses. auto: from the frames of the robot, if at least two
+        links have a length, prismatic joints have limits, and the record does not contradict the
+        bounds; null: no such bounds.
     explain : bool
-        Name every condition that least squares breaks; false: the parameters alone, in a third of the time.
+        Whether to name every condition that least squares breaks; false: only the parameters, in a
+        third of the time.
     linear : mapping
         Options of the least squares that starts the method: rank_tolerance, block.
     """
@@ -111,10 +115,10 @@ class FeasibleOptions(RobotLimits):
 
 
 def fit(start: Beginning) -> Fitted:
-    """Fit by method feasible.
+    """Fit the parameters by method feasible.
 
-    `details` holds the standard parameters, the smallest eigenvalues, and the estimate of least
-    squares.
+    `details` holds the standard parameters, the smallest eigenvalue of each condition, and the
+    least-squares estimate.
     """
     if start.model is None:
         raise InputError(
@@ -199,7 +203,7 @@ def fit(start: Beginning) -> Fitted:
 
 
 def conditions_of(judged: Feasibility | None) -> dict[str, Any]:
-    """Conditions of a physical robot that least squares breaks, for JSON; {} if not requested."""
+    """Return the physical conditions that least squares breaks, for JSON; {} if not requested."""
     if judged is None:
         return {}
     blocking = [{"condition": name, "margin": t} for name, t in judged.blocking]
@@ -209,7 +213,10 @@ def conditions_of(judged: Feasibility | None) -> dict[str, Any]:
 def within_limits(
     physical: PhysicalModel, names: Sequence[str], X: Array, options: FeasibleOptions
 ) -> Feasibility:
-    """Whether X is that of a physical robot, and if it is, whether of one within the limits: these are what is known or guessed of a robot, not physics."""
+    """Check whether X is physical and, if so, whether it is also within the limits of the robot.
+
+    The two are separate because the limits are known or guessed values of a robot, not physics.
+    """
     judged = feasibility(physical, names, X, blame=options.explain)
     named = dict.fromkeys(limit_rows(physical, options).names)
     if not judged.feasible or not named:
@@ -228,9 +235,10 @@ def solve_with_weight(
     options: FeasibleOptions,
     without_prior: Array | None = None,
 ) -> tuple[Array, float]:
-    """Solve a factored system for chi, and choose the weight of D.
+    """Find chi and the weight of the prior distance D, for a factored system.
 
-    without_prior : chi of weight 0, shape (p,), if it is known.
+    Returns chi, shape (p,), and the weight. without_prior : chi of weight 0, shape (p,), if it is
+    known.
     """
     if options.prior == "none":
         if without_prior is None:
@@ -258,12 +266,11 @@ def solve_with_weight(
 def held_out_weight(
     observation: Observation, system: System, physical: PhysicalModel, options: FeasibleOptions
 ) -> float:
-    """Choose the weight of D with which each fifth of the record is predicted best by the others.
+    """Choose the weight of D with which four fifths of the record predict the left-out fifth best.
 
-    The largest of several.
-
-    Errors of the fifths add up, and none is below that of the least squares of its own rows: a
-    weight is left as soon as it cannot be the best.
+    The squared errors of the five predictions are added; if two weights are equally good, the
+    larger is chosen. A weight is abandoned as soon as it cannot be the best, since no prediction
+    error is below the error of least squares on the same fifth.
     """
     number = observation.equal_parts(LIMIT.HELD_OUT_PARTS)
     parts = [part_factor(observation.where(number == p), system) for p in np.unique(number)]
@@ -304,10 +311,11 @@ def held_out_weight(
 def decide_options(
     options: FeasibleOptions, model: GeneratedModel, physical: PhysicalModel
 ) -> FeasibleOptions:
-    """Fill in the prior and the bounds where the options leave them to the robot.
+    """Replace "auto" in the options by values for this robot: the prior and the bounds.
 
-    No centre of mass lies further from the origin of its frame, along any axis, than the robot
-    reaches, and all links together weigh less than a fifth of the water in a cube of that side.
+    The size of the robot gives two bounds: no centre of mass lies further from the origin of its
+    frame, along any axis, and all links together weigh less than a fifth of the water in a cube of
+    that side.
     """
     prior = (
         ("euclidean" if known_inertia(physical) else "none")
@@ -338,7 +346,7 @@ def decide_options(
 
 
 def reach_text(options: FeasibleOptions) -> str:
-    """Describe the bounds that were guessed from the lengths of the robot."""
+    """Write a sentence on bounds guessed from the size of the robot; "" if there are none."""
     if options.reach is None or options.reach == "auto":
         return ""
     mass = options.total_mass[1] if isinstance(options.total_mass, tuple) else np.inf
@@ -352,7 +360,11 @@ def reach_text(options: FeasibleOptions) -> str:
 def by_reach(
     rows: Factor, physical: PhysicalModel, unbounded: FeasibleOptions, bounded: FeasibleOptions
 ) -> tuple[Array | None, Array | None]:
-    """Fit chi without a prior, once without and once with guessed bounds; None if no robot is within them."""
+    """Fit chi without a prior twice: without, then with the bounds guessed from the robot's size.
+
+    Returns both chi; None for a fit without solution, for instance if no robot is within the
+    bounds.
+    """
     found: list[Array | None] = []
     for limits in (unbounded, bounded):
         options = replace(limits, prior="none", weight="auto")  # a weight is of a prior
@@ -368,8 +380,8 @@ def bounds_contradict(
 ) -> bool:
     """Whether guessed bounds contradict the record.
 
-    They do if they raise the residual by more than LIMIT.WEIGHT_INCREASE, or if no robot is
-    within them.
+    They do if they raise the residual norm by more than the factor LIMIT.WEIGHT_INCREASE, or if no
+    robot is within them.
     """
     if unbounded is None or bounded is None:
         return unbounded is not None
@@ -380,7 +392,7 @@ def bounds_contradict(
 
 
 def prior_text(physical: PhysicalModel, options: FeasibleOptions, weight: float) -> str:
-    """Describe the effect of the robot file's values."""
+    """Write a sentence on the prior: its kind, its weight, and how many values are missing."""
     if options.prior == "none":
         return ""
     missing = len(physical.links) * 10 - len(known_inertia(physical))
@@ -389,7 +401,7 @@ def prior_text(physical: PhysicalModel, options: FeasibleOptions, weight: float)
 
 
 def part_factor(part: Observation, system: System) -> Factor:
-    """Triangular factor of some rows, each joint weighted as in the fit of all rows."""
+    """Compute the triangular factor of some rows, with the joint weights of the fit of all rows."""
     chosen = part.columns(system.names)
     return factor(chosen.W, chosen.Y, chosen.rows, chosen.names).weighted(
         1 / np.array(system.scales)
@@ -399,7 +411,10 @@ def part_factor(part: Observation, system: System) -> Factor:
 def solve_feasible(
     rows: Factor, physical: PhysicalModel, options: FeasibleOptions, weight: float
 ) -> Array:
-    """chi, shape (p,), of min ||R (z - K chi)||^2 + weight D(chi) under the conditions, of a factored system."""
+    """Find the standard parameters chi, shape (p,), of the best fit under the physical conditions.
+
+    For a factored system, chi minimises ||R (z - K chi)||^2 / ||Y||^2 + weight D(chi).
+    """
     size = float(np.hypot(np.linalg.norm(rows.r12), rows.r22)) or 1.0
     R, z = rows.R11 @ physical.rows(rows.names) / size, rows.r12 / size
     bounds, space = limit_rows(physical, options), everything(units(physical))
@@ -415,5 +430,5 @@ def solve_feasible(
 
 
 def residual_norm(rows: Factor, X: Array) -> float:
-    """||Y - W X|| of a factored system."""
+    """Compute ||Y - W X|| of a factored system."""
     return float(np.hypot(rows.r22, np.linalg.norm(rows.R11 @ X - rows.r12)))

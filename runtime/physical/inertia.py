@@ -1,4 +1,6 @@
-"""Conditions on the standard parameters of a physical robot: every link has a mass density, actuators have inertia, friction takes power.
+"""Conditions on the standard parameters of a physical robot.
+
+Every link has a mass density, actuators have inertia, and friction dissipates power.
 
 Base parameters are X = K chi, chi the standard parameters. Of link j, with J the inertia tensor
 about the origin of its frame (the elements XX .. ZZ as they are) and l = (MX, MY, MZ), the
@@ -7,12 +9,12 @@ pseudo-inertia
     P_j = [[tr(J)/2 1 - J, l], [l', M]],   4 x 4,
 
 is the matrix of second moments of the density in homogeneous coordinates: a density exists if and
-only if P_j is positive semidefinite, which holds the triangle inequalities of the moments of
-inertia. Every element along s = G q (inertia, viscous, Coulomb) asks for c >= 0. Elements given as
-forms q'Bq act together with those along the same joints: the sum of c_k B_k of one kind is positive
-semidefinite (the inertia of a coupled wrist, the power its viscous friction takes). Friction of one
-direction of motion counts in that direction and leaves forms alone. Offsets and springs have no
-sign.
+only if P_j is positive semidefinite. This condition contains the triangle inequalities of the
+moments of inertia. Every element along s = G q (inertia, viscous, Coulomb) needs c >= 0. Elements
+given as forms q'Bq act together with the elements along the same joints: the sum of c_k B_k of one
+kind is positive semidefinite (the inertia of a coupled wrist, the power that its viscous friction
+dissipates). Friction of one direction of motion counts in that direction and does not enter the
+forms. Offsets and springs may have any sign.
 
 References: Wensing, Kim and Slotine (2018) for P_j; Sousa and Cortesao (2014, 2019) for
 identification under such constraints.
@@ -38,19 +40,20 @@ FORMED = ("inertia", "viscous")  # kinds whose forms must be positive semidefini
 
 @dataclass(frozen=True, eq=False)
 class Condition:
-    """The matrix sum_k chi[numbers[k]] B[k] is positive semidefinite.
+    """One physical condition: the matrix P = sum_k chi[numbers[k]] B[k] is positive semidefinite.
 
     Attributes
     ----------
     name : str
         Link, form or element that the condition is about.
     numbers : tuple of int
-        Standard parameters, by their place.
+        Indices of its standard parameters in chi.
     B : ndarray, shape (k, m, m)
+        One symmetric matrix for each of these parameters.
     size : ndarray, shape (m,), SI
-        What its eigenvalues are measured in: second moment and mass of the link in the robot file;
-        of inertias of drives 1000 times the least of these second moments, at most 1; 1 without
-        values, and of friction.
+        Scale of the eigenvalues: second moment and mass of the link in the robot file; for inertias
+        of drives 1000 times the least of these second moments, at most 1; 1 without values, and for
+        friction.
     """
 
     name: str
@@ -60,28 +63,28 @@ class Condition:
 
     @property
     def scaled(self) -> Array:
-        """B of S^-1/2 P S^-1/2, S = diag(size)."""
+        """Matrices B of the scaled condition S^-1/2 P S^-1/2, S = diag(size)."""
         root = np.sqrt(self.size)
         return np.asarray(self.B / np.outer(root, root))
 
     def matrix(self, chi: Array) -> Array:
-        """The matrix P at chi, shape (m, m)."""
+        """Compute the matrix P of the condition at chi, shape (m, m)."""
         return np.asarray(np.tensordot(chi[list(self.numbers)], self.B, axes=1))
 
     def smallest(self, chi: Array) -> float:
-        """The largest t with P >= t S: its smallest eigenvalue in units of `size`."""
+        """Compute the smallest eigenvalue of P in units of `size`: the largest t with P >= t S."""
         P = np.tensordot(chi[list(self.numbers)], self.scaled, axes=1)
         return float(np.linalg.eigvalsh(P)[0])
 
 
 @dataclass(frozen=True, eq=False)
 class PhysicalModel:
-    """The standard parameters of a model: their map to base parameters, and their conditions.
+    """Standard parameters of a model, their map to base parameters, and their physical conditions.
 
     Attributes
     ----------
     standard, base : tuple of str
-        Names, p and b of them.
+        Names of the p standard and the b base parameters.
     K : ndarray, shape (b, p)
         X = K chi.
     links : tuple of int
@@ -89,7 +92,7 @@ class PhysicalModel:
     conditions : tuple of Condition
         One per link, then one per form, then one per signed element.
     values : mapping
-        Those of the robot file, by name.
+        Values of the robot file, by name.
     """
 
     standard: tuple[str, ...]
@@ -100,7 +103,10 @@ class PhysicalModel:
     values: Mapping[str, float]
 
     def link(self, j: int) -> list[int]:
-        """Places of the ten parameters of link j among the standard parameters, in the order of INERTIAL."""
+        """Return the indices in chi of the ten inertial parameters of link j.
+
+        The order is XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M.
+        """
         if j not in self.links:
             raise InputError(
                 f"link {j} has no inertial parameters; links are {', '.join(map(str, self.links))}"
@@ -108,33 +114,36 @@ class PhysicalModel:
         return [self.standard.index(f"{family}{j}") for family in INERTIAL]
 
     def named(self, chi: Array) -> dict[str, float]:
-        """Standard parameters by name."""
+        """Return the standard parameters chi as a mapping from name to value."""
         return {name: float(value) for name, value in zip(self.standard, chi, strict=True)}
 
     def smallest(self, chi: Array) -> dict[str, float]:
-        """The smallest eigenvalue of every condition in units of its size, by its name: not negative for a physical robot."""
+        """Compute the smallest eigenvalue of every condition, in units of its size, by name.
+
+        No value is negative for a physical robot.
+        """
         return {condition.name: condition.smallest(chi) for condition in self.conditions}
 
     def rows(self, names: Sequence[str]) -> Array:
-        """The rows of K of the base parameters `names`."""
+        """Return the rows of K of the base parameters `names`."""
         return self.K[[self.base.index(name) for name in names]]
 
 
 def physical_model(
     model: GeneratedModel, constants: Mapping[str, float] | None = None
 ) -> PhysicalModel:
-    """Standard parameters of an emitted model and the conditions on them.
+    """Collect the standard parameters of a generated model and the physical conditions on them.
 
     Parameters
     ----------
     model : GeneratedModel
     constants : mapping, optional
-        Values in place of the robot file's, as for `base_parameters`.
+        Values that replace constants of the robot file, as for `base_parameters`.
 
     Raises
     ------
     ModelError
-        A model of an older version, without these tables.
+        The model was generated by an older version, without these tables.
     """
     require(model, "base_parameters")
     elements = elements_of(model, constants)
@@ -159,7 +168,10 @@ def physical_model(
 
 
 def pseudo_inertia(ten: Array) -> Array:
-    """P_j, shape (4, 4), of the ten parameters of a link in the order of INERTIAL, about the origin of its frame."""
+    """Build the pseudo-inertia P_j, shape (4, 4), from the ten inertial parameters of a link.
+
+    The parameters are in the order of INERTIAL, about the origin of the link frame.
+    """
     XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M = ten
     J = np.array([[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]])
     l = np.array([[MX, MY, MZ]])
@@ -181,7 +193,10 @@ def _links(
 def _forms(
     elements: Mapping[str, Any], standard: Sequence[str], least: float
 ) -> Iterator[Condition]:
-    """One condition per kind and per group of joints that forms of that kind couple."""
+    """Yield the conditions on inertia or viscous friction that couples joints, one per group of joints.
+
+    The sum of the matrices c_k B_k over the elements of the group must be positive semidefinite.
+    """
     for kind in FORMED:
         own = {
             name: _form(acts)
@@ -206,7 +221,11 @@ def _forms(
 def _signs(
     elements: Mapping[str, Any], standard: Sequence[str], least: float
 ) -> Iterator[Condition]:
-    """c >= 0 along each row; where friction of one direction is set on that of both, their sum in either direction."""
+    """Yield the conditions c >= 0 on elements that act along one row G: inertia and friction.
+
+    If friction of one direction adds to friction of both directions, their sum must be >= 0 in each
+    direction.
+    """
     along: dict[tuple[Any, ...], dict[str, list[str]]] = {}
     for name, (kind, when, acts) in elements.items():
         if kind in SIGNED and not is_form(acts):
@@ -224,14 +243,17 @@ def _signs(
 
 
 def _form(acts: Mapping[Any, float]) -> dict[tuple[int, int], float]:
-    """The form q'Bq of an element as {(i, j): B_ij}, i <= j; along s = G q it is (G q)**2."""
+    """Return the quadratic form q'Bq of an element as {(i, j): B_ij}, i <= j.
+
+    For an element along s = G q the form is (G q)**2.
+    """
     if is_form(acts):
         return dict(acts)
     return {(i, j): a * b for i, a in acts.items() for j, b in acts.items() if i <= j}
 
 
 def _coupled(groups: Sequence[set[int]]) -> list[set[int]]:
-    """Unite sets that share a joint."""
+    """Unite sets of joints that share a joint, so that the resulting sets are disjoint."""
     united: list[set[int]] = []
     for group in groups:
         touching = [other for other in united if other & group]

@@ -1,4 +1,4 @@
-"""The robot itself: how large it is."""
+"""Size of a robot, computed from the origins of its frames."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ Array = np.ndarray
 
 
 def frame_origins(model: GeneratedModel, q: Array) -> Array | None:
-    """Origins of all frames in frame 0, m, shape (K, frames, 3), in the positions q, shape (K, n).
+    """Compute the origins of all frames in frame 0, m, at the joint positions q, shape (K, n).
 
-    None without poses, or where a loop does not close.
+    The result has shape (K, frames, 3). It is None if the model has no frame poses, or if a
+    kinematic loop does not close.
     """
     poses = getattr(model, "frame_poses", None)
     try:
@@ -24,10 +25,12 @@ def frame_origins(model: GeneratedModel, q: Array) -> Array | None:
 
 
 def reach_of(model: GeneratedModel) -> float:
-    """Size of a robot, m: the largest distance between two of its frames in random poses, and once more the longest link, whose end no frame marks.
+    """Estimate the size of a robot, m: largest distance between two frames, plus the longest link.
 
-    Joints move within their limits, without them revolute joints turn anywhere. nan if frames
-    say little: a prismatic joint without limits, or fewer than two links with a length.
+    Random poses are tried. The longest link is added because no frame marks the end of the last
+    link. Joints move within their limits; without limits, revolute joints turn anywhere. The result
+    is nan if the frames do not show the size: there is a prismatic joint without limits, or fewer
+    than two links have a length.
     """
     limits = dict(getattr(model, "LIMITS", None) or {}).get("q")
     units = joint_units(model)

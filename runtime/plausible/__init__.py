@@ -1,3 +1,5 @@
-"""Is the record, the robot file or the study wrong? What is asked before the fit and after it, and
-the causes that are tried if something is.
+"""Checks whether the record, the robot file or the study is wrong.
+
+Some checks are made before the fit, others after it. If one of them is doubtful, possible causes
+are tried, for instance a wrong sign or unit.
 """

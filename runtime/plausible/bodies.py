@@ -1,12 +1,14 @@
-"""How well a model explains the samples: by any parameters, and by those of bodies that exist, near the values that are known.
+"""Fit the samples with free parameters, or with parameters of bodies that can exist.
 
-Rows are weighed by joint with their own residuals, so that a wrist counts as much as a shoulder.
-The score is the negative logarithm of the likelihood with those weights profiled out, in nats,
+Bodies stay near the values that are known. Rows of a joint are weighted by its own residuals, so
+that a wrist counts as much as a shoulder. The score is the negative logarithm of the likelihood
+with the best weights, in nats,
 
     score = N sum_j log(sigma_j) + D(chi),   sigma_j^2 = max(||Y_j - W_j chi||^2 / N_j, floor_j^2)
 
-N the rows of a joint that count (residuals are coloured); a difference of 5 is a likelihood ratio of 150.
-Rows j are those of a torque as it was measured, whatever map of the torques is tried (`runtime.plausible.trials`).
+N is the number of rows of a joint that count, which is smaller if neighbouring residuals are
+correlated; a difference of 5 is a likelihood ratio of 150. Rows j are those of a torque as it was
+measured, also if a cause changes the torques (`runtime.plausible.trials`).
 
 `Bodies` minimises half the weighted squares and D over the standard parameters of a physical robot
 (`runtime.physical.inertia`): every pseudo-inertia P >= 0, motor inertias and frictions c >= 0, and
@@ -15,8 +17,9 @@ M R^2 >= tr S, S the second moments of a link and R its largest extent.
     D(chi) = sum_links 1/2 ||P0^-1/2 (P - P0) P0^-1/2||^2 / tolerance^2
              + sum_elements 1/2 (c/c0 - 1)^2 / tolerance^2 + price sum_links M/M0
 
-the first two over links and motor inertias whose values P0, c0 the robot file gives, the price of
-the masses over the other links. A weak price of all that no value bounds keeps small what the samples leave open.
+The first two sums are over links and motor inertias whose values P0, c0 the robot file gives, the
+price of the masses is for the other links. A weak price on all parameters without a known value
+keeps them small if the samples do not determine them.
 
 Reference: Lee, Wensing and Park (2020) for the distance, the constant pullback of the entropic one.
 """
@@ -37,13 +40,14 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Grams:
-    """Normal equations of every torque.
+    """Normal equations of least squares, separately for the torque of each joint.
 
     Attributes
     ----------
     of_joints : ndarray, shape (n, b + 1, b + 1)
         [W_j Y_j]'[W_j Y_j].
     rows : ndarray of int, shape (n,)
+        Number of rows of each joint.
     measured : ndarray, shape (n,)
         ||tau_j||^2 over the same rows.
     """
@@ -54,8 +58,12 @@ class Grams:
 
     @classmethod
     def of(cls, D: Array, Y: Array, mask: Array, tau: Array | None = None) -> Grams:
-        """Of a regressor (K, n, b), torques (K, n) and the rows used, bool (K, n). tau : measured
-        torques; default: Y.
+        """Form the normal equations from the regressor D, the torques Y and a mask of rows.
+
+        D : shape (K, n, b).
+        Y : shape (K, n).
+        mask : rows used, bool (K, n).
+        tau : measured torques, shape (K, n), to which errors are related; default: Y.
         """
         columns = np.concatenate([D.T, Y.T[None]])
         grams = []
@@ -66,27 +74,31 @@ class Grams:
         return cls(np.array(grams), mask.sum(axis=0), measured)
 
     def mapped(self, K: Array) -> Grams:
-        """The normal equations with the columns W K, K of shape (b, p)."""
+        """Transform the normal equations to the columns W K, with K of shape (b, p)."""
         M = np.zeros((K.shape[0] + 1, K.shape[1] + 1))
         M[:-1, :-1], M[-1, -1] = K, 1.0
         return Grams(M.T @ self.of_joints @ M, self.rows, self.measured)
 
     def squares(self, X: Array) -> Array:
-        """||Y_j - W_j X||^2, shape (n,)."""
+        """Compute the squared norm of the residuals of each joint, ||Y_j - W_j X||^2; (n,)."""
         v = np.append(X, -1.0)
         return np.asarray(np.maximum(self.of_joints @ v @ v, 0.0))
 
     def sigma(self, X: Array) -> Array:
-        """Root mean square residual of each joint, at least LIMIT.RESIDUAL_FLOOR of its torque, shape (n,).
+        """Compute the root mean square residual of each joint, shape (n,).
 
-        1 of a joint without rows.
+        It is at least LIMIT.RESIDUAL_FLOOR of the torque of the joint, and 1 for a joint without
+        rows.
         """
         N = np.maximum(self.rows, 1)
         square = np.maximum(self.squares(X), LIMIT.RESIDUAL_FLOOR**2 * self.measured) / N
         return np.asarray(np.where(square > 0, np.sqrt(square), 1.0), dtype=float)
 
     def weighted(self, sigma: Array) -> tuple[Array, Array]:
-        """A = sum_j W_j'W_j / sigma_j^2 and g = sum_j W_j'Y_j / sigma_j^2."""
+        """Add the normal equations of all joints, each divided by sigma_j^2.
+
+        Return A = sum_j W_j'W_j / sigma_j^2 and g = sum_j W_j'Y_j / sigma_j^2.
+        """
         G = np.tensordot(sigma**-2.0, self.of_joints, axes=1)
         return G[:-1, :-1], G[:-1, -1]
 
@@ -115,14 +127,18 @@ class Fit:
 
 
 def fit_of(grams: Grams, X: Array, N: float, penalty: float = 0.0) -> Fit:
-    """The Fit of given parameters. N : rows of a joint that count."""
+    """Evaluate the parameters X: residuals and error of each joint, and the score.
+
+    N : number of rows of a joint that count.
+    penalty : added to the score, nats.
+    """
     sigma, measured = grams.sigma(X), grams.measured
     errors = 100 * np.sqrt(grams.squares(X) / np.where(measured > 0, measured, 1.0))
     return Fit(X, sigma, errors, float(N * np.log(sigma[grams.rows > 0]).sum() + penalty), penalty)
 
 
 def solve_scaled(A: Array, g: Array, ridge: float = LIMIT.RIDGE) -> Array:
-    """A^-1 g, A positive semidefinite, its columns scaled."""
+    """Solve A x = g for a positive semidefinite A, whose columns are scaled first."""
     d = np.diag(A)
     D = 1 / np.sqrt(np.where(d > 0, d, 1.0))
     scaled = A * D * D[:, None]
@@ -132,9 +148,10 @@ def solve_scaled(A: Array, g: Array, ridge: float = LIMIT.RIDGE) -> Array:
 
 
 def least_squares(grams: Grams, N: float, bodies: Bodies | None = None) -> Fit:
-    """Weighted least squares, weights by joint from their own residuals.
+    """Fit by least squares, with the rows of each joint weighted by its own residuals.
 
-    Near the values of the robot file if `bodies` is given, over the standard parameters then.
+    If `bodies` is given, the parameters are the standard parameters, and they are drawn towards the
+    values of the robot file.
     """
     sigma = grams.sigma(np.zeros(grams.of_joints.shape[1] - 1))
     for _ in range(LIMIT.WEIGHT_PASSES):
@@ -147,7 +164,7 @@ def least_squares(grams: Grams, N: float, bodies: Bodies | None = None) -> Fit:
 
 
 class Bodies:
-    """The standard parameters of a physical robot, near the values that are known.
+    """Conditions and known values under which the standard parameters of a robot are fitted.
 
     Parameters
     ----------
@@ -162,13 +179,13 @@ class Bodies:
     Attributes
     ----------
     known_links : ndarray of bool, shape (links,)
-        Links near their values.
+        Whether each link is drawn towards its values in the robot file.
     H, h, constant
-        Distance from the values: 1/2 chi'H chi - h'chi + constant.
+        Distance from these values: 1/2 chi'H chi - h'chi + constant.
     heavy : ndarray, shape (p,), nats
         Price of the masses of links without values.
     price : ndarray, shape (p,), nats
-        Weak price of what no value bounds.
+        Weak price of the parameters that no known value bounds.
     """
 
     def __init__(
@@ -233,7 +250,10 @@ class Bodies:
         self.program = Quadratic(conditions, inside, scale)
 
     def _of_file(self, link: Condition, length: float) -> Array | None:
-        """P0 of the robot file; None if it does not give all ten parameters of a body."""
+        """Compute the pseudo-inertia P0 of a link from its values in the robot file.
+
+        None if the file does not give all ten parameters, or if no body can have them.
+        """
         known = self.physical.values
         ten = np.array([known.get(self.physical.standard[k], np.nan) for k in link.numbers])
         if not np.isfinite(ten).all() or ten[-1] <= 0:
@@ -244,36 +264,42 @@ class Bodies:
         return P if np.linalg.eigvalsh(P)[0] > 0 else None
 
     def _motor_inertia(self, element: Condition) -> float:
-        """The value of a motor inertia in the robot file; 0 of other elements and without it."""
+        """Look up the value of a motor inertia Ia in the robot file.
+
+        0 for other elements, or if the file does not give the value.
+        """
         names = [self.physical.standard[k] for k in element.numbers]
         single = len(names) == 1 and names[0].startswith("Ia")
         return self.physical.values.get(names[0], 0.0) if single else 0.0
 
     def _pull(self, numbers: list[int], near: Array, linear: Array, size: float) -> None:
-        """1/2 x'near x - linear'x + size/2/tolerance^2 of the parameters x of these numbers."""
+        """Add a distance that draws the parameters with these numbers towards known values.
+
+        It is 1/2 x'near x - linear'x + size/2/tolerance^2, x the parameters.
+        """
         self.H[np.ix_(numbers, numbers)] += near
         self.h[numbers] += linear
         self.constant += size / 2 / LIMIT.LINK_TOLERANCE**2
 
     @property
     def near_values(self) -> bool:
-        """Whether the robot file holds values of links that pull."""
+        """Whether the robot file gives values of links, towards which the fit is drawn."""
         return bool(self.known_links.any())
 
     def distance(self, chi: Array) -> float:
-        """Distance from the values of the robot file, nats."""
+        """Compute the distance of the parameters chi from the values of the robot file, nats."""
         return float(0.5 * chi @ self.H @ chi - self.h @ chi + self.constant)
 
     def penalty(self, chi: Array) -> float:
-        """D(chi), nats."""
+        """Compute D(chi): the distance from the known values and the price of the masses, nats."""
         return self.distance(chi) + float(self.heavy @ chi)
 
     def minimum(self, A: Array, g: Array) -> Array:
-        """chi of the smallest 1/2 chi'A chi - g'chi + D(chi) + price'chi."""
+        """Find the physical chi that minimises 1/2 chi'A chi - g'chi + D(chi) + price'chi."""
         return self.program.minimum(A + self.H, g + self.h - self.heavy - self.price)
 
     def stiffness(self, chi: Array) -> Array:
-        """Second derivatives of D plus those of a logarithmic barrier on the conditions.
+        """Compute second derivatives of D, plus those of a logarithmic barrier on the conditions.
 
         The barrier has the weight LIMIT.WEAK_PRICE. It makes the matrix large in the directions in
         which parameters would leave their bounds.
@@ -294,8 +320,11 @@ class Bodies:
 
 
 def physical_fit(grams: Grams, bodies: Bodies, N: float, sigma: Array, rounds: int = 8) -> Fit:
-    """Fit of a physical robot, near the values that `bodies` holds. sigma : first weights, which
-    those of the residuals follow, at most `rounds` times.
+    """Fit the parameters of a physical robot, near the known values of `bodies`.
+
+    N : number of rows of a joint that count.
+    sigma : residuals of the joints that give the first weights; each fit gives new ones, at most
+        `rounds` times.
     """
     for _ in range(rounds):
         chi = bodies.minimum(*grams.weighted(sigma))
@@ -306,5 +335,5 @@ def physical_fit(grams: Grams, bodies: Bodies, N: float, sigma: Array, rounds: i
 
 
 def quick_fit(grams: Grams, bodies: Bodies, N: float, sigma: Array) -> Fit:
-    """About what `physical_fit` gives, to a few nats above it."""
+    """Fit a physical robot in one round; the score is at most a few nats above `physical_fit`."""
     return physical_fit(grams, bodies, N, sigma, rounds=1)

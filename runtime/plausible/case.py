@@ -1,4 +1,7 @@
-"""What the checks of one study read, each part made once, when a check first asks for it."""
+"""Data for the plausibility checks of one study.
+
+Most of these data are computed only when a check first needs them.
+"""
 
 from __future__ import annotations
 
@@ -29,24 +32,24 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """Records, study and robot file.
+    """The records, the study and the robot model of one problem, as the checks use them.
 
     Attributes
     ----------
     model : GeneratedModel
     given : sequence of Prepared
-        Records, or excerpts of long ones, as they were read.
+        Records as they were read; of a long record, some excerpts.
     straight : sequence of Prepared
-        The same, counts that start anew unwrapped.
+        The same records; with reader counts, a counter that wraps around is made continuous.
     study : Study
     through : sequence of Filtered
-        The records through a low-pass of their motion.
+        The same records, filtered by a low-pass that is chosen by their motion.
     samples : Samples
-        Of all records.
+        Selected instants of all records.
     D : ndarray, shape (K, n, b)
         Regressor at the samples.
     variants : GeneratedModel or None
-        The module of `symgen.variants`.
+        The module that `symgen.variants` makes: entries of the table of frames are arguments.
     unseen : sequence of Prepared
         Validation records of the study.
     """
@@ -63,47 +66,57 @@ class Case:
 
     @property
     def records(self) -> list[Record]:
-        """The records themselves, positions unwrapped."""
+        """The records, in which counters that wrap around are made continuous."""
         return [one.record for one in self.straight]
 
     @cached_property
     def labels(self) -> tuple[str, ...]:
-        """Labels of the joints in results."""
+        """Labels of the joints, as the results show them."""
         return joint_labels(self.model)
 
     @cached_property
     def units(self) -> list[str]:
-        """Units of the positions, by joint."""
+        """Units of the joint positions: rad or m, one for each joint."""
         return list(joint_units(self.model))
 
     def grams(self, mask: Array) -> Grams:
-        """Normal equations of the samples of a mask, bool (K, n)."""
+        """Compute the normal equations over the samples that the mask selects, bool (K, n)."""
         tau = self.samples.tau
         return Grams.of(self.D, tau - self.samples.tau_known, mask, tau)
 
     @property
     def turning(self) -> Array:
-        """Whether each joint turns, (n,)."""
+        """Whether each joint is revolute, bool (n,)."""
         return np.array([unit == "rad" for unit in self.units])
 
     def limits(self, key: str, *shape: int) -> Array | None:
-        """Limits of each joint by the robot file, shape (n, *shape); None if it has none."""
+        """Read the joint limits of the robot file named `key`, for instance qd; shape (n, *shape).
+
+        None if the file does not give them in this shape.
+        """
         given = np.asarray(dict(getattr(self.model, "LIMITS", {}) or {}).get(key, ()), dtype=float)
         return given if given.shape == (self.samples.n, *shape) else None
 
     def joints(self, chosen: Array) -> str:
-        """Labels of the joints of a mask."""
+        """List the labels of the joints that the mask selects, separated by commas."""
         return ", ".join(self.labels[j] for j in np.flatnonzero(chosen))
 
     def reaching(self, values: Array, units: Sequence[str], chosen: Array) -> str:
-        """They reach these values, with their units: the joints of a mask, or else the largest."""
+        """Write the values of the selected joints, for instance "They reach 3.1 rad (joint 2)".
+
+        At most four joints are named. If the mask selects none, the joint with the largest value is
+        named.
+        """
         shown = np.flatnonzero(chosen)[:4] if chosen.any() else [int(np.argmax(values))]
         each = (f"{values[j]:.3g} {units[j]} (joint {self.labels[j]})" for j in shown)
         return f"They reach {', '.join(each)}"
 
     @cached_property
     def observation(self) -> Observation | None:
-        """Rows of the study; None if none is used, or counts cannot be read."""
+        """Observation matrix W and torques Y of the study.
+
+        None if they cannot be computed, for instance if no row is left.
+        """
         try:
             return stacked(self.model, self.given)
         except (InputError, np.linalg.LinAlgError):
@@ -111,7 +124,10 @@ class Case:
 
     @cached_property
     def physical(self) -> PhysicalModel | None:
-        """Conditions of a physical robot; None if the model has no standard parameters."""
+        """Conditions that the parameters of a physical robot satisfy, such as positive masses.
+
+        None if the model has no standard parameters.
+        """
         try:
             return physical_model(self.model)
         except InputError:
@@ -119,12 +135,16 @@ class Case:
 
     @property
     def silent(self) -> str:
-        """Why no cause is tried; "" if the samples allow it."""
+        """Reason why no cause is tried; an empty string if causes can be tried."""
         return self.unfit or self.few
 
     @cached_property
     def few(self) -> str:
-        """Why the samples are too few to try causes; gravity of the values needs no motion."""
+        """Reason why the samples are too few to try causes; an empty string if they suffice.
+
+        Too few samples do not prevent the check of the robot file's values, because gravity needs
+        no motion.
+        """
         rows = self.samples.moving().sum(axis=0)
         least = LIMIT.ROWS_PER_PARAMETER * len(self.model.BASE_PARAMETERS)
         few = int(rows.sum()) <= least or int(rows.min()) <= LIMIT.FEWEST_ROWS
@@ -132,7 +152,10 @@ class Case:
 
     @cached_property
     def unfit(self) -> str:
-        """Why nothing can be fitted, however many samples there are."""
+        """Reason why no model can be fitted, for instance a torque that never changes.
+
+        An empty string if a model can be fitted.
+        """
         if self.physical is None:
             return "the model has no standard parameters"
         if self.samples.constant().any():
@@ -143,19 +166,25 @@ class Case:
 
     @cached_property
     def sides(self) -> tuple[str, str]:
-        """Sides of positions and torques in the files; law for torques that a controller's law gives."""
+        """Sides of the positions and of the torques in the files: "joint" or "motor".
+
+        The side of the torques is "law" if the control law of a controller computed them.
+        """
         settings: Any = self.study
         q, tau = settings.record[0].sides if settings.record else ("joint", "joint")
         return q, "law" if any(record.origin.by_law for record in self.records) else tau
 
     @cached_property
     def baseline(self) -> Baseline | None:
-        """The study as it is, fitted; None if nothing is fitted."""
+        """Fit of the study as given, to which changes are compared; None if nothing is fitted."""
         return None if self.silent else self._baseline(values=True)
 
     @cached_property
     def validation(self) -> Baseline | None:
-        """The rows of the validation records, for the fits of `baseline`; None if there are none."""
+        """The fit `baseline`, with the samples and the regressor of the validation records.
+
+        None if there are no validation records, or if they cannot be used.
+        """
         if self.baseline is None or not self.unseen:
             return None
         try:
@@ -169,7 +198,10 @@ class Case:
 
     @cached_property
     def alone(self) -> Baseline | None:
-        """The same without the values of the robot file."""
+        """Fit of the study without the values of the robot file.
+
+        If the file has no values, this is the fit `baseline`.
+        """
         if self.baseline is None or self.robot_values is None:
             return self.baseline
         return self._baseline(values=False)
@@ -186,7 +218,10 @@ class Case:
 
     @cached_property
     def robot_values(self) -> KnownValues | None:
-        """Torque of the values of the robot file, if it has them."""
+        """Comparison of torques computed from the robot file's values with measured torques.
+
+        None if the file has no values, or if nothing can be fitted.
+        """
         if self.unfit:
             return None
         baseline = self.baseline or self._baseline(values=True)
@@ -194,8 +229,10 @@ class Case:
 
     @cached_property
     def noise_floor(self) -> float:
-        """Error of a joint, %, that noise of the positions may make: NOISE_MADE sqrt(a), a the largest share of an acceleration that is noise.
-        As much of a torque may be lost in the columns, and a cause may find it again.
+        """Relative torque error that noise of the positions alone may cause, %.
+
+        It is 100 NOISE_MADE sqrt(a), with a the largest share of noise in the power of an
+        acceleration. Errors below this floor are no evidence for a cause.
         """
         median = self.study.signals.median
         shares = [noise_share(x.record.q, x.record.rate, x.low, median) for x in self.through]
@@ -203,7 +240,10 @@ class Case:
 
     @cached_property
     def late(self) -> Delay | None:
-        """Delay of the torques of the longest record; None if it is too short."""
+        """Estimated delay of the torques in the longest record.
+
+        None if it cannot be estimated, for instance because the record is too short.
+        """
         through = max(self.through, key=lambda one: len(one.record))
         t = through.record.t
         try:

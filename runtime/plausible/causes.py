@@ -1,12 +1,14 @@
-"""What may be wrong with a study, a robot file or a log, one thing at a time: two tables of causes.
+"""Two tables of causes: what may be wrong with a study, a robot file or a log, one thing at a time.
 
-A row says of what kind a cause is, of what it is tried (joints, pairs of them, frames, ...), how the
-finding and its remedy read, and what it does to the samples and to the table of frames:
+Each row gives the kind of a cause, for which items it is tried (joints, pairs of joints, frames,
+...), the sentences of the finding and of the remedy, and the change of the samples or of the table
+of frames that corrects the error:
 
-    q' = P q + p,  qd' = f P qd,  qdd' = f^2 P qdd,    tau' = T tau - s known - rho,    free_... = another value
+    q' = P q + p,  qd' = f P qd,  qdd' = f^2 P qdd
+    tau' = T tau - s known - rho,    free_... = another value
 
     CAUSES     a sign, an order, a unit: one change each, some 10 n^2 of a robot of n joints
-    NUMBERS    a factor, a zero, a length: one number xi each, zero in the study as given
+    NUMBERS    a factor, a zero, a length: one unknown number xi each, zero in the study as given
 
 A new cause is a row (docs/contributing.md). `runtime.plausible.trials` tries them.
 """
@@ -56,30 +58,34 @@ ENTRY = re.compile(r"free_(alpha|[drb])(\d+)")
 
 @dataclass(frozen=True, eq=False)
 class Cause:
-    """One thing changed in the study.
+    """One possible error of a study, a robot file or a log, and the change that corrects this
+    error.
 
     Attributes
     ----------
     kind : str
-        Family: sign, exchange, order, unit, side, rate, angle, zero, gravity, length, table, coupling, ...
+        Family: sign, exchange, order, unit, side, rate, angle, zero, gravity, length, table,
+        coupling, ...
     says, remedy : str
-        What would be wrong, as an engineer says it, and what to change.
+        Sentences on what would be wrong, and what to change.
     subject : str
-        The number that is changed, where other amounts of it are causes too; else what it says.
+        Name of the changed number, if other amounts of it are causes, too; otherwise the text of
+        `says`.
     P, p : ndarray, shape (n, n) and (n,)
-        Map of the positions.
+        Change of the positions: q' = P q + p.
     T : ndarray, shape (n, n)
-        Map of the torques.
+        Matrix that multiplies the torques.
     rate : float
-        Factor f on the sampling rate.
+        Factor f that multiplies the sampling rate.
     known_factor : float or ndarray, shape (n,)
-        Factor s on the known torques.
+        Factor s that multiplies the known torques.
     unmodelled : ndarray, shape (n, 2), or 0
         Factors of `unmodelled_torques` for each joint, N m or N: rho.
     constants : mapping of str to float
-        Entries of the table of frames, SI.
+        Changed entries of the table of frames, SI.
     change : mapping of str to value
-        The remedy as a change of the study, as of a Check; {} if it is none.
+        The remedy as settings of the study, for instance {"record.units.q": "deg"}; {} if there are
+        none.
     """
 
     kind: str
@@ -97,23 +103,26 @@ class Cause:
 
     @property
     def on_torques(self) -> bool:
-        """Whether positions, rate and table of frames stay as they are: W does too."""
+        """Whether only torques change, not positions, rate or table of frames: W then stays the
+        same.
+        """
         still = np.array_equal(self.P, np.eye(len(self.p))) and not self.p.any()
         return still and self.rate == 1 and not self.constants
 
     def states(self, samples: Samples) -> tuple[Array, Array, Array]:
-        """q, qd, qdd, shape (K, n) each."""
+        """Apply the change to the states of the samples: return q, qd, qdd, shape (K, n) each."""
         q = samples.q @ self.P.T + self.p
         qd = self.rate * samples.qd @ self.P.T
         qdd = self.rate**2 * samples.qdd @ self.P.T
         return q, qd, qdd
 
     def torque(self, samples: Samples) -> Array:
-        """Torques left for the model, shape (K, n)."""
+        """Compute the changed torques that the model has to explain, shape (K, n)."""
         return np.asarray(samples.tau @ self.T.T - self.subtracted(samples))
 
     def subtracted(self, samples: Samples) -> Array:
-        """Known torques outside the model, shape (K, n)."""
+        """Compute the torques outside the model, which are subtracted: s known + rho, shape (K, n).
+        """
         known = np.asarray(self.known_factor * samples.tau_known)
         if np.ndim(self.unmodelled) == 0:
             return known
@@ -121,9 +130,10 @@ class Cause:
 
 
 def unmodelled_torques(samples: Samples) -> Array:
-    """Torques that the model may lack, shape (K, n, 2): 1, and sign(qd) exp(-(qd/v)^2), dry friction at low speed.
+    """Compute two torques of unit size that the model may lack, shape (K, n, 2).
 
-    v is the share LIMIT.SLOW of the largest speed.
+    The first is constant: 1. The second is dry friction at low speed: sign(qd) exp(-(qd/v)^2), with
+    v the share LIMIT.SLOW of the largest speed.
     """
     qd = samples.qd
     v = np.maximum(LIMIT.SLOW * np.abs(qd).max(axis=0), 1e-12)
@@ -132,25 +142,27 @@ def unmodelled_torques(samples: Samples) -> Array:
 
 
 def unchanged_study(n: int, **changed: Any) -> Cause:
-    """The study of n joints with only the given changes."""
+    """Make a cause for n joints that changes nothing except the given fields."""
     plain = {"kind": "", "says": "", "remedy": "", "subject": ""}
     return Cause(**plain | {"P": np.eye(n), "p": np.zeros(n), "T": np.eye(n)} | changed)
 
 
 class Robot:
-    """Joints, drives and frame table of a study of n joints, from which causes are made.
+    """Joints, drives and frame table of a robot with n joints, from which causes are made.
 
     Parameters
     ----------
     model : GeneratedModel
     variants : GeneratedModel, optional
-        The module of `symgen.variants`, whose table of frames is free; without it, the table stays.
+        The module of `symgen.variants`, in which entries of the table of frames can be changed.
+        Without it, no cause changes the table.
     sides : (str, str)
         Sides of positions and torques in the files: motor or joint.
     samples : Samples, optional
-        Which joints have known torques, and how large torques are.
+        Samples that show which joints have known torques, and how large the torques are.
     friction : ndarray, shape (n,), N m or N, optional
-        Friction at low speed that the model lacks, to first order; None: of no joint for certain.
+        Friction at low speed that the model lacks, to first order; None if it is certain in no
+        joint.
     """
 
     def __init__(
@@ -174,58 +186,67 @@ class Robot:
         self.constant = np.eye(n) if drives is None else np.diag(drives.torque_constant)
 
     def one(self, j: int, value: float, others: float = 1.0) -> Array:
-        """`value` at joint j and 0 elsewhere, shape (n,)."""
+        """Make an array with `value` at joint j and `others` at all other joints, shape (n,)."""
         return np.where(np.arange(self.n) == j, value, others)
 
     def positions(self, E: Array) -> Maps:
-        """Map of position columns by E, on the side of the files; for motors q' = R^-1 E R (q - offset) + offset."""
+        """Apply the matrix E to the position columns of the files; return P and p of the joint
+        positions.
+
+        For files on the side of the motors, q' = R^-1 E R (q - offset) + offset, with R the gear
+        ratio.
+        """
         if self.sides[0] == "motor":
             E = np.linalg.inv(self.R) @ E @ self.R
             return {"P": E, "p": self.offset - E @ self.offset}
         return {"P": E}
 
     def torques(self, E: Array) -> Maps:
-        """Map of torque columns by E, on the side of the files."""
+        """Apply the matrix E to the torque columns of the files; return T of the joint torques."""
         if self.sides[1] == "motor":
             E = self.R.T @ E @ np.linalg.inv(self.R.T)
         return {"T": E}
 
     @property
     def gravity(self) -> Array:
-        """Gravity of the robot file in frame 0, shape (3,), m/s^2; zeros without `variants`."""
+        """Gravity vector of the robot file in frame 0, shape (3,), m/s^2; zeros without `variants`.
+        """
         return np.array([self.free.get(key, 0.0) for key in GRAVITY])
 
     @property
     def frames(self) -> list[int]:
-        """Frames with free entries; frames of constrained joints keep theirs."""
+        """Numbers of the frames whose entries in the table of frames can be changed.
+
+        Frames of constrained joints are not among them.
+        """
         entries = (ENTRY.fullmatch(key) for key in self.free)
         return sorted(int(entry[2]) for entry in entries if entry and entry[1] == "alpha")
 
     @property
     def whole_table(self) -> bool:
-        """Whether the entries of all frames with links are free."""
+        """Whether the table entries of all frames with links can be changed."""
         return {*self.links} <= {*self.frames} and bool(self.frames)
 
 
 @dataclass(frozen=True)
 class Row:
-    """A row of the tables.
+    """One row of the tables CAUSES and NUMBERS: a kind of error, and how its causes are made.
 
     Attributes
     ----------
     kind : str
     of : function of the Robot
-        Items that the cause is tried of.
+        Yields the items for which the cause is tried, for instance joints.
     says, remedy, subject : str
-        Sentences with the words of an item in braces; without a subject, what it says is one.
+        Sentences with the words of an item in braces; the default of `subject` is `says`.
     maps : function of the Robot, the item and, in NUMBERS, xi
-        What it does.
+        Returns the fields of the Cause that change the samples or the table of frames.
     span : float
-        In NUMBERS, the largest |xi| that is searched.
+        In NUMBERS, the largest |xi| to which the search extends.
     words : function of the Robot, the item and xi
-        In NUMBERS, words of the sentences that depend on xi.
+        In NUMBERS, returns words of the sentences that depend on xi.
     change : function of the Robot and the item
-        The remedy as a change of the study.
+        Returns the remedy as settings of the study.
     """
 
     kind: str
@@ -239,7 +260,7 @@ class Row:
     change: Callable[[Robot, Item], Mapping[str, Any]] = lambda robot, item: {}
 
     def cause(self, robot: Robot, item: Item, *xi: float) -> Cause:
-        """The cause of one item."""
+        """Make the cause for one item, for instance one joint; rows of NUMBERS also need xi."""
         words = {**item, **(self.words(robot, item, *xi) if xi else {})}
         says = self.says.format(**words)
         return unchanged_study(
@@ -257,46 +278,46 @@ class Row:
 
 
 def study(robot: Robot) -> Iterator[Item]:
-    """The study as a whole."""
+    """Yield one item without words, for a cause that concerns the whole study."""
     yield {}
 
 
 def several_joints(robot: Robot) -> Iterator[Item]:
-    """The study of more than one joint."""
+    """Yield one item for the whole study if the robot has more than one joint."""
     yield from [{}] if robot.n > 1 else []
 
 
 def joints(robot: Robot) -> Iterator[Item]:
-    """Each joint by its label."""
+    """Yield each joint: its number from 0, and its label."""
     for j, label in enumerate(robot.labels):
         yield {"j": j, "joint": label}
 
 
 def senses(robot: Robot) -> Iterator[Item]:
-    """Every joint in the other sense."""
+    """Yield each joint with the matrix E that reverses its sense."""
     for item in joints(robot):
         yield {**item, "E": np.diag(robot.one(item["j"], -1.0))}
 
 
 def joints_of_several(robot: Robot) -> Iterator[Item]:
-    """Every joint of more than one."""
+    """Yield each joint if the robot has more than one."""
     yield from joints(robot) if robot.n > 1 else ()
 
 
 def turning_joints(robot: Robot) -> Iterator[Item]:
-    """Every revolute joint."""
+    """Yield each revolute joint."""
     yield from (item for item in joints(robot) if robot.turning[item["j"]])
 
 
 def turns(robot: Robot) -> Iterator[Item]:
-    """Turns of every revolute joint."""
+    """Yield each revolute joint with each angle of TURNS, by which its zero may be wrong."""
     for item in turning_joints(robot):
         for text, angle in TURNS.items():
             yield {**item, "turn": text, "angle": angle}
 
 
 def pairs(robot: Robot) -> Iterator[Item]:
-    """Two joints."""
+    """Yield each pair of joints with the matrix E that exchanges them."""
     for i, k in combinations(range(robot.n), 2):
         E = np.eye(robot.n)
         E[[i, k]] = E[[k, i]]
@@ -304,7 +325,10 @@ def pairs(robot: Robot) -> Iterator[Item]:
 
 
 def orders(robot: Robot) -> Iterator[Item]:
-    """All columns in another order."""
+    """Yield matrices E that put all columns in another order: reversed, or moved by one joint.
+
+    Nothing is yielded for fewer than three joints.
+    """
     E = np.eye(robot.n)
     if robot.n > 2:
         yield {"E": E[::-1], "moved": "come in reverse order"}
@@ -313,14 +337,20 @@ def orders(robot: Robot) -> Iterator[Item]:
 
 
 def torque_units(robot: Robot) -> Iterator[Item]:
-    """Units of torques of turning joints."""
+    """Yield each unit in which torques may have been recorded, with its factor to N m.
+
+    Nothing is yielded if a joint is prismatic, or if the law of a controller gives the torques.
+    """
     measured = robot.sides[1] != "law"
     for unit, factor in TORQUE_UNITS.items() if measured and robot.turning.all() else ():
         yield {"unit": unit, "factor": factor}
 
 
 def position_units(robot: Robot) -> Iterator[Item]:
-    """Units of all positions that turn, or slide."""
+    """Yield each unit for which positions may have been mistaken, for instance degrees read as rad.
+
+    The unit concerns all revolute joints or all prismatic joints.
+    """
     for unit, factor, turning, mistake in (
         ("deg", DEGREE, True, "degrees are read as rad"),
         ("rad", 1 / DEGREE, True, "rad are read as degrees"),
@@ -334,27 +364,34 @@ def position_units(robot: Robot) -> Iterator[Item]:
 
 
 def position_unit_of_joints(robot: Robot) -> Iterator[Item]:
-    """Units of one position among several of its kind."""
+    """Yield each unit for which the position of a single joint may have been mistaken.
+
+    Only if the robot has several joints of this kind (revolute or prismatic).
+    """
     for item in position_units(robot):
         for j in np.flatnonzero(item["chosen"]) if item["chosen"].sum() > 1 else ():
             yield {**item, "chosen": np.arange(robot.n) == j, "joint": robot.labels[j]}
 
 
 def rates(robot: Robot) -> Iterator[Item]:
-    """Factors of LIMIT.RATE_FACTORS."""
+    """Yield each factor by which the sampling rate may be wrong (LIMIT.RATE_FACTORS)."""
     for factor in LIMIT.RATE_FACTORS:
         yield {"factor": factor, "times": times(factor)}
 
 
 def times(factor: float) -> str:
-    """A factor in words: 2 times, 1/4 of, 0.752 of."""
+    """Write a factor in words, for instance "2 times", "1/4 of" or "0.752 of"."""
     if factor > 1:
         return f"{factor:.3g} times"
     return f"1/{1 / factor:g} of" if np.isclose(2 / factor % 1, 0) else f"{factor:.3g} of"
 
 
 def neighbours(robot: Robot) -> Iterator[Item]:
-    """A joint and the next one of the same unit, with the sense in which its motor turns with it."""
+    """Yield each pair of neighbouring joints of the same unit whose drives may be coupled.
+
+    Each pair is tried with both senses in which the motor of the second joint may turn with the
+    first joint.
+    """
     for k in range(1, robot.n):
         if robot.units[k - 1] == robot.units[k]:
             for share, sense, back in ((1.0, "plus", "minus"), (-1.0, "minus", "plus")):
@@ -363,29 +400,32 @@ def neighbours(robot: Robot) -> Iterator[Item]:
 
 
 def known_torques(robot: Robot) -> Iterator[Item]:
-    """Joints with known torques."""
+    """Yield each joint with a known torque in the record."""
     if robot.samples is not None:
         for j in np.flatnonzero(robot.samples.tau_known.any(axis=0)):
             yield {"j": j, "joint": robot.labels[j]}
 
 
 def geared(robot: Robot) -> Iterator[Item]:
-    """The study of a robot with gears."""
+    """Yield one item for the whole study if the robot has gears."""
     yield from [{}] if not np.allclose(robot.R, np.eye(robot.n)) else []
 
 
 def with_constants(robot: Robot) -> Iterator[Item]:
-    """The study of a robot with torque constants."""
+    """Yield one item for the whole study if the drives have torque constants."""
     yield from [{}] if not np.allclose(robot.constant, np.eye(robot.n)) else []
 
 
 def with_offsets(robot: Robot) -> Iterator[Item]:
-    """The study of a robot whose drives have offsets."""
+    """Yield one item for the whole study if the drives have position offsets."""
     yield from [{}] if robot.offset.any() else []
 
 
 def other_ratios(robot: Robot) -> Iterator[Item]:
-    """Two joints of other ratios, of files on the side of the motors."""
+    """Yield each pair of joints whose gear ratios differ, and so may have been exchanged.
+
+    Only if positions or torques of the files are on the side of the motors.
+    """
     ratio = np.diag(robot.R)
     for item in pairs(robot) if "motor" in robot.sides else ():
         i, k = item["i"], item["k"]
@@ -395,14 +435,14 @@ def other_ratios(robot: Robot) -> Iterator[Item]:
 
 
 def other_gravity(robot: Robot) -> Iterator[Item]:
-    """Gravity of another size than on earth."""
+    """Yield gravity of 9.81 m/s^2 if the robot file gives another size."""
     size = float(np.linalg.norm(robot.gravity))
     if size and abs(size / 9.81 - 1) > LIMIT.GRAVITY_VARIES:
         yield {"size": f"{size:.4g}", "g": 9.81 / size * robot.gravity}
 
 
 def axes(robot: Robot) -> Iterator[Item]:
-    """The six axes of frame 0 that gravity does not point along."""
+    """Yield gravity along each of the six axes of frame 0, except its present direction."""
     size = float(np.linalg.norm(robot.gravity))
     for k, axis in enumerate("xyz"):
         for sign in (1.0, -1.0):
@@ -418,7 +458,7 @@ def axes(robot: Robot) -> Iterator[Item]:
 
 
 def alphas(robot: Robot) -> Iterator[Item]:
-    """Turns of alpha of every frame."""
+    """Yield the angle alpha of each frame, turned by 90, -90 or 180 degrees."""
     for frame in robot.frames:
         for text, turn in TURNS.items():
             before = robot.free[f"free_alpha{frame}"]
@@ -429,7 +469,7 @@ def alphas(robot: Robot) -> Iterator[Item]:
 
 
 def _angle(x: float) -> str:
-    """An angle in multiples of pi/2 if it is one."""
+    """Write an angle as a multiple of pi/2 if it is one, otherwise in rad."""
     quarter = x / (np.pi / 2)
     if not np.isclose(quarter, round(quarter)):
         return f"{x:.4g} rad"
@@ -438,7 +478,7 @@ def _angle(x: float) -> str:
 
 
 def lengths(robot: Robot) -> Iterator[Item]:
-    """Lengths of every frame that are not zero."""
+    """Yield each length d, r or b of the table of frames that is not zero."""
     for frame in robot.frames:
         for name in ("d", "r", "b"):
             length = robot.free.get(f"free_{name}{frame}", 0.0)
@@ -447,7 +487,10 @@ def lengths(robot: Robot) -> Iterator[Item]:
 
 
 def odd_lengths(robot: Robot) -> Iterator[Item]:
-    """Lengths that may be in mm, or in m where mm were meant."""
+    """Yield each length of unusual size with the factors 1000 and 1/1000.
+
+    Such a length may have been given in mm instead of m, or in m instead of mm.
+    """
     for item in lengths(robot):
         if not LIMIT.MM_BELOW < abs(item["length"]) < LIMIT.MM_ABOVE:
             for text, factor in LENGTHS.items():
@@ -455,7 +498,7 @@ def odd_lengths(robot: Robot) -> Iterator[Item]:
 
 
 def exchanged_lengths(robot: Robot) -> Iterator[Item]:
-    """Frames of other d than r."""
+    """Yield each frame whose d and r differ, and so may have been exchanged."""
     for frame in robot.frames:
         d, r = robot.free[f"free_d{frame}"], robot.free[f"free_r{frame}"]
         if d != r:
@@ -463,7 +506,10 @@ def exchanged_lengths(robot: Robot) -> Iterator[Item]:
 
 
 def odd_tables(robot: Robot) -> Iterator[Item]:
-    """All lengths of a table whose longest one is no length of an arm."""
+    """Yield all lengths of the table of frames, multiplied by 1000 and by 1/1000.
+
+    Only if the longest length is too long or too short for an arm: mm and m may be confused.
+    """
     given = {
         key: x for key, x in robot.free.items() if key[:6] in ("free_d", "free_r", "free_b") and x
     }
@@ -474,7 +520,10 @@ def odd_tables(robot: Robot) -> Iterator[Item]:
 
 
 def conventions(robot: Robot) -> Iterator[Item]:
-    """alpha and d of every frame taken from the frame before, or after it."""
+    """Yield alpha and d of all frames, each copied from the frame before or from the frame after.
+
+    This corrects a table in the distal convention that is read as Khalil's, or the reverse.
+    """
     for step, mistake, remedy in (
         (
             -1,
@@ -497,7 +546,8 @@ def conventions(robot: Robot) -> Iterator[Item]:
 
 
 def entries(robot: Robot, names: str) -> Iterator[Item]:
-    """Entries of the table of these names, lengths if they are not zero."""
+    """Yield the entries of the table of frames with these names; lengths only if they are not zero.
+    """
     for key, value in robot.free.items():
         entry = ENTRY.fullmatch(key)
         if entry and entry[1] in names.split() and (value or entry[1] == "alpha"):
@@ -505,7 +555,10 @@ def entries(robot: Robot, names: str) -> Iterator[Item]:
 
 
 def slow_joints(robot: Robot) -> Iterator[Item]:
-    """All joints with friction at low speed that the model lacks."""
+    """Yield one item: all joints with friction at low speed that the model lacks.
+
+    Nothing is yielded if no joint certainly has such friction.
+    """
     if robot.friction is not None:
         names = ", ".join(robot.labels[j] for j in np.flatnonzero(robot.friction))
         yield {"joints": names, "friction": robot.friction}
@@ -515,22 +568,27 @@ def slow_joints(robot: Robot) -> Iterator[Item]:
 
 
 def in_positions(robot: Robot, item: Item) -> Maps:
-    """The map E of an item in the columns of positions."""
+    """Apply the matrix E of an item to the columns of positions."""
     return robot.positions(item["E"])
 
 
 def in_torques(robot: Robot, item: Item) -> Maps:
-    """The map E of an item in the columns of torques."""
+    """Apply the matrix E of an item to the columns of torques."""
     return robot.torques(item["E"])
 
 
 def in_both(robot: Robot, item: Item) -> Maps:
-    """The map E of an item in the columns of positions and torques."""
+    """Apply the matrix E of an item to the columns of positions and to those of torques."""
     return robot.positions(item["E"]) | robot.torques(item["E"])
 
 
 def turned(*quantities: str) -> Callable[[Robot, Item], Mapping[str, Any]]:
-    """The sign of the columns of a joint turned, without one of all joints."""
+    """Make a function that states a reversed sign as settings of the study (record.scale).
+
+    The sign is that of the joint of the item, or of all joints if the item has none.
+
+    quantities : columns whose sign is reversed: q, tau.
+    """
 
     def change(robot: Robot, item: Item) -> Mapping[str, Any]:
         signs = robot.one(item["j"], -1) if "j" in item else -np.ones(robot.n)
@@ -540,7 +598,7 @@ def turned(*quantities: str) -> Callable[[Robot, Item], Mapping[str, Any]]:
 
 
 def transmitted(robot: Robot, *, positions: bool, torques: bool, to_joints: bool) -> Maps:
-    """Signals of the motors converted to the joints, or the reverse."""
+    """Convert positions, torques or both from the motors to the joints, or the reverse."""
     inverse = np.linalg.inv(robot.R)
     P, p, T = (
         (inverse, robot.offset, robot.R.T)
@@ -551,7 +609,7 @@ def transmitted(robot: Robot, *, positions: bool, torques: bool, to_joints: bool
 
 
 def coupled(robot: Robot, item: Item, *, positions: bool, torques: bool) -> Maps:
-    """q_k' = q_k + share q_i and tau_i' = tau_i - share tau_k."""
+    """Couple two joints i and k: q_k' = q_k + share q_i and tau_i' = tau_i - share tau_k."""
     P, T = np.eye(robot.n), np.eye(robot.n)
     P[item["k"], item["i"]] = item["share"]
     T[item["i"], item["k"]] = -item["share"]
@@ -559,24 +617,31 @@ def coupled(robot: Robot, item: Item, *, positions: bool, torques: bool) -> Maps
 
 
 def constants_as_currents(robot: Robot) -> Array:
-    """Torques of the joints from what torque constants were applied to by mistake."""
+    """Compute the matrix that removes torque constants which were applied by mistake, shape (n, n).
+
+    It multiplies the torques of the joints.
+    """
     return np.asarray(robot.R.T @ np.linalg.inv(robot.constant) @ np.linalg.inv(robot.R).T)
 
 
 def exchanged_ratios(robot: Robot, item: Item) -> Maps:
-    """Ratios of two joints exchanged, of what the files have on the side of the motors."""
+    """Correct exchanged gear ratios of two joints.
+
+    Only torques or positions that the files give on the side of the motors change.
+    """
     factors = item["factors"]
     maps = {"T": np.diag(factors)} if robot.sides[1] == "motor" else {}
     return maps | ({"P": np.diag(1 / factors)} if robot.sides[0] == "motor" else {})
 
 
 def gravity(item: Item) -> Maps:
-    """Gravity along g."""
+    """Set gravity to the vector g of an item, m/s^2 in frame 0."""
     return {"constants": dict(zip(GRAVITY, map(float, item["g"]), strict=True))}
 
 
 def chosen(item: Item) -> Array:
-    """The factor of an item on the positions chosen."""
+    """Make a diagonal matrix: the factor of an item for its chosen joints, 1 for the other joints.
+    """
     return np.diag(np.where(item["chosen"], item["factor"], 1.0))
 
 
@@ -889,31 +954,31 @@ CAUSES = (
 
 
 def factor_words(robot: Robot, item: Item, xi: float) -> Item:
-    """A factor exp(xi), and what it may be."""
+    """Write the factor exp(xi) in words, and the mistake that may explain it."""
     near = [text for value, text in GUESSES.items() if abs(abs(xi) - np.log(value)) < 0.05]
     guess = near[0] if near else "they are right when this factor is 1"
     return {"factor": f"{np.exp(xi):.3g}", "times": times(float(np.exp(xi))), "guess": guess}
 
 
 def size_of_torque(robot: Robot, j: int) -> float:
-    """Root mean square torque of a joint, N m or N."""
+    """Compute the root mean square torque of joint j, N m or N."""
     assert robot.samples is not None
     return float(np.sqrt((robot.samples.tau[:, j] ** 2).mean()))
 
 
 def offset_words(robot: Robot, item: Item, xi: float) -> Item:
-    """A constant torque of xi times the size of that of the joint."""
+    """Write the constant torque of a joint: xi times its root mean square torque."""
     j = item["j"]
     return {"offset": f"{xi * size_of_torque(robot, j):.3g} {'N m' if robot.turning[j] else 'N'}"}
 
 
 def angle_words(robot: Robot, item: Item, xi: float) -> Item:
-    """An angle off by xi."""
+    """Write the error xi of an angle in degrees, and the corrected angle in rad."""
     return {"degrees": f"{np.degrees(xi):.3g}", "fits": f"{item.get('value', 0.0) + xi:.3f}"}
 
 
 def length_words(robot: Robot, item: Item, xi: float) -> Item:
-    """A length of exp(xi) times the given one."""
+    """Write the corrected length, exp(xi) times the given length, and the given length."""
     return {"fits": f"{item['value'] * np.exp(xi):.4g}", "given": f"{item['value']:.4g}"}
 
 
@@ -1015,5 +1080,5 @@ NUMBERS = (
 
 
 def causes(robot: Robot) -> list[Cause]:
-    """All that can be tried on a robot, of CAUSES."""
+    """Make all causes of the table CAUSES for a robot."""
     return [row.cause(robot, item) for row in CAUSES for item in row.of(robot)]

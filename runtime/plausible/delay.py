@@ -1,16 +1,16 @@
-"""The time by which the torque of each joint is late against its position, estimated with its deviation.
+"""Estimate the delay of the torque of each joint against its position, with standard deviations.
 
     Y_j(t) = [W_j X](t - delta_j) + rho
     Y_j(t + delta) = W_j X - (delta_j - delta) d/dt(W_j X) + ...
 
-Gauss-Newton over X and every delta_j together: torques are shifted by the last delta (cubic
-interpolation of the filtered signal), W stays. The start is the best common shift of a grid. Rows
-near a reversal are left out, if sign(qd) has no derivative and the filter smears its step.
-Deviations are the larger of two, that of least squares and that of blocks of time taken as
-independent.
+X and all delta_j are estimated together by Gauss-Newton steps: torques are shifted by the last
+delta (cubic interpolation of the filtered signal), W stays. The start is the best common shift of a
+grid. Rows near a reversal are left out for columns sign(qd), which have no derivative there and
+whose step the filter smears. The standard deviation is the larger of two: that of least squares,
+and that between blocks of time that are assumed to be independent.
 
-A delay of a few ms is what controllers and field buses make of a record; at 1 Hz and 10 rad/s^2 it
-costs some per cent of the torque.
+Controllers and field buses often cause a delay of a few ms; at 1 Hz and 10 rad/s^2 it costs some
+per cent of the torque.
 """
 
 from __future__ import annotations
@@ -37,18 +37,18 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Delay(Result):
-    """Delays of the torques, by joint; a positive one is a torque that comes late.
+    """Delays of the torques, one for each joint; it is positive if the torque is late.
 
     Attributes
     ----------
     joints : tuple of str
     shift, sigma : ndarray, shape (n,), s
-        Delay of each joint, and its deviation; nan of a joint that does not move enough.
+        Delay of each joint, and its standard deviation; nan for a joint that does not move enough.
     common, sigma_common : float, s
-        Weighted mean over the joints, and its deviation; the larger of the stated one and that of
-        their scatter.
+        Weighted mean over the joints, and its standard deviation: the larger one of that computed
+        from sigma and that computed from the scatter of the delays.
     before, after : ndarray, shape (n,), %
-        100 ||Y_j - W_j X|| / ||Y_j|| without and with the delays.
+        Relative error 100 ||Y_j - W_j X|| / ||Y_j|| without and with the delays.
     """
 
     joints: tuple[str, ...]
@@ -60,7 +60,7 @@ class Delay(Result):
     after: Array
 
     def table(self) -> Table:
-        """One line per joint, ms and %."""
+        """Tabulate the delays in ms and the relative errors in %, one line for each joint."""
         columns = (1e3 * self.shift, 1e3 * self.sigma, self.before, self.after)
         return Table(
             "Delay of the torques against the positions",
@@ -72,7 +72,7 @@ class Delay(Result):
         )
 
     def to_table(self) -> str:
-        """The table, and the mean over the joints."""
+        """Write the table of the delays, then their mean over the joints."""
         return (
             f"{self.table().to_text()}\nall joints: {1e3 * self.common:.2f} ms, deviation "
             f"{1e3 * self.sigma_common:.2f} ms"
@@ -85,9 +85,9 @@ def delay(problem: Problem, *, longest: float = LIMIT.LONGEST_DELAY) -> Delay:
     Parameters
     ----------
     problem : Problem
-        Filters and window by its settings.
+        Its settings give the filters and the window.
     longest : float, s
-        Largest delay looked for.
+        Largest delay that is searched for.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def delay(problem: Problem, *, longest: float = LIMIT.LONGEST_DELAY) -> Delay:
     Raises
     ------
     InputError
-        `longest` beyond a tenth of the record, or fewer rows than unknowns.
+        `longest` is more than a tenth of the record, or there are too few rows.
     """
     require_motion(problem.settings.signals, "a delay")
     reading = problem.prepared[0]
@@ -104,7 +104,7 @@ def delay(problem: Problem, *, longest: float = LIMIT.LONGEST_DELAY) -> Delay:
 
 
 def delay_of(model: GeneratedModel, through: Filtered, longest: float) -> Delay:
-    """Estimate the delays of a record that is filtered already."""
+    """Estimate the delays of the torques in a record that is filtered already."""
     record = through.record
     duration = float(record.t[-1] - record.t[0])
     if not 0 < longest <= duration / 10:
@@ -131,7 +131,7 @@ def delay_of(model: GeneratedModel, through: Filtered, longest: float) -> Delay:
 
 
 def _mean(shift: Array, sigma: Array) -> tuple[float, float]:
-    """Weighted mean of the delays and its deviation."""
+    """Compute the weighted mean of the delays and its standard deviation, both in s."""
     if not len(shift):
         return float("nan"), float("nan")
     w = sigma**-2.0
@@ -146,7 +146,10 @@ def _mean(shift: Array, sigma: Array) -> tuple[float, float]:
 
 
 class Shifts:
-    """W and its rate at some instants, and torques that can be shifted."""
+    """Least-squares problem of one record whose torques can be shifted in time.
+
+    It holds W and its time derivative at some instants.
+    """
 
     def __init__(self, model: GeneratedModel, through: Filtered, longest: float) -> None:
         record, states, cutoff = through.record, through.states, through.low.hertz
@@ -200,13 +203,16 @@ class Shifts:
         self.mask = moving & ~(np.any(steps, axis=0) & flat).any(axis=2)
 
     def shifted(self, shift: Array) -> Array:
-        """Y_j(t + delta_j), shape (K, n)."""
+        """Interpolate the torque of each joint at the instants t + delta_j, shape (K, n)."""
         return np.column_stack(
             [torque(self.t + d) for torque, d in zip(self.torques, shift, strict=True)]
         )
 
     def fit(self, shift: Array) -> tuple[Array, Array, Array]:
-        """X, sigma by joint, and the residuals, shape (K, n)."""
+        """Fit X to torques that are shifted by `shift`, s.
+
+        Return X, the residual of each joint (root mean square), and all residuals, shape (K, n).
+        """
         Y = self.shifted(shift)
         grams = Grams.of(self.D, Y, self.mask)
         rows = np.maximum(self.mask.sum(axis=0), 1)
@@ -217,13 +223,17 @@ class Shifts:
         return X, sigma, (Y - self.D @ X) * self.mask
 
     def errors(self, shift: Array) -> Array:
-        """Relative error by joint, %."""
+        """Compute the relative error of each joint, %, if its torque is shifted by `shift`, s."""
         size = np.linalg.norm(self.shifted(shift) * self.mask, axis=0)
         left = np.linalg.norm(self.fit(shift)[2], axis=0)
         return np.asarray(100 * left / np.maximum(size, 1e-300))
 
     def step(self, shift: Array) -> tuple[Array, Array, Array]:
-        """Gauss-Newton step of the delays, their deviations, and which of them the record determines."""
+        """Compute one Gauss-Newton step of the delays.
+
+        Return the step and its standard deviation for each joint, s, and whether the record
+        determines this delay.
+        """
         X, sigma, e = self.fit(shift)
         w = self.mask / sigma
         slope = -(self.rate @ X) * w

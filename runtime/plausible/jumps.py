@@ -1,12 +1,12 @@
-"""Along the record: positions that jump, torques that are cut off.
+"""Checks along the record: positions that jump or freeze, torques that are clipped.
 
-jumps      a step of q between two samples that differs from those around it by LIMIT.JUMP times
-           what is usual, and by more than any robot accelerates: an encoder that dropped out,
-           samples that are missing, angles that wrap, two records joined into one
-frozen     a joint in motion that holds one value for LIMIT.HELD samples from one sample to the next
-cut        the largest or the smallest torque holds for many samples, and the model that is fitted
-           to the others goes beyond it: a clipped signal. It meets a torque that saturates the
-           drive and is recorded as it acted
+jumps      a step of q between two samples that differs from the steps around it by LIMIT.JUMP
+           times the usual change, and by more than any robot accelerates. Causes are an encoder
+           that dropped out, missing samples, angles that wrap, or two records joined into one
+frozen     a moving joint that suddenly holds one value for LIMIT.HELD samples
+cut        the largest or the smallest torque is repeated in many samples, and a model that is
+           fitted to the other samples goes beyond it: the signal was clipped. If the drive
+           saturates and its true torque is recorded, the model does not go beyond it
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Array = np.ndarray
     "accelerates",
 )
 def jumps(case: Case) -> Answer:
-    """Check whether positions jump further than a joint can move between samples."""
+    """Check whether a joint position jumps, freezes, or is the same as that of another joint."""
     median, units, limits = case.study.signals.median, case.units, case.limits("qd")
     fastest = np.array([LIMIT.LARGEST_SPEED[unit][1] for unit in units])
     fastest = fastest if limits is None else 4 * limits
@@ -113,13 +113,17 @@ def jumps(case: Case) -> Answer:
 
 
 def _usual(x: Array) -> Array:
-    """The 90 % quantile of the nonzero values of each column, (n,)."""
+    """Compute the 90 % quantile of the positive values of each column, shape (n,)."""
     return np.array([np.quantile(own[own > 0], 0.9) if own.any() else np.inf for own in x.T])
 
 
 def _frozen(steps: Array, sharp: Array) -> Array:
-    """Where a position is held for LIMIT.HELD samples once its speed has changed sharply, bool (N,).
-    sharp : such changes, (N - 2,).
+    """Find the instants at which a joint stops sharply and then holds one value, bool (N,).
+
+    The value must stay for LIMIT.HELD samples.
+
+    steps : size of each step between samples, shape (N - 1,).
+    sharp : whether the speed changes sharply from one step to the next, bool (N - 2,).
     """
     still = np.append(np.cumsum(steps == 0), 0)
     k = np.flatnonzero(sharp) + 1  # the first of the steps after each change
@@ -130,16 +134,19 @@ def _frozen(steps: Array, sharp: Array) -> Array:
 
 
 def _runs(high: Array, median: int) -> tuple[Array, Array]:
-    """First and last step of each jump; a jump that was resampled takes several steps."""
+    """Find the first and the last step of each jump.
+
+    Resampling may spread a jump over several steps.
+    """
     instants = np.flatnonzero(high)
     apart = np.diff(instants) > max(median, LIMIT.JUMP_STEPS)
     return instants[np.append(True, apart)], instants[np.append(apart, True)]
 
 
 def _wrap(q: Array, high: Array, usual: Array, median: int) -> bool:
-    """Whether all jumps of every joint have one size and occur more than once.
+    """Whether the jumps of each joint have one size, as if an angle or a counter wraps around.
 
-    A counter or an angle that starts anew jumps so.
+    A joint that jumps must do so more than once.
     """
     around, again = LIMIT.JUMP_STEPS, []
     for own, jump, step in zip(q.T, high.T, usual, strict=True):
@@ -159,11 +166,10 @@ def _wrap(q: Array, high: Array, usual: Array, median: int) -> bool:
     "for less torque",
 )
 def cut_torques(case: Case) -> Answer | None:
-    """Check whether torques stay at their largest or smallest value.
+    """Check whether torques were clipped at their largest or smallest value.
 
-    The model that is fitted to the other samples says what they would be there.
-
-    None if there are none.
+    A model that is fitted to the other samples predicts the torques there. None if no torque stays
+    at such a value, or if nothing is fitted.
     """
     if case.silent:
         return None
@@ -219,7 +225,10 @@ def cut_torques(case: Case) -> Answer | None:
 
 
 def _at_bound(tau: Array) -> Array:
-    """Whether each sample is at a bound at which the torque stays, (N,)."""
+    """Whether each sample has the largest or the smallest torque, bool (N,).
+
+    True only if the record repeats this value far more often than the values next to it.
+    """
     held = np.zeros(len(tau), dtype=bool)
     span = float(np.ptp(tau))
     for side in (1.0, -1.0):

@@ -1,21 +1,21 @@
-"""The values of the robot file against the record: gravity torque and inertia torque of every joint, ratio and sign.
+"""Compare the torques computed from the robot file's values with the record, joint by joint.
 
     Y_j = a_j (gravity torque by the values)_j + b_j (the rest of their torque)_j + friction and
     offset,
 
-least squares joint by joint: a_j = b_j = 1 if values, gear and sign are right. A part is left
+by least squares for each joint: a_j = b_j = 1 if values, gear and sign are right. A part is left
 out if it is small or cannot be separated.
 
-Are the measured torques torques at all? Beside those of the values, currents have the same course
-and another size.
+A second question: are the measured torques really torques? Motor currents change in time as the
+computed torques do, but have another size.
 
     slope_j = Y_j'W_j X_0 / ||W_j X_0||^2,    alike_j = Y_j'W_j X_0 / (||Y_j|| ||W_j X_0||),
             X_0 the base parameters of the file's values
 
-Values of a maker's file are right to tens of per cent; a joint that runs like them (alike above
-LIMIT.TORQUE_ALIKE) at less than 1/LIMIT.TORQUE_FACTOR or more than LIMIT.TORQUE_FACTOR of their
-size was measured in another unit, or on the other side of its gear. Drivers of some arms publish
-motor currents as effort.
+Values of a maker's file are right to tens of per cent. If the measured torque of a joint is similar
+to the computed one (alike above LIMIT.TORQUE_ALIKE), but is less than 1/LIMIT.TORQUE_FACTOR or more
+than LIMIT.TORQUE_FACTOR of its size, it was measured in another unit or on the other side of the
+gear. Drivers of some arms publish motor currents as effort.
 """
 
 from __future__ import annotations
@@ -43,15 +43,16 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class KnownValues(Result):
-    """Comparison of the torque of the values of the robot file with that of the record.
+    """Comparison of the torques computed from the robot file's values with the measured torques.
 
     Attributes
     ----------
     joints : tuple of str
     gravity, inertia : ndarray, shape (n,)
-        Measured over computed; nan if the part is too small.
+        Ratio of measured to computed torque, for the gravity part and for the rest; nan if this
+        part is too small.
     error : ndarray, shape (n,), %
-        Of the torque, with friction fitted and both ratios 1.
+        Relative error of the computed torque, with friction fitted and both ratios 1.
     complete : bool
         Whether every link has its ten values.
     """
@@ -63,7 +64,7 @@ class KnownValues(Result):
     complete: bool
 
     def table(self) -> Table:
-        """One line per joint."""
+        """Tabulate the ratios and the error of the computed torques, one line for each joint."""
         rows = zip(self.joints, self.gravity, self.inertia, self.error, strict=True)
         return Table(
             "Values of the robot file against the record, friction fitted",
@@ -78,16 +79,20 @@ class KnownValues(Result):
 
     @property
     def heavy(self) -> bool:
-        """Whether the ratios of all gravity torques lie above LIMIT.CAD_RATIOS, or all below.
+        """Whether the gravity torques of all joints are far larger than computed, or far smaller.
 
-        Wrong time stamps cannot cause this.
+        All ratios are then on the same side of the range LIMIT.CAD_RATIOS. Wrong time stamps cannot
+        cause this.
         """
         ratios, (low, high) = self.gravity[np.isfinite(self.gravity)], LIMIT.CAD_RATIOS
         return len(ratios) > 0 and bool((ratios < low).all() or (ratios > high).all())
 
     @property
     def off(self) -> tuple[str, ...]:
-        """The ratios outside LIMIT.CAD_RATIOS, and errors above LIMIT.CAD_ERROR, in words."""
+        """Sentences on the joints whose measured torques do not agree with the computed ones.
+
+        These are joints with ratios outside LIMIT.CAD_RATIOS, or with errors above LIMIT.CAD_ERROR.
+        """
         texts = []
         doubtful = set()
         for name, ratios in (("gravity", self.gravity), ("inertia", self.inertia)):
@@ -107,7 +112,10 @@ class KnownValues(Result):
 
 
 def known_values(baseline: Baseline) -> KnownValues | None:
-    """Compare the torque of the robot file's values with the record; None if no link has all values."""
+    """Compare the torques computed from the robot file's values with the record.
+
+    None if the file does not give all ten values of any link.
+    """
     physical, s = baseline.physical, baseline.samples
     given = [all(f"{family}{j}" in physical.values for family in INERTIAL) for j in physical.links]
     if not any(given):
@@ -154,7 +162,7 @@ def known_values(baseline: Baseline) -> KnownValues | None:
 
 @dataclass(frozen=True)
 class TorqueUnit(Part):
-    """The measured torques may be no torques."""
+    """A warning that the measured torques may have another unit, for instance that of currents."""
 
     sentence: str
 
@@ -162,21 +170,21 @@ class TorqueUnit(Part):
     title = "Unit of the torques"
 
     def warnings(self) -> tuple[str, ...]:
-        """The question to the user, as a tuple."""
+        """Return the question to the user, as a tuple."""
         return (self.sentence,)
 
 
 def torque_unit(result: Identification) -> TorqueUnit | None:
-    """Whether the unit of the torques is doubtful; None if it is not."""
+    """Make a warning if the unit of the measured torques is doubtful; None if it is not."""
     by_law = any(record.origin.by_law for record in result.records)
     doubt = torque_unit_doubt(result.model, result.observation, by_law)
     return TorqueUnit(f"{doubt}.") if doubt else None
 
 
 def torque_unit_doubt(model: GeneratedModel, observation: Observation, by_law: bool) -> str:
-    """The question to the user whether the torques are in N m.
+    """Ask the user whether the torques are in N m, if their size contradicts the robot file.
 
-    "" if nothing speaks against the unit, or the file has no values.
+    An empty string if nothing contradicts the unit, or if the file lacks values.
     """
     values, standard = dict(getattr(model, "VALUES", {})), getattr(model, "STANDARD_PARAMETERS", ())
     inertial = [name for name in standard if name.rstrip("0123456789") in INERTIAL]

@@ -1,14 +1,16 @@
-"""Does the motion serve: do the joints move while they are used, and which parameters can it not tell, from W alone, before anything is fitted?
-Friction at rest is no law of motion.
+"""Checks of the motion: do the joints move, and does the motion determine every parameter?
+
+Joints have to move in the rows that are used, because friction at rest obeys no law of motion. The
+parameters are judged before anything is fitted, by
 
     share_i = 100 sigma_i ||W_w,i|| / ||Y_w||
-            rows of W_w, Y_w divided by the deviation of their torque, sigma_i as
+            rows of W_w, Y_w divided by the standard deviation of their torque, sigma_i as
             `runtime.core.rows.predicted` predicts it
 
-is the predicted deviation of parameter i in % of the value with which it alone would make all of
-the measured torque. A larger value is not to be expected, so its %sigma is hardly below share_i.
-The torque noise is taken as LIMIT.TORQUE_NOISE of the torque of the joint, white: a convention,
-since the noise is not known before the fit.
+This is the predicted standard deviation of parameter i, in % of the value with which this parameter
+alone would make all of the measured torque. A larger value is not to be expected, so %sigma of the
+parameter is hardly below share_i. The torque noise is assumed to be white, with LIMIT.TORQUE_NOISE
+of the torque of the joint: a convention, since the noise is not known before the fit.
 """
 
 from __future__ import annotations
@@ -40,7 +42,7 @@ Array = np.ndarray
     f"standing at most {100 * LIMIT.REST_SHARE:g} % of the rows that are used",
 )
 def rest(case: Case) -> Answer:
-    """Check how long each joint rests, and how the fit changes without these samples."""
+    """Check how long each joint rests, and how the fit changes without the rows at rest."""
     model, study = case.model, case.study
     share = standing_share(case.samples, study)
     worst = int(np.argmax(share))
@@ -72,7 +74,7 @@ def rest(case: Case) -> Answer:
 
 
 def standing_share(samples: Samples, study: Study) -> Array:
-    """Share of the rows of each joint at which it rests, shape (n,)."""
+    """Compute, for each joint, the share of its used rows in which it rests, shape (n,)."""
     speed = np.where(
         samples.still, np.inf, np.abs(samples.qd)
     )  # a joint that never moves is told as such
@@ -82,9 +84,10 @@ def standing_share(samples: Samples, study: Study) -> Array:
 
 
 def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ...] | None:
-    """Threshold `rows.low_speed` that leaves out the rows of joints that rest, rad/s or m/s.
+    """Propose the threshold `rows.low_speed` that leaves out rows of joints at rest, rad/s or m/s.
 
-    None if at most LIMIT.REST_SHARE of them stand.
+    One number for all joints if their thresholds are similar, otherwise one for each joint. None if
+    every joint rests in at most LIMIT.REST_SHARE of its rows.
     """
     if standing_share(samples, study).max() <= LIMIT.REST_SHARE:
         return None
@@ -97,12 +100,12 @@ def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ..
 
 
 def speed_of_rest(problem: Problem) -> float | tuple[float, ...] | None:
-    """`low_speed_of_rest` of the records of a problem."""
+    """Propose the threshold `rows.low_speed` for the records of a problem."""
     return low_speed_of_rest(samples_of(problem.prepared, problem.settings), problem.settings)
 
 
 def _rounded_up(x: float) -> float:
-    """Round x up to two digits, since a smaller threshold would keep what it is to leave out."""
+    """Round x up to two digits; a smaller threshold would not leave out all rows at rest."""
     digit = 10.0 ** (np.floor(np.log10(x)) - 1) if x > 0 else 1.0
     return float(f"{np.ceil(x / digit * (1 - 1e-12)) * digit:.2g}")
 
@@ -115,14 +118,20 @@ def _rounded_up(x: float) -> float:
     "a motion), or leave them out (estimate.columns)",
 )
 def motion_excites(case: Case) -> Answer | None:
-    """Check which parameters the motion does not determine; None without rows, or if a joint rests."""
+    """Check whether the motion determines every parameter.
+
+    None if there are no rows, or if a joint rests in all records.
+    """
     if case.observation is None or case.samples.still.any():
         return None
     return excited(case.observation, case.given[0].study.signals, case.records[0].rate)
 
 
 def excited(observation: Observation, signals: Signals, rate: float) -> Answer | None:
-    """Parameters that the motion does not determine; None if W is rank-deficient, which the fit itself reports."""
+    """Check whether the motion of these rows determines every parameter.
+
+    None if W is rank-deficient, which the fit itself reports, or if a torque is zero throughout.
+    """
     try:
         shares = unexcited_shares(observation, signals, rate)
     except (InputError, np.linalg.LinAlgError):
@@ -139,7 +148,10 @@ def excited(observation: Observation, signals: Signals, rate: float) -> Answer |
 
 
 def unexcited_shares(observation: Observation, signals: Signals, rate: float) -> dict[str, float]:
-    """share_i, %, by name of the parameter; LinAlgError if W has no full rank."""
+    """Compute share_i of each parameter (see the module), %, by parameter name.
+
+    Raises LinAlgError if W is rank-deficient, and InputError if a torque is zero throughout.
+    """
     s = np.array(
         [
             LIMIT.TORQUE_NOISE
@@ -168,7 +180,10 @@ def unexcited_shares(observation: Observation, signals: Signals, rate: float) ->
     "joints take differences of the positions",
 )
 def recorded_speeds(case: Case) -> Answer | None:
-    """Check gain and lag of recorded velocities; None if none are recorded."""
+    """Compare recorded velocities with the derivatives of the positions: gain and time lag.
+
+    None if no velocities are recorded, or if the study does not use them.
+    """
     own = max(case.straight, key=lambda one: len(one.record))
     record, signals = own.record, own.study.signals
     if "qd" not in record.channels or signals.velocity == "differences":

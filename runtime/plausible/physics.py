@@ -1,5 +1,7 @@
-"""After the fit: can a physical robot explain the record, of this size, with these values, with gravity and time as they are said to be?
-And would another study explain it better?
+"""Checks after the fit: can a physical robot explain the record, and would another study do better?
+
+Other checks are the mass and the values of the robot, noise and friction in the torques, and the
+delay between positions and torques.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ Array = np.ndarray
     "Does physics agree?", "", "record a longer motion, or give a higher signals.lowpass.cutoff"
 )
 def not_asked(case: Case) -> Answer | None:
-    """Reason why no cause is tried; None if causes are tried.
+    """State the reason why no cause is tried; None if causes are tried.
 
     Too few samples are a doubt, because a wrong sign or unit would not be detected.
     """
@@ -40,7 +42,10 @@ def not_asked(case: Case) -> Answer | None:
     "alternatives below",
 )
 def physics(case: Case) -> Answer | None:
-    """Compare the errors of the best physical robot with those of free parameters, by joint."""
+    """Compare the error of the best physical robot with that of free parameters, joint by joint.
+
+    None if nothing is fitted.
+    """
     if case.alone is None:
         return None
     free, given = case.alone.free, case.alone.given
@@ -66,10 +71,10 @@ def physics(case: Case) -> Answer | None:
     "tells of that model, not of the robot",
 )
 def measured(case: Case) -> Answer | None:
-    """Check whether the torques look measured: some joint shows friction, and there is noise.
+    """Check whether the torques were measured: they must show friction and noise.
 
-    Friction is a share of a joint's torque, noise comes from fifth differences of the samples.
-    None if a law of the controller gives the torques.
+    Friction is measured as a share of the torque of a joint, noise by fifth differences of the
+    samples. None if the law of a controller gives the torques, or if nothing is fitted.
     """
     if case.alone is None or any(record.origin.by_law for record in case.records):
         return None
@@ -103,7 +108,10 @@ def measured(case: Case) -> Answer | None:
     "drives.ratio, torque_constant)",
 )
 def size(case: Case) -> Answer | None:
-    """Check the mass that the torques ask for against the reach of the robot; None if that is unknown."""
+    """Check whether the mass that explains the torques suits the reach of the robot.
+
+    None if either is unknown, or if a joint is prismatic.
+    """
     if case.alone is None or not case.alone.physical.links or not case.turning.all():
         return None
     length, physical = reach(case.model, case.samples.q), case.alone.physical
@@ -125,7 +133,10 @@ def size(case: Case) -> Answer | None:
     "subtracted as record.columns.tau_known; or the values are those of another robot",
 )
 def values(case: Case) -> Answer | None:
-    """Check the values of the robot file, by joint."""
+    """Compare the torques computed from the robot file's values with the measured ones, by joint.
+
+    None if the robot file has no values.
+    """
     if case.robot_values is None:
         return None
     if off := case.robot_values.off:
@@ -145,7 +156,8 @@ def values(case: Case) -> Answer | None:
 def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
     """Check for a time shift between positions and torques.
 
-    None if the record does not determine it, or if an alternative explains the record better.
+    None if the record does not determine the shift. If another change of the study explains the
+    record better, the question stays open.
     """
     late = None if case.baseline is None else case.late
     if late is None or not np.isfinite(late.sigma).any():
@@ -183,15 +195,19 @@ def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
 
 
 def _from_to(text: str, before: float, after: float) -> str:
-    """Add to the text how an error changes, in %; "" if it stays."""
+    """Write how an error changes, for instance "; the error goes from 8.1 to 2.0 %".
+
+    An empty string if both errors are printed alike.
+    """
     a, b = f"{before:.1f}", f"{after:.1f}"
     return "" if a == b else f"; {text} from {a} to {b} %"
 
 
 def late_joints(late: Delay) -> Array:
-    """Joints whose delay is certain, bool (n,).
+    """Whether the delay of each joint is certain, bool (n,).
 
-    If one delay suits all joints, these are all; otherwise those whose delays have one sign.
+    If one delay suits all joints, all are marked; otherwise only joints whose delays have the same
+    sign.
     """
     visible = late.before > LIMIT.DELAY_VISIBLE * late.after
     certain = np.fmax(LIMIT.CERTAIN_JOINT_DELAY * late.sigma, LIMIT.LATE_JOINT)
@@ -206,26 +222,36 @@ def late_joints(late: Delay) -> Array:
 
 
 def gain_of_delays(case: Case, late: Delay) -> float:
-    """Log-likelihood gained by correcting the delays `late`, in nats."""
+    """Compute the log-likelihood gained by correcting the delays `late`, in nats."""
     N = 0.0 if case.baseline is None else case.baseline.N
     return N * float(np.log(late.before / np.maximum(late.after, 0.1)).sum())
 
 
 def gain_of_alternative(case: Case, trial: Trial) -> float:
-    """Log-likelihood gained by an alternative, in nats; its rows are counted as for a delay."""
+    """Compute the log-likelihood gained by a change of the study, in nats.
+
+    The number of rows that count is the same as in `gain_of_delays`, so that both gains can be
+    compared.
+    """
     assert case.baseline is not None and trial.fit is not None
     return case.baseline.given.score - trial.fit.score
 
 
 def late_gain(case: Case) -> float:
-    """Log-likelihood gained by correcting the delays, in nats; 0 if no joint is certainly late."""
+    """Compute the log-likelihood gained by correcting the delays of the torques, in nats.
+
+    0 if no joint is certainly late.
+    """
     if case.baseline is None or case.late is None:
         return 0.0
     return gain_of_delays(case, case.late) if certain_joints(case).any() else 0.0
 
 
 def certain_joints(case: Case) -> Array:
-    """Joints whose torques are certainly late, bool (n,): none if that gains less than LIMIT.LATE_GAIN."""
+    """Whether the torques of each joint are certainly late, bool (n,).
+
+    All are false if correcting the delays gains less than LIMIT.LATE_GAIN.
+    """
     assert case.late is not None
     return np.asarray(late_joints(case.late) & (gain_of_delays(case, case.late) >= LIMIT.LATE_GAIN))
 
@@ -235,9 +261,10 @@ def certain_joints(case: Case) -> Array:
     f"no single change explains it decisively better ({LIMIT.DECISIVE:g} nats)",
 )
 def better(case: Case, named: Sequence[Trial]) -> Answer:
-    """The alternatives that explain the record decisively better.
+    """Report the changes of the study that explain the record decisively better than the study.
 
-    Friction that the model lacks is no slip, whatever else explains a part of it.
+    If the best of them is friction that the model lacks, the study is not wrong and the answer is
+    good.
     """
     if not named:
         return Answer(

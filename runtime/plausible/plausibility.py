@@ -1,9 +1,11 @@
-"""What may be wrong with a record, a study or a robot file, found by computing: one call, one Check for each question.
+"""Find by computation what may be wrong with a record, a study or a robot file.
 
-    CHECKS       of the record and the robot file, then of the fit: a family of slips a file
-    EXPLAINED    of the causes (`runtime.plausible.causes`), which are tried if
-                 `variants`
-                 is given, or where something else is doubtful
+One call answers several questions, each with a Check:
+
+    CHECKS       questions about the record and the robot file, then about the fit; one file
+                 for each family of errors
+    EXPLAINED    questions about causes (`runtime.plausible.causes`), which are tried if
+                 `variants` is given or if another check is doubtful
 
 A new check is a function of a `Case` and its line in CHECKS (docs/contributing.md).
 """
@@ -85,15 +87,15 @@ class Plausibility(
     Part,
     keys="checks:answers named:named_causes equivalent delay known_values:robot_values",
 ):
-    """Checks of a record, a study and a robot file, and the causes that explain it better.
+    """Results of the checks of a record, a study and a robot file, with causes that were tried.
 
     Attributes
     ----------
     answers : tuple of Check
     trials : tuple of Trial
-        Alternatives, the best first; empty if none were tried.
+        Changes of the study that were fitted, the best first; empty if none were tried.
     named : tuple of Trial
-        Those that explain the record decisively better.
+        The trials that explain the record decisively better than the study.
     equivalent : tuple of str
         Changes that no fit of this record can distinguish from the study as given.
     delay : Delay or None
@@ -113,12 +115,15 @@ class Plausibility(
 
     @property
     def worst(self) -> Check | None:
-        """The first finding that is not good."""
+        """The worst finding; None if all findings are good."""
         return worst_of(self.answers)
 
     @property
     def named_causes(self) -> list[dict[str, Any]]:
-        """Cause, remedy, gain and change of the study of what is named."""
+        """Causes that explain the record decisively better than the study.
+
+        Each has the keys cause, remedy, gain (nats) and change (of the study).
+        """
         return [
             {
                 "cause": t.cause.says,
@@ -131,31 +136,31 @@ class Plausibility(
 
     @property
     def line(self) -> str:
-        """The worst finding in one line; "" if there is none."""
+        """Question, finding and remedy of the worst check; an empty string if all are good."""
         return "" if self.worst is None else self.worst.sentence
 
     def checks(self) -> tuple[Check, ...]:
-        """The questions with their answers."""
+        """Return the questions with their answers."""
         return self.answers
 
     def text(self) -> str:
-        """Text besides the checks: changes that no record can reveal."""
+        """List the possible errors of the study that no fit of the record can reveal."""
         return "\n".join(f"No record can tell: {change}." for change in self.equivalent)
 
     def to_text(self) -> str:
-        """Findings that are not good, then changes that no record can reveal."""
+        """Write the findings that are not good, then the errors that no fit can reveal."""
         lines = [f"{c.state}: {c.sentence}" for c in self.answers if c.state in WORST[:2]]
         told = "\n".join(filter(None, [*lines, self.text()]))
         return told or "Record, study and robot file suit each other, as far as judged."
 
     def tables(self) -> list[Table]:
-        """Alternatives, delays and values of the robot file, as far as they were judged."""
+        """Tabulate causes, delays, and values of the robot file, as far as they were judged."""
         judged = (self.delay, self.robot_values)
         tried = [self.table()] if any(trial.fit is not None for trial in self.trials) else []
         return [*tried, *(own.table() for own in judged if own is not None)]
 
     def table(self) -> Table:
-        """The alternatives that come nearest, errors by joint in %."""
+        """Tabulate the best ten causes: gain in nats, and error of each joint in %."""
         rows = [
             (t.cause.says, f"{t.gain:+.0f}", *(f"{e:.1f}" for e in t.fit.errors))
             for t in self.trials
@@ -172,7 +177,10 @@ class Plausibility(
 
 
 def plausibility_of(result: Identification, variants: GeneratedModel | None = None) -> Plausibility:
-    """`plausibility` of the problem of an identification."""
+    """Check record, study and robot file of an identification (see `plausibility`).
+
+    Static poses and robots with force sensors are refused with an InputError.
+    """
     if result.study.signals.reader == "static":
         raise InputError("not judged for poses at rest")
     if any(is_axis(joint) for joint in result.model.JOINTS):
@@ -181,14 +189,18 @@ def plausibility_of(result: Identification, variants: GeneratedModel | None = No
 
 
 def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) -> Plausibility:
-    """Check whether record, study and robot file agree, and search single changes that explain the record better.
+    """Check whether record, study and robot file agree, and search for causes if they do not.
+
+    A cause is a single change of the study, for instance another sign, that explains the record
+    better.
 
     Parameters
     ----------
     problem : Problem
         Prepared.
     variants : GeneratedModel, optional
-        The module of `symgen.variants`: alternatives are then tried in any case, those of the table of frames too.
+        The module of `symgen.variants`. With it, causes are tried in any case, and errors of the
+        table of frames are among them.
     """
     require_motion(problem.settings.signals, "a check of slips")
     if any(is_axis(joint) for joint in problem.model.JOINTS):
@@ -240,7 +252,7 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
 
 
 def _case(problem: Problem, variants: GeneratedModel | None) -> Case | Check:
-    """Data for the checks; a finding if there are no data."""
+    """Prepare the data for the checks; if this is impossible, return a Check with the reason."""
     model, study = problem.model, problem.settings
     own = [part for reading in problem.prepared for part in excerpts(reading)]
     try:

@@ -1,8 +1,8 @@
-"""Some instants of the records, filtered once: what every check reads, and every cause that is tried.
+"""Selected instants of the records, filtered once, on which all checks and causes are evaluated.
 
-Filters are linear: a sign, a scale or an exchange of columns acts on the filtered signals as on the
-measured ones, and a wrong rate scales velocities and accelerations. So a cause costs the regressor
-at these instants and nothing else, and none if it leaves the positions as they are.
+Filters are linear: a change of sign, scale or column order has the same effect before and after
+filtering, and a wrong sampling rate scales velocities and accelerations. So a cause needs only the
+regressor at these instants, and not even this if it leaves the positions as they are.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ SIGNALS = ("t", "q", "qd", "qdd", "tau", "tau_known", "steady", "record")
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Filtered states and torques at K instants.
+    """Filtered positions, velocities, accelerations and torques of all joints at K instants.
 
     Attributes
     ----------
@@ -44,14 +44,15 @@ class Samples:
     tau_known : ndarray, shape (K, n), N m or N
         Known torques.
     steady : ndarray of bool, shape (K, n)
-        Whether the joint keeps its direction as far as the low-pass reaches: at a reversal filtered
-        torques hold a part of the dry friction, its regressor sign(qd) all of it.
+        Whether the joint keeps its direction within the reach of the low-pass. Near a reversal,
+        filtered torques contain only a part of the dry friction, but its regressor sign(qd) is
+        complete.
     record : ndarray of int, shape (K,)
-        Number of the record of each instant.
+        Number of the record to which each instant belongs.
     cutoff : float, Hz
-        Of the low-pass.
+        Cut-off frequency of the low-pass.
     still : ndarray of bool, shape (n,)
-        Whether the joint rests in the whole record.
+        Whether the joint rests in all records.
     """
 
     t: Array
@@ -78,33 +79,39 @@ class Samples:
         return np.asarray(LIMIT.STANDING * np.abs(self.qd).max(axis=0))
 
     def moving(self) -> Array:
-        """Whether each joint moves at each instant, and keeps its direction, bool (K, n)."""
+        """Whether each joint moves and keeps its direction at each instant, bool (K, n)."""
         return np.asarray(moving(self.qd) & self.steady & ~self.still)
 
     def without_motor(self) -> Array:
-        """Whether the torque of each joint is zero throughout, (n,)."""
+        """Whether the torque of each joint is zero throughout, bool (n,)."""
         return np.asarray(~self.tau.any(axis=0))
 
     def constant(self) -> Array:
-        """Whether the torque of each joint that has a motor never changes, (n,)."""
+        """Whether the torque of each joint never changes, bool (n,).
+
+        False for a joint without a motor, whose torque is zero throughout.
+        """
         size = np.abs(self.tau).max(axis=0)
         return np.asarray((np.ptp(self.tau, axis=0) <= 1e-9 * size) & ~self.without_motor())
 
     def thinned(self, most: int) -> Samples:
-        """At most `most` instants at equal distances."""
+        """Keep at most `most` instants, at equal distances."""
         kept = np.arange(0, len(self), -(-len(self) // most))
         return replace(self, **{name: getattr(self, name)[kept] for name in SIGNALS})
 
 
 def moving(qd: Array) -> Array:
-    """Samples at which each joint moves, bool (K, n)."""
+    """Whether each joint moves at each sample, bool (K, n).
+
+    A joint moves if its speed is above LIMIT.STANDING times its largest speed.
+    """
     return np.asarray(np.abs(qd) > np.maximum(LIMIT.STANDING * np.abs(qd).max(axis=0), 1e-12))
 
 
 def excerpts(reading: Prepared) -> list[Prepared]:
-    """Cut a long record to EXCERPTS that are spread evenly over the window.
+    """Cut a long record to a few excerpts that are spread evenly over the window.
 
-    A shorter record stays whole.
+    Their number and length are LIMIT.EXCERPTS. A shorter record stays whole.
     """
     record = reading.record
     start, stop = window_of(record.t, reading.study.rows.window, record.name)
@@ -130,17 +137,17 @@ def excerpts(reading: Prepared) -> list[Prepared]:
 
 @dataclass(frozen=True, eq=False)
 class Filtered:
-    """A record filtered by a low-pass that is chosen by its motion.
+    """A record, and its states filtered by a low-pass that is chosen by the motion.
 
     Attributes
     ----------
     record : Record
     study : Study
     low : Lowpass
-        Its cut-off is that of the study, or LIMIT.DYNAMIC times the frequency of the motion where
-        that is lower.
+        Its cut-off is that of the study, or LIMIT.DYNAMIC times the frequency of the motion if that
+        is lower.
     states : States
-        q, qd, qdd of the positions as they are, shape (N, n) each.
+        q, qd, qdd, shape (N, n) each.
     """
 
     record: Record
@@ -149,7 +156,7 @@ class Filtered:
     states: States
 
     def torque(self, tau: Array) -> Array:
-        """Torques through the same low-pass, shape (N, n)."""
+        """Filter torques with the same low-pass, shape (N, n)."""
         smooth = median_filtered(tau, self.study.signals.window_of_torques)
         return lowpass_filtered(smooth, self.record.rate, self.low)
 
@@ -164,12 +171,12 @@ def filtered(reading: Prepared, study: Study) -> Filtered:
 
 
 def samples_of(records: Sequence[Prepared | Filtered], study: Study) -> Samples:
-    """Filtered instants of all records, in their windows, at most LIMIT.INSTANTS_KEPT.
+    """Select at most LIMIT.INSTANTS_KEPT filtered instants of all records, within their windows.
 
     Raises
     ------
     InputError
-        Records too short for the filters.
+        A record is too short for the filters.
     """
     through = [x if isinstance(x, Filtered) else filtered(x, study) for x in records]
     parts = [_instants(record, number) for number, record in enumerate(through)]
@@ -180,7 +187,11 @@ def samples_of(records: Sequence[Prepared | Filtered], study: Study) -> Samples:
 
 
 def motion_cutoff(record: Record, study: Study) -> float:
-    """Cut-off of the low-pass, Hz: that of the study, or LIMIT.DYNAMIC times the frequency of the motion where that is lower."""
+    """Choose the cut-off of the low-pass for the motion of a record, Hz.
+
+    It is the cut-off of the study, or LIMIT.DYNAMIC times the frequency of the motion if that is
+    lower. Of the power of the velocities, 95 % lie below the frequency of the motion.
+    """
     low = study.signals.lowpass
     most = min(low.hertz if low is not None else np.inf, 0.4 * record.rate)
     power = np.abs(np.fft.rfft(np.diff(record.q - record.q.mean(axis=0), axis=0), axis=0)) ** 2
@@ -195,7 +206,7 @@ def motion_cutoff(record: Record, study: Study) -> float:
 
 
 def usable(record: Record, study: Study, before: int, after: int) -> Array:
-    """Samples in the window that are far enough from a gap, bool (N,)."""
+    """Whether each sample is in the window and far enough from missing samples, bool (N,)."""
     t0, t1 = study.rows.window
     inside = (record.t >= (-np.inf if t0 is None else t0)) & (
         record.t <= (np.inf if t1 is None else t1)
@@ -208,9 +219,8 @@ def usable(record: Record, study: Study, before: int, after: int) -> Array:
 def _instants(through: Filtered, number: int) -> Samples:
     """Choose the instants of one record: one for about 0.8 rate/(2 cutoff) samples.
 
-    There are two where these would be fewer than LIMIT.INSTANTS_LEAST in a long record.
-
-    Without 2/cutoff at each end.
+    If these are fewer than LIMIT.INSTANTS_LEAST in a long record, twice as many are chosen. A time
+    of 2/cutoff is left out at each end.
     """
     record, states, cutoff = through.record, through.states, through.low.hertz
     known = np.zeros_like(record.tau) if record.tau_known is None else record.tau_known
@@ -232,9 +242,9 @@ def _instants(through: Filtered, number: int) -> Samples:
 
 
 def _steady(qd: Array, reach: float) -> Array:
-    """Whether a velocity keeps its sign from `reach` samples before to as many after, bool (N,).
+    """Whether a velocity keeps its sign from `reach` samples before to `reach` after, bool (N,).
 
-    The reach is halved, or zero, where less than half of the samples would be left.
+    If less than half of the samples do so, the reach is halved, then set to zero.
     """
     turned = np.cumsum(np.diff(np.sign(qd), prepend=np.sign(qd[:1])) != 0)
     k = np.arange(len(qd))

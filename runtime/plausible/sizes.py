@@ -1,7 +1,8 @@
-"""Before any fit: are positions, speeds, accelerations, torques and lengths those of this robot?
+"""Checks before any fit: are positions, speeds, torques and lengths those of this robot?
 
-Against `limits` of the robot file if it has them, against sane sizes otherwise. Sane sizes are
-conventions: an industrial joint turns a few rad/s and less than a turn or two.
+Values are compared with `limits` of the robot file if it has them, otherwise with usual sizes.
+Usual sizes are conventions: an industrial joint turns at a few rad/s, and by less than a turn or
+two.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ Array = np.ndarray
     "look at the unit of the time column (record.units.t: ms, us) and at record.rate",
 )
 def times(records: Sequence[Record]) -> Answer:
-    """Sampling rate and duration of the records."""
+    """Check whether the sampling rate of every record is plausible."""
     record = min(records, key=lambda one: one.rate)
     text = f"{record.rate:.4g} Hz over {len(record) / record.rate:.4g} s"
     wrong = any(not LIMIT.LOG_RATES[0] <= one.rate <= LIMIT.LOG_RATES[1] for one in records)
@@ -40,7 +41,7 @@ def times(records: Sequence[Record]) -> Answer:
     ahead=True,
 )
 def standing(case: Case) -> Answer | None:
-    """Joints that rest in every record; None if all move."""
+    """Find the joints that rest in every record; None if all joints move."""
     still = case.samples.still
     if not still.any():
         return None
@@ -66,7 +67,7 @@ def standing(case: Case) -> Answer | None:
 
 
 def _joint_names(case: Case, still: Array) -> list[tuple[int, str]]:
-    """Number and name of each joint of a mask, as --lock takes it."""
+    """List the number (from 0) and the name of each selected joint, as the option --lock needs."""
     names = getattr(case.model, "LABELS", {})
     joints = case.model.JOINTS
     return [(int(j), names.get(joints[j], f"q{joints[j]}")) for j in np.flatnonzero(still)]
@@ -78,7 +79,7 @@ def _joint_names(case: Case, still: Array) -> list[tuple[int, str]]:
     "the columns, the unit and the side of the positions",
 )
 def positions(case: Case) -> Answer:
-    """Compare the largest |q| with limits.q, or without these with a turn or two."""
+    """Compare the positions of each joint with limits.q of the robot file, or with usual sizes."""
     q, turning = case.samples.q, case.turning
     low, high = q.min(axis=0), q.max(axis=0)
     largest = np.maximum(-low, high)
@@ -111,7 +112,7 @@ def positions(case: Case) -> Answer:
 
 
 def _against(case: Case, key: str, values: Array, sane: dict[str, tuple[float, float]]) -> Answer:
-    """Compare the largest speeds or accelerations with the limits of the robot file, or with usual ones."""
+    """Compare the largest speeds or accelerations with limits of the robot file, or usual ones."""
     unit = {"qd": "s", "qdd": "s^2"}[key]
     limits = case.limits(key)
     if limits is not None:
@@ -131,7 +132,10 @@ def _against(case: Case, key: str, values: Array, sane: dict[str, tuple[float, f
     "unit and the side of the positions",
 )
 def speeds(case: Case) -> Answer:
-    """Check the largest speed of every joint; it may be far too small, too."""
+    """Check whether the largest speed of every joint is plausible for this robot.
+
+    If all speeds are very small, the answer is that nothing moves.
+    """
     largest = np.abs(case.samples.qd).max(axis=0)
     answer = _against(case, "qd", largest, LIMIT.LARGEST_SPEED)
     if float(largest.max()) < LIMIT.NOTHING_MOVES:
@@ -145,7 +149,7 @@ def speeds(case: Case) -> Answer:
     "lower signals.lowpass.cutoff",
 )
 def accelerations(case: Case) -> Answer:
-    """Check the largest acceleration of every joint."""
+    """Check whether the largest acceleration of every joint is plausible for this robot."""
     largest = np.abs(case.samples.qdd).max(axis=0)
     answer = _against(case, "qdd", largest, LIMIT.LARGEST_ACCELERATION)
     mild = answer.state == "no" and case.limits("qdd") is not None
@@ -159,9 +163,9 @@ def accelerations(case: Case) -> Answer:
     "torque_side, columns.tau)",
 )
 def torques(case: Case) -> Answer:
-    """Compare the largest torques with limits.tau, if the robot file gives them.
+    """Check that every torque changes, and compare the largest torques with limits.tau.
 
-    Torques that never change.
+    Torques below 1 % of these limits of the robot file are doubtful, too.
     """
     limits = case.limits("tau")
     if (flat := case.samples.constant()).any():
@@ -189,7 +193,11 @@ def torques(case: Case) -> Answer:
     "give d and r of the robot file in m",
 )
 def lengths(case: Case) -> Answer | None:
-    """Check the reach and the longest link of the robot file in the positions of the record."""
+    """Check whether the links of the robot file are as long as those of an arm.
+
+    Lengths are distances between frames, computed in the positions of the record. None if these are
+    not known.
+    """
     P = frame_origins(case.model, case.samples.q[:: max(1, len(case.samples) // 32)])
     if P is None or not P.shape[1]:
         return None
@@ -213,9 +221,10 @@ def lengths(case: Case) -> Answer | None:
     "-integral x y dm; kg m^2",
 )
 def inertias(case: Case) -> Answer | None:
-    """Check whether the values of the robot file are those of bodies.
+    """Check whether real bodies can have the masses and inertias of the robot file.
 
-    Every pseudo-inertia must be positive semidefinite.
+    The pseudo-inertia of every link must be positive semidefinite. None if the file gives no
+    values.
     """
     if case.physical is None or not case.physical.values:
         return None
@@ -228,10 +237,10 @@ def inertias(case: Case) -> Answer | None:
 
 
 def _far_bodies(physical: PhysicalModel, length: float) -> Iterator[str]:
-    """Find links whose values put their mass too far from their frame.
+    """Yield a sentence for each link whose values put its mass too far from its frame.
 
-    That is further than LIMIT.LINK_EXTENT times the reach of the robot, m. A link may have fewer
-    than ten values.
+    Too far is more than LIMIT.LINK_EXTENT times the reach of the robot (`length`, m). Values of the
+    link that the file does not give count as zero.
     """
     for j in physical.links:
         given = {family: physical.values.get(f"{family}{j}", 0.0) for family in INERTIAL}

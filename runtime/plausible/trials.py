@@ -1,16 +1,20 @@
-"""The causes of `runtime.plausible.causes`, tried on the samples of a study: which of them explains the record decisively better with as few parameters.
+"""Try the causes of `runtime.plausible.causes`: which one explains the record decisively better?
 
-Every cause gets weighted least squares, which bounds from below what a physical robot of it can
-reach; only those whose bound beats the best so far are fitted under the conditions of a physical
-robot, near the values of the robot file if there are any.
+A cause is a possible error of the study, tried as a change that corrects it. Every cause is first
+fitted by weighted least squares: no physical robot can have a better score. Only causes whose bound
+is better than the best score so far are fitted under the conditions of a physical robot, near the
+values of the robot file if there are any.
 
-A number xi is tried if its first step gains enough. Around the fit chi of a physical robot, with A
-the weighted normal matrix, B the stiffness of bodies and values, J = d(W chi)/d xi its effect,
+An unknown number xi of a cause, for instance a factor, is searched if its first step gains enough.
+Around the fit chi of a physical robot, with A the weighted normal matrix, B the stiffness of bodies
+and values, J = d(W chi)/d xi its effect,
 
     [A + B   W'J] [d chi]   [ 0  ]
-    [J'W     J'J] [d xi ] = [J'e ],      sigma_xi^2 = 1/(J'J - J'W (A + B)^-1 W'J),      gain = xi^2/(2 sigma_xi^2) nats,
+    [J'W     J'J] [d xi ] = [J'e ],      sigma_xi^2 = 1/(J'J - J'W (A + B)^-1 W'J)
 
-rows over their sigma; then xi is searched by fits of a physical robot.
+    gain = xi^2/(2 sigma_xi^2) nats
+
+with rows divided by their sigma. Then fits of a physical robot search the best xi.
 """
 
 from __future__ import annotations
@@ -55,17 +59,19 @@ Change = Callable[[float], Cause]
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A cause and the fit of its parameters.
+    """One cause (a possible error of the study), and the fit of the study with this error
+    corrected.
 
     Attributes
     ----------
     cause : Cause
     fit : Fit or None
-        Under the conditions of a physical robot; None if the bound already loses.
+        Fit under the conditions of a physical robot; None if it was not made because a simpler one
+        shows that it cannot win.
     gain : float, nats
-        Score of the study as given minus its own.
+        Score of the study as given minus that of this fit; some causes have a price on it.
     equivalent : bool
-        Whether no fit can tell it from the study as given.
+        Whether no fit can distinguish the cause from the study as given.
     """
 
     cause: Cause
@@ -76,25 +82,25 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
-    """The fit of the study as it is, with which causes are compared.
+    """Fit of the study as given, to which the fits of the causes are compared.
 
     Attributes
     ----------
     model, variants : GeneratedModel
-        The emitted module, and that of `symgen.variants` or None.
+        The generated module of the robot, and that of `symgen.variants` or None.
     physical : PhysicalModel
     samples : Samples
     D : ndarray, shape (K, n, b)
         Regressor of the study at the samples.
     size : float, m
-        Of the robot.
+        Length of the robot.
     bodies : Bodies
     N : float
-        Rows of a joint that count.
+        Number of rows of a joint that count, fewer than there are if residuals are correlated.
     free, given : Fit
-        By least squares, and under the conditions of a physical robot.
+        Fit of free parameters by least squares, and fit of a physical robot.
     F : ndarray, shape (n, n)
-        Torques of the files from those of the joints.
+        Matrix that converts torques of the joints to torques on the side of the files.
     """
 
     model: GeneratedModel
@@ -110,9 +116,10 @@ class Baseline:
     F: Array
 
     def regressor(self, cause: Cause) -> Array | None:
-        """D of a cause, shape (K, n, b), over the standard parameters where its table changes.
+        """Evaluate the regressor of the study with a cause corrected, shape (K, n, b).
 
-        None if it cannot be evaluated.
+        Its columns are the standard parameters if the table of frames changes. None if it cannot be
+        evaluated.
         """
         if cause.on_torques:
             return self.D
@@ -124,9 +131,12 @@ class Baseline:
             return None
 
     def rows(self, cause: Cause) -> tuple[Array, Array, Array] | None:
-        """F T^-1 W', F tau - F T^-1 known and the rows used, bool: T tau - known = W' X' in the torques of the files F tau.
+        """Form the rows of the study with a cause corrected, on the side of the files.
 
-        So every cause explains the same numbers, and the residuals of coupled motors are not mixed.
+        Return the regressor F T^-1 W', the torques F tau - F T^-1 known, and the rows used, bool
+        (K, n). Together they are T tau - known = W' X', multiplied by F T^-1. So every cause
+        explains the same measured torques F tau, and residuals of coupled motors are not mixed.
+        None if the regressor cannot be evaluated.
         """
         D = self.regressor(cause)
         if D is None:
@@ -141,38 +151,41 @@ class Baseline:
 
     @cached_property
     def tau(self) -> Array:
-        """Torques on the side of the files, shape (K, n)."""
+        """Measured torques on the side of the files, shape (K, n)."""
         return np.asarray(self.samples.tau @ self.F.T)
 
     @cached_property
     def as_given(self) -> tuple[Array, Array, Array]:
-        """Rows of the study."""
+        """Rows of the study as given: regressor, torques, and mask of the rows used."""
         rows = self.rows(unchanged_study(self.samples.n))
         assert rows is not None
         return rows
 
     @cached_property
     def basis(self) -> Array:
-        """Orthonormal basis of the span of W, each row divided by the residual of its joint; (K*n, rank)."""
+        """Orthonormal basis of the span of W, shape (K*n, rank).
+
+        Each row of W is first divided by the residual of its joint.
+        """
         weighted = (self.as_given[0] / self.free.sigma[:, None]).reshape(-1, self.D.shape[2])
         scale = np.linalg.norm(weighted, axis=0)
         Q, R, _ = qr(weighted / np.where(scale > 0, scale, 1.0), mode="economic", pivoting=True)
         return np.asarray(Q[:, np.abs(np.diag(R)) > 1e-9])
 
     def grams(self, cause: Cause) -> Grams | None:
-        """Normal equations of a cause; None if it cannot be evaluated."""
+        """Form the normal equations with a cause corrected; None if they cannot be evaluated."""
         rows = self.rows(cause)
         return None if rows is None else Grams.of(*rows, self.tau)
 
     def standard(self, grams: Grams) -> Grams:
-        """Normal equations over the standard parameters."""
+        """Transform normal equations to the standard parameters, unless they have these already."""
         p = len(self.physical.standard)
         return grams if grams.of_joints.shape[1] == p + 1 else grams.mapped(self.physical.K)
 
     def bound(self, grams: Grams) -> Fit:
-        """Least squares, drawn towards the values of the robot file if it has them.
+        """Fit by least squares: a physical robot can have no better score on these rows.
 
-        No physical robot explains the rows better.
+        If the robot file has values of links, the parameters are drawn towards them.
         """
         if self.bodies.near_values:
             return least_squares(self.standard(grams), self.N, self.bodies)
@@ -181,17 +194,21 @@ class Baseline:
     def fit(
         self, grams: Grams, how: Callable[..., Fit] = physical_fit, sigma: Array | None = None
     ) -> Fit:
-        """The parameters of a physical robot, over the standard parameters.
+        """Fit the standard parameters of a physical robot by the function `how`.
 
-        Weights begin at sigma, without it at those of least squares.
+        sigma : residuals of the joints that give the first weights; default: those of least
+            squares.
         """
         sigma = self.bound(grams).sigma if sigma is None else sigma
         return how(self.standard(grams), self.bodies, self.N, sigma)
 
     def trial(self, cause: Cause, sigma: Array | None = None) -> Trial:
-        """Fit a cause under the conditions of a physical robot.
+        """Fit a cause under the conditions of a physical robot, and compute its gain.
 
-        Its rows are weighted by the residuals of the study, or by its own. sigma : first weights.
+        The number of rows that count is the larger one of the study and of the cause.
+
+        sigma : residuals of the joints that give the first weights; default: those of least
+            squares.
         """
         rows = self.rows(cause)
         if rows is None:
@@ -204,9 +221,10 @@ class Baseline:
         return Trial(cause, fit, gain)
 
     def unseen(self, cause: Cause) -> float:
-        """Score of a cause in nats: each of two parts of the rows is predicted by a fit of the other.
+        """Compute the score of a cause on rows that were not fitted, in nats.
 
-        Parts are blocks of time by turns.
+        The rows are divided into two parts, of alternating blocks of time. The fit of each part
+        predicts the other part; a smaller score is better.
         """
         rows = self.rows(cause)
         if rows is None:
@@ -221,19 +239,22 @@ class Baseline:
         return score
 
     def beyond(self, V: Array) -> float:
-        """Largest part of the torques V, shape (K, n, m), on the side of the files, that no parameters of the study explain, relative."""
+        """Compute the largest relative part of the torques V that no parameters of the study
+        explain.
+
+        V : m sets of torques on the side of the files, shape (K, n, m).
+        """
         rows = (V / self.free.sigma[:, None]).reshape(-1, V.shape[2])
         size = np.linalg.norm(rows, axis=0)
         left = np.linalg.norm(rows - self.basis @ (self.basis.T @ rows), axis=0)
         return float((left / np.where(size > 0, size, 1.0)).max(initial=0.0))
 
     def hides(self, cause: Cause) -> bool:
-        """Whether no fit can distinguish a cause from the study.
+        """Whether no fit can distinguish a cause from the study as given.
 
-        Its rows lie in the span of W, and physics has the same conditions for both.
-
-        The columns are tested on random combinations of them, beside the difference of the known
-        torques.
+        If so, the rows of the cause are in the span of W, and a physical robot explains both
+        equally well. The columns are tested in random combinations, together with the change of the
+        known torques.
         """
         rows = self.rows(cause)
         if rows is None:
@@ -253,7 +274,11 @@ class Baseline:
 
     @cached_property
     def normal(self) -> tuple[Array, Array, Array, Array]:
-        """W over the standard parameters, shape (K, n, p), the torques it explains (K, n), and over sigma the residuals e (K, n) and A + B."""
+        """Quantities of the physical fit of the study, around which the numbers xi are estimated.
+
+        These are W over the standard parameters, shape (K, n, p), the torques it explains, shape
+        (K, n), the residuals e divided by sigma, shape (K, n), and the matrix A + B.
+        """
         D, Y, mask = self.as_given
         W = D @ self.physical.K
         explained = W @ self.given.X
@@ -262,7 +287,7 @@ class Baseline:
         return W, explained, e, A + self.bodies.stiffness(self.given.X)
 
     def effect(self, change: Callable[[float], Cause]) -> Array:
-        """Derivative J = d tau/d xi of the study's torques by the number xi, shape (K, n)."""
+        """Compute the derivative J = d tau/d xi of the torques of the study by xi, shape (K, n)."""
         explained = self.normal[1]
         cause = change(LIMIT.DIFFERENCE_STEP)
         rows = self.rows(cause)
@@ -275,11 +300,12 @@ class Baseline:
         return np.asarray((moved - plain) / LIMIT.DIFFERENCE_STEP)
 
     def first_step(self, J: Array) -> tuple[Array, Array] | None:
-        """First step xi of each number, by its effect J, shape (a, K, n), and the covariance.
+        """Estimate the numbers xi to first order, with the parameters of the model free.
 
-        The parameters of the model are free, too.
+        J : effects of a numbers, shape (a, K, n).
 
-        None if the samples do not tell them from it.
+        Return xi, shape (a,), and its covariance. None if the samples do not determine any of the
+        numbers beside the parameters.
         """
         W, _, e, H = self.normal
         mask = self.as_given[2]
@@ -307,9 +333,11 @@ def baseline_of(
     torque_side: str = "joint",
     values: bool = True,
 ) -> Baseline:
-    """The study as it is, fitted.
+    """Fit the study as given, with free parameters and as a physical robot.
 
-    D : regressor at the samples, shape (K, n, b). torque_side : that of the files, motor or joint.
+    D : regressor at the samples, shape (K, n, b).
+    torque_side : side of the torques in the files, motor or joint.
+    values : whether the fit stays near the values of the robot file.
     """
     physical, drives = physical_model(model), drives_of(model)
     F = np.eye(samples.n)
@@ -328,12 +356,14 @@ def baseline_of(
 
 
 def regressor(model: GeneratedModel, states: tuple[Array, Array, Array], **constants: Any) -> Array:
-    """D at states, shape (K, n, b), without columns that are rounding, such as cos(pi/2).
+    """Evaluate the regressor D at given states, shape (K, n, b).
 
     Raises
     ------
     ValueError
-        A loop that does not close, or numbers that are not finite.
+        A loop does not close, or D is not finite.
+
+    Columns that contain only rounding errors, such as those of cos(pi/2), are set to zero.
     """
     with np.errstate(all="ignore"):
         D = np.asarray(model.regressor(*states, out=None, **constants))
@@ -345,16 +375,19 @@ def regressor(model: GeneratedModel, states: tuple[Array, Array, Array], **const
 
 
 def bodies_of(physical: PhysicalModel, size: float, Y: Array, values: bool) -> Bodies:
-    """Bodies of the size, m, that the torques Y, shape (K, n), ask for."""
+    """Make the `Bodies` of a robot from its length `size`, m, and its torques Y, shape (K, n).
+
+    The usual mass of a link follows from the largest torque.
+    """
     torque = float(np.sqrt((Y**2).mean(axis=0)).max()) or 1.0
     mass = max(torque / (9.81 * size), 1e-3)
     return Bodies(physical, mass, 0.3 * size, 0.01 * torque, values=values)
 
 
 def counting_rows(D: Array, Y: Array, mask: Array, X: Array) -> float:
-    """Number of rows of a joint that count.
+    """Estimate how many rows of a joint count, on average over the joints that move.
 
-    It is the average over moving joints, reduced by the correlation of neighbouring residuals.
+    The number is smaller than that of the rows, because neighbouring residuals are correlated.
     """
     counts = []
     for j in range(Y.shape[1]):
@@ -366,7 +399,12 @@ def counting_rows(D: Array, Y: Array, mask: Array, X: Array) -> float:
 
 
 def reach(model: GeneratedModel, q: Array) -> float:
-    """Length of the robot, m: largest distance of a frame from the first one in the positions q, shape (K, n); at least 0.1, 1 if not known."""
+    """Compute the length of the robot, m: the largest distance of a frame from the first frame.
+
+    q : positions, shape (K, n), in which the distance is computed.
+
+    The length is at least 0.1, and 1 if it is unknown.
+    """
     P = frame_origins(model, q[:: max(1, len(q) // 32)])
     if P is None:
         return 1.0
@@ -375,10 +413,10 @@ def reach(model: GeneratedModel, q: Array) -> float:
 
 
 def try_causes(baseline: Baseline, sides: Sequence[str] = ("joint", "joint")) -> list[Trial]:
-    """Try all causes and return them, the best first.
+    """Try all causes, which are possible errors of the study; return the trials, the best first.
 
-    Another sampling rate has to gain LIMIT.RATE_GAIN more, since a slower motion gives the
-    parameters more room, and so has a coupling, the scale of a position and a constant torque.
+    A wrong sampling rate, coupling, scale of a position or constant torque must gain
+    LIMIT.RATE_GAIN more than the others, because it gives the parameters more freedom.
     """
     robot = Robot(
         baseline.model, baseline.variants, sides, baseline.samples, slow_friction(baseline)
@@ -394,9 +432,9 @@ def try_causes(baseline: Baseline, sides: Sequence[str] = ("joint", "joint")) ->
 
 
 def _of_causes(baseline: Baseline, which: Sequence[Cause]) -> list[Trial]:
-    """Try the causes that have no number.
+    """Try the causes without an unknown number, for instance a wrong sign.
 
-    Those that cannot win are not fitted under the conditions of a physical robot.
+    Causes that cannot win are not fitted under the conditions of a physical robot.
     """
     given, least = baseline.given, baseline.samples.moving().sum(axis=0) // 2
     trials: list[Trial] = []
@@ -430,9 +468,10 @@ def _of_causes(baseline: Baseline, which: Sequence[Cause]) -> list[Trial]:
 
 
 def _of_numbers(baseline: Baseline, robot: Robot) -> list[Trial]:
-    """Try the causes with a number whose first step gains enough, each at its best value.
+    """Try the causes with an unknown number, for instance a factor, each at its best value.
 
-    Also returns those that no fit can distinguish from the study.
+    Only causes whose first step gains enough are searched. Causes that no fit can distinguish from
+    the study are returned, too.
     """
     trials: list[Trial] = []
     steps: list[tuple[float, float, Row, Change]] = []
@@ -463,10 +502,11 @@ def _of_numbers(baseline: Baseline, robot: Robot) -> list[Trial]:
 
 
 def _search_number(baseline: Baseline, row: Row, change: Change, first: float) -> Trial | None:
-    """Find the best value of a number; each parameter costs half of log N.
+    """Search the best value of the unknown number of a cause; None if no value gains enough.
 
-    A coarse grid, weights those of the study, then golden section, weights those of each value by
-    itself: far from the best these may be worse than none.
+    A coarse grid uses the weights of the study, then a golden section search uses the weights of
+    each value: far from the best value its own weights may mislead. Each parameter of the cause
+    costs half of log N of the gain.
     """
     scores: dict[float, float] = {}
     sigma = baseline.given.sigma
@@ -501,11 +541,9 @@ def _search_number(baseline: Baseline, row: Row, change: Change, first: float) -
 
 
 def slow_friction(baseline: Baseline) -> Array | None:
-    """Estimate to first order the friction at low speed that the model lacks, N m or N, by joint.
+    """Estimate, to first order, the friction at low speed that the model lacks, by joint, N m or N.
 
-    It is given for joints that certainly have it.
-
-    None without such joints.
+    It is zero for joints in which it is uncertain, and None if this is so for all joints.
     """
     samples = baseline.samples
     size = np.sqrt((samples.tau**2).mean(axis=0))
@@ -527,15 +565,16 @@ def decisive(
 ) -> list[Trial]:
     """Select the trials that explain the record decisively better than the study as given.
 
-    They must do so on rows that did not give their parameters, too. The best comes first, then those
-    like it.
+    They must also predict better the rows that were not fitted. The best trial is first, then those
+    with a similar gain.
 
-    floor : error of a joint, %, that noise of the positions may make. A smaller error shows no cause,
-        nor does the distance from the values where this is more than LIMIT.NOISY, or where a joint
-        pays for it with a good part of its error.
-    other : rows of validation records, which a cause has to explain better too.
-    alone : the study without the values of the robot file. A cause whose bodies are not those of the
-        file, such as a unit that makes torques small, has to gain there too.
+    floor : error of a joint, %, that noise of the positions alone may cause. A smaller error is no
+        evidence for a cause. Nor is the distance from the robot file's values, if the floor is
+        above LIMIT.NOISY or if the error of a joint grows by a good part.
+    other : baseline of the validation records, which a cause must explain better, too.
+    alone : baseline without the values of the robot file. A cause must reduce an error there, too,
+        if its bodies differ from those of the file, for instance because a unit makes torques
+        small.
     """
     given, better = baseline.given, []
     for trial in trials:
@@ -577,15 +616,17 @@ def decisive(
 
 
 def takes_away(given: Fit, fit: Fit) -> Array:
-    """Joints whose error a fit reduces by a good part, (n,)."""
+    """Whether `fit` reduces the error of each joint by a good part against `given`, bool (n,)."""
     ratio = given.errors / fit.errors.clip(0.1)
     return np.asarray((ratio > LIMIT.VISIBLE) & (given.errors - fit.errors > 0.2))
 
 
 def leaves_values(fit: Fit, baseline: Baseline) -> bool:
-    """Whether the robot file's bodies need other torques than the fitted ones, beyond LIMIT.CAD_RATIOS.
+    """Whether the bodies of a fit need far larger or far smaller torques than those of the robot
+    file.
 
-    False where the file lacks a body.
+    The ratio of the torques is then outside LIMIT.CAD_RATIOS. False if the file does not give every
+    body.
     """
     bodies, physical = baseline.bodies, baseline.physical
     if not bodies.near_values or not bodies.known_links.all():
@@ -598,9 +639,11 @@ def leaves_values(fit: Fit, baseline: Baseline) -> bool:
 
 
 def helps(trial: Trial, baseline: Baseline, other: Baseline) -> bool:
-    """Whether the parameters of a cause explain another record better than those of the study.
+    """Whether the parameters of a cause predict the validation records better than the study's own.
 
-    The record is read as the study says, or as the cause says.
+    A validation record may or may not have the same error: the better result counts.
+
+    other : baseline of the validation records.
     """
 
     def misfit(cause: Cause, X: Array) -> float:
@@ -614,14 +657,15 @@ def helps(trial: Trial, baseline: Baseline, other: Baseline) -> bool:
 
 
 def _misfit(grams: Grams, X: Array) -> float:
-    """Sum of the logarithms of the residuals of the joints."""
+    """Add the logarithms of the root mean square residuals of all joints, for parameters X."""
     return fit_of(grams, X, 1.0).score
 
 
 def loads(baseline: Baseline) -> list[Trial]:
-    """Try other values of the last link than those of the robot file, as a load would give.
+    """Try whether the robot had a load: the last link may have other values than in the robot file.
 
-    Its ten parameters cost half of log N each. None where the file does not give them.
+    The ten parameters of this link cost half of log N each. The list is empty if the file does not
+    give them.
     """
     if not baseline.bodies.known_links[-1:].any():
         return []

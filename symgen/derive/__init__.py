@@ -1,4 +1,5 @@
-"""Mechanics, written once over scalars: geometry, recursions, loops.
+"""Derivation of the robot models as formulas: geometry, recursions and closed loops.
 
-Lagrange by CasADi as an independent check.
+The module `lagrange` derives the dynamics a second time, from the energies with CasADi. It is an
+independent check.
 """

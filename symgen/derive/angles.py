@@ -1,6 +1,10 @@
-"""Fixed angles and square roots of a robot over F_p: the unit angles, the radicands, and the primes in which all of them exist.
+"""Fixed angles and square roots of a robot, prepared for exact arithmetic in a finite field F_p.
 
-Fractions of pi with a moderate denominator are whole multiples of pi/D, a root of unity of F_p. Every other fixed angle is a sum of monomials in constants and in numbers as they are written (`derive.numbers`); all multiples of one monomial are whole multiples of a unit angle that is drawn at random, since radians and multiples of constants are transcendental against all algebraic numbers.
+A fraction of pi with a moderate denominator is a whole multiple of pi/D, which is a root of unity
+of F_p. Every other fixed angle is a sum of monomials in constants and in numbers kept as written
+(`derive.numbers`). All multiples of one monomial are whole multiples of a unit angle, which is
+drawn at random: cosines and sines of such angles satisfy no polynomial equation with algebraic
+coefficients, because radians and multiples of constants are transcendental.
 """
 
 from __future__ import annotations
@@ -25,7 +29,10 @@ Variable = str | Number | Call | Unit
 
 
 def fixed_angles(robot: Robot) -> tuple[Expression, ...]:
-    """The distinct fixed angles of a robot that are no quarter turns, quarter turns taken off and the leading sign positive."""
+    """Return the fixed angles of a robot without their quarter turns, each once up to sign.
+
+    A fixed angle that is only a number of quarter turns is left out.
+    """
     angles: dict[Expression, None] = {}
     for e in _angles(robot):
         rest = quarter_turns(e)[1]
@@ -35,10 +42,10 @@ def fixed_angles(robot: Robot) -> tuple[Expression, ...]:
 
 
 class Units:
-    """The unit angles of a robot: `of` writes a fixed angle as a sum of whole multiples of them.
+    """The unit angles of a robot: every fixed angle is a sum of whole multiples of unit angles.
 
-    pi/D is the first, D the common denominator of its moderate fractions of pi and of those that
-    its square roots need.
+    The first unit angle is pi/D. D is the common denominator of the fractions of pi with a moderate
+    denominator and of the angles that the square roots need.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -58,11 +65,14 @@ class Units:
 
     @property
     def all(self) -> list[Unit]:
-        """pi/D, then the free ones."""
+        """All unit angles: pi/D first, then the others."""
         return [(PI, Fraction(1, self.D)), *self.free.items()]
 
     def of(self, angle: Expression) -> list[tuple[Unit, int]]:
-        """[(unit, whole multiple)]; an amount that is no multiple of its unit is a unit of its own."""
+        """Write a fixed angle as a sum of unit angles: a list of (unit, whole multiple).
+
+        An amount that is no whole multiple of its unit angle becomes a unit angle itself.
+        """
         parts: list[tuple[Unit, int]] = []
         for m, c in angle.terms.items():
             if self._is_turn(m, c):
@@ -75,19 +85,19 @@ class Units:
         return parts
 
     def _is_turn(self, m: Monomial, c: Fraction) -> bool:
-        """Whether an amount is a whole multiple of pi/D."""
+        """Whether the amount c of monomial m is a whole multiple of pi/D."""
         return m == PI and (c * self.D).denominator == 1
 
 
 def _common(a: Fraction, b: Fraction) -> Fraction:
-    """The largest amount of which both are whole multiples."""
+    """Return the largest fraction of which both a and b are whole multiples."""
     d = lcm(a.denominator, b.denominator)
     return Fraction(gcd(int(a * d), int(b * d)), d)
 
 
 @lru_cache(maxsize=64)
 def units_of(robot: Robot) -> Units:
-    """The unit angles of `robot`."""
+    """Return the unit angles of a robot."""
     return Units(robot)
 
 
@@ -103,7 +113,10 @@ def _angles(robot: Robot) -> Iterator[Expression]:
 
 
 def _angles_of_laws(robot: Robot) -> Iterator[Expression]:
-    """The constants of the angles in laws of columns, where these are whole turns of joints."""
+    """Yield the constant part of each angle in a cosine or sine of the torque laws of elements.
+
+    For instance 0.3 for the law cos(q1 + 0.3).
+    """
     keys = [(e, j) for e in robot.elements if e.is_own for j in e.along]
     pending = [x for e, j in keys for x in (e.law(j), e.potential(j))]
     for law in pending:
@@ -121,7 +134,10 @@ def _angles_of_laws(robot: Robot) -> Iterator[Expression]:
 
 
 def varies(a: str | Number | Call) -> bool:
-    """Whether an atom of a law is no constant expression of robot files."""
+    """Whether a symbol or function call in a torque law depends on the state or on time.
+
+    A function other than cos, sin and 1/x counts as varying, even if its operand is constant.
+    """
     if isinstance(a, Call):
         exact = a.function in ("cos", "sin", "inv")
         return not exact or any(varies(b) for e in a.operands for b in e.atoms)
@@ -129,13 +145,16 @@ def varies(a: str | Number | Call) -> bool:
 
 
 def rows_of(robot: Robot) -> list[Expression]:
-    """The entries of the rows and forms of elements."""
+    """Return the coefficients of all elements: the rows `along` and the quadratic forms `form`."""
     tables = [table for e in robot.elements for table in (e.along, e.form)]
     return [c for table in tables for row in table.values() for c in row.values()]
 
 
 def atoms_of(robot: Robot) -> Iterator[str | Number | Call]:
-    """Atoms of lengths, gravity, relations and rows of elements, and of what functions among them are of."""
+    """Yield the symbols, numbers and calls in lengths, gravity, relations and element rows.
+
+    A call is a function of an expression, such as a square root; its argument is searched too.
+    """
     pending = [e for f in robot.frames for e in (f.b, f.d, f.r)]
     pending += [*robot.gravity, *robot.constraints.values(), *rows_of(robot)]
     for e in pending:
@@ -150,18 +169,21 @@ def _calls(robot: Robot) -> Iterator[Call]:
 
 
 def radicands(robot: Robot) -> tuple[int, ...]:
-    """The whole numbers under square roots: primes, and what no small prime divides."""
+    """Return the whole numbers under the square roots of a robot, each once, in ascending order.
+
+    Each is a prime, or a number that no small prime divides.
+    """
     arguments = {a.argument.constant for a in _calls(robot) if a.function == "sqrt"}
     return tuple(sorted({int(c) for c in arguments if c is not None}))
 
 
 def roots_of(robot: Robot) -> tuple[Call, ...]:
-    """The square roots in lengths, gravity, ratios and rows of elements."""
+    """Return the square roots in lengths, gravity, joint relations and element rows, each once."""
     return tuple(dict.fromkeys(a for a in _calls(robot) if a.function == "sqrt"))
 
 
 def is_prime(n: int) -> bool:
-    """Miller-Rabin with bases 2, 3, 5, 7: exact below 3.2e9."""
+    """Whether n is prime, by the Miller-Rabin test with bases 2, 3, 5, 7: exact below 3.2e9."""
     if n < 2 or any(n % b == 0 for b in (2, 3, 5, 7) if n != b):
         return False
     d, s = n - 1, 0

@@ -1,27 +1,26 @@
-"""What the recursions of `derive` do not give by themselves: velocities of links, energies,
-accelerations at reference rates, and the columns of reference torques and of momentum.
+"""Energies, link velocities, and regressors of momentum, base wrench and reference torques.
 
 Energies of link j, with its velocities v_j of the origin and w_j in its frame, gravity g and its
 origin P_0j in frame 0:
 
-    E_j = 1/2 (w_j' J_j w_j + M_j v_j' v_j) + MS_j . (v_j x w_j) ,
-            U_j = -g . (M_j P_0j + A_0j MS_j)
+    E_j = 1/2 (w_j' J_j w_j + M_j v_j' v_j) + MS_j . (v_j x w_j)
+    U_j = -g . (M_j P_0j + A_0j MS_j)
 
 Both are linear in the parameters. Elements add E = 1/2 c sd**2 (inertia), U = 1/2 c s**2
-(stiffness), U = c s (offset), U = c energy (columns that give one).
+(stiffness), U = c s (offset), U = c energy (elements with an energy of the user).
 
-Accelerations at reference rates. Per unit rate of joint k, a point r of link j has the velocity v_k + z_k x r. Its
-rate of change in space is
+Accelerations at reference rates. Per unit rate of joint k, a point r of link j has the velocity v_k
++ z_k x r. Its rate of change in space is
 
     a_k + U_k r ,     U_k = skew(zd_k) + skew(z_k) skew(w_j) ,
 
-and C_ik is the torque at joint i that moves the links with these accelerations: C_ik = sum over
-mass points of dx/dq_i . d/dt(dx/dq_k), whose part per qd_l is the Christoffel symbol sum dx/dq_i .
-d2x/dq_k dq_l of the inertia matrix. Hence Ad = C + C', and Ad - 2C is skew symmetric.
+and C_ik is the torque at joint i that moves the links with these accelerations: C_ik is the sum of
+dx/dq_i . d/dt(dx/dq_k) over the mass points. Its part per qd_l is the Christoffel symbol
+sum dx/dq_i . d2x/dq_k dq_l of the inertia matrix. Hence Ad = C + C', and Ad - 2C is skew symmetric.
 
 Columns of other dynamics, all linear in the parameters:
 
-    A qddr + C qdr + Q + friction    links that accelerate by qddr, and by C at the rates qdr
+    A qddr + C qdr + Q + friction    torques of the accelerations qddr and, by C, of the rates qdr
     p = A qd                         torques of the accelerations qd from rest, without gravity
     dp/dt - Gamma = C' qd - Q - friction ,    (C' qd)_i = sum_j v_j . F_ij + w_j . N_ij ,
 
@@ -65,7 +64,10 @@ HALF = Expression.number(Fraction(1, 2))
 
 
 def origin_velocities(motion: Motion) -> dict[int, Vector]:
-    """{j: velocity of O_j, in frame j}: v_j = jRi (v_i + w_i x P_ij) + qd_j e3 (prismatic)."""
+    """Return {j: v_j}, the velocity of the origin of frame j, in frame j.
+
+        v_j = jRi (v_i + w_i x P_ij)  [+ qd_j e3   prismatic]
+    """
     v: dict[int, Vector] = {0: ZERO3}
     for f in motion.robot.frames:
         x, y, z = motion.geometry.rotation[f.j].down(
@@ -78,7 +80,7 @@ def origin_velocities(motion: Motion) -> dict[int, Vector]:
 
 
 def kinetic_energy(d: Derivation) -> Scalar:
-    """E of all links and of the inertias on the joints."""
+    """Return the kinetic energy E of all links and of the inertias on the joints."""
     motion = d.motion
     v, half = origin_velocities(motion), d.algebra.constant(HALF)
     total: Scalar = 0
@@ -96,9 +98,9 @@ def kinetic_energy(d: Derivation) -> Scalar:
 
 
 def potential_energy(d: Derivation) -> Scalar:
-    """U of gravity, springs and constant torques.
+    """Return the potential energy U of gravity, springs and constant torques.
 
-    Zero if the origin of frame 0 is, springs at q = 0.
+    Gravity energy is zero at the origin of frame 0, spring energy at q = 0.
     """
     frames, half = Frames(d.geometry), d.algebra.constant(HALF)
     x, y, z = (d.algebra.gravity(axis) for axis in range(3))
@@ -120,7 +122,7 @@ def potential_energy(d: Derivation) -> Scalar:
 
 
 def _square(d: Derivation, e: Element, j: int, x: Mapping[int, Scalar]) -> Scalar:
-    """(G x)**2, or x' B x."""
+    """Return (G x)**2 for an element with a row G, or x' B x for an element with a form B."""
     if j in e.along:
         s = linear(d.algebra, e.along[j], x)
         return mul(s, s)
@@ -128,16 +130,19 @@ def _square(d: Derivation, e: Element, j: int, x: Mapping[int, Scalar]) -> Scala
 
 
 class AtRates(Motion):
-    """The accelerations sum_k qdr_k (a_k + U_k r) of all links, by which the torques of `joint_torques` are C qdr: column k of C where qdr_k = 1 is the only rate.
+    """Accelerations of all links for which the joint torques are C qdr, qdr reference rates.
+
+    These accelerations are sum_k qdr_k (a_k + U_k r), see the head of this module; `joint_torques`
+    turns them into C qdr. With qdr_k = 1 as the only rate, the result is column k of C.
 
     Parameters
     ----------
     motion : Motion
         The links with their velocities.
     rates : mapping
-        qdr of the independent joints; 0 of one that it leaves out.
+        qdr of the independent joints; a joint left out has rate 0.
     tag : int
-        Last index of the names of the steps.
+        Last index in the names of the intermediate variables.
     """
 
     def __init__(self, motion: Motion, rates: Mapping[int, Scalar], tag: int) -> None:
@@ -174,7 +179,11 @@ class AtRates(Motion):
 
 
 def _link(z: Vector, zd: Vector, w: Vector, a: Vector, half: Scalar) -> LinkMotion:
-    """U_k by its antisymmetric part (in the place of wd), its symmetric part (of w w') and the differences of its diagonal."""
+    """Return U = skew(zd) + skew(z) skew(w) and the acceleration a of a link as a `LinkMotion`.
+
+    The antisymmetric part of U replaces wd, the symmetric part replaces w w', and the differences
+    of the diagonal of U replace DW.
+    """
     across = dot(z, w)
     skew = ((0, -zd[2], zd[1]), (zd[2], 0, -zd[0]), (-zd[1], zd[0], 0))
     rows = []
@@ -192,7 +201,10 @@ Columns = Mapping[str, Mapping[int, Scalar]]
 
 
 def _accelerated(d: Derivation, qdd: Mapping[int, Scalar]) -> Motion:
-    """The links at rest under gravity, accelerated by qdd; the joints have their rates."""
+    """Return a motion in which the links start from rest with accelerations qdd, under gravity.
+
+    Friction still acts with the actual joint velocities.
+    """
     zero = dict.fromkeys(d.closure.independent, 0)
     motion = copy(d.motion)
     motion.link = Motion(d.geometry, tag=(0,), qd=zero, qdd={**zero, **qdd}).link
@@ -201,7 +213,10 @@ def _accelerated(d: Derivation, qdd: Mapping[int, Scalar]) -> Motion:
 
 
 def slotine_li(d: Derivation) -> Columns:
-    """Columns of A qddr + C qdr + Q + friction(qd), qdr and qddr inputs of their own."""
+    """Return the regressor columns of A qddr + C qdr + Q + friction(qd), by standard parameter.
+
+    The reference rates qdr and accelerations qddr are inputs.
+    """
     qdr, qddr = (
         {i: d.algebra.graph.symbol(Symbol(kind, f"{family}{i}")) for i in d.robot.joints}
         for kind, family in (("qdr", "QPR"), ("qddr", "QDPR"))
@@ -212,7 +227,7 @@ def slotine_li(d: Derivation) -> Columns:
 
 
 def _together(a: LinkMotion, b: LinkMotion) -> LinkMotion:
-    """The sum of two accelerations of a link."""
+    """Return the sum of two accelerations a and b of one link."""
     return LinkMotion(
         b.w,
         vadd(a.wd, b.wd),
@@ -224,7 +239,7 @@ def _together(a: LinkMotion, b: LinkMotion) -> LinkMotion:
 
 
 def momentum_rate(d: Derivation) -> Columns:
-    """Columns of C' qd - Q - friction = dp/dt - Gamma."""
+    """Return the regressor columns of dp/dt - Gamma = C' qd - Q - friction, by parameter."""
     at_rest = columns(_accelerated(d, {}), d.robot.parameters)
     found = {name: {i: -x for i, x in D.items()} for name, D in at_rest.items()}
     v, inertial = origin_velocities(d.motion), inertial_names(d.robot)
@@ -238,7 +253,10 @@ def momentum_rate(d: Derivation) -> Columns:
 
 
 def base_wrench(d: Derivation) -> dict[str, tuple[Scalar, ...]]:
-    """{inertial parameter: force, then moment about the origin of frame 0}, in frame 0, by which the base moves the robot."""
+    """Return the regressor of the wrench by which the base moves the robot, in frame 0.
+
+    For each inertial parameter: the force, then the moment about the origin of frame 0.
+    """
     found = {}
     for name, (p, j) in inertial_names(d.robot).items():
         F, N = (apply(d.poses[j][0], x) for x in unit_wrench(d.motion.link[j], p))

@@ -1,4 +1,4 @@
-"""Floats, a domain of graph nodes: arrays of any one shape, or symbols of a package that has their functions."""
+"""Values of graph nodes in floating point: NumPy arrays, or symbols of a package such as CasADi."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ LETTERS = {"q": "q", "qd": "QP", "qdd": "QDP"}
 
 
 class Floats:
-    """The constants of a robot, and states.
+    """Values of the constants and states of a robot, with which `interpret` evaluates nodes.
 
     Parameters
     ----------
     robot : Robot
         The robot.
     states : mapping, optional
-        Value of each input that is no constant; rad or m and seconds.
+        {input: value} for the inputs that vary, such as q1; rad or m and seconds.
     constants : mapping, optional
-        In place of those of the robot file.
+        Values that replace constants of the robot file.
     functions : mapping, optional
-        Functions of another package that states are of, such as CasADi.
+        Functions, such as cos, of the package whose symbols the states are. Default: NumPy.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class Floats:
         self.constants = {**robot.constants, **(constants or {})}
 
     def symbol(self, symbol: Symbol) -> Any:
-        """The value of an input."""
+        """Return the value of an input, such as q1 or a constant of the robot."""
         match symbol.kind:
             case "constant" | "channel":
                 return self.constants[symbol.name]
@@ -58,11 +58,11 @@ class Floats:
         return self.states[symbol]
 
     def number(self, c: Fraction) -> float:
-        """A rational, rounded."""
+        """Return a rational number, rounded to a float."""
         return float(c)
 
     def function(self, node: Node, x: list[Any]) -> Any:
-        """A function of the package."""
+        """Apply the function of a node, such as cos or 1/x, to the values x of its operands."""
         if node.op == INV:
             return 1.0 / x[0]
         if node.op == POS:
@@ -75,7 +75,7 @@ class Floats:
 
 
 def states_of(**states: Mapping[int, Any]) -> dict[Symbol, Any]:
-    """States by input, from q, qd and qdd of the joints by their numbers."""
+    """Return {input: value} from the values of q, qd and qdd, each given by joint number."""
     return {
         Symbol(kind, f"{LETTERS[kind]}{j}"): x
         for kind, by_joint in states.items()

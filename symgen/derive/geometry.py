@@ -3,10 +3,10 @@
     iRj = A_j Rot(z, theta_j),   A_j = Rot(z, gamma_j) Rot(x, alpha_j),
             P_ij = b e3 + d A_j e1 + r A_j e3
 
-Consecutive parallel axes (alpha = 0) are one rotation by the sum of their angles: the *carrier* of
-frame j is the last frame m on its path whose z axis is not parallel to z_j, and mRj = A Rot(z, sum
-of angles). Whatever only rotates (angular velocities, joint axes) is taken from the carrier in one
-step, which is where C23 and S23 come from.
+Consecutive parallel axes (alpha = 0) are one rotation by the sum of their angles. The *carrier* of
+frame j is the last frame m before j whose z axis is not parallel to z_j, and
+mRj = A Rot(z, sum of angles). Angular velocities and joint axes, which only rotate, are transformed
+from the carrier in one step: from there are C23 and S23.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from symgen.description.robot import PRISMATIC, REVOLUTE, Frame, Robot
 
 @dataclass(frozen=True)
 class Rotation:
-    """A Rot(z, theta).
+    """The rotation A Rot(z, theta) of a frame j in a frame i, with A fixed.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Rotation:
     s: Scalar
 
     def up(self, v: Vector) -> Vector:
-        """A Rot(z, theta) v: components in the outer frame j to components in the inner frame i."""
+        """Transform v from the outer frame j to the inner frame i: return A Rot(z, theta) v."""
         u = (
             sub(mul(self.c, v[0]), mul(self.s, v[1])),
             add(mul(self.s, v[0]), mul(self.c, v[1])),
@@ -59,7 +59,7 @@ class Rotation:
         return u if self.A is None else apply(self.A, u)
 
     def down(self, v: Vector) -> Vector:
-        """(A Rot(z, theta))' v: components in frame i to components in frame j."""
+        """Transform v from the inner frame i to the outer frame j: return (A Rot(z, theta))' v."""
         u = v if self.A is None else apply_transposed(self.A, v)
         return (
             add(mul(self.c, u[0]), mul(self.s, u[1])),
@@ -70,16 +70,18 @@ class Rotation:
 
 @dataclass(frozen=True)
 class Carrier:
-    """The frame from which frame j is reached by one rotation.
+    """The frame m from which one rotation leads to frame j, and this rotation.
+
+    All joint axes after frame m, up to joint j, are parallel, so that their angles add up.
 
     Attributes
     ----------
     m : int
-        Number of that frame.
+        Number of frame m.
     rotation : Rotation
         mRj.
     turn : Turn
-        The angle about z_j, in the independent joints.
+        The angle about z_j: pairs (independent joint, multiple).
     """
 
     m: int
@@ -88,12 +90,12 @@ class Carrier:
 
 
 def axis_rotation(cg: Scalar, sg: Scalar, ca: Scalar, sa: Scalar) -> Matrix:
-    """A = Rot(z, gamma) Rot(x, alpha) by cosines and sines of gamma and alpha."""
+    """Return A = Rot(z, gamma) Rot(x, alpha) from cosines and sines of gamma and alpha."""
     return ((cg, -mul(sg, ca), mul(sg, sa)), (sg, mul(cg, ca), -mul(cg, sa)), (0, sa, ca))
 
 
 def displacement(A: Matrix, b: Scalar, d: Scalar, r: Scalar) -> Vector:
-    """P_ij = b e3 + d A e1 + r A e3."""
+    """Return the origin of frame j in frame i, P_ij = b e3 + d A e1 + r A e3."""
     return (
         add(mul(d, A[0][0]), mul(r, A[0][2])),
         add(mul(d, A[1][0]), mul(r, A[1][2])),
@@ -102,7 +104,10 @@ def displacement(A: Matrix, b: Scalar, d: Scalar, r: Scalar) -> Vector:
 
 
 class Geometry:
-    """Rotations, positions and carriers of all frames of `robot`, as nodes of `algebra`; of those that frame `root` carries alone, if it is not the base."""
+    """Rotations, positions and carriers of the frames of a robot, as nodes of a graph.
+
+    If `root` is not the base, only the frames mounted on frame `root` are included.
+    """
 
     def __init__(
         self, robot: Robot, algebra: GraphAlgebra, closure: Closure, root: int = 0
@@ -153,7 +158,7 @@ class Geometry:
         return Rotation(A, c, s)
 
     def position(self, j: int) -> Scalar:
-        """q_j of any moving joint, from the independent ones."""
+        """Return the position q_j of any moving joint as a function of the independent joints."""
         q = {i: self.algebra.q(i) for i in self.closure.row[j]}
         return add(
             linear(self.algebra, self.closure.row[j], q),
@@ -161,12 +166,12 @@ class Geometry:
         )
 
     def from_carrier(self, j: int, v: Vector) -> Vector:
-        """Components in frame j of a vector given in the carrier's frame."""
+        """Transform a vector from the carrier of frame j (see `Carrier`) to frame j."""
         return v if is_zero(v) else self.carrier[j].rotation.down(v)
 
 
 def summed(turn: Turn) -> Turn:
-    """The turn with one term per joint, sorted; terms that cancel are left out."""
+    """Add up the multiples n_j of each joint in `turn`, sort by joint, and leave out zeros."""
     total: dict[int, int | Fraction] = {}
     for j, n in turn:
         total[j] = total.get(j, 0) + n

@@ -1,9 +1,16 @@
-"""Hash-consed expression graph: the one intermediate representation between the recursions and every printer, and the one evaluator of it.
+"""Expression graph: every formula as nodes that recursions make and code generators print.
 
-A node is (op, operands); equal nodes are one object, so a shared sub-expression is computed once. Signs live on the edges: a `Scalar` is a node and a sign, negations are free and x and -x share everything. A node may carry a name given by the recursion that made it.
-Operations: sym, const (exact rational), add, mul, cos, sin of angles of the robot, sign, pos (positive part max(x, 0)), inv (1/x), sqrt; in the laws of columns also exp, tanh, pow, and any of these of operands of which exact arithmetic knows nothing.
+A node is (op, operands). Equal nodes are one object (hash-consing), so a shared sub-expression is
+computed once. Signs are stored outside the nodes: a `Scalar` is a node and a sign, so that a
+negation costs nothing, and x and -x share one node. A recursion may give a name to a node that it
+makes.
 
-`interpret` gives the values of nodes over a domain: residues of F_p, floats, CasADi's SX, SymPy's objects. `rates` gives their time derivatives, as nodes.
+Operations: sym, const (exact rational), add, mul, cos, sin of angles of the robot, sign, pos
+(positive part max(x, 0)), inv (1/x), sqrt. Torque laws of elements may also have exp, tanh, pow,
+and any of these functions with operands that exact arithmetic cannot represent.
+
+`interpret` computes the values of nodes over a domain: residues of F_p, floats, CasADi's SX,
+SymPy's objects. `rates` gives the time derivatives of nodes, again as nodes.
 """
 
 from __future__ import annotations
@@ -21,7 +28,9 @@ EVEN, ODD = {COS}, {SIN, SIGN, INV, "tanh"}
 
 
 class Symbol(NamedTuple):
-    """An input of a derivation: two inputs of one name and different kinds are different.
+    """An input of a derivation, such as q1 or the constant D3: its kind and its name.
+
+    Two inputs of one name and different kinds are different.
 
     Attributes
     ----------
@@ -29,7 +38,7 @@ class Symbol(NamedTuple):
         constant, pi, number, q, qd, qdd, qdr, qddr, channel, torque, rate (of a tied joint),
         parameter or gravity.
     name : str
-        As it is written: D3, q1, QP1, QDP1, GAM1, G31, XX1; of gravity the axis, 0 to 2; of a
+        Name in formulas: D3, q1, QP1, QDP1, GAM1, G31, XX1; for gravity the axis, 0 to 2; for a
         number of the robot file its value, 2159/5000.
     """
 
@@ -45,7 +54,7 @@ ActiveRow = tuple[tuple[int, Expression], ...]  # ((i, G_i), ...): the velocity 
 
 
 class Angle(NamedTuple):
-    """The angle sum_j n q_j + offset of a cosine or sine."""
+    """The angle sum_j n_j q_j + offset of a cosine or sine; `turn` holds the pairs (j, n_j)."""
 
     turn: Turn
     offset: Expression
@@ -55,7 +64,7 @@ class Angle(NamedTuple):
 
 
 class Velocity(NamedTuple):
-    """The velocity G qd of a sign or a positive part, qd of the independent joints."""
+    """The velocity sum_i G_i qd_i, in independent joints, of a sign or a positive part."""
 
     row: ActiveRow
 
@@ -64,13 +73,13 @@ class Velocity(NamedTuple):
 
 
 class Node:
-    """One operation of the graph. `operands` are Scalars; `fixed` nodes depend on no sample
-    (constants and parameters only).
+    """One operation of the graph, with its operands and the name of its result.
 
-    `value` says what exact arithmetic has to know: the Symbol of an input, the number of a
+    `operands` are Scalars. A `fixed` node depends on constants and parameters only, not on the
+    sample. `value` describes the node for exact arithmetic: the Symbol of an input, the number of a
     constant, the Angle of a cosine or sine, the Velocity of a sign or positive part, the Expression
-    of a square root; None if it knows nothing but the operands. `name` is what the emitted line is called; `hint` is used for the name of a node that turns out
-    to be shared and has none.
+    of a square root; None if the operands are the only description. `name` is the name of the
+    emitted line. `hint` is used as the name if the node turns out to be shared and has no name.
     """
 
     __slots__ = ("fixed", "hint", "index", "name", "name_sign", "op", "operands", "value")
@@ -92,7 +101,7 @@ class Node:
 
 
 class Scalar:
-    """A node with a sign; + - * build the graph."""
+    """A node of the graph with a sign; the operators + - * / make new nodes."""
 
     __slots__ = ("graph", "node", "sign")
 
@@ -135,7 +144,7 @@ class Scalar:
 
 
 class Graph:
-    """Owner of the nodes; two graphs never mix."""
+    """An expression graph: the list of its nodes. Nodes of two graphs must never be mixed."""
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
@@ -143,7 +152,11 @@ class Graph:
         self._sealed = 0  # nodes before this one keep the names they have
 
     def __getstate__(self) -> tuple[Any, ...]:
-        """Nodes as a flat list: a chain of operations may be deeper than Python recurses."""
+        """Return the nodes as a flat list, for pickling.
+
+        Nested nodes would be too deep: a chain of operations may exceed the recursion limit of
+        Python.
+        """
         key = {node.index: key for key, node in self._node.items()}
         nodes = [
             (key[n.index], [(x.node.index, x.sign) for x in n.operands])
@@ -164,19 +177,20 @@ class Graph:
         self._sealed = state[1]
 
     def scalar(self, index: int, sign: int) -> Scalar:
-        """The value of a node, or its opposite."""
+        """Return the node number `index` with a sign, 1 or -1."""
         return Scalar(self, self.nodes[index], sign)
 
     def seal(self) -> None:
-        """Keep the names of the nodes there are: what is derived later renames none of them."""
+        """Fix the names of all present nodes, so that a later derivation cannot rename any of them.
+        """
         self._sealed = len(self.nodes)
 
     def symbol(self, symbol: Symbol, *, fixed: bool = False) -> Scalar:
-        """An input of the emitted code; `fixed` if it is the same for all samples."""
+        """Return the node of an input; `fixed` if the input is the same for all samples."""
         return self._scalar((SYM, symbol), SYM, (), symbol, fixed)
 
     def number(self, c: Fraction | int) -> Scalar | int:
-        """A constant; 0, 1 and -1 stay Python integers."""
+        """Return the node of a constant number; 0, 1 and -1 stay Python integers."""
         c = Fraction(c)
         if c in (0, 1, -1):
             return int(c)
@@ -190,7 +204,10 @@ class Graph:
         return s if c >= 0 else -s
 
     def add(self, a: Scalar, b: Scalar) -> Scalar | int:
-        """a + b; the node is kept with its first operand positive, so that a - b and b - a are one node."""
+        """Return a + b.
+
+        The first operand of the node has a positive sign, so that a - b and b - a share one node.
+        """
         if a.node is b.node:
             return 0 if a.sign != b.sign else self.mul(self.lift(2), a)
         if a.node.op == CONST and a.node.value == 0:
@@ -224,8 +241,10 @@ class Graph:
         return s if sign > 0 else -s
 
     def call(self, op: str, x: Scalar, *more: Scalar, of: Any = None) -> Scalar:
-        """A function of the table of `description.expression`, or the positive part: even and odd ones of a positive operand.
-        `of` is what x is, as `Node.value` says it.
+        """Return the node of a function of x, such as cos, sqrt or the positive part.
+
+        Even and odd functions use a positive operand: sin(-x) becomes -sin(x). `of` describes x for
+        exact arithmetic, for instance as an Angle (see `Node.value`).
         """
         parity = op in EVEN or op in ODD
         operands = (_positive(x) if parity else x, *more)
@@ -236,14 +255,18 @@ class Graph:
         return -s if op in ODD and x.sign < 0 else s
 
     def name(self, value: Scalar | int, name: str) -> Scalar | int:
-        """Call an operation `name`; the first name holds, inputs and numbers keep theirs."""
+        """Give a name to the node of a value, and return the value.
+
+        The first name of a node stays; inputs and numbers get no other name.
+        """
         if isinstance(value, Scalar) and self._may_be_named(value.node):
             value.node.name = name
             value.node.name_sign = value.sign
         return value
 
     def hint(self, value: Scalar | int, name: str) -> Scalar | int:
-        """Suggest a name for an operation, to be used if it is needed more than once."""
+        """Suggest a name for a node, used if the node is needed more than once; return its value.
+        """
         if isinstance(value, Scalar) and self._may_be_named(value.node) and value.node.hint is None:
             value.node.hint = name
             value.node.name_sign = value.sign
@@ -270,7 +293,10 @@ def _positive(x: Scalar) -> Scalar:
 def reachable(
     outputs: Iterable[Scalar | int], known: Mapping[int, Any] | None = None
 ) -> list[Node]:
-    """Nodes that the outputs need, in order of creation (operands first), but those `known`."""
+    """Return the nodes that the outputs depend on, operands first, without the nodes in `known`.
+
+    The order is that of creation.
+    """
     nodes: dict[int, Node] = {}
     known = {} if known is None else known
     stack = [o.node for o in outputs if isinstance(o, Scalar) and o.node.index not in known]
@@ -286,24 +312,25 @@ def reachable(
 
 
 class Domain(Protocol):
-    """Where values of graph nodes are: anything with + * and unary minus."""
+    """A number system for graph nodes, such as floats or F_p, with + * and unary minus."""
 
     def symbol(self, symbol: Symbol) -> Any:
-        """The value of an input."""
+        """Return the value of an input."""
 
     def number(self, c: Fraction) -> Any:
         """Represent the rational number c in this domain."""
 
     def function(self, node: Node, x: list[Any]) -> Any:
-        """The value of any other operation than + and *, by those of its operands."""
+        """Return the value of an operation other than + and *, from the values of its operands."""
 
 
 def interpret(
     outputs: Sequence[Scalar | int], domain: Domain, known: dict[int, Any] | None = None
 ) -> list[Any]:
-    """The values of graph scalars over a domain; 0, 1 and -1 stay whole numbers.
+    """Compute the values of graph scalars over a domain; Python integers stay integers.
 
-    known : values of nodes by their index; those that are needed besides them are added.
+    known : {index of a node: its value}; the values that are computed here are added to this
+    mapping.
     """
     value: dict[int, Any] = {} if known is None else known
 
@@ -332,7 +359,7 @@ def interpret(
 def rates(
     outputs: Sequence[Scalar | int], inputs: Mapping[Symbol, Scalar | int]
 ) -> list[Scalar | int]:
-    """The rates of change of graph scalars where inputs change at these rates, in forward mode."""
+    """Return the time derivatives of graph scalars, from the rates of the inputs (forward mode)."""
     rate: dict[int, Scalar | int] = {}
 
     def signed(s: Scalar | int) -> Scalar | int:

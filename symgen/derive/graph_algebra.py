@@ -1,6 +1,8 @@
-"""The symbols of a robot as nodes of one graph: constants, angles, joint rates, signs.
+"""Symbols of a robot as nodes of one graph: constants, angles, joint rates, signs.
 
-Inputs are q1, QP1, QDP1 ... and the constants of the robot file under their names; numbers that formulas keep as they are written are inputs too, so that one graph serves all numbers. `interpret` finds with each node what exact arithmetic has to know of it (see `graph.Node`).
+Inputs of the graph are q1, QP1, QDP1 ... and the constants of the robot file under their names.
+Numbers that formulas keep as written are inputs too, so that one graph serves all numbers. Each
+node contains the description that exact arithmetic needs (see `graph.Node`).
 """
 
 from __future__ import annotations
@@ -28,21 +30,21 @@ from symgen.description.robot import Robot
 
 
 class GraphAlgebra:
-    """The graph of a derivation, and what its recursions take from the robot.
+    """The graph of one derivation, with methods that return the nodes of a robot's symbols.
 
     Parameters
     ----------
     robot : Robot
         The robot.
     written : bool
-        Whether numbers that it keeps as they are written stay inputs, or are their values.
+        Whether numbers that formulas keep as written are inputs; if not, their values are used.
 
     Attributes
     ----------
     sections : list of (int, str)
-        Index of the first node under each heading.
+        Index of the first node under each heading, and the heading.
     labels : dict
-        Which angle each label of a sum of angles is: 23 for q2 + q3.
+        {label: angle}, for instance 23 for q2 + q3.
     """
 
     def __init__(self, robot: Robot, *, written: bool = True) -> None:
@@ -54,11 +56,11 @@ class GraphAlgebra:
         self.labels: dict[str, Angle] = {}
 
     def section(self, title: str) -> None:
-        """Put the following steps under this heading."""
+        """Start a section of the formulas: nodes made from now on are under the heading `title`."""
         self.sections.append((len(self.graph.nodes), title))
 
     def constant(self, e: Expression) -> Scalar | int:
-        """A constant expression: number, length, component of gravity, cos or sin of a fixed angle."""
+        """Return the scalar of a constant expression: a length, or the cosine of a fixed angle."""
         value: Scalar | int = e.evaluate(
             self._constant, self._call, self.graph.number, self._number
         )
@@ -73,11 +75,11 @@ class GraphAlgebra:
         return self.graph.symbol(Symbol("number", str(number.value)), fixed=True)
 
     def parameter(self, name: str) -> Scalar:
-        """A standard or base parameter."""
+        """Return the node of a standard or base parameter."""
         return self.graph.symbol(Symbol("parameter", name), fixed=True)
 
     def gravity(self, axis: int) -> Scalar | int:
-        """Component of minus the acceleration of gravity in frame 0, m/s**2."""
+        """Return a component of minus the gravity acceleration in frame 0, m/s**2, or zero."""
         symbol = Symbol("gravity", str(axis))
         return self.graph.symbol(symbol, fixed=True) if self.robot.gravity[axis] else 0
 
@@ -89,7 +91,7 @@ class GraphAlgebra:
         return self.graph.call(function, x, of=of)
 
     def cos_sin(self, turn: Turn, offset: Expression) -> tuple[Scalar | int, Scalar | int]:
-        """cos and sin of sum n_j q_j + offset."""
+        """Return the cosine and sine of the angle sum_j n_j q_j + offset, (j, n_j) in `turn`."""
         if not turn:
             return self.constant(call("cos", offset)), self.constant(call("sin", offset))
         quarters, rest = quarter_turns(offset)
@@ -112,7 +114,7 @@ class GraphAlgebra:
         return ((c, s), (-s, c), (-c, -s), (s, -c))[quarters % 4]
 
     def _label(self, turn: Turn) -> str:
-        """23 for q2 + q3, 5m2 for q5 - q2, 2x3 for 2 q3, 2o5x3 for 2/5 q3."""
+        """Return a label for a sum of angles: 23 for q2 + q3, 2m5 for q2 - q5, 2o5x3 for 2/5 q3."""
         text = ""
         for j, n in turn:
             times = f"{abs(n)}x".replace("/", "o") if abs(n) != 1 else ""
@@ -132,19 +134,25 @@ class GraphAlgebra:
         return self.graph.symbol(Symbol("qdd", f"QDP{j}"))
 
     def channel(self, name: str) -> Scalar:
-        """A constant that is a function of time."""
+        """Return the node of a channel: a constant that is a function of time."""
         return self.graph.symbol(Symbol("channel", name))
 
     def rate(self, u: int, i: int) -> Scalar:
-        """dq_u/dq_i of a passive joint u that only the loop equations tie to the actuated joint i."""
+        """Return the node of dq_u/dq_i, for a passive joint u and an actuated joint i.
+
+        Only the closure equations relate such a joint u to the actuated joints.
+        """
         return self.graph.symbol(Symbol("rate", self.named("G", u, i)))
 
     def sign(self, rate: Scalar, row: ActiveRow) -> Scalar:
-        """sign(sd), sd = G qd = `rate`, G = `row`."""
+        """Return sign(sd) of the velocity sd = G qd; `rate` is its scalar sd, `row` is G."""
         return self.graph.call(SIGN, rate, of=Velocity(row))
 
     def one_sided(self, rate: Scalar, row: ActiveRow, when: str) -> tuple[Scalar, Scalar]:
-        """(sign(sd), sd) where the motion has the direction `when`, (0, 0) elsewhere."""
+        """Return sign(sd) and the velocity sd if the motion is in direction `when`, else two zeros.
+
+        Both are nodes made of positive parts max(x, 0).
+        """
         direction = self.sign(rate, row)
         if when == "positive":
             return self.graph.call(POS, direction), self.graph.call(POS, rate, of=Velocity(row))
@@ -152,13 +160,13 @@ class GraphAlgebra:
         return -self.graph.call(POS, -direction), -backward
 
     def function(self, op: str, *operands: Scalar | Fraction | int) -> Scalar:
-        """A function of the table of `description.expression`, of scalars."""
+        """Return a function of scalars, such as exp or pow (table of `description.expression`)."""
         return self.graph.call(op, *map(self.graph.lift, operands))
 
     def name(self, value: Scalar | int, name: str) -> Scalar | int:
-        """The same value, which later steps call `name`."""
+        """Give a name, such as W12, to the node of a value, and return the value."""
         return self.graph.name(value, name)
 
     def hint(self, value: Scalar | int, name: str) -> Scalar | int:
-        """The same value, to be called `name` if it is used more than once."""
+        """Suggest a name for a value, used if it is needed more than once, and return the value."""
         return self.graph.hint(value, name)

@@ -1,7 +1,7 @@
-"""Dynamics from energies, differentiated by CasADi: an independent oracle that shares nothing with the Newton-Euler recursions.
+"""Dynamics from energies, differentiated by CasADi: an independent check of the recursions.
 
-With T_j(q) the pose of frame j in frame 0 (4 x 4) and Sigma_j the pseudo-inertia of link j about
-the origin of its frame,
+This module shares no formula with the Newton-Euler recursions. With T_j(q) the pose of frame j in
+frame 0 (4 x 4) and Sigma_j the pseudo-inertia of link j about the origin of its frame,
 
     E = sum_j 1/2 tr(Tdot_j Sigma_j Tdot_j')      U = - sum_j (g', 0) T_j Sigma_j e4
 
@@ -11,22 +11,25 @@ the origin of its frame,
 both linear in the standard parameters chi. Since dTdot/dqd_i = dT/dq_i, Lagrange's equations are
 [U65]
 
-    Gamma_i = d/dt dE/dqd_i - dE/dq_i + dU/dq_i = sum_j tr(dT_j/dq_i Sigma_j Tddot_j') - (g', 0)
-    dT_j/dq_i Sigma_j e4 ,
+    Gamma_i = d/dt dE/dqd_i - dE/dq_i + dU/dq_i
+            = sum_j tr(dT_j/dq_i Sigma_j Tddot_j') - (g', 0) dT_j/dq_i Sigma_j e4
 
-dT/dq and Tddot by CasADi. Elements with parameter c along s = G q, or of form B (G'G where they act
-along s), add
+CasADi gives dT/dq and Tddot. An element with parameter c acts along a motion s = G q, or has a
+matrix B (B = G'G if it acts along s). It adds to Gamma
 
-    c B qdd (inertia),  c G' (offset),  c B q (stiffness),  c B qd (viscous),  c G' sign(sd)
-    (coulomb)
+    c B qdd          inertia
+    c G'             offset
+    c B q            stiffness
+    c B qd           viscous friction
+    c G' sign(sd)    Coulomb friction
 
-with `when: positive` where sd > 0 only, negative where sd < 0. Coordinates are all joints that
-move, the cut and passive ones included (the open tree). A mechanism with loops is the tree
-restricted to q = f(qa), where phi(q) = 0 closes the loops:
+With `when: positive` it acts for sd > 0 only, with `when: negative` for sd < 0 only. The
+coordinates are all joints that move, also the cut and passive ones (the open tree). A mechanism
+with loops is this tree restricted to q = f(qa), where phi(q) = 0 closes the loops:
 
     Gamma_a = G' Gamma_tree,   G = dq/dqa,   qd = G qad,   qdd = G qadd + Gdot qad .
 
-The certificates and the tests import this module; nothing else does.
+Only the certificate and the tests import this module.
 
 [U65] J. J. Uicker, On the dynamic analysis of spatial linkages using 4 x 4 matrices, Northwestern
 University, 1965.
@@ -61,9 +64,9 @@ SX = Any  # casadi.SX
 
 
 def pose(frame: Frame, q: SX, constants: Mapping[str, SX]) -> SX:
-    """iTj = Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r), i = ant(j).
+    """Return the pose iTj of frame j in its antecedent frame i, a 4 x 4 matrix.
 
-    4 x 4.
+        iTj = Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r)
     """
     gamma, b, alpha, d, theta, r = (
         _symbolic(e, {}, constants)
@@ -75,7 +78,8 @@ def pose(frame: Frame, q: SX, constants: Mapping[str, SX]) -> SX:
 
 
 def _screw(axis: int, angle: SX, shift: SX) -> SX:
-    """Rotation about x (axis 0) or z (axis 2) and translation along it, 4 x 4."""
+    """Return a rotation about x (axis 0) or z (axis 2) with a translation along that axis, 4 x 4.
+    """
     T = ca.SX.eye(4)
     u, v = (axis + 1) % 3, (axis + 2) % 3
     T[u, u], T[u, v], T[v, u], T[v, v] = ca.cos(angle), -ca.sin(angle), ca.sin(angle), ca.cos(angle)
@@ -86,7 +90,10 @@ def _screw(axis: int, angle: SX, shift: SX) -> SX:
 def poses(
     robot: Robot, q: Mapping[int, SX], constants: Mapping[str, SX], root: int = 0
 ) -> dict[int, SX]:
-    """rTj of every frame that frame r, the `root`, carries, by frame number; q by joint number."""
+    """Return {j: rTj}: the pose, in frame r = `root`, of each frame j mounted on frame r.
+
+    The positions q are given by joint number; a missing joint has position 0.
+    """
     T = {root: ca.SX.eye(4)}
     for f in (f for f in robot.frames if f.ant in T):
         T[f.j] = T[f.ant] @ pose(f, q.get(f.j, 0), constants)
@@ -94,7 +101,7 @@ def poses(
 
 
 def pseudo_inertia(name: str) -> Array:
-    """Sigma of a link whose only nonzero standard parameter is `name` = 1."""
+    """Return the pseudo-inertia Sigma, 4 x 4, of a link with the only parameter `name` = 1."""
     S = np.zeros((4, 4))
     if name == "M":
         S[3, 3] = 1
@@ -113,7 +120,10 @@ LINK = np.array([pseudo_inertia(name) for name in INERTIAL])  # (10, 4, 4)
 
 
 def _floats(function: Any, *arguments: Array) -> Array:
-    """A CasADi function of column vectors on samples: arguments (..., m_k), result (..., rows, columns)."""
+    """Evaluate a CasADi function of column vectors at many samples.
+
+    The arguments have shape (..., m_k), the result has shape (..., rows, columns).
+    """
     shape = np.broadcast_shapes(*(np.shape(a)[:-1] for a in arguments))
     columns = [
         np.broadcast_to(a, (*shape, np.shape(a)[-1])).reshape(-1, np.shape(a)[-1]).T
@@ -132,16 +142,17 @@ def _floats(function: Any, *arguments: Array) -> Array:
 
 
 def _matrices(columns: Array) -> Array:
-    """Columns of stacked vec(4 x 4), (..., 16 F, n), as matrices, (..., n, F, 4, 4)."""
+    """Reshape columns of stacked 4 x 4 matrices, (..., 16 F, n), to shape (..., n, F, 4, 4)."""
     stacked = np.moveaxis(columns, -1, -2)
     return np.swapaxes(stacked.reshape(*stacked.shape[:-1], -1, 4, 4), -1, -2)
 
 
 class Lagrange:
-    """Dynamics of the open tree of a robot in all its moving joints (order `robot.moving`), geometry in floats.
+    """Dynamics of the open tree of a robot, in all its moving joints, from its energies.
 
-    Every method takes q, qd, qdd of shape (..., n), rad or m and their rates, and returns the same
-    leading axes. chi is (p,) in the order of `robot.parameters`, or (..., p).
+    The joints have the order `robot.moving`. Arrays q, qd, qdd have shape (..., n), in rad or m and
+    their rates; results have the same leading axes. The parameters chi have shape (p,), in the
+    order of `robot.parameters`, or (..., p).
     """
 
     def __init__(self, robot: Robot, constants: Mapping[str, float] | None = None) -> None:
@@ -157,21 +168,22 @@ class Lagrange:
         return _floats(self._functions[name], *arguments, self._values)
 
     def vary(self, rng: np.random.Generator, states: int) -> None:
-        """Draw channels (functions of time) at each of `states` states."""
+        """Draw a random value of each channel (a constant that varies with time) for every state.
+        """
         self._values = np.tile(self._values, (states, 1))
         for name in self.robot.channels:
             self._values[:, [*self.constants].index(name)] = rng.uniform(0.5, 2, states)
 
     def poses(self, q: Array) -> Array:
-        """0Tj of every frame in file order, (..., frames, 4, 4)."""
+        """Return the pose 0Tj of every frame in file order, shape (..., frames, 4, 4)."""
         return _matrices(self._floats("poses", q))[..., 0, :, :, :]
 
     def slopes(self, q: Array) -> Array:
-        """d0Tj/dq_i, (..., n, frames, 4, 4)."""
+        """Return the derivatives d0Tj/dq_i of all poses, shape (..., n, frames, 4, 4)."""
         return _matrices(self._floats("slopes", q))
 
     def regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """D with Gamma = D chi, (..., n, p)."""
+        """Return the standard regressor D of Gamma = D chi, shape (..., n, p)."""
         robot = self.robot
         dT, ddT = (
             self.slopes(q),
@@ -193,7 +205,10 @@ class Lagrange:
         return D
 
     def _element(self, e: Element, j: int, q: Array, qd: Array, qdd: Array) -> Array:
-        """Gamma of an element's key j for parameter 1, (..., n)."""
+        """Return the torques of one element parameter set to 1, shape (..., n).
+
+        j is the number in the name of the parameter, for instance 2 for FV2.
+        """
         if e.is_own:
             return np.asarray(self._floats(parameter(e.family, j), q, qd)[..., 0])
         G, B = self._row(e, j), self._form(e, j)
@@ -206,14 +221,20 @@ class Lagrange:
         return force if e.when is None else force * (sd > 0 if e.when == "positive" else sd < 0)
 
     def _row(self, e: Element, j: int) -> Array:
-        """G of an element's key j, (n,)."""
+        """Return the row G, shape (n,), of the motion s = G q along which an element acts.
+
+        j is the number in the name of the element parameter.
+        """
         G = np.zeros(len(self.robot.moving))
         for i, x in e.along.get(j, {}).items():
             G[self.robot.moving.index(i)] = x.value(self.constants)
         return G
 
     def _form(self, e: Element, j: int) -> Array:
-        """B of an element's key j, (n, n); G'G along a row."""
+        """Return the matrix B, shape (n, n), of an element parameter; B = G'G along a row G.
+
+        j is the number in the name of the parameter.
+        """
         G, moving = self._row(e, j), self.robot.moving
         B = np.outer(G, G)
         for (i, l), x in e.form.get(j, {}).items():
@@ -221,22 +242,33 @@ class Lagrange:
         return B
 
     def torque(self, q: Array, qd: Array, qdd: Array, chi: Array) -> Array:
-        """Gamma, (..., n)."""
+        """Return the joint torques Gamma = D chi, shape (..., n)."""
         return np.asarray((self.regressor(q, qd, qdd) @ np.asarray(chi)[..., None])[..., 0])
 
     def inertia_matrix(self, q: Array, chi: Array) -> Array:
-        """A = d2E/dqd2, (..., n, n): column i is Gamma for qdd_i = 1 from rest, less that at rest."""
+        """Return the inertia matrix A = d2E/dqd2, shape (..., n, n), from joint torques.
+
+        Column i is Gamma for qdd_i = 1 from rest, minus Gamma at rest.
+        """
         return inertia_of(lambda qdd: self.torque(q, 0 * q, qdd, chi), q)
 
     def jacobian(self, q: Array, frame: int | None = None) -> Array:
-        """Velocity of the origin, then angular velocity w from hat(w) = Rdot R', of `frame` (default: the last) in frame 0 per qd, (..., 6, n)."""
+        """Return the Jacobian of a frame (default: the last) in frame 0, shape (..., 6, n).
+
+        Rows 1 to 3 are the velocity of the origin, rows 4 to 6 the angular velocity w from
+        hat(w) = Rdot R'.
+        """
         j = frame or self.robot.frames[-1].j
         slope, R = self.slopes(q)[..., j - 1, :3, :], self.poses(q)[..., j - 1, :3, :3]
         W = slope[..., :3] @ np.swapaxes(R, -1, -2)[..., None, :, :]
         return np.swapaxes(np.concatenate([slope[..., 3], _axial(W)], axis=-1), -1, -2)
 
     def acceleration(self, q: Array, qd: Array, qdd: Array, frame: int) -> Array:
-        """Acceleration of the origin of `frame`, then angular acceleration wd from hat(wd) = Rddot R' + Rdot Rdot', in frame 0, (..., 6)."""
+        """Return the acceleration of a frame in frame 0, shape (..., 6).
+
+        First the acceleration of its origin, then its angular acceleration wd from
+        hat(wd) = Rddot R' + Rdot Rdot'.
+        """
         if frame == 0:
             return np.zeros((*np.shape(q)[:-1], 6))
         R = self.poses(q)[..., frame - 1, :3, :3]
@@ -246,8 +278,11 @@ class Lagrange:
         return np.concatenate([second[..., 3], _axial(W)], axis=-1)
 
     def base_regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """Force and moment about O_0, in frame 0, that move the links against gravity, by standard
-        parameter, (..., 6, p): the moments of mass of hat(r) rdd, from Tdd Sigma T'.
+        """Return the regressor of the wrench at the base, in frame 0, shape (..., 6, p).
+
+        The wrench is the force, then the moment about O_0, that move the links against gravity. The
+        moment is computed from the products of position and acceleration of the mass points, Tdd
+        Sigma T'.
         """
         g = np.array([e.value(self.constants) for e in self.robot.gravity])
         T, Tdd = (
@@ -265,7 +300,7 @@ class Lagrange:
         return D
 
     def potential_energy(self, q: Array, chi: Array) -> Array:
-        """U of gravity, springs and offsets, (...)."""
+        """Return the potential energy U of gravity, springs and offsets, shape (...)."""
         value, T = dict(zip(self.names, chi, strict=True)), self.poses(q)
         g = np.array([e.value(self.constants) for e in self.robot.gravity] + [0.0])
         U = np.zeros(np.shape(q)[:-1])
@@ -285,10 +320,12 @@ class Lagrange:
         return U
 
     def motion(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array, Array]:
-        """Tree motion q, qd, qdd (..., n) and G = dq/dqa (..., n, n_a) of the actuated q, qd, qdd (..., n_a).
+        """Compute the motion of all joints of the tree from the motion of the actuated joints.
 
-        Loops are closed by Newton's method from the constraints, or followed from a `start` of all
-        joints; a state that it cannot close, or reach without passing near a dead point, is NaN.
+        The arguments have shape (..., n_a). Return the tree motion q, qd, qdd, shape (..., n), and
+        G = dq/dqa, shape (..., n, n_a). Newton's method closes the loops. It begins with the
+        constraints of the file, or moves in small steps from a `start` that gives all joints. A
+        state is NaN if the loops cannot be closed, or can only be reached near a dead point.
         """
         actuated = [self.robot.moving.index(j) for j in self.robot.joints]
         passive = [self.robot.moving.index(j) for j in self.robot.passive]
@@ -330,28 +367,39 @@ class Lagrange:
         return x, xd, xdd, G
 
     def _gap(self, x: Array) -> Array:
-        """phi, (..., equations)."""
+        """Return the residual phi of the closure equations, shape (..., equations)."""
         return self._floats("loop", x)[..., 0]
 
     def _regularity(self, x: Array, passive: list[int]) -> Array:
-        """Smallest over largest singular value of the closure's derivatives by the passive joints."""
+        """Return the smallest over the largest singular value of dphi/dq_passive.
+
+        The ratio is small near a dead point of the mechanism.
+        """
         s = np.linalg.svd(self._floats("loop_jacobian", x)[..., passive], compute_uv=False)
         return np.asarray(s[..., -1] / s[..., 0])
 
     def actuated_regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """G' D_tree at actuated q, qd, qdd (..., n_a), order `robot.joints`: (..., n_a, p)."""
+        """Return the standard regressor G' D_tree of the actuated joints, shape (..., n_a, p).
+
+        The arguments q, qd, qdd of the actuated joints have shape (..., n_a), in the order of
+        `robot.joints`.
+        """
         *state, G = self.motion(q, qd, qdd)
         return np.swapaxes(G, -1, -2) @ self.regressor(*state)
 
 
 def _axial(W: Array) -> Array:
-    """w of hat(w), (..., 3)."""
+    """Return the vector w, shape (..., 3), of a skew-symmetric matrix W = hat(w)."""
     return np.stack([W[..., 2, 1], W[..., 0, 2], W[..., 1, 0]], axis=-1)
 
 
 @lru_cache(maxsize=8)
 def _functions(robot: Robot) -> dict[str, Any]:
-    """The functions of q, qd, qdd of all moving joints, then of the constants and a number more."""
+    """Return the CasADi functions of a robot by name, such as poses, slopes and loop.
+
+    Their arguments are q, qd, qdd of all moving joints, as far as needed, then the constants with
+    one more number at the end.
+    """
     n, symbols = len(robot.moving), ca.SX.sym("c", len(robot.constants) + 1)
     constants = dict(zip(robot.constants, ca.vertsplit(symbols), strict=False))
     q, qd, qdd = ca.SX.sym("q", n), ca.SX.sym("qd", n), ca.SX.sym("qdd", n)
@@ -383,10 +431,11 @@ def _functions(robot: Robot) -> dict[str, Any]:
 
 
 def _closure(robot: Robot, q: SX, constants: Mapping[str, SX]) -> SX:
-    """phi(q), zero if every twin coincides with its cut frame and every constrained joint has its value.
+    """Return the closure residual phi(q), zero if all loops close and all constraints hold.
 
-    Positions per longest length, from the frame that carries a loop: beside the lengths of an arm
-    the digits of a small loop on it would be lost.
+    A loop closes if its twin frame coincides with its cut frame. Positions are relative to the
+    frame on which the loop is mounted and are divided by the longest length of the loops: with the
+    lengths of a large arm, the digits of a small loop on the arm would be lost.
     """
     phi, by_joint = [], {j: q[k] for k, j in enumerate(robot.moving)}
     for loop in robot.loops:
@@ -404,7 +453,10 @@ def _closure(robot: Robot, q: SX, constants: Mapping[str, SX]) -> SX:
 
 
 def _start(robot: Robot, q: SX, constants: Mapping[str, SX]) -> tuple[SX, SX]:
-    """The actuated joints, and all from them: passive ones from their constraint, else from `start` of their loop, else 0."""
+    """Return the actuated joints, and start positions of all moving joints computed from them.
+
+    A passive joint has the position of its constraint, else the `start` of its loop, else 0.
+    """
     names = {f"q{j}": q[k] for k, j in enumerate(robot.moving)}
     x = [
         names[f"q{j}"] if j in robot.joints else ca.SX(robot.start.get(j, 0.0))
@@ -424,7 +476,11 @@ def _start(robot: Robot, q: SX, constants: Mapping[str, SX]) -> tuple[SX, SX]:
 def _law(
     robot: Robot, e: Element, j: int, q: SX, qd: SX, constants: Mapping[str, SX]
 ) -> tuple[SX, SX]:
-    """Torque (n,) of key j for parameter 1, dU/dq of an energy by CasADi, and the energy."""
+    """Return the joint torques, shape (n,), of one element parameter set to 1, and its energy.
+
+    j is the number in the name of the parameter. CasADi differentiates an energy U to the torque
+    dU/dq.
+    """
     G = ca.SX.zeros(len(robot.moving))
     for i, g in e.along[j].items():
         G[robot.moving.index(i)] = _symbolic(g, {}, constants)
@@ -448,7 +504,7 @@ def _symbolic(e: Expression, q: Mapping[str, SX], constants: Mapping[str, SX]) -
 
 @dataclass(frozen=True)
 class Sample:
-    """The standard regressor at random states.
+    """Random states of a robot, and its standard regressor at these states.
 
     Attributes
     ----------
@@ -468,14 +524,15 @@ class Sample:
 
     @property
     def W(self) -> Array:
-        """D of all states, shape (n*N, p), rows joint-major."""
+        """Observation matrix, shape (n*N, p): D of all states, first the rows of joint 1."""
         return self.D.transpose(1, 0, 2).reshape(-1, self.D.shape[2])
 
 
 def _leverage(robot: Robot, constants: Mapping[str, float]) -> Array:
-    """Largest coefficient of each actuated joint among the rows of elements that several of these share, 1 if there is none.
+    """Return, for each actuated joint, its largest coefficient in element rows of several joints.
 
-    Shape (n,).
+    The coefficient is 101.25 for q5 in the row q4 + 101.25 q5, and 1 if there is no such row. Shape
+    (n,).
     """
     closure = close(robot)
     rows = [dict(closure.in_independent(r)) for e in robot.elements for r in e.along.values()]
@@ -495,11 +552,13 @@ def sampled(
     constants: Mapping[str, float] | None = None,
     in_time: bool = False,
 ) -> Sample:
-    """The standard regressor at `states` random states: q within pi rad or 1 m, general loops within 0.5 of their start.
+    """Draw random states of a robot, and compute the standard regressor at these states.
 
-    Velocities and accelerations are standard normal; in every other state each velocity is divided
-    by its leverage, so that the sign of q4 + 101.25 q5 is not that of q5 alone. `in_time`: channels
-    are drawn at every state. Raises DescriptionError if the loops close in too few of the
+    Positions are within pi rad or 1 m; in general loops they are within 0.5 rad or m of the start
+    of the loop, less for short links. Velocities and accelerations are standard normal. In every
+    other state each velocity is divided by the leverage of its joint, so that the sign of q4d +
+    101.25 q5d is not always the sign of q5d. `in_time`: whether channels are drawn at every state.
+    Raises DescriptionError if the torques are not finite or the loops close in too few of the
     states.
     """
     model, rng = Lagrange(robot, constants), np.random.default_rng(seed)
@@ -546,10 +605,11 @@ def sampled(
 
 
 def in_one_mode(robot: Robot) -> Robot:
-    """`robot` with its passive joints declared where they are linear in the actuated ones: no state lies in an antiparallelogram.
+    """Return the robot with its loops fixed to one assembly mode, never an antiparallelogram.
 
-    The dynamics by energies still closes every loop itself and refuses states in which the declared
-    joints do not close it.
+    If all passive joints are linear in the actuated ones, these relations become constraints of the
+    robot; else its loops get a start configuration that closes them. The dynamics by energies still
+    close every loop themselves, and refuse states in which the declared positions do not close it.
     """
     closure = close(robot)
     if closure.tied:

@@ -1,7 +1,8 @@
-"""What a model is: its name, arguments, shape and unit, and its entries from a derivation.
+"""One model of a robot: its name, arguments, shape and unit, and the formulas of its entries.
 
-Entries come in cases, each with the inputs of the recursion that it replaces: `Model.values` writes
-them over a graph of their own. The table of models is `derive.models`.
+The formulas come from a derivation. They are given in cases; each case has its own values for
+inputs of the recursion, such as qdd = 0. `Model.values` writes the formulas into a new graph. The
+table of all models is `derive.models`.
 """
 
 from __future__ import annotations
@@ -24,16 +25,16 @@ TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")  # of an origin, and the angular ve
 
 @dataclass(frozen=True)
 class Request:
-    """Parameters, frames and substitutions for a model.
+    """The choices of a user for one model: its parameters, its frames, and values of inputs.
 
     Attributes
     ----------
     parameters : mapping
         {standard parameter: symbol} of the parameters that take part, in the order of the columns.
     of, frame : int
-        Which frame's model, in components of which frame.
+        Number of the frame that the model describes; number of the frame of the components.
     inputs : mapping
-        Values that replace inputs.
+        {input: value that replaces it}.
     """
 
     parameters: Mapping[str, str]
@@ -44,7 +45,7 @@ class Request:
 
 @dataclass(frozen=True)
 class Entry:
-    """A value of a result: its place, the heading and the comment of its line."""
+    """One entry of a model: its index in the array, its value, its heading and its comment."""
 
     place: Place
     value: Scalar | int
@@ -54,7 +55,10 @@ class Entry:
 
 @dataclass(frozen=True)
 class Case:
-    """Entries that replace the same inputs; `tag` ends the names of the steps that this changes."""
+    """Entries of a model that share the same replaced inputs, for instance one column of A.
+
+    `tag` ends the names of the intermediate variables that these replaced inputs change.
+    """
 
     entries: Sequence[Entry]
     inputs: Inputs = field(default_factory=dict)
@@ -63,7 +67,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Values:
-    """The entries of a model over a graph of their own, with its angles and headings."""
+    """The entries of one model as nodes of a graph of their own, with the angles and headings."""
 
     entries: tuple[Entry, ...]
     algebra: GraphAlgebra
@@ -75,54 +79,54 @@ class Values:
 
 @dataclass(frozen=True)
 class Model:
-    """One model, in symbols and as a function of emitted modules.
+    """One model of a robot, such as the inertia matrix: its name, arguments, shape and formulas.
 
     Attributes
     ----------
     name : str
-        The function, in every target.
+        Name of its function in all generated languages.
     letter : str
-        What its entries are called in formulas.
+        Letter of its entries in formulas.
     arguments : tuple of str
-        Among q, qd, qdd, tau and X.
+        Its arguments, such as q, qd, qdd, tau and X.
     axes : tuple of str
-        What its rows and columns are, see `labels`; () for a scalar.
+        Meaning of its rows and columns, see `labels`; () for a scalar.
     unit : str
-        Of its entries, revolute | prismatic joints, SI.
+        Unit of its entries, for revolute | prismatic joints, SI.
     meaning : str
-        What it is.
+        Description of the model, without a full stop.
     cases : callable or None
-        Its entries from a derivation; None for what is composed of others.
+        Function that returns its entries from a derivation; None if other models compose it.
     closed : callable or None
-        The same entries where they multiply out to fewer terms than those of `cases`.
+        Function that returns the same entries in a form that multiplies out to fewer terms.
     composed : str
-        How its closed form is composed of others: "formulas", "determinant" or "quotient".
+        How its closed form is composed of other models: "formulas", "determinant" or "quotient".
     instead : str
-        What works in the place of a recursion that it does not have.
+        Advice for the user if the model has no recursion: another model or form that works.
     denominator : str
-        What its entries are still to be divided by, where the closed form says that apart.
+        Common divisor of its entries, if the closed form gives it apart: "det A".
     result : str
-        What emitted text calls the array; empty if no target has the function.
+        Name of the array in generated code; empty if no generated code has the function.
     symbolic : bool
-        Whether it can be had as symbols.
+        Whether the model is available in symbols.
     of_frames : bool
-        Whether it is that of a frame, in components of a frame.
+        Whether it describes one chosen frame, in components of another chosen frame.
     symmetric : bool
-        Whether entries below the diagonal are those above it, and left out.
+        Whether the matrix is symmetric, so that entries below the diagonal are left out.
     by_columns : bool
-        Whether it is stored column by column in a store that is reused.
+        Whether generated code stores it column by column in an array that is reused.
     of_loops : bool
-        Whether it serves the closing of general loops alone.
+        Whether it only serves to close general loops.
     up_to_a_constant : bool
         Whether a constant may be added to it.
     page : int
-        Its place on the page of a robot, from 1; 0 if it is not shown there.
+        Its position on the page of a robot, from 1; 0 if it is not shown there.
     case_of : str
-        The model that it is where the arguments that it has not are zero: Python modules call that.
+        Model that equals it if the arguments missing here are zero: Python modules call that model.
     option : str
-        What asks targets for it (`symgen generate --with`); empty if they always have it.
+        Option of `symgen generate --with` that adds it; empty if it is always generated.
     latex : str
-        The letter in LaTeX; where left out, `letter` in bold.
+        The letter in LaTeX; default: `letter` in bold.
     """
 
     name: str
@@ -150,7 +154,7 @@ class Model:
 
     @property
     def summary(self) -> str:
-        """Description of the model in one sentence; a symbol at its start keeps its case."""
+        """Description of the model as one sentence; a symbol at its start keeps its case."""
         word = self.meaning.partition(" ")[0]
         first = (
             self.meaning[0] if word in self.arguments + (self.result,) else self.meaning[0].upper()
@@ -159,12 +163,16 @@ class Model:
 
     @property
     def printed(self) -> bool:
-        """Whether targets print its entries; what is of any frame they compose of others."""
+        """Whether code generators print the entries of the model from the graph.
+
+        A model of a chosen frame, such as the Jacobian, is computed in generated code from other
+        models.
+        """
         return bool(self.result) and self.cases is not None and not self.of_frames
 
     @property
     def states(self) -> tuple[str, ...]:
-        """Arguments that have samples."""
+        """Names of the arguments that vary from sample to sample: all except the parameters X."""
         return tuple(a for a in self.arguments if a != "X")
 
     @property
@@ -179,10 +187,11 @@ class Model:
         *,
         closed: bool = False,
     ) -> Values:
-        """The entries that may differ from zero, rewritten with what the request gives.
+        """Return the entries of the model for the parameters, frames and inputs of a request.
 
-        Over the graph of `rewrite`, of the same request, where several models share one. closed :
-        to be multiplied out.
+        rewrite : graph to write the entries into, if several models of the same request share one.
+        closed : whether to use the form that is meant to be multiplied out. Of a symmetric matrix,
+        only entries on and above the diagonal are returned.
         """
         cases = (closed and self.closed) or self.cases
         assert cases is not None
@@ -199,7 +208,7 @@ class Model:
 
 
 def labels(d: Derivation, axis: str, parameters: Sequence[str]) -> tuple[str, ...]:
-    """The rows or columns of a model: joints, tied joints, frames, parameters, components."""
+    """Return the labels of the rows or columns of a model, such as joint or parameter names."""
     closure, robot = d.closure, d.robot
     match axis:
         case "joints":
@@ -229,16 +238,22 @@ def labels(d: Derivation, axis: str, parameters: Sequence[str]) -> tuple[str, ..
 
 
 def equations(d: Derivation) -> tuple[int, ...]:
-    """The residuals of the loops that close them: all, where no joint is taken as a function."""
+    """Return the indices of the loop residuals that serve as closure equations.
+
+    There is one equation for each tied joint, a passive joint that only these equations relate to
+    the actuated joints. If every passive joint stays a symbol instead, all six residuals of each
+    loop are used.
+    """
     if d.closure.tied and d.closure == loop_system(d.robot).closure:
         return loop_system(d.robot).equations
     return tuple(range(LOOP_RESIDUALS * len(d.robot.loops)))
 
 
 def rewriting(d: Derivation, request: Request) -> Rewrite:
-    """The substitutions that all models share.
+    """Return a new graph with the substitutions that all models of a request share.
 
-    Parameters become those of the request, gravity that of the robot, and inputs their values.
+    Standard parameters become the symbols of the request or zero, gravity becomes that of the
+    robot, and the inputs of the request become their values.
     """
     inputs: dict[Symbol, Input] = {}
     for name in d.robot.parameters:

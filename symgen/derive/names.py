@@ -1,8 +1,9 @@
-"""Families of named quantities, and how their indices are written.
+"""Names of the intermediate variables in formulas, such as W12, sorted into families, such as W.
 
-Order of indices: component digits, link, then the joint it belongs to: W12 is component 1 of link
-2, U312 row 3 column 1 of link 2, Z132 component 1 in frame 3 of the axis of joint 2. With more than
-nine frames indices are separated: W1_12.
+Order of the indices: components, link, then the joint if there is one. W12 is component 1 of the
+angular velocity of link 2, U312 is row 3, column 1 of the matrix U of link 2, Z132 is component 1,
+in frame 3, of the axis of joint 2. With more than nine frames, an underscore separates the indices:
+W1_12.
 """
 
 from __future__ import annotations
@@ -60,7 +61,11 @@ FAMILIES = {
 
 
 class Names:
-    """Writes indices for a robot of `n_frames` frames."""
+    """The names of the intermediate variables of a robot with `n_frames` frames.
+
+    A call with a family and indices returns the name, for instance W12 for family W and indices 1,
+    2.
+    """
 
     def __init__(self, n_frames: int) -> None:
         self.separator = "_" if n_frames > 9 else ""
@@ -79,9 +84,9 @@ MEMBER = re.compile(rf"(?:({FAMILY})\d[\d_moxb]*|(QP|DG|DN|DF)(?:\d[\d_]*)?[A-Za
 
 
 def families_of(names: Iterable[str]) -> tuple[str, ...]:
-    """The families that `names` belong to, in the order of FAMILIES.
+    """Return the families of the given names, such as W for W12, in the order of FAMILIES.
 
-    Products and sums of names belong to none.
+    A product or a sum of names belongs to no family.
     """
     matches = filter(None, map(MEMBER.match, names))
     occurring = {match[1] or match[2] for match in matches}

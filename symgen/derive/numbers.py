@@ -1,6 +1,15 @@
-"""A robot whose numbers are kept as written: 0.4318 becomes an atom of the formulas, 0.4318**2*M2 in place of 0.18645124*M2.
+"""Robots in which decimal numbers stay symbols: 0.4318**2*M2 in place of 0.18645124*M2.
 
-Lengths, gravity, mimic ratios and the rows of elements are polynomials over constants; each rational coefficient c of theirs that is no small whole number becomes sign(c) `Number(|c|)`. Equal numbers are one atom. So does a decimal angle, and a fraction of pi with a large denominator: 0.35 + 0.7 is a sum of two angles that exact arithmetic takes for any two. The atoms have two uses: formulas read like the robot file, and coefficients are recognised at random values of the atoms, as functions of low degree, where the digits of a number are too long for rational reconstruction. What is recognised is then checked at the numbers themselves (`certificate`).
+Lengths, gravity, mimic ratios and the rows of elements are polynomials in the constants of the
+robot. A rational coefficient c of such a polynomial becomes sign(c) `Number(|c|)`, an atom (a
+symbol that has this value), unless c is a small whole number. Equal numbers are one atom. An angle
+written as a decimal and a fraction of pi with a large denominator become atoms too: exact
+arithmetic treats 0.35 + 0.7 as the sum of two unrelated angles.
+
+The atoms have two uses. The formulas look like the robot file. And coefficients are recognised as
+functions of low degree at random values of the atoms, if the digits of a number are too long for
+rational reconstruction. The recognised coefficients are then checked at the numbers themselves
+(`certificate`).
 """
 
 from __future__ import annotations
@@ -26,9 +35,11 @@ LARGEST_WHOLE = 12  # whole numbers up to here are counts (2, 4) rather than len
 
 @lru_cache(maxsize=64)
 def numbered(robot: Robot) -> Robot:
-    """`robot` with the numbers of its lengths, gravity, ratios, element rows and angles as `Number` atoms.
+    """Replace the decimal numbers of a robot by `Number` atoms, which formulas keep as written.
 
-    Ratios as they are where one relation is put into another, whose angles need them.
+    The numbers are those of its lengths, gravity, joint relations, element rows and angles. If one
+    relation between joints is put into another, the ratios stay numbers, because the angles of the
+    joints need these ratios.
     """
     followed = {a for e in robot.constraints.values() for a in e.atoms}
     chained = any(f"q{j}" in followed for j in robot.constraints)
@@ -39,7 +50,10 @@ def numbered(robot: Robot) -> Robot:
 
 
 def keep_rationals(e: Expression) -> Expression:
-    """The same polynomial with its rational coefficients as atoms, those inside square roots and inverses too."""
+    """Replace the rational coefficients of a polynomial by atoms, also inside square roots and 1/x.
+
+    Whole numbers up to LARGEST_WHOLE stay numbers.
+    """
     total = Expression()
     for m, c in e.terms.items():
         term = Expression({(): Fraction(1 if c > 0 else -1)}) * _atom(abs(c))
@@ -57,9 +71,9 @@ def keep_rationals(e: Expression) -> Expression:
 
 
 def kept_angle(e: Expression) -> Expression:
-    """The same angle with its decimals as atoms, and its fractions of pi with a large denominator.
+    """Replace the decimal numbers of an angle by atoms, and fractions with a large denominator.
 
-    A joint's ratio stays a number.
+    Quarter turns and the multiples of a joint angle stay numbers.
     """
     _, rest = quarter_turns(e)
     total = e - rest
@@ -73,7 +87,7 @@ def kept_angle(e: Expression) -> Expression:
 
 
 def number_atom(c: Fraction) -> Expression:
-    """A positive number as an atom."""
+    """Return a positive number as an atom: an expression of one symbol that has this value."""
     return Expression({((Number(c), 1),): Fraction(1)})
 
 
@@ -84,5 +98,5 @@ def _atom(c: Fraction) -> Expression:
 
 
 def numbers_of(robot: Robot) -> tuple[Number, ...]:
-    """The Number atoms of a robot made by `numbered`, in the order of the file."""
+    """Return the `Number` atoms in lengths, gravity, relations and element rows, each once."""
     return tuple(dict.fromkeys(a for a in atoms_of(robot) if isinstance(a, Number)))

@@ -1,6 +1,8 @@
-"""Vectors and matrices of graph scalars.
+"""Vectors and matrices whose components are nodes of the expression graph.
 
-A scalar is a node of the graph with a sign, or a constant expression: anything with + - * and unary minus. The Python integers 0, 1 and -1 are structural: they are known while the recursion runs, cost nothing and never reach the graph.
+A scalar is a node of the graph with a sign, a constant expression, or any other object with + - *
+and unary minus. The Python integers 0, 1 and -1 cost nothing: a sum with 0 or a product with 0, 1
+or -1 is simplified at once and makes no node of the graph.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ E3: Vector = (0, 0, 1)
 
 
 def is_zero(v: Vector) -> bool:
-    """Whether all components are the structural zero."""
+    """Whether every component of v is the Python integer 0, so that v vanishes identically."""
     return all(type(x) is int and x == 0 for x in v)
 
 
@@ -58,12 +60,12 @@ def dot(u: Sequence[Scalar], v: Sequence[Scalar]) -> Scalar:
 
 
 def linear(algebra: GraphAlgebra, row: Mapping[K, Expression], x: Mapping[K, Scalar]) -> Scalar:
-    """sum_i row_i x_i."""
+    """Return sum_i row_i x_i, with constant expressions row_i and scalars x_i."""
     return dot([algebra.constant(g) for g in row.values()], [x[i] for i in row])
 
 
 def turned(algebra: GraphAlgebra, turn: Turn, x: Mapping[int, Scalar]) -> Scalar:
-    """Sum n_j x_j with the joint multiples n_j of `turn`; a joint that x leaves out counts as 0."""
+    """Return sum_j n_j x_j for the pairs (j, n_j) of `turn`; a joint j missing in x counts as 0."""
     row = {j: Expression.number(n) for j, n in turn}
     return linear(algebra, row, {j: x.get(j, 0) for j in row})
 
@@ -85,12 +87,12 @@ def scale(s: Scalar, u: Vector) -> Vector:
 
 
 def apply(m: Matrix, u: Vector) -> Vector:
-    """M u."""
+    """Return the product M u of a 3x3 matrix M and a vector u."""
     return (dot(m[0], u), dot(m[1], u), dot(m[2], u))
 
 
 def apply_transposed(m: Matrix, u: Vector) -> Vector:
-    """M' u."""
+    """Return the product M' u of the transpose of a 3x3 matrix M and a vector u."""
     return (
         dot((m[0][0], m[1][0], m[2][0]), u),
         dot((m[0][1], m[1][1], m[2][1]), u),

@@ -1,4 +1,4 @@
-"""What a user writes: robot files, read into the frozen Robot."""
+"""Read robot descriptions (robot files, SYMORO .par, URDF, MJCF) into immutable Robot objects."""
 
 from symgen.description.angles import AngleWarning
 from symgen.description.expression import Expression

@@ -1,5 +1,6 @@
-"""What a message adds when a novice's mistake is recognised: the thing to write instead. Each
-returns "" if it has nothing to say.
+"""Hints for error messages: recognise a typical mistake in a robot file and name the remedy.
+
+Each function returns "" if it has no hint.
 """
 
 from __future__ import annotations
@@ -33,12 +34,14 @@ _YAML = {  # what the scanner says: what to change
 
 
 def yaml_advice(problem: str) -> str:
-    """Remedy for the message `problem` of the YAML scanner."""
+    """Return the hint for an error message `problem` of the YAML parser, such as "indent with
+    spaces".
+    """
     return next((f"; {advice}" for part, advice in _YAML.items() if part in problem), "")
 
 
 def symbol_advice(name: str, declared: Iterable[str]) -> str:
-    """The declared symbol that was probably meant by `name`, else where one is declared."""
+    """Suggest the declared symbol that the user probably meant by the unknown symbol `name`."""
     symbols = [*declared, "pi"]
     same = [symbol for symbol in symbols if symbol.lower() == name.lower()]
     close = same or difflib.get_close_matches(
@@ -48,7 +51,7 @@ def symbol_advice(name: str, declared: Iterable[str]) -> str:
 
 
 def unit_advice(token: str) -> str:
-    """Remedy for a number that is followed by a unit."""
+    """Return a hint for the unexpected text `token`: a unit such as deg or mm, or ^ for a power."""
     unit = token.lower()
     if unit in ("deg", "degree", "degrees", "°", "grad"):
         return "; angles are in rad: 90 degrees are pi/2"
@@ -58,7 +61,11 @@ def unit_advice(token: str) -> str:
 
 
 def degrees_advice(angle: Expression, constants: dict[str, float]) -> str:
-    """Remedy for an angle beyond a full turn that is no multiple of pi: degrees were meant. angle : without q_j."""
+    """Return a hint if an angle larger than a full turn was probably written in degrees, not in
+    rad.
+
+    Multiples of pi in the angle are ignored. `angle` is given without the joint variable q_j.
+    """
     turn = angle - PI * angle.coefficient("pi")
     if "pi" in turn.atoms or turn.symbols - constants.keys():
         return ""

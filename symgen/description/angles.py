@@ -1,4 +1,4 @@
-"""Angles that a file writes as decimals and means as multiples of pi/12."""
+"""Rounding of the angles in a file: a decimal near a multiple of pi/12 becomes this multiple."""
 
 from __future__ import annotations
 
@@ -15,35 +15,41 @@ ALL_DIGITS = 1e-12  # rad: closer to a multiple of pi/12 is that multiple in eve
 
 
 class RobotFileWarning(UserWarning):
-    """Statement of a foreign robot file that its author probably did not intend."""
+    """Warning about a value in a URDF, MJCF or .par file that its author probably did not intend.
+    """
 
 
 class InertiaWarning(RobotFileWarning):
-    """A link of a URDF has an inertia that no body can have."""
+    """Warning about a URDF link whose mass and inertia tensor no physical body can have."""
 
 
 class AngleWarning(RobotFileWarning):
-    """Angles of a file were taken as multiples of pi/12; `exact=True` takes them as written."""
+    """Warning that angles of a file were rounded to multiples of pi/12; `exact=True` prevents this.
+    """
 
 
 @dataclass
 class Angles:
-    """Angles of one file as they are read.
+    """The rounding rule for the angles of one file, and the list of angles near multiples of pi/12.
 
     Attributes
     ----------
     exact : bool
-        Whether all stay as they are written.
+        Whether all angles stay as written in the file.
     near : list of tuple
-        Of each that differs from a multiple of pi/12 by less than SNAP and more than ALL_DIGITS:
-        joint, angle and line; rad in the file; k of the multiple k pi/12.
+        Each angle that differs from a multiple k pi/12 by at most SNAP and more than ALL_DIGITS:
+        its
+        name (joint, angle and line), its value in the file (rad), and k.
     """
 
     exact: bool
     near: list[tuple[str, float, int]] = field(default_factory=list)
 
     def twelfths(self, angle: float, name: str) -> int | None:
-        """k of the multiple k pi/12 that `angle` is taken as; None if it stays."""
+        """Return k if `angle` (rad) is to be replaced by k pi/12, or None if it stays as written.
+
+        An angle that is only near k pi/12 is also stored in `near` under `name`.
+        """
         k = twelfths(angle, SNAP)
         if k is None or abs(k * (math.pi / 12) - angle) <= ALL_DIGITS:
             return k
@@ -51,7 +57,12 @@ class Angles:
         return None if self.exact else k
 
     def report(self, file: str) -> tuple[str, tuple[str, ...]]:
-        """How angles were read, for headers and as a note, with an AngleWarning."""
+        """Describe how angles near multiples of pi/12 were read: a text for headers, and a tuple of
+        notes.
+
+        If angles were rounded, a note names the largest change, and an AngleWarning is issued. Both
+        results are empty if the file has no such angle.
+        """
         if not self.near:
             return "", ()
         near = f"{len(self.near)} angle{'s' * (len(self.near) > 1)} near multiples of pi/12"

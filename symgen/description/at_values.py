@@ -1,4 +1,7 @@
-"""A robot at the values of its constants: symbols replaced by their numbers, for geometries at which the generic formulas do not hold."""
+"""Robots with numbers in place of symbolic constants, for special geometries.
+
+At such geometries the formulas of the general robot do not hold.
+"""
 
 from __future__ import annotations
 
@@ -20,20 +23,24 @@ WITHIN = 1e-6  # rad, of a multiple of pi/12: rounding of 1.570796
 
 
 def at_values(robot: Robot, values: Mapping[str, Expression] | None = None) -> Robot:
-    """`robot` with every constant as a number: decimals exactly, angles that are multiples of pi/12 as such; or some constants at given values.
+    """Replace the constants of `robot` by their numbers, or some constants by given expressions.
+
+    Decimals are exact. An angle near a multiple of pi/12 becomes this multiple if `values` is left
+    out.
 
     Parameters
     ----------
     robot : Robot
-        With symbolic constants.
+        A robot with symbolic constants.
     values : mapping, optional
-        Constants to replace, and by what; all of them by their numbers where left out.
+        The constants to replace, each with its new value. By default, all constants are replaced by
+        their numbers.
 
     Returns
     -------
     Robot
-        The same mechanism without these constants; base parameters and formulas are those that hold
-        for these values alone.
+        The same mechanism without these constants. Its base parameters and formulas hold for these
+        values alone. Fitted scalars of friction laws remain constants.
     """
     replaced = _numbers(robot) if values is None else values
 
@@ -53,14 +60,20 @@ def at_values(robot: Robot, values: Mapping[str, Expression] | None = None) -> R
 
 
 def round_angle(e: Expression) -> Expression:
-    """An angle, a joint's with it, its decimal as a multiple of pi/12 if it is one."""
+    """Replace the constant part of an angle by a multiple of pi/12 if it is near such a multiple.
+
+    A joint variable stays: q1 + 1.570796 becomes q1 + pi/2.
+    """
     c = e.terms.get((), Fraction(0))
     near = c and twelfths(float(c), WITHIN) is not None
     return e - c + exact(float(c), angle=True) if near else e
 
 
 def substituted(e: Expression, values: Mapping[str, Expression]) -> Expression:
-    """`e` at these values; raises DescriptionError if it has none there."""
+    """Replace the symbols of `e` by the expressions in `values`.
+
+    Raises DescriptionError if `e` has no finite real value there.
+    """
     try:
         return e.substitute(values)
     except (ArithmeticError, ValueError) as error:
@@ -71,7 +84,12 @@ def substituted(e: Expression, values: Mapping[str, Expression]) -> Expression:
 
 
 def mapped(robot: Robot, length: Change, angle: Change = lambda e: e) -> Robot:
-    """`robot` with `length` of its lengths, gravity, ratios and rows of elements, and `angle` of its angles."""
+    """Apply `length` to all lengths of `robot` and `angle` to all its angles, and return the new
+    robot.
+
+    `length` is also applied to gravity and to the coefficients of elements. A constraint on a
+    prismatic joint counts as a length, a constraint on a revolute joint as an angle.
+    """
 
     def rows(table: Mapping[int, Mapping[K, Expression]]) -> dict[int, dict[K, Expression]]:
         return {j: {i: length(g) for i, g in row.items()} for j, row in table.items()}
@@ -95,7 +113,8 @@ def mapped(robot: Robot, length: Change, angle: Change = lambda e: e) -> Robot:
 
 
 def _numbers(robot: Robot) -> dict[str, Expression]:
-    """The constants as exact numbers."""
+    """Map each constant to its exact number; a constant in an angle may become a multiple of pi/12.
+    """
     in_angles = {s for f in robot.frames for e in (f.gamma, f.alpha, f.theta0) for s in e.symbols}
     in_angles |= {
         s
@@ -107,7 +126,10 @@ def _numbers(robot: Robot) -> dict[str, Expression]:
 
 
 def exact(value: float, *, angle: bool = False) -> Expression:
-    """A value as its shortest decimal, or an angle as a multiple of pi/12 if it is one."""
+    """Convert `value` to an exact expression: its shortest decimal, for instance 9/40 for 0.225.
+
+    If `angle` is true and `value` is near a multiple of pi/12, the result is this multiple.
+    """
     if angle and value and (k := twelfths(value, WITHIN)) is not None and math.isfinite(value):
         return PI * Fraction(k, 12)
     return Expression.number(repr(float(value)))

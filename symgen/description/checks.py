@@ -1,5 +1,6 @@
-"""What makes a table of frames, elements and loops a mechanism. Each check raises DescriptionError
-with the path of the field at fault.
+"""Checks that the frames, elements and loops of a robot file describe a valid mechanism.
+
+Each check raises DescriptionError with the path of the wrong field, for instance frames.2.alpha.
 """
 
 from __future__ import annotations
@@ -33,7 +34,8 @@ from symgen.errors import DescriptionError
 
 
 def check_robot(robot: Any) -> None:
-    """Raise DescriptionError unless the fields of `robot`, a Robot, make a mechanism."""
+    """Check that the fields of `robot` describe a valid mechanism; raise DescriptionError if not.
+    """
     _check_tree(robot.frames, robot.massless)
     check_names(robot)
     if not robot.parameters:
@@ -58,7 +60,11 @@ def check_robot(robot: Any) -> None:
 
 
 def _check_tree(frames: Sequence[Frame], massless: Collection[int]) -> None:
-    """Frames are numbered without gaps, every chain of antecedents ends at the base, some joint is actuated."""
+    """Check the numbers, joint types and antecedents of the frames.
+
+    Frames are numbered 1, 2, 3 ... without gaps, every chain of antecedents ends at the base, and
+    at least one joint is actuated.
+    """
     numbers = [f.j for f in frames]
     if not numbers:
         raise DescriptionError("no frames; a robot has at least frame 1", path=("frames",))
@@ -120,7 +126,11 @@ def _check_tree(frames: Sequence[Frame], massless: Collection[int]) -> None:
 
 
 def _check_geometry(robot: Any) -> None:
-    """Expressions of declared constants; q_j once, where the joint moves."""
+    """Check the expressions of gravity and of the frame table.
+
+    All symbols must be declared constants. q_j must occur once in theta_j of a revolute joint or in
+    r_j of a prismatic joint, and nowhere else.
+    """
     constants = robot.constants
     for k, component in enumerate(robot.gravity):
         _check_expression(component, ("gravity", k), constants)
@@ -161,7 +171,10 @@ def _check_expression(
 
 
 def _check_finite(e: Expression, path: Path, constants: Mapping[str, float]) -> None:
-    """Refuse division by zero and roots of negative numbers; joints have the value 1."""
+    """Refuse an expression with a division by zero or a square root of a negative number.
+
+    Joint positions have the value 1 in this check.
+    """
     try:
         finite = math.isfinite(e.value({**dict.fromkeys(e.symbols, 1.0), **constants}))
     except (ArithmeticError, ValueError):
@@ -190,9 +203,9 @@ def _check_declared(e: Expression, path: Path, symbols: Collection[str]) -> None
 
 
 def _check_exact(e: Expression, path: Path, *, angle: bool) -> None:
-    """Refuse what exact arithmetic has no numbers for: pi outside an angle, functions inside one.
+    """Refuse pi outside an angle, and functions inside an angle: they have no exact value there.
 
-    A constant may have such a value.
+    A declared constant may have such a value instead.
     """
     for a in e.atoms:
         if isinstance(a, Call) and not angle:
@@ -206,7 +219,10 @@ def _check_exact(e: Expression, path: Path, *, angle: bool) -> None:
 
 
 def _other_sigma(f: Frame) -> str:
-    """Sentence on the right sigma, if the row looks like that of another kind of joint; else ""."""
+    """Suggest another joint type sigma if the row of frame `f` looks like a joint of another type.
+
+    Returns "" if the position q_j is where sigma expects it.
+    """
     if moves(f.theta) or (f.sigma == PRISMATIC and moves(f.r)):
         return ""
     if f.sigma == REVOLUTE:
@@ -221,7 +237,8 @@ def _other_sigma(f: Frame) -> str:
 
 
 def _check_element(e: Element, robot: Any) -> None:
-    """Kind, direction, and tables along joints of the robot."""
+    """Check one element on the joints: its kind, law, unit, direction of motion and coefficients.
+    """
     where: Path = ("elements", e.family)
     both = sorted(set(e.along) & set(e.form))
     laws = [law for law in (e.torque, e.energy) if law is not None]
@@ -289,7 +306,11 @@ def _check_element(e: Element, robot: Any) -> None:
 
 
 def _check_loops(robot: Any) -> None:
-    """Cut joints are passive, twins fixed, constraints those of passive joints, and passive joints have a relation."""
+    """Check the closed loops and the constraints on passive joints.
+
+    A cut joint must be passive and its twin frame fixed. A constraint must give the position of a
+    passive joint. Passive joints need a loop or a constraint.
+    """
     numbers = [f.j for f in robot.frames]
     for k, loop in enumerate(robot.loops):
         where = ("loops", k)
@@ -328,7 +349,7 @@ def _check_loops(robot: Any) -> None:
 
 
 def _check_drives(robot: Any) -> None:
-    """Matrices and rows of n actuated joints, a ratio that can be inverted."""
+    """Check the drives: one row per actuated joint, and an invertible matrix of gear ratios."""
     drives, n = robot.drives, len(robot.joints)
     if drives is None:
         return
@@ -351,7 +372,8 @@ def _check_drives(robot: Any) -> None:
 
 
 def _check_limits(robot: Any) -> None:
-    """Rows of one entry per actuated joint, lower below upper."""
+    """Check that each limit has one entry per actuated joint, with lower bounds below upper bounds.
+    """
     n = len(robot.joints)
     for name, row in robot.limits.items():
         if name not in ("q", "qd", "qdd", "tau") or len(row) != n:
@@ -371,7 +393,9 @@ def _check_limits(robot: Any) -> None:
 
 
 def _meant(name: str, robot: Any) -> str:
-    """Where a name under `values` was probably meant to lead."""
+    """Suggest the parameter that was probably meant by the unknown `name` under `values` or
+    `assume`.
+    """
     if name.endswith("R") and name[:-1] in robot.parameters:
         return f"; base parameters (...R) are not given, standard ones are: {name[:-1]}"
     number = re.search(r"\d+\Z", name)

@@ -1,17 +1,17 @@
-"""Tables of the distal (classic, Denavit-Hartenberg 1955) convention, turned into those of Khalil and Kleinfinger.
+"""Conversion of classic Denavit-Hartenberg tables (1955) into tables of Khalil and Kleinfinger.
 
-Distal: frame j lies at the far end of link j, joint j turns about or moves along z of its
-antecedent,
+In the classic convention, here called distal, frame j lies at the far end of link j, and joint j
+turns about or moves along z of its antecedent:
 
     iTj = Rot(z, theta_j) Trans(z, r_j) Trans(x, d_j) Rot(x, alpha_j)
 
-where textbooks call d_j a_j and r_j d_j.
+Textbooks write a_j for this d_j, and d_j for this r_j.
 
-Grouped anew, [Rot(x, alpha_i) Trans(x, d_i)] Rot(z, theta_j) Trans(z, r_j) is Khalil's
-transformation: theta_j and r_j stay, alpha_j and d_j are those of the antecedent, 0 for joints on
-the base. What is left at the end of a branch becomes a fixed frame without link, the textbook's
-last frame. Link frames, hence standard parameters, are Khalil's; `values` of such a file are those
-of the textbook's frames and are moved.
+With the factors grouped as [Rot(x, alpha_i) Trans(x, d_i)] Rot(z, theta_j) Trans(z, r_j), this is
+Khalil's transformation: theta_j and r_j stay; alpha and d are those of the antecedent i, or 0 for
+joints on the base. The last alpha and d of a branch give a fixed frame without link, the last frame
+of the textbook. Link frames, hence standard parameters, are Khalil's. `values` of such a file refer
+to the textbook's frames and are converted.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from symgen.errors import DescriptionError
 
 
 def khalil_frames(frames: tuple[Frame, ...]) -> tuple[Frame, ...]:
-    """Khalil's table of a distal one, fixed frames of the branch ends last.
+    """Convert the rows of a classic (distal) table into rows of Khalil's table.
 
-    Raises DescriptionError if gamma or b is given.
+    Fixed frames for the ends of branches come last. Raises DescriptionError if gamma or b is given.
     """
     for f in frames:
         for key in ("gamma", "b"):

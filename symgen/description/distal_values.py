@@ -1,4 +1,4 @@
-"""Link data of a distal (classic) table, given in the frames at the ends of the links."""
+"""Conversion of link parameters from the frames of a classic (distal) table to Khalil's frames."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ ROUNDING = 1e-14  # cos(pi/2)
 
 
 def khalil_values(robot: Robot) -> dict[str, float]:
-    """`values` of a distal table, given in the frames at the ends of the links, in Khalil's frames.
+    """Convert the link parameters of a classic (distal) table to Khalil's link frames.
 
-    Frame j of the table lies at Rot(x, alpha_j) Trans(x, d_j) in Khalil's frame j. With R and p of
-    it, ms = R MS and J, M of the link,
+    Frame j of the table lies at Rot(x, alpha_j) Trans(x, d_j) in Khalil's frame j. With the
+    rotation R and the position p of this transformation, ms = R MS, and J, M of the link,
 
         MS' = ms + M p,     J' = R J R' + 2 (ms p) E - p ms' - ms p' + M (p p E - p p')
 
-    A value is given where all that enters it is. Raises DescriptionError if one that was given
-    enters none, with what is missing.
+    A parameter is converted if all values that it depends on are given. Raises DescriptionError if
+    a given value enters no converted parameter; the message names the missing values.
     """
     values = dict(robot.values)
     for j in robot.links:
@@ -52,7 +52,8 @@ def khalil_values(robot: Robot) -> dict[str, float]:
 
 
 def _transport(alpha: float, d: float) -> Array:
-    """The ten parameters of a body in Khalil's frame from those in the frame at the end, (10, 10)."""
+    """Build the matrix (10, 10) that converts link parameters from the end frame to Khalil's frame.
+    """
     c, s = np.cos(alpha), np.sin(alpha)
     R = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
     p, E = np.array([d, 0, 0]), np.eye(3)

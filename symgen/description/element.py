@@ -1,14 +1,16 @@
-"""Elements on the joints: what acts on them besides links, columns of the user's among it.
+"""Elements: torques on the joints that do not come from links, such as friction or springs.
+
+For each key j, an element has one standard parameter c, named family + key (for instance FV3):
 
     along {j: G}:  s = G q,  Gamma += G' c law(s, sd, sdd)
     form  {j: B}:  Gamma += c B qdd | c B qd | c B q
 
-The laws are the expressions of KINDS, in which q, qd, qdd mean s, sd, sdd; a column of the
-user's has its own, over s, sd, q1, qd1 ... of any joints, constants and scalars, as a torque or as
-an energy, Gamma += c dU/dq. Forms are for laws that are qdd, qd or q. With `when`, viscous and
-coulomb elements act in motion along s in this direction only. Parameter c is called family + key.
-channel.NAME in a law is the constant NAME as a function of time, and tau_model the torque that the
-rest of the model transmits at the joint.
+The law of each kind is an expression in KINDS, in which q, qd, qdd mean s, sd, sdd. A column is an
+element with a law of the user, in s, sd, q1, qd1 ... of any joints, constants and scalars. This law
+is a torque, or an energy U with Gamma += c dU/dq. A form is possible only for the laws qdd, qd and
+q. If `when` is given, a viscous or coulomb element acts only in motion along s in this direction.
+In a law, channel.NAME is the constant NAME as a function of time, and tau_model is the torque that
+the rest of the model transmits at the joint.
 """
 
 from __future__ import annotations
@@ -59,7 +61,9 @@ class LawScalar:
 
 
 def _scalars(table: Mapping[str, Any], declared: Any) -> dict[str, LawScalar]:
-    """A number alone is fixed."""
+    """Convert the scalars of a law in a file to LawScalar objects; a plain number is a fixed
+    scalar.
+    """
     return {
         name: x if isinstance(x, LawScalar) else LawScalar((float(x), float(x)))
         for name, x in table.items()
@@ -67,7 +71,8 @@ def _scalars(table: Mapping[str, Any], declared: Any) -> dict[str, LawScalar]:
 
 
 def _law(text: str | None, declared: Any) -> Expression | None:
-    """The law of a column; `checks` refuses the names that it may not have."""
+    """Parse the text of a law written by the user; `check_law` later refuses unknown names in it.
+    """
     try:
         return None if text is None else parse(text, None, LAWS)
     except ExpressionError as error:
@@ -75,7 +80,7 @@ def _law(text: str | None, declared: Any) -> Expression | None:
 
 
 def _scalar(name: str, given: Any) -> LawScalar:
-    """A scalar of KINDS."""
+    """Make a LawScalar from an entry of KINDS: a fixed number, or a table with bounds and start."""
     if not isinstance(given, Mapping):
         return LawScalar((float(given), float(given)))
     lower, upper = map(float, given["bounds"])
@@ -137,7 +142,7 @@ class Element:
 
     @property
     def scalars(self) -> dict[str, LawScalar]:
-        """LawScalars of its law: those of the kind, and those of the file in their place."""
+        """Scalars of the law by name; values of the file replace the defaults of the kind."""
         kind = KINDS.get(self.kind)
         return {name: _scalar(name, x) for name, x in (kind.fit if kind else {}).items()} | {
             **self.fit
@@ -145,14 +150,22 @@ class Element:
 
     @property
     def constants(self) -> dict[str, float]:
-        """Names and values of its scalars that are fitted, one of each key, vs3, and of transmitted torques, zero."""
+        """Start values of the fitted scalars, by name and key, for instance vs3.
+
+        If the law depends on the transmitted torque, the mapping also has its name for each key,
+        such as tau_model3, with the value 0.
+        """
         values = {name: x.value for name, x in self.scalars.items() if not x.fixed}
         if TRANSMITTED in (self.torque or KINDS.get(self.kind, KINDS["column"]).torque).symbols:
             values[TRANSMITTED] = 0.0
         return {parameter(name, j): x for name, x in values.items() for j in self.keys}
 
     def _of_key(self, law: Expression, j: int) -> Expression:
-        """A law with the scalars of a key: symbols, and numbers where they are fixed."""
+        """Replace the scalars in `law` for key j: by symbols (vs by vs3), or by numbers if they are
+        fixed.
+
+        The transmitted torque tau_model becomes channel.tau_model3.
+        """
         torque = Expression.symbol(f"{CHANNEL}{parameter(TRANSMITTED, j)}")
         return law.substitute(
             {TRANSMITTED: torque}
@@ -165,27 +178,39 @@ class Element:
         )
 
     def channels(self, j: int) -> list[str]:
-        """Names of the functions of time in the law of key j."""
+        """List the functions of time in the law of key j by name, for instance T for channel.T."""
         names = self.law(j).symbols if j in self.along else ()
         return sorted(name.removeprefix(CHANNEL) for name in names if name.startswith(CHANNEL))
 
     def law(self, j: int) -> Expression:
-        """Torque along s of key j for parameter 1; zero if it is that of an energy."""
+        """Return the torque along s of key j for the parameter value 1; zero if the file gives an
+        energy.
+        """
         return self._of_key(self.torque or KINDS[self.kind].torque, j)
 
     def potential(self, j: int) -> Expression:
-        """Energy of key j for parameter 1; zero where the file gives a torque."""
+        """Return the energy of key j for the parameter value 1; zero if the element has a torque
+        instead.
+        """
         return self._of_key(self.energy or ZERO, j)
 
     def laws(self, j: int) -> tuple[Expression, dict[int, Expression]]:
-        """Torque of key j along s for parameter 1, and of its energy at the joints that it names: Gamma = G' x + dU/dq_i."""
+        """Return the torques of key j for the parameter value 1: along s, and at joints in its
+        energy.
+
+        With the torque x along s and the energy U, Gamma = G' x + dU/dq_i. The torque x includes
+        the derivative of U with respect to s. The second result maps each joint i that U names to
+        dU/dq_i.
+        """
         law, U = self.law(j), self.potential(j)
         joints = sorted(int(match[2]) for n in U.symbols if (match := STATE.match(n)) and match[2])
         return law + U.derivative("q"), {i: U.derivative(f"q{i}") for i in joints}
 
     @property
     def is_own(self) -> bool:
-        """Whether its law is one beyond inertia, linear friction, offset and spring."""
+        """Whether the law differs from inertia, viscous and Coulomb friction, constant offset and
+        spring.
+        """
         return (
             bool(self.torque or self.energy or self.scalars)
             or self.kind not in USUAL_KINDS.values()
@@ -193,22 +218,26 @@ class Element:
 
     @property
     def acts_as(self) -> str:
-        """Kind of the element in emitted modules; of own laws these know only whether they dissipate."""
+        """Kind of the element in generated modules; for special laws only "column" or
+        "dissipative".
+
+        Generated modules do not know special laws, only whether such a law dissipates energy.
+        """
         return OWN_LAWS[KINDS[self.kind].dissipative] if self.is_own else self.kind
 
     @property
     def symbols(self) -> set[str]:
-        """Symbols of its law or energy."""
+        """Names of the symbols in the laws and energies of all keys."""
         return set().union(*((self.law(j) + self.potential(j)).symbols for j in self.keys))
 
     @property
     def is_friction(self) -> bool:
-        """Whether the torque depends on velocities."""
+        """Whether the torque depends on joint velocities."""
         return any((match := STATE.match(name)) and match[1] == "qd" for name in self.symbols)
 
     @property
     def keys(self) -> tuple[int, ...]:
-        """Keys of both tables in order."""
+        """Keys of the tables `along` and `form` (frame numbers), in ascending order."""
         return tuple(sorted({*self.along, *self.form}))
 
 
@@ -273,7 +302,11 @@ def check_law(e: Element, robot: Any) -> None:
 
 
 def _positions(robot: Any, row: Any) -> tuple[float, float]:
-    """Two positions at which a law is a number: within limits.q of its one joint, else on either side of zero."""
+    """Choose two joint positions at which a law is tested, within the joint limits if they are
+    known.
+
+    Without limits, or for several joints, the positions are -0.4 and 0.7.
+    """
     (j, *others), limits = row, robot.limits.get("q")
     if others or limits is None or j not in robot.joints:
         return -0.4, 0.7
@@ -282,7 +315,8 @@ def _positions(robot: Any, row: Any) -> tuple[float, float]:
 
 
 def check_channels(robot: Any) -> None:
-    """Check that a channel is used in laws only, not as a constant elsewhere."""
+    """Check that a channel (a constant that varies with time) occurs only in laws, as channel.NAME.
+    """
     of_frames = [
         getattr(f, name)
         for f in robot.frames

@@ -1,14 +1,13 @@
-"""Exact constants and linear or quadratic forms: polynomials over symbols. `grammar.parse` reads
-them from text.
+"""Exact symbolic expressions: polynomials in symbols and functions, with rational coefficients.
 
-An expression is a polynomial with rational coefficients
+`grammar.parse` reads them from text. An expression is
 
     e = sum_k c_k prod_i atom_i**n_ki ,
 
-each atom a symbol, a number as it is written, or cos(e), sin(e), sqrt(e), inv(e), in laws also
-sign(e), exp(e), tanh(e) and pow(e, f), so that two equal forms are equal objects; decimals are
-exact (0.225 = 9/40). Quarter turns leave cos and sin at once, square roots of rationals become
-products of sqrt(prime) to the first power.
+where each atom is a symbol, a number as it is written, or cos(e), sin(e), sqrt(e), inv(e), in laws
+also sign(e), exp(e), tanh(e) and pow(e, f). Two equal expressions are equal objects. Decimals are
+exact (0.225 = 9/40). Quarter turns are removed from cos and sin at once. Square roots of rationals
+become products of sqrt(prime) to the first power.
 """
 
 from __future__ import annotations
@@ -35,7 +34,11 @@ Monomial = tuple[tuple[Atom, int], ...]
 
 @dataclass(frozen=True)
 class Call:
-    """A function of an expression that the polynomial cannot hold: cos, sin, sqrt, sign, exp, tanh, inv (1/argument) or pow (argument**exponent)."""
+    """A function of an expression as a factor of a polynomial, for instance cos(q1 + q2).
+
+    The functions are cos, sin, sqrt, sign, exp, tanh, inv (1/argument) and pow
+    (argument**exponent).
+    """
 
     function: str
     argument: Expression
@@ -56,7 +59,7 @@ class Call:
         return (self.argument,) if self.exponent is None else (self.argument, self.exponent)
 
     def of(self, *operands: Expression) -> Expression:
-        """The same function of other operands."""
+        """Apply the same function to other operands."""
         if self.exponent is not None:
             return power(*operands)
         return call(self.function, *operands)
@@ -67,7 +70,9 @@ class Call:
 
 @dataclass(frozen=True)
 class Number:
-    """A positive rational that formulas keep as the robot file writes it: 0.4318**2, not 0.18645124.
+    """A positive rational that formulas show as the robot file writes it: 0.4318**2, not
+    0.18645124.
+
     See `derive.numbers`.
     """
 
@@ -90,9 +95,9 @@ class Number:
 
 
 class Expression:
-    """Polynomial with rational coefficients over symbols and calls.
+    """A polynomial with rational coefficients in symbols and functions such as cos(q1).
 
-    immutable, hashable, equal by value.
+    Expressions are immutable and hashable, and compare by value.
     """
 
     __slots__ = ("_hash", "terms")
@@ -158,7 +163,9 @@ class Expression:
         return result
 
     def inverse(self) -> Expression:
-        """1/e: a monomial is inverted term by term, a sum becomes the atom inv(e)."""
+        """Return 1/e: a single term is inverted factor by factor, a sum becomes the function
+        inv(e).
+        """
         if not self.terms:
             raise ZeroDivisionError
         if len(self.terms) == 1:
@@ -171,7 +178,7 @@ class Expression:
         return isinstance(other, Expression) and self.terms == other.terms
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle by the terms, because hashes of texts differ between processes."""
+        """Pickle the terms only, because hash values of strings differ between processes."""
         return Expression, (self.terms,)
 
     def __hash__(self) -> int:
@@ -184,14 +191,14 @@ class Expression:
 
     @property
     def constant(self) -> Fraction | None:
-        """The value of an expression without symbols, else None."""
+        """Value of the expression as a rational if it is a plain number, else None."""
         if not self.terms:
             return Fraction(0)
         return self.terms.get(()) if len(self.terms) == 1 else None
 
     @property
     def ordered(self) -> list[tuple[Monomial, Fraction]]:
-        """The terms in the order of the text: highest degree first."""
+        """Terms in the order in which they are printed: highest degree first."""
         return sorted(self.terms.items(), key=lambda mc: _order(mc[0]))
 
     @property
@@ -209,9 +216,10 @@ class Expression:
         return names
 
     def coefficient(self, *names: str) -> Expression:
-        """Coefficient of the product of `names`, an expression in the other atoms.
+        """Return the coefficient of the product of the symbols `names`.
 
-        A name that is given k times means its k-th power.
+        The coefficient is an expression in the other factors. A name that is given k times means
+        its k-th power.
         """
         wanted: dict[str | Number | Call, int] = {}
         for name in names:
@@ -224,7 +232,7 @@ class Expression:
         return Expression(terms)
 
     def mapped(self, image: Callable[[Atom], Expression]) -> Expression:
-        """Replace every atom by its image."""
+        """Replace every atom (symbol, number or function) by the expression `image(atom)`."""
         terms: dict[Monomial, Fraction] = {}
         for m, c in self.terms.items():
             term = Expression({(): c})
@@ -235,7 +243,7 @@ class Expression:
         return Expression(terms)
 
     def substitute(self, values: Mapping[str, Expression]) -> Expression:
-        """Replace symbols by expressions."""
+        """Replace symbols by the expressions in `values`, also inside functions."""
 
         def image(a: Atom) -> Expression:
             if isinstance(a, Call):
@@ -245,7 +253,7 @@ class Expression:
         return self.mapped(image)
 
     def derivative(self, name: str) -> Expression:
-        """The derivative by a symbol; that of sign is 0."""
+        """Differentiate with respect to the symbol `name`; the derivative of sign is 0."""
         result = Expression()
         for m, c in self.terms.items():
             for k, (a, n) in enumerate(m):
@@ -264,9 +272,11 @@ class Expression:
         number: Callable[[Fraction], Any],
         written: Callable[[Number], Any] | None = None,
     ) -> Any:
-        """Fold over any scalars: `value` of a symbol (and of pi), `function(name, argument)` of a call, `number` of a rational.
+        """Evaluate the expression in any type of scalar, for instance floats or CasADi symbols.
 
-        `written` is the value of a Number, by default that of its rational.
+        The arguments convert the parts of the expression: `value` a symbol or pi, `function` a
+        function given its name and its operands, `number` a rational, and `written` a Number (by
+        default, its rational is converted).
         """
         total: Any = number(Fraction(0))
         for m, c in self.ordered:
@@ -292,8 +302,9 @@ class Expression:
         return self.value({})
 
     def value(self, values: Mapping[str, float]) -> float:
-        """The number this expression has where `values` gives its symbols. Raises KeyError naming a
-        missing one.
+        """Evaluate the expression as a float, with the numbers in `values` for its symbols.
+
+        Raises KeyError with the name of a symbol that has no value.
         """
 
         def function(name: str, *operands: Expression) -> float:
@@ -321,9 +332,9 @@ ZERO, ONE, PI = Expression(), Expression.number(1), Expression.symbol("pi")
 
 
 def decimal(c: Fraction, *, fractions: bool = True) -> str:
-    """A rational as an exact decimal if it is one of reasonable length, else as p/q.
+    """Write a rational as an exact decimal of at most PLACES places, else as p/q.
 
-    halves, quarters and eighths are p/q too where `fractions` is true.
+    If `fractions` is true, halves, quarters and eighths are written as p/q too.
     """
     if c.denominator == 1:
         return str(c.numerator)
@@ -374,7 +385,11 @@ def _product(m1: Monomial, m2: Monomial) -> Monomial:
 
 
 def _with_simple_roots(m: Monomial) -> tuple[Monomial, Fraction]:
-    """The monomial with every sqrt(rational) and every sign to the power 0 or 1, and the rational factor that leaves: sqrt(3)**-1 = sqrt(3)/3, sign(x)**2 = 1."""
+    """Reduce the powers of sqrt(rational) and sign(x) in the monomial `m` to 0 or 1.
+
+    Return the reduced monomial, and the rational factor that this leaves: sqrt(3)**-1 = sqrt(3)/3,
+    sign(x)**2 = 1.
+    """
     if not any(n != 1 and isinstance(a, Call) and a.function in ("sqrt", "sign") for a, n in m):
         return m, Fraction(1)
     factor, powers = Fraction(1), []
@@ -395,7 +410,11 @@ def _atom(a: Atom) -> Expression:
 
 
 def _sqrt_of_rational(c: Fraction) -> Expression:
-    """sqrt(m/n) = sqrt(m n)/n, m n = square * product of primes (trial division to LARGEST_PRIME) * rest."""
+    """Return the square root of a rational as a rational times square roots of primes.
+
+    sqrt(m/n) = sqrt(m n)/n, and m n is factored by trial division up to LARGEST_PRIME; a remaining
+    factor stays under one root.
+    """
     if c < 0:
         raise ValueError("square root of a negative number")
     rest, result = c.numerator * c.denominator, Expression.number(Fraction(1, c.denominator))
@@ -409,9 +428,13 @@ def _sqrt_of_rational(c: Fraction) -> Expression:
 
 
 def _sqrt(e: Expression) -> Expression:
-    """sqrt(c m) = sqrt(c) sqrt(m) for a rational c > 0, and sqrt(a + b) = sqrt((a + s)/2) +-
-    sqrt((a - s)/2) where b**2 and s = sqrt(a**2 - b**2) are rational: sqrt(3 + 2 sqrt(2)) = 1 +
-    sqrt(2).
+    """Return the square root of an expression, simplified if possible.
+
+        sqrt(c m) = sqrt(c) sqrt(m)  for a rational c > 0
+        sqrt(a + b) = sqrt((a + s)/2) +- sqrt((a - s)/2)  if b**2 and s = sqrt(a**2 - b**2) are
+        rational
+
+    For instance, sqrt(3 + 2 sqrt(2)) = 1 + sqrt(2).
     """
     c, a = e.constant, e.terms.get((), Fraction(0))
     if c is not None:
@@ -432,9 +455,9 @@ def _sqrt(e: Expression) -> Expression:
 
 @lru_cache(maxsize=4096)
 def call(function: str, argument: Expression) -> Expression:
-    """cos, sin, tan, sqrt, inv, sign, abs, exp or tanh of an expression.
+    """Apply a function to an expression: cos, sin, tan, sqrt, inv, sign, abs, exp or tanh.
 
-    Quarter turns, signs and perfect squares are taken out exactly.
+    Quarter turns, signs and perfect squares are simplified exactly: sin(q1 + pi/2) = cos(q1).
     """
     if function == "abs":
         return argument * call("sign", argument)
@@ -468,7 +491,7 @@ def call(function: str, argument: Expression) -> Expression:
 
 
 def power(base: Expression, exponent: Expression) -> Expression:
-    """base**exponent; a whole number stays in the polynomial."""
+    """Return base**exponent: a polynomial for a whole exponent, else the function pow."""
     c = exponent.constant
     if c is not None and c.denominator == 1:
         return base ** int(c)
@@ -476,7 +499,7 @@ def power(base: Expression, exponent: Expression) -> Expression:
 
 
 def _slope(a: Atom, name: str) -> Expression:
-    """The derivative of an atom by a symbol."""
+    """Differentiate an atom (symbol, number or function) with respect to the symbol `name`."""
     if not isinstance(a, Call):
         return ONE if a == name else ZERO
     x, value = a.argument, _atom(a)
@@ -489,18 +512,18 @@ def _slope(a: Atom, name: str) -> Expression:
 
 
 class Function(NamedTuple):
-    """A function of expressions, and what it is called elsewhere.
+    """A function such as cos: its derivative, its values, and its name in other languages.
 
     Attributes
     ----------
     at_zero : int or None
-        Its value there.
+        Value of the function at zero.
     slope : callable
-        The derivative by its argument, from the argument and the value.
+        Derivative of the function, computed from its argument and its value.
     number : callable
-        Its value at a number.
+        The function for floats.
     numpy, casadi, c, sympy : str
-        Its name there; empty if it is written otherwise.
+        Name of the function in that library or language; empty if it is written otherwise, as 1/x.
     """
 
     at_zero: int | None
@@ -534,7 +557,7 @@ FUNCTIONS = {
 
 
 def with_known_cosines(e: Expression) -> Expression:
-    """The same expression with the values of cos and sin of pi/6, pi/4 and pi/3 in their place."""
+    """Replace cos and sin of pi/6, pi/4 and pi/3 by their exact values, such as sqrt(3)/2."""
 
     def image(a: Atom) -> Expression:
         if isinstance(a, Call) and a.function in ("cos", "sin") and a.argument in KNOWN:
@@ -546,7 +569,11 @@ def with_known_cosines(e: Expression) -> Expression:
 
 
 def simplified(e: Expression) -> Expression:
-    """cos(a)**2 m + sin(a)**2 m = m and m - cos(a)**2 m = sin(a)**2 m wherever both terms are there with one coefficient."""
+    """Simplify an expression by cos(a)**2 + sin(a)**2 = 1 wherever both terms occur in it.
+
+        cos(a)**2 m + sin(a)**2 m = m
+        m - cos(a)**2 m = sin(a)**2 m
+    """
     terms: dict[Monomial, Fraction] = {}
     monomials: list[Monomial] = []  # by their place
     places: dict[Monomial, int] = {}
@@ -585,7 +612,9 @@ def simplified(e: Expression) -> Expression:
 
 
 def _sine_and_rest(m: Monomial) -> list[tuple[Monomial, Monomial]]:
-    """m with sin(a)**2 in place of cos(a)**2, and m without it, for each a."""
+    """For each cos(a)**2 in the monomial m, return m with sin(a)**2 instead, and m without this
+    factor.
+    """
     pairs = []
     for a, n in m:
         if isinstance(a, Call) and a.function == "cos" and n >= 2:
@@ -595,22 +624,29 @@ def _sine_and_rest(m: Monomial) -> list[tuple[Monomial, Monomial]]:
 
 
 def quarter_turns(angle: Expression) -> tuple[int, Expression]:
-    """angle = k pi/2 + rest, rest without a whole number of quarter turns."""
+    """Split an angle into k quarter turns and a rest: angle = k pi/2 + rest. Return k and the rest.
+
+    The coefficient of pi in the rest is at least 0 and less than 1/2.
+    """
     c = angle.terms.get((("pi", 1),), Fraction(0)) * 2
     k = c.numerator // c.denominator
     return k, angle - PI * Fraction(k, 2)
 
 
 def ratio(x: float) -> Fraction:
-    """The fraction of a denominator up to LARGEST_RATIO that x is except for rounding, such as 1/3 of 0.3333333333333333, else its shortest decimal."""
+    """Convert x to a simple fraction that rounds to x, such as 1/3, else to its shortest decimal.
+
+    The denominator of the fraction is at most LARGEST_RATIO.
+    """
     near = Fraction(x).limit_denominator(LARGEST_RATIO)
     return near if float(near) == x else Fraction(repr(x))
 
 
 def twelfths(angle: float, within: float) -> int | None:
-    """k of the multiple k pi/12 that lies within `within` rad of a decimal angle.
+    """Find the integer k for which k pi/12 lies within `within` rad of `angle`; None if there is
+    none.
 
-    None if none does. Drawings have such angles.
+    Angles in drawings are often such multiples.
     """
     k = round(angle * 12 / math.pi)
     return k if abs(angle - k * math.pi / 12) <= within else None

@@ -1,8 +1,8 @@
-"""Types of the fields of a robot: how each is written in a file, and what the Robot holds.
+"""Types of the fields of a Robot: how a file writes each field, and how the Robot stores it.
 
-A table of a robot file (`parts`, `robot`) is one pydantic dataclass. Read from a file, with a
-`Declared` as context, its fields are validated as the file writes them and turned into what the
-Robot holds; built in Python they are taken as they are.
+Each table of a robot file (`parts`, `robot`) is one pydantic dataclass. If a table is read from a
+file, with a `Declared` as context, its fields are validated as the file writes them and converted
+to the values that the Robot stores. If it is built in Python, its fields are used as they are.
 """
 
 from __future__ import annotations
@@ -35,13 +35,17 @@ CONFIG = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
 
 
 def dotted(path: Path) -> str:
-    """The path as messages name it."""
+    """Join the keys of a path by dots for messages, for instance frames.2.alpha."""
     return ".".join(str(key) for key in path)
 
 
 @contextmanager
 def located(file: str, line: Callable[[Path], int] = lambda _: 1) -> Iterator[None]:
-    """DescriptionErrors of a file name it, and the line of their path where they have none."""
+    """Add the file name and line number to every DescriptionError that is raised in the block.
+
+    `line` finds the line number from the path of the field. An error that already has a file or a
+    line keeps it.
+    """
     try:
         yield
     except DescriptionError as error:
@@ -55,9 +59,20 @@ def located(file: str, line: Callable[[Path], int] = lambda _: 1) -> Iterator[No
 
 @dataclass
 class Declared:
-    """Names that a robot file declares, and other context in which its tables are read.
+    """Names that a robot file declares, and other facts that are needed to read its tables.
 
-    Names of constants; these and joint variables; the number of rows; whether they are distal; the frames read.
+    Attributes
+    ----------
+    constants : frozenset of str
+        Names of the constants.
+    variables : frozenset of str
+        Names of the constants and of the joint variables.
+    rows : int
+        Number of rows of the frame table.
+    distal : bool
+        Whether the table follows the classic (distal) convention.
+    frames : tuple of Frame
+        The frames, as soon as they are read.
     """
 
     constants: frozenset[str]
@@ -69,13 +84,17 @@ class Declared:
 
 @dataclass(frozen=True)
 class Given:
-    """A value that the reader adds to a table; the file has no key for it."""
+    """A field value that the reader itself adds to a table, such as the file name.
+
+    The file has no key for this field.
+    """
 
     value: Any
 
 
 class Written:
-    """Annotation of a field: `form`, its type in a file; `turn` makes the field of it."""
+    """Annotation of a field: its type `form` in a file, and the function `turn` that converts it.
+    """
 
     def __init__(
         self, form: Any, turn: Callable[[Any, Declared], Any] = lambda value, _: value
@@ -85,7 +104,11 @@ class Written:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> core_schema.CoreSchema:
-        """Schema of the form in a file; in Python the field itself is given."""
+        """Build the schema by which pydantic validates the field as written in a file and converts
+        it.
+
+        In Python, without a file, the final value of the field is given and is not converted.
+        """
 
         def read(value: Any, form: Callable[[Any], Any], info: ValidationInfo) -> Any:
             if info.context is None:
@@ -101,7 +124,7 @@ class Written:
 
 
 def problem(error: SymgenError) -> PydanticCustomError:
-    """A pydantic error with our own message."""
+    """Convert `error` to a pydantic error with the same message."""
     return PydanticCustomError("described", "{error}", {"error": error})
 
 
@@ -151,7 +174,9 @@ def _interval(value: Any) -> tuple[float, float]:
 
 
 def plain(value: Any) -> Any:
-    """Numbers of other packages as Python's, in tuples and tables too."""
+    """Convert numbers of other packages, such as NumPy, to Python numbers, also in lists and
+    tables.
+    """
     if isinstance(value, Mapping):
         return {key: plain(x) for key, x in value.items()}
     if isinstance(value, list | tuple):

@@ -1,4 +1,7 @@
-"""Robots by packaged name or file: robot files (.yaml), SYMORO's `.par`, URDF and MJCF, read and written by suffix."""
+"""Read and write robots: packaged robots, robot files (.yaml), SYMORO .par, URDF and MJCF files.
+
+The suffix of the file selects the format. Robot files and URDF can be written.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,8 @@ UNREAD = {
 
 
 def packaged_robots() -> tuple[str, ...]:
-    """Names of the packaged robots, which `load_robot` reads without a path."""
+    """List the names of the robots in this package, which `load_robot` accepts in place of a path.
+    """
     folder = resources.files("symgen.description") / "robots"
     return tuple(
         sorted(
@@ -43,20 +47,20 @@ def load_robot(source: str | Path, *, keep_fixed: bool = False, exact: bool = Fa
     ----------
     source : str or Path
         Name of a packaged robot (`tx40`), or path of a robot file (`arm.yaml`, `./tx40`), a `.par`
-        file, a URDF (`.urdf`) or an MJCF
-        (`.xml`, `.mjcf`; extra `mjcf`).
+        file, a URDF (`.urdf`) or an MJCF (`.xml`, `.mjcf`; extra `mjcf`).
     keep_fixed : bool
-        Of a URDF or MJCF: links that fixed joints hold are fixed frames of their own, as by
+        For a URDF or MJCF: whether links on fixed joints become fixed frames of their own, as in
         `read_tree`.
     exact : bool
-        Of a URDF, MJCF or `.par` file: angles are those of the file, as a calibrated one needs it.
-        Else angles within 1e-4 rad of a multiple of pi/12 are taken as that, and an AngleWarning
-        tells which, and by how much the tool then moves.
+        For a URDF, MJCF or `.par` file: whether angles stay as written, which a calibrated robot
+        needs. Otherwise, an angle within 1e-4 rad of a multiple of pi/12 becomes this multiple, and
+        an
+        AngleWarning names the largest change.
 
     Returns
     -------
     Robot
-        Checked, and frozen.
+        The checked, immutable robot.
 
     Raises
     ------
@@ -75,25 +79,27 @@ def read_robot(
     lock: Mapping[str, float] | None = None,
     chain: tuple[str, str] | None = None,
 ) -> tuple[Robot, tuple[str, ...]]:
-    """The robot of a file as by `load_robot`, and notes on what of a foreign format was read otherwise than written, or not at all.
+    """Read a robot as `load_robot` does, and also return notes on data that were changed or left
+    out.
 
     Parameters
     ----------
     source, keep_fixed, exact
-        As of `load_robot`.
+        As in `load_robot`.
     constants : mapping, SI and rad
-        Values of the symbols of a `.par` file, which has no place for them.
+        Values of the symbols of a `.par` file, because this format has no field for them.
     lock : mapping, rad or m
-        Of a URDF or MJCF: joints that are held, by name, and where.
+        For a URDF or MJCF: positions at which joints are held, by joint name.
     chain : tuple of str
-        Of a URDF or MJCF: links between which joints move, base and tip; the other joints outward
-        of the base are held at zero.
+        For a URDF or MJCF: names of a base link and a tip link. Only the joints between these links
+        move; the other joints are held at zero.
 
     Raises
     ------
     DescriptionError
-        As by `load_robot`; `lock` or `chain` of another format, or of a joint or link that the file
-        does not have.
+        As in `load_robot`; also if `lock` or `chain` is given for another format, or names a joint
+        or
+        link that the file does not have.
     """
     if not isinstance(source, str | Path):
         raise DescriptionError(
@@ -132,7 +138,10 @@ def read_robot(
 
 
 def _beside(path: Path) -> Callable[[str, int], bytes]:
-    """Reader of the files that the file `path` includes: each once, in its folder or below."""
+    """Make a function that reads the files which the MJCF file `path` includes.
+
+    Each file may be included once, and must lie in the folder of `path` or below.
+    """
     folder, before = path.resolve().parent, {path.resolve()}
 
     def read(name: str, line: int) -> bytes:
@@ -157,21 +166,24 @@ def _beside(path: Path) -> Callable[[str, int], bytes]:
 def write_robot(
     robot: Robot, file: str, *, comments: Sequence[str] = ()
 ) -> tuple[str, tuple[str, ...]]:
-    """Text of `robot` in the format that the suffix of `file` names, and notes on what of it the format does not carry.
+    """Return the text of `robot` in the format given by the suffix of `file`, and notes on lost
+    data.
+
+    The notes list what the format cannot store. No file is written.
 
     Parameters
     ----------
     robot : Robot
-        What is written.
+        The robot to be written.
     file : str
         Name of the file, with one of the suffixes WRITTEN.
     comments : sequence of str
-        Lines at the top of a robot file (.yaml).
+        Comment lines at the top of a robot file (.yaml).
 
     Raises
     ------
     DescriptionError
-        The suffix is unknown, or the format would hold another mechanism.
+        The suffix is unknown, or the format cannot represent this mechanism.
     """
     suffix = Path(file).suffix.lower()
     if suffix not in WRITTEN:
@@ -184,9 +196,9 @@ def write_robot(
 
 
 def content_of(path: Path) -> bytes:
-    """Bytes of a robot file, one more than MAX_BYTES at most.
+    """Read the bytes of a robot file, at most MAX_BYTES + 1.
 
-    DescriptionError if it cannot be read.
+    Raises DescriptionError if the file cannot be read.
     """
     names = ", ".join(packaged_robots())
     try:

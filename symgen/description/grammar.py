@@ -1,4 +1,4 @@
-"""The grammar of robot files: text to Expression, never evaluated as Python.
+"""Parser for the expressions in robot files; a text is never evaluated as Python code.
 
     sum     = product (("+" | "-") product)*
     product = unary (("*" | "/") unary)*
@@ -6,10 +6,10 @@
     power   = primary ["**" ["-"] primary]          exponent: a whole number
     primary = number | name | function "(" sum ["," sum] ")" | "(" sum ")"
 
-Names are `pi` and the declared symbols, functions sin, cos, tan, sqrt, in the laws of columns also
-abs, sign, exp, tanh, min, max, names channel.NAME, and exponents that are expressions; anything
-else is an ExpressionError at its column. Length, depth, exponents, terms and
-digits are bounded, so that no text takes long to read.
+Names are `pi` and the declared symbols. Functions are sin, cos, tan, sqrt. Laws of columns also
+allow abs, sign, exp, tanh, min, max, names channel.NAME, and exponents that are expressions.
+Anything else is an ExpressionError at its column. Length, depth, exponents, terms and digits are
+limited, so that every text is parsed quickly.
 """
 
 from __future__ import annotations
@@ -213,9 +213,11 @@ def parse(
     symbols: Iterable[str] | None = None,
     functions: tuple[str, ...] = FUNCTIONS,
 ) -> Expression:
-    """Read one expression; `symbols` are the declared names (None: any), `functions` FUNCTIONS, or LAWS for the law of a column.
+    """Parse one expression from a text or a number.
 
-    Raises ExpressionError with the column of whatever is outside the grammar.
+    `symbols` are the declared names (None: any name is allowed). `functions` is FUNCTIONS, or LAWS
+    for the law of a column. Raises ExpressionError, with the column, at the first text that is not
+    allowed.
     """
     if isinstance(text, (int, float)) and not isinstance(text, bool):
         text = repr(text)

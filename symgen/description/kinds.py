@@ -1,6 +1,6 @@
-"""The kinds of elements: the one table of what acts on joints besides links.
+"""Table of all kinds of elements on the joints, such as viscous friction, with laws and units.
 
-A new kind is one entry here (docs/contributing.md).
+A new kind is one entry in KINDS (docs/contributing.md).
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ JOINT_FAMILIES = ("Ia", "FV", "FS", "OFFSET")  # after the inertial ones of eq. 
 
 
 class Kind(NamedTuple):
-    """A kind of element.
+    """One kind of element on the joints: its law, its units, and the options that it allows.
 
     Attributes
     ----------
     law : str
-        Its torque along s for parameter 1; q, qd, qdd are s, sd, sdd.
+        Torque along the coordinate s for the parameter value 1; q, qd, qdd mean s, sd, sdd.
     units : tuple of str
-        Of its parameter: revolute, prismatic.
+        Units of the parameter for a revolute and for a prismatic joint.
     meaning : str
-        What it is.
+        Name of the kind in words.
     dissipative : bool
-        Whether its parameter cannot be negative: it takes power from the motion.
+        Whether the parameter cannot be negative, because the element takes power from the motion.
     form, when : bool
-        Whether it takes `form` and `when`.
+        Whether an element of this kind may have `form` and `when`.
     fit : mapping
-        Scalars of the law, as a file gives them; a file may give others.
+        Default scalars of the law, as a file gives them. A file may give other values.
     """
 
     law: str

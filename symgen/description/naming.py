@@ -1,9 +1,9 @@
-"""Names of a robot, its constants, families and parameters, and the texts beside them in emitted
-files: every guard of a name is here, and what gives way where two would meet in one emitted text.
+"""Checks of the names in a robot file, and renaming of names that collide in a generated file.
 
-Constants, parameters and base parameters are the user's: they keep their names in every text, or
-`check_names` refuses them before anything is derived. Steps of the recursion, arrays and words of a
-language give way by one rule, an underscore at the end, and the header says so.
+`check_names` refuses unsuitable names of constants, families and parameters before anything is
+derived, so that these names appear unchanged in generated files. A name of an intermediate variable
+or array that is already used, or a reserved word of the target language, gets an underscore at the
+end, and the header of the file says so.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ DEVICES = {
 
 
 def check_identifier(name: str, path: Path) -> None:
-    """Refuse what is no name in emitted code."""
+    """Refuse a name that is not a valid identifier in generated code."""
     if not IDENTIFIER.match(name) or keyword.iskeyword(name):
         what = "is a word of Python; choose another"
         if not keyword.iskeyword(name):
@@ -83,9 +83,9 @@ def check_identifier(name: str, path: Path) -> None:
 
 
 def check_names(robot: Any) -> None:
-    """Robot, families, constants and parameters have names of their own, which no emitted text gives another meaning.
+    """Check that robot, element families, constants and parameters have distinct, allowed names.
 
-    Texts end no docstring or comment.
+    Title, source and file name must not contain characters that end a docstring or comment.
     """
     check_identifier(robot.name, ("name",))
     if robot.name.upper() in DEVICES:
@@ -120,7 +120,9 @@ def check_names(robot: Any) -> None:
 
 
 def check_families(elements: Sequence[Element]) -> None:
-    """Families of elements have names of their own, and so have their parameters."""
+    """Check that each family of elements, such as FV, and each of its parameters has a name of its
+    own.
+    """
     families = [e.family for e in elements]
     for e in elements:
         family, path = e.family, ("elements", e.family)
@@ -142,7 +144,8 @@ def check_families(elements: Sequence[Element]) -> None:
 
 
 def _of_others(name: str) -> str:
-    """Reason why a name is taken in every text (by symgen, the grammar or Python); empty if it is free."""
+    """Describe what `name` already means in generated code or in Python; empty if the name is free.
+    """
     if STATES.match(name):
         return "a joint position, rate or torque (q, QP, QDP, GAM and a number)"
     if name in LAYOUT:
@@ -151,7 +154,9 @@ def _of_others(name: str) -> str:
 
 
 def _check_labels(labels: Mapping[int, str], frames: int) -> None:
-    """Labels name frames that exist, each by another name."""
+    """Check that each joint label belongs to an existing frame, and that the labels are all
+    different.
+    """
     used: dict[str, int] = {}
     for j, text in labels.items():
         message = ""
@@ -170,7 +175,9 @@ def _check_labels(labels: Mapping[int, str], frames: int) -> None:
 
 
 def is_label(text: str) -> bool:
-    """Whether `text` may name a joint."""
+    """Whether `text` is allowed as a joint label: short, printable, without quotes or comment
+    marks.
+    """
     return (
         0 < len(text) <= LONGEST_LABEL
         and text.isprintable()
@@ -179,14 +186,14 @@ def is_label(text: str) -> bool:
 
 
 class Namespace:
-    """The names of one text.
+    """The names used in one generated file; prevents two things from having the same name.
 
     Parameters
     ----------
     names : iterable of str
         Constants, parameters and base parameters of the robot.
     is_word : callable
-        Whether the language of the text has a word of its own of that name.
+        Function that returns whether a name is a reserved word in the language of the file.
     """
 
     def __init__(self, names: Iterable[str], is_word: Callable[[str], bool] = lambda name: False):
@@ -197,15 +204,19 @@ class Namespace:
             self._written[name] = self.own(name)
 
     def of_file(self, name: str) -> str:
-        """The emitted name of a constant or parameter of the robot file."""
+        """Return the name in the generated file of a constant or parameter of the robot file."""
         return self._written.get(name, name)
 
     def has(self, name: str) -> bool:
-        """Whether something in this text is called so."""
+        """Whether `name` is already used in the generated file, or is a reserved word of its
+        language.
+        """
         return name in self._taken or self._is_word(name)
 
     def own(self, name: str) -> str:
-        """A name of ours, which nothing else in this text has."""
+        """Reserve a free name for an internal variable: `name`, with underscores added if it is
+        taken.
+        """
         free = f"{name}_" if self._is_word(name) else name
         while free in self._taken:
             free += "_"
@@ -215,7 +226,12 @@ class Namespace:
         return free
 
     def inner(self) -> Namespace:
-        """The names of one function of the text; what it renames, the text renames."""
+        """Make the namespace of one function in the generated file, starting with all names used so
+        far.
+
+        Names that the function reserves stay local. Its renamed variables are also listed for the
+        file.
+        """
         scope = Namespace((), self._is_word)
         scope._taken, scope._written, scope.renamed = {*self._taken}, self._written, self.renamed
         return scope

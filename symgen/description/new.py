@@ -1,4 +1,4 @@
-"""The robot file a newcomer starts from."""
+"""Template of a robot file, from which a user starts the description of a new robot."""
 
 from __future__ import annotations
 
@@ -53,18 +53,19 @@ elements:
 
 
 def skeleton(name: str) -> str:
-    """Text of a commented two-joint robot file called `name`.
+    """Return the text of a commented robot file for a two-joint robot called `name`.
 
-    Raises DescriptionError if that is no identifier.
+    Raises DescriptionError if `name` is not an identifier.
     """
     check_identifier(name, ("name",))
     return _SKELETON.format(name=name, schema=SCHEMA)
 
 
 def skeleton_for(file: Path) -> str:
-    """Text of a skeleton for the robot file `file`; its first lines lead editors to the JSON Schema.
+    """Return the text of a commented template for the robot file `file`.
 
-    Raises DescriptionError if the name of the file is none of a robot file.
+    Its first lines name the JSON Schema for editors. Raises DescriptionError if `file` does not end
+    in .yaml or .yml, or if its name is not an identifier.
     """
     if file.suffix not in (".yaml", ".yml"):
         raise DescriptionError(f"{file}: a robot file ends in .yaml")

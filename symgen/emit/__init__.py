@@ -1,1 +1,1 @@
-"""Emission: from base parameters to the text of modules in every target."""
+"""Code generator: writes the models of a robot over its base parameters in Python and C."""

@@ -1,5 +1,6 @@
-"""Functions of a robot as text, in any language whose steps are assignments: what each takes, its
-lines, and the entries of its result.
+"""Functions of a robot as source text, for any language whose steps are assignments.
+
+For each function: its arguments, its lines, and the entries of its result.
 """
 
 from __future__ import annotations
@@ -16,22 +17,22 @@ from symgen.emit.spec import STATES, Function, ModuleSpec
 
 @dataclass(frozen=True)
 class Block:
-    """A function as text: what it takes, its lines, and the array that it fills.
+    """One function as source text: its arguments, its lines, and the array that it fills.
 
     Attributes
     ----------
     function : Function
-        The model.
+        Function that the text computes.
     text : Text
-        Its printed values.
+        Names and expressions of its values.
     sections : tuple of Section
-        Inputs and steps.
+        Lines that load the inputs and compute the steps, under headings.
     result : str
-        The array, under its local name.
+        Name of the result array in the text.
     arguments : tuple of str
-        States, X and constants.
+        Names of the arguments: states, X and constants.
     constants : tuple of str
-        The last of them, those that are functions of time at the end.
+        Names of the constants among the arguments; constants that are functions of time come last.
     """
 
     function: Function
@@ -42,7 +43,10 @@ class Block:
     constants: tuple[str, ...]
 
     def results(self, target: Callable[[Sequence[int]], str]) -> list[Section]:
-        """Assignments of the computed entries under their headings; `target` of a place."""
+        """Write the assignments of the computed entries, grouped under headings.
+
+        `target` turns an array index into the left side of an assignment, such as `A[0, 1]`.
+        """
         language = self.text.language
         lines = []
         for entry in self.function.computed:
@@ -64,9 +68,9 @@ Call = Callable[[Sequence[str], Sequence[str]], list[str]]
 def blocks_of(
     spec: ModuleSpec, language: Language, component: Callable[[str, int], str] = "{}[{}]".format
 ) -> dict[str, Block]:
-    """Every function of a module in a language, each by itself.
+    """Write every function of a robot in a language, independent of the other functions.
 
-    component : how an entry of a state or of X is read.
+    component : gives the text of entry k of a state or of X, such as `q[0]`.
     """
 
     def inputs(source: str, wanted: Sequence[tuple[int, str]], count: int) -> list[str]:
@@ -80,20 +84,20 @@ def blocks_of(
 
 
 class FunctionPrinter:
-    """Functions over one graph as text, in one scope of names.
+    """Printer of functions that share one expression graph and one set of local names.
 
     Parameters
     ----------
     spec : ModuleSpec
-        The module.
+        All functions of the robot.
     functions : sequence of Function
-        Over one graph.
+        Functions to print; their entries are nodes of one graph.
     names : Namespace
-        The names of the scope.
+        Names in use, so that no two quantities get the same name.
     language : Language
-        How lines are written.
+        Rules for the lines.
     inputs : callable
-        How states and X are read.
+        Writes the lines that give names to entries of a state or of X.
     """
 
     def __init__(
@@ -117,19 +121,22 @@ class FunctionPrinter:
 
     @property
     def given(self) -> list[str]:
-        """Names of what the functions read of what they share."""
+        """Names of the shared steps whose values the functions need for their own lines."""
         read = {n.index for f in self.functions for n in self._read(f)}
         return [self.text.called[k] for k in sorted(read & self.shared & self.text.named)]
 
     @property
     def motion(self) -> Block:
-        """The block of the steps that all functions share."""
+        """Block of the steps that all functions share: the motion of the links."""
         own = [n for n in self.functions[0].nodes if n.index in self.shared]
         operands = {x.node.index for n in own for x in n.operands}
         return self._block(self.functions[0], own, [n for n in own if n.index in operands], ())
 
     def block(self, f: Function, call: Call = lambda names, arguments: []) -> Block:
-        """A function; what it shares it gets from a `call`."""
+        """Write one function as a block.
+
+        `call` writes the lines that get the shared values from the block `motion`.
+        """
         own = [n for n in f.nodes if n.index not in self.shared]
         names = {self.text.called.get(n.index, "") for n in self._read(f)}
         given = [name if name in names else "_" for name in self.given]
@@ -137,7 +144,7 @@ class FunctionPrinter:
         return self._block(f, own, self._read(f), lines)
 
     def _read(self, f: Function) -> list[Node]:
-        """The nodes that the lines of a function read or make."""
+        """List the nodes that the own lines of a function use or compute."""
         read = {o.node.index for o in f.values.outputs if isinstance(o, Scalar)}
         for node in f.nodes:
             if node.index not in self.shared:
@@ -147,7 +154,11 @@ class FunctionPrinter:
     def _block(
         self, f: Function, own: Sequence[Node], read: Sequence[Node], call: Sequence[str]
     ) -> Block:
-        """The lines of the nodes `own`, which read others, behind a call."""
+        """Make a block whose lines compute the nodes `own`.
+
+        `read` are the nodes that these lines use. The lines `call` stand before the steps and
+        provide the shared values.
+        """
         spec = self.spec
         joints, independent = spec.robot.joints, spec.derivation.closure.independent
         sources = {s: [f"{letter}{j}" for j in independent] for s, letter in STATES.items()}
@@ -182,13 +193,16 @@ class FunctionPrinter:
 
 
 def label(f: Function, entry: Entry) -> str:
-    """Name an entry in comments, such as DG1ZZ2, GAM3 or A12."""
+    """Return the name of an entry for comments, such as DG1ZZ2, GAM3 or A12."""
     name = entry.comment.partition(",")[0]
     return name or f"{f.model.result}{''.join(str(k + 1) for k in entry.place)}"
 
 
 def aligned(lines: Sequence[str], language: Language) -> tuple[str, ...]:
-    """Comments behind a tab in one column, up to a limit; none where the line gets too long."""
+    """Align the comments of code lines in one column, at most column 64.
+
+    Each given line has its comment after a tab.
+    """
     parts = [line.partition("\t") for line in lines]
     width = min(max((len(code) for code, _, _ in parts), default=0), 64)
     mark = language.comment

@@ -1,5 +1,7 @@
-"""A long body of C in parts, each a function of its own: the time of compilers grows faster than a
-function. Values that later parts read stand in an array, `kept`.
+"""Split a long C function body into parts, each a C function of its own.
+
+The time of compilers grows faster than the length of a function. Values that later parts need are
+stored in an array `kept`.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ Titled = tuple[str, Sequence[str]]  # lines that belong together, under a title
 
 @dataclass(frozen=True)
 class Part:
-    """The lines of a part over `lanes` samples, and all words in them."""
+    """One part of a long C function body: its lines over `lanes` samples, and all words in them."""
 
     sections: tuple[Section, ...]
     read: frozenset[str]
@@ -24,8 +26,10 @@ class Part:
 def in_parts(
     inputs: Sequence[str], steps: Sequence[Titled], results: Sequence[Titled], longest: int
 ) -> tuple[list[Part], int]:
-    """Steps `const real x = ...;` cut after every `longest`, results behind the last step that they
-    read, each part with the inputs it reads; and the number of values that are kept.
+    """Split the steps of a C function into parts of at most `longest` steps.
+
+    A result belongs to the part of the last step that it depends on. Each part loads the inputs
+    that it uses. Return the parts, and the number of values that must be stored for later parts.
     """
     chunks = [list(steps[k : k + longest]) for k in range(0, len(steps), longest)]
     place = {lines[0].split()[2]: p for p, chunk in enumerate(chunks) for _, lines in chunk}
@@ -56,7 +60,10 @@ def words(lines: Sequence[str]) -> frozenset[str]:
 
 
 def read_by(read: frozenset[str], steps: Sequence[str]) -> list[str]:
-    """Select the steps `const real x = ...;` that compute the names in `read`, and those that these need."""
+    """Select the steps that compute the names in `read`, and the steps that these depend on.
+
+    Each step has the form `const real x = ...;`.
+    """
     needed = []
     for step in reversed(steps):
         if step.split()[2] in read:

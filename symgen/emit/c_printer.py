@@ -1,9 +1,10 @@
-"""Graph to lines of C: the named quantities and sections of the NumPy module as `const double`
-declarations.
+"""Printer of C: writes the steps of an expression graph as `const real` declarations.
 
-A kernel treats a tile of samples in two loops over plain doubles: sines and cosines first, which
-compilers turn into calls of vector functions, then straight-line arithmetic, which they turn into
-vectors of any width. What depends on no sample stands before the loops.
+Names and sections are the same as in the NumPy module.
+
+A C function computes a tile of samples in several loops: first sines and cosines, which compilers
+turn into calls of vector functions, then the other arithmetic, which they turn into vector
+instructions of any width. Values that are the same for all samples are computed before the loops.
 """
 
 from __future__ import annotations
@@ -30,12 +31,12 @@ HEADERS = re.compile(r"(M|FP|HUGE|MATH|U?INT\w*|SIZE|PTRDIFF|SIG|WCHAR|WINT)_\w+
 
 
 def is_word(name: str) -> bool:
-    """Whether C, its headers or the frame of a kernel use the name."""
+    """Whether a name is reserved by C, by its headers or by the code around the functions."""
     return name in RESERVED or bool(HEADERS.fullmatch(name))
 
 
 def number(c: Fraction) -> str:
-    """A constant in the type of the file."""
+    """Write a rational number in C: a small integer as digits, others with the type `real`."""
     whole = c.denominator == 1 and abs(c) < 2**31
     return str(c.numerator) if whole else f"(real){float(c)!r}"
 
@@ -56,8 +57,10 @@ C = Language(
 
 
 class CText(Text):
-    """The lines of one kernel: `fixed`, `trigonometry_of` (with `angles` before them), `sections`,
-    then `expression` for each output.
+    """The lines of C that compute one function over a tile of samples.
+
+    They run in this order: `fixed` (the same for all samples), `angles`, `trigonometry_of` (sines
+    and cosines of the angles), `sections`, and `expression` for each output.
     """
 
     language: Language = C
@@ -95,8 +98,10 @@ class CText(Text):
 
 
 def _needed(outputs: Iterable[Node]) -> Iterator[int]:
-    """Indices of the nodes that a loop over the samples needs: not below a sine or cosine, nor
-    below what is computed before the loop.
+    """Yield the indices of the nodes that a loop over the samples needs.
+
+    Operands of sines and cosines are left out, because another loop computes them; so are operands
+    of values that are computed before the loops.
     """
     stack, visited = list(outputs), set()
     while stack:

@@ -1,4 +1,4 @@
-"""How C functions take their states: a pointer for each, or one struct of a closed mechanism."""
+"""How C functions receive the states: one pointer per state, or one struct if loops tie joints."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from symgen.emit.spec import STATES, ModuleSpec
 
 @dataclass(frozen=True)
 class CStates:
-    """The states of C functions.
+    """The state arguments of the C functions of one robot.
 
     Attributes
     ----------
     robot : str
-        Its name, which the name of the struct begins with.
+        Name of the robot; the name of the struct starts with it.
     widths : mapping of str to int
-        How many numbers each state of one sample has, in the order of the struct.
+        Number of values of each state per sample, in the order of the struct.
     closed : bool
-        Whether loops tie joints, so that q, qd, qdd, G and qdd0 stand in one struct s.
+        Whether loops tie joints, so that q, qd, qdd, G and qdd0 are members of one struct s.
     """
 
     robot: str
@@ -28,7 +28,7 @@ class CStates:
 
     @classmethod
     def of(cls, spec: ModuleSpec) -> CStates:
-        """The states of the functions of `spec`."""
+        """Make the state arguments for the functions of `spec`."""
         size = spec.sizes
         if not spec.tied:
             return cls(spec.robot.name, dict.fromkeys(STATES, size["n"]), closed=False)
@@ -37,20 +37,25 @@ class CStates:
         return cls(spec.robot.name, joints | tied, closed=True)
 
     def arguments(self, *states: str) -> list[str]:
-        """Names by which a function takes these states."""
+        """Return the names of the arguments that pass the given states: s, or one name per state.
+        """
         return ["s"] if self.closed else [*states]
 
     def parameters(self, *states: str) -> list[str]:
-        """Declarations of `arguments`."""
+        """Return the C declarations of these arguments, such as `const real *q`."""
         kind = f"{self.robot}_state" if self.closed else "real"
         return [f"const {kind} *{x}" for x in self.arguments(*states)]
 
     def read(self, state: str) -> str:
-        """Pointer to the numbers of a state of one sample."""
+        """Return the C expression that points to a state of one sample: `s->q`, or `q`."""
         return f"s->{state}" if self.closed else state
 
     def load(self, state: str) -> str:
-        """Numbers between a state of one sample and the next, and a pointer to the first of a tile."""
+        """Return two arguments of the C function that copies a state of many samples into a tile.
+
+        They are the distance from one sample to the next, in numbers, and a pointer to the first
+        sample of the tile.
+        """
         if self.closed:
             return f"sizeof *s/sizeof(real), s[start].{state}"
         n = self.widths[state]

@@ -1,13 +1,11 @@
-"""What a C file says, as data: bodies of one state or of a tile of samples, the rows of the stores
-they fill, the header.
+"""Contents of an emitted C file, as data for the template that only lays them out.
 
-The body of a function stands once, over `lanes` samples side by side: its compiler makes it anew for
-one state and for a tile.
+The body of each function is written once, as a loop over `lanes` samples. The compiler makes two
+versions of it, one for a single state and one for a tile, a group of samples that are computed
+together.
 
-Joints that only the closure equations tie stand in a state of their own, which one function closes by
-Newton's method; every other function reads it.
-
-Everything is computed here; the template only lays it out.
+Joints that only the closure equations tie belong to a state struct. One function computes it by
+Newton's method; every other function uses it.
 """
 
 from __future__ import annotations
@@ -48,12 +46,15 @@ RESULTS = (
 
 
 def render(spec: ModuleSpec, *, command: str | None = None) -> str:
-    """The C file of `spec`. Same robot file, same version: same bytes."""
+    """Return the text of the C file of a robot.
+
+    The same robot file and the same version give the same bytes.
+    """
     return laid_out("kernels.c", _context(spec, command))
 
 
 def render_header(spec: ModuleSpec, *, command: str | None = None) -> str:
-    """The header of that file."""
+    """Return the text of the C header file that declares the functions of the C file."""
     context = _context(spec, command)
     real = f"{spec.robot.name.upper()}_REAL"
     declared = re.sub(r"\breal\b", real, laid_out("declared.h", context))
@@ -62,7 +63,7 @@ def render_header(spec: ModuleSpec, *, command: str | None = None) -> str:
 
 @lru_cache(maxsize=1)
 def _context(spec: ModuleSpec, command: str | None) -> dict[str, Any]:
-    """The values that the templates of the C file and of its header read."""
+    """Collect the values that the templates of the C file and of its header file use."""
     robot, free = spec.robot, spec.regrouping.constants
     names, states = spec.names(is_word), CStates.of(spec)
     kernels = [
@@ -111,7 +112,10 @@ def _context(spec: ModuleSpec, command: str | None) -> dict[str, Any]:
 def _loops(
     spec: ModuleSpec, states: CStates, closing: Sequence[Mapping[str, Any]]
 ) -> dict[str, Any]:
-    """Values of the template's loop code: start, units, Newton steps and signatures."""
+    """Collect the values that the template needs to write the closure of loops in C.
+
+    These are start configuration, units, tolerance, step size and signatures for Newton's method.
+    """
     name, loops = spec.robot.name, loop_system(spec.robot)
     start = f"{{{', '.join(map(repr, loops.start.tolist()))}}}"
     actuated = [f"const real *{x}_a" for x in ("q", "qd", "qdd")]
@@ -131,7 +135,7 @@ def _loops(
 
 
 def _kinematics(spec: ModuleSpec, states: CStates, names: Namespace) -> dict[str, Any]:
-    """Tables and signatures of the Jacobian and of the forward dynamics."""
+    """Make the C tables and signatures for the Jacobian and the forward dynamics."""
     robot, closure, name = spec.robot, spec.derivation.closure, spec.robot.name
     moved = [
         (f.j, k, closure.row[f.j][i])
@@ -170,22 +174,26 @@ def _kinematics(spec: ModuleSpec, states: CStates, names: Namespace) -> dict[str
 
 
 def _constant(e: Expression) -> str:
-    """A constant expression as C; no quotient of integers."""
+    """Write a constant expression in C, 2 as 2.0, because C truncates quotients of integers."""
     if e.constant is not None:
         return repr(float(e.constant))
     return re.sub(r"(?<![\w.])(\d+)(?![\w.])", r"\1.0", C.expression(e))
 
 
 def _comment(text: str) -> str:
-    """Text that cannot end a C comment, start another or continue a line."""
+    """Make a text safe in a C comment: it cannot end the comment, start another or continue a line.
+    """
     shown = "".join(c if c.isprintable() else " " for c in plain(text))
     return re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", r"\g<0> ", shown)
 
 
 def _kernel(spec: ModuleSpec, states: CStates, f: Function, names: Namespace) -> dict[str, Any]:
-    """A function over a tile: its lines before the loops, those of sines and cosines, each a loop
-    of its own (compilers merge sin(x) and cos(x) of one loop into a call that has no vector form),
-    those of the loop over a tile; its rows {row of the store, signal, sign}; its C signatures.
+    """Collect all that the template needs to write one function in C.
+
+    These are the lines before the loops, the loops for sines and cosines, the main loop over a tile
+    of samples, the table {row of the result, number of the value, sign}, and the C signatures.
+    Cosines and sines have separate loops, because compilers merge sin(x) and cos(x) of one loop
+    into a call that has no vector form.
     """
     robot, model, result = spec.robot, f.model, names.own(f.model.result)
     entries = [
@@ -285,7 +293,7 @@ def _kernel(spec: ModuleSpec, states: CStates, f: Function, names: Namespace) ->
 
 
 def _row(place: Sequence[int], shape: Sequence[int]) -> int:
-    """The place of an entry in C order."""
+    """Return the position of an entry in an array that is stored in C order, last index fastest."""
     row = 0
     for k, size in zip(place, shape, strict=True):
         row = row * size + k
@@ -297,8 +305,9 @@ def _input(name: str, state: str, k: int) -> str:
 
 
 def _result(result: str, k: int, expression: str, comment: str) -> list[str]:
-    """An entry of a tile, its comment behind it, or before it where both are too long for a
-    line.
+    """Write the C line that stores a result of a tile, with its comment.
+
+    The comment gets a line of its own, before the other, if both together are too long.
     """
     line = f"AT({result}, {k}) = {expression};"
     both = f"{line:<64}  /* {comment} */" if comment else line
@@ -333,7 +342,10 @@ def _header(spec: ModuleSpec, states: CStates, kernels: Sequence[Mapping[str, An
 def _signatures(
     states: CStates, f: Function, laid: Mapping[str, Any], needs: Sequence[str]
 ) -> dict[str, object]:
-    """A kernel's C signatures; `needs` of X and constants."""
+    """Make the C signatures and calls of one function.
+
+    `needs` names X, the constants, both or none, whichever its lines use.
+    """
     model, result, name = f.model, laid["result"], states.robot
     used, computed, calls = laid["used"], laid["computed"], laid["calls"]
     pointers = [*(["X"] if model.reads_X else []), "constants"]
@@ -390,7 +402,10 @@ def _signatures(
 def _part(
     laid: Mapping[str, Any], number: int, part: Part, parameters: Sequence[str]
 ) -> dict[str, object]:
-    """A part of a body as a function, which takes those of the parameters that it reads."""
+    """Make one part of a long C function body as a C function of its own.
+
+    Its parameters are the ones among `parameters` that its lines use.
+    """
     before = read_by(part.read, laid["opening"])
     read = part.read | words(before)
     given = [p for p in parameters if p.split()[-1].lstrip("*") in read]

@@ -1,4 +1,4 @@
-"""From a robot to the files of its targets: derive, regroup, lay out."""
+"""From a robot to its source files: derive the model, regroup the parameters, print the targets."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from symgen.regroup.regrouping import Regrouping
 
 @dataclass(frozen=True)
 class Emitter:
-    """How a target is written: its language, and `render(spec, command=...)`."""
+    """Code generator of one target: its language, and the function that writes the file."""
 
     language: Language
     render: Callable[..., str]
@@ -33,7 +33,7 @@ EMITTERS = {
 
 
 def generate_module(robot: Robot, *, command: str | None = None) -> str:
-    """Text of the NumPy module of `robot`."""
+    """Return the source text of the NumPy module of `robot`."""
     return generate_files(robot, command=command)[TARGETS["numpy"].file.format(robot.name)]
 
 
@@ -45,25 +45,26 @@ def generate_files(
     regrouping: Regrouping | None = None,
     options: Sequence[str] = (),
 ) -> dict[str, str]:
-    """Texts of the files of a robot.
+    """Return the source texts of the files of a robot.
 
     Parameters
     ----------
     robot : Robot
         The robot.
     targets : sequence of str
-        Among TARGETS; one that does not serve a robot is left out.
+        Names among TARGETS. A target that cannot serve the robot is left out.
     command : str, optional
-        What the header gives as argument of `symgen generate`. Default: the file of the robot.
+        Argument of `symgen generate` that the header of the files shows. Default: the file of the
+        robot.
     regrouping : Regrouping, optional
         Base parameters of `robot`. Default: derived.
     options : sequence of str
-        Models on request, among `symgen.derive.models.OPTIONS`.
+        Names of models that are written only on request, among `symgen.derive.models.OPTIONS`.
 
     Returns
     -------
     dict
-        {file name: text}. Same robot file, same version: same bytes.
+        {file name: text}. The same robot file and the same version give the same bytes.
     """
     spec: ModuleSpec = (
         spec_of(robot, tuple(options)) if regrouping is None else module_spec(regrouping, options)

@@ -1,5 +1,7 @@
-"""The header of an emitted module, and its tables: what a reader needs before the first line of
-code.
+"""Text at the start of an emitted file: its header comment and its tables of constants.
+
+The header shows frames, elements, base parameters and costs, so that a reader understands the code
+below.
 """
 
 from __future__ import annotations
@@ -22,9 +24,10 @@ COLUMNS = ("j", "ant", "mu", "sigma", "gamma", "b", "alpha", "d", "theta", "r")
 
 
 def header(spec: ModuleSpec, texts: Mapping[str, Text], formulas: bool) -> list[str]:
-    """Lines of the module docstring below the command.
+    """Write the header of an emitted file: frames, gravity, elements, base parameters and costs.
 
-    texts : the printed models, by name. formulas : whether the regrouping formulas stand here.
+    texts : the printed models, by name. formulas : whether the header lists the regrouping
+    formulas.
     """
     robot, regrouping = spec.robot, spec.regrouping
     gravity = ", ".join(str(e) for e in robot.gravity)
@@ -95,18 +98,20 @@ def header(spec: ModuleSpec, texts: Mapping[str, Text], formulas: bool) -> list[
 
 
 def line_of(title: str, text: str) -> list[str]:
-    """A line of the header, its title in the first column."""
+    """Write an entry of the header: a title in the first column, then a text, wrapped."""
     return wrap_text(f"{title:<11} {text}", "", " " * 12)
 
 
 def grouped(regrouping: Regrouping) -> dict[str, str]:
-    """Formulas of the base parameters that take in others."""
+    """Return the formulas of the base parameters that combine several standard parameters, by name.
+    """
     return {b.name: str(b.formula) for b in regrouping.base if b.name != b.own}
 
 
 def one_sided_friction_that_absorbs(regrouping: Regrouping) -> list[str]:
-    """Base parameters of one-sided Coulomb friction that stand for a weight too: D_FSP - D_FSN = 1
-    in motion, 0 at rest.
+    """List the base parameters of one-sided Coulomb friction that contain a constant force too.
+
+    D_FSP - D_FSN = 1 in motion, as for a constant force, but 0 at rest.
     """
     elements = element_names(regrouping.robot)
     return [
@@ -117,8 +122,9 @@ def one_sided_friction_that_absorbs(regrouping: Regrouping) -> list[str]:
 
 
 def frame_table(robot: Robot) -> list[str]:
-    """The rows of the frame table, aligned; columns that are zero everywhere are left out, except
-    the classical six.
+    """Write the rows of the frame table as aligned text.
+
+    The columns mu, gamma and b are left out if they contain no information.
     """
     kept = informative_columns(robot)
     table = [list(kept), *([str(getattr(f, c)) for c in kept] for f in robot.frames)]
@@ -137,7 +143,11 @@ def frame_table(robot: Robot) -> list[str]:
 
 
 def informative_columns(robot: Robot) -> tuple[str, ...]:
-    """The classical six with j and ant, and of the others those that say something."""
+    """Select the columns of the frame table to print.
+
+    j, ant, sigma, alpha, d, theta and r are always printed, gamma and b if an entry is not zero, mu
+    if a joint is passive.
+    """
     said = {
         "mu": any(not f.mu for f in robot.frames if f.sigma != FIXED),
         "gamma": any(f.gamma for f in robot.frames),
@@ -147,7 +157,10 @@ def informative_columns(robot: Robot) -> tuple[str, ...]:
 
 
 def element_lines(robot: Robot) -> list[str]:
-    """One line per element family: which rows or forms its parameters act along."""
+    """Describe each family of elements, such as friction or springs: its kind and where it acts.
+
+    An element acts along a linear combination of joint motions, or in a quadratic form of them.
+    """
     lines = []
     for e in robot.elements:
         rows = {
@@ -166,7 +179,10 @@ def element_lines(robot: Robot) -> list[str]:
 
 
 def channel_lines(robot: Robot) -> list[str]:
-    """Constants that are functions of time, and what the transmitted torques are."""
+    """Describe the constants of the robot that may be functions of time.
+
+    Some of them are torques at a joint that the caller computes from the other parameters.
+    """
     own = [c for c in robot.channels if not c.startswith(TRANSMITTED)]
     torques = [c for c in robot.channels if c not in own]
     array = "an array (N,), one value a sample; one value a call in C"
@@ -178,7 +194,10 @@ def channel_lines(robot: Robot) -> list[str]:
 
 
 def _law_text(e: Element) -> str:
-    """The law of an element that is not inertia, linear friction, offset or spring."""
+    """Write the torque or energy law of an element, with its constants.
+
+    The text is empty for elements with a standard law: inertia, linear friction, offset and spring.
+    """
     if not e.is_own:
         return ""
     law = e.energy if e.energy is not None else e.torque or KINDS[e.kind].torque
@@ -190,7 +209,7 @@ def _law_text(e: Element) -> str:
 
 
 def loop_lines(robot: Robot, closure: Closure) -> list[str]:
-    """The loops, and every passive joint as a function of others."""
+    """Describe the loops of the robot, and each passive joint as a function of the other joints."""
     lines = [f"frame {loop.twin} coincides with cut frame {loop.cut}" for loop in robot.loops]
     for j in robot.passive:
         if j in closure.tied:
@@ -221,7 +240,7 @@ def _form_text(form: Mapping[tuple[int, int], Any]) -> str:
 
 
 def tables(spec: ModuleSpec) -> list[str]:
-    """The constants of the module, as Python source."""
+    """Write the tables of the Python module: joints, constants, parameters, formulas and units."""
     robot, regrouping = spec.robot, spec.regrouping
     units = names("UNITS", [unit(robot, b.own) for b in regrouping.base])
     units[0] = units[0].replace("= ", "= dict(zip(BASE_PARAMETERS, ", 1)
@@ -245,7 +264,7 @@ def tables(spec: ModuleSpec) -> list[str]:
 
 
 def data(spec: ModuleSpec) -> list[str]:
-    """Drives, limits and values of the robot file as Python source."""
+    """Write the drives, limits and parameter values of the robot file as Python source."""
     robot = spec.robot
     return [
         *_drives(robot),
@@ -262,7 +281,10 @@ def data(spec: ModuleSpec) -> list[str]:
 
 
 def scalars(robot: Robot) -> dict[str, tuple[tuple[float, float], int, str]]:
-    """{constant: (bounds, starts, parameter)} of the scalars of laws that may be fitted."""
+    """Collect the constants in torque laws that a fit may change, such as a Stribeck velocity.
+
+    Return {constant: (bounds, number of starts of the fit, parameter)}.
+    """
     return {
         f"{name}{j}": (x.bounds, x.grid, f"{e.family}{j}")
         for e in robot.elements
@@ -273,7 +295,7 @@ def scalars(robot: Robot) -> dict[str, tuple[tuple[float, float], int, str]]:
 
 
 def channels(regrouping: Regrouping) -> dict[str, tuple[str, ...]]:
-    """{constant that is a function of time: base parameters whose columns read it}."""
+    """Find for each constant that is a function of time the base parameters that depend on it."""
     return {
         c: tuple(b.name for b in regrouping.base if b.own in read)
         for c, read in regrouping.robot.channels.items()
@@ -307,7 +329,10 @@ def _structure(spec: ModuleSpec) -> list[str]:
 
 
 def names(name: str, values: Sequence[str]) -> list[str]:
-    """`name = (...)`, a tuple of words as one text that is split."""
+    """Write the source `name = (...)` of a tuple of words.
+
+    A long tuple is written as one text that `split` divides, because this is shorter.
+    """
     flat = f"{name} = {tuple(values)!r}"
     if len(flat) <= WIDTH:
         return [flat]
@@ -315,7 +340,7 @@ def names(name: str, values: Sequence[str]) -> list[str]:
 
 
 def by_line(name: str, values: Mapping[str, str]) -> list[str]:
-    """`name = {...}`, an entry a line, long texts in parts."""
+    """Write the source `name = {...}` of a dict of texts: one entry per line, long texts split."""
     lines = []
     for key, value in values.items():
         first, *more = wrap(value, WIDTH - 20, break_long_words=False) or [""]
@@ -326,7 +351,7 @@ def by_line(name: str, values: Mapping[str, str]) -> list[str]:
 
 
 def literal(name: str, value: Any) -> list[str]:
-    """`name = value` as Python source, wrapped entry by entry."""
+    """Write the source `name = value`, with line breaks between entries if it is too long."""
     return _literal(f"{name} = ", value, "")
 
 
@@ -352,7 +377,7 @@ def plain(text: str) -> str:
 
 
 def packed(entries: Sequence[str], indent: str = "    ") -> list[str]:
-    """Entries separated by commas, as many on a line as fit."""
+    """Write entries separated by commas, as many on each line as fit."""
     lines, line = [], indent
     for entry in entries:
         if len(line) + len(entry) + 1 > WIDTH - 4 and line.strip():
@@ -363,7 +388,10 @@ def packed(entries: Sequence[str], indent: str = "    ") -> list[str]:
 
 
 def wrap_text(text: str, indent: str, hanging: str | None = None) -> list[str]:
-    """Text broken at spaces."""
+    """Break a text at spaces into lines of at most 100 columns.
+
+    `indent` starts the first line, `hanging` the others (default: four spaces more).
+    """
     more = indent + "    " if hanging is None else hanging
     return wrap(
         text,

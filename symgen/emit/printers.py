@@ -1,10 +1,11 @@
-"""Graph to lines of text: which nodes get a line of their own, what they are called, and how an
-expression is written.
+"""Printer: writes the nodes of an expression graph as lines of source text.
 
-A node has a line if it has a name, or if it is used more than once; then it takes its hint, a name
-made of its factors (C4DV23 = C4*DV23), or that of the quantity that it is a part of (N16a).
-Everything else is written inside its only user, so each operation of the graph stands in the text
-exactly once.
+A node gets a line of its own if it has a name or is used more than once. A node without a name gets
+one from its hint, from its factors (C4DV23 = C4*DV23), or from the quantity that it is a part of
+(N16a, a part of N16).
+
+Every other node is written inside the only expression that uses it, so that each operation of the
+graph occurs in the text exactly once.
 """
 
 from __future__ import annotations
@@ -38,32 +39,33 @@ SAYABLE = 3  # factors of a name that is made of them
 
 
 def number(c: Fraction) -> str:
-    """A constant as Python reads it back."""
+    """Write a rational number in Python: an integer as digits, another number as a float."""
     return str(c.numerator) if c.denominator == 1 and abs(c) < 2**53 else repr(float(c))
 
 
 @dataclass(frozen=True)
 class Language:
-    """How operations, steps and entries are written.
+    """Rules by which a programming language writes operations, steps and entries.
 
     Attributes
     ----------
     calls : mapping
-        Name of each function of `description.expression.FUNCTIONS`.
+        Name in the language of each function of `description.expression.FUNCTIONS`.
     above, below : str
-        The part of {} above or below zero.
+        Text of max(x, 0) and of min(x, 0), with {} for x.
     pi, one, square : str
-        pi, the 1 of 1/x, and the square of {}.
+        Text of pi, of the 1 in 1/x, and of the square of {0}.
     number : callable
-        A rational as text.
+        Writes a rational number.
     comment : str
-        What starts a comment that ends with its line.
+        Mark that starts a comment up to the end of the line.
     step, entry : str
-        A line that names a value, and one that fills an entry of a result: name, value.
+        Line that gives a name to a value, and line that assigns a value to an entry of a result; {}
+        stands for the name, then for the value.
     chained : bool
-        Whether one line may fill several entries, `A[0, 1] = A[1, 0] = x`.
+        Whether one line may assign several entries, `A[0, 1] = A[1, 0] = x`.
     is_word : callable
-        Whether the language, or the frame of its functions, has a word of its own of that name.
+        Tests whether the language, or the code around the functions, reserves a name.
     """
 
     calls: Mapping[str, str]
@@ -80,12 +82,13 @@ class Language:
     is_word: Callable[[str], bool] = lambda name: False
 
     def expression(self, e: Expression) -> str:
-        """A constant expression, or one linear in joint positions."""
+        """Write an expression of constants, or one that is linear in joint positions."""
         text = re.sub(r"\b(cos|sin|sqrt)\(", lambda name: f"{self.calls[name[1]]}(", str(e))
         return re.sub(r"\bpi\b", self.pi, text)
 
     def entries(self, targets: Sequence[str], value: str, remark: str) -> list[str]:
-        """The lines that fill the places of one entry; a remark stands behind a tab."""
+        """Write the lines that assign a value to all places of an entry, with a remark after a tab.
+        """
         targets = [" = ".join(targets)] if self.chained else targets
         return [f"{self.entry.format(target, value)}\t{remark}" for target in targets]
 
@@ -115,7 +118,7 @@ class Section:
 
 
 def under_titles(lines: Iterable[tuple[str, str]]) -> tuple[Section, ...]:
-    """Group (title, line) into sections: lines that follow one another under one title are one section."""
+    """Group pairs of title and line: consecutive lines with the same title form one section."""
     return tuple(
         Section(title, tuple(line for _, line in group))
         for title, group in groupby(lines, key=itemgetter(0))
@@ -123,18 +126,20 @@ def under_titles(lines: Iterable[tuple[str, str]]) -> tuple[Section, ...]:
 
 
 class Text:
-    """The lines of one function: `sections`, then an expression for each output by `expression`.
+    """The lines of source text that compute one function.
+
+    `sections` holds the steps; then `expression` writes each output.
 
     Parameters
     ----------
     outputs : sequence
-        Values of one graph.
+        Values to compute, all of one graph.
     headings : sequence of (index of the first node, title)
-        Of its steps.
+        Headings of the steps.
     names : Namespace
-        The names of the function.
+        Names in use in the function.
     labels : sequence of str
-        What each output is called, for parts that several share.
+        Name of each output; parts of it that are shared are named after it.
     """
 
     language: Language = PYTHON
@@ -169,13 +174,13 @@ class Text:
 
     @property
     def given(self) -> set[str]:
-        """Names that the recursions gave."""
+        """Names of the inputs, and names that the derivation gave to steps."""
         named = [n for n in self.nodes if n.index in self.named and (n.name or n.hint)]
         return {self.called[n.index] for n in named} | self.inputs
 
     @property
     def inputs(self) -> set[str]:
-        """Names of the symbols that the outputs need, as the derivation has them."""
+        """Names of the symbols that the outputs depend on, as the derivation writes them."""
         return {str(node.value) for node in self.nodes if node.op == SYM}
 
     def _symbol(self, node: Node) -> str:
@@ -205,7 +210,10 @@ class Text:
                 self.called[node.index] = self._made_of(node) or self._part_of(node, whole)
 
     def _wholes(self, outputs: Sequence[Scalar | int], labels: Sequence[str]) -> dict[int, str]:
-        """The first named quantity, or else the first output, that each node enters."""
+        """Find for each node the quantity that the node is a part of, to derive a name from it.
+
+        This is the first named quantity that uses the node, or else the first output.
+        """
         whole: dict[int, str] = {}
         for o, label in zip(outputs, labels, strict=bool(labels)):
             if isinstance(o, Scalar) and label:
@@ -217,7 +225,11 @@ class Text:
         return whole
 
     def _made_of(self, node: Node) -> str:
-        """Factors side by side: of a product of few named ones; its line starts without a minus."""
+        """Name a product after its factors, such as C4DV23 = C4*DV23.
+
+        The name is empty if the node is not a product of at most three named factors. The sign of
+        the node is chosen such that its line starts without a minus.
+        """
         words = self._factors(node)
         if words is None or len(words) > SAYABLE:
             return ""
@@ -248,7 +260,7 @@ class Text:
         return sign
 
     def _part_of(self, node: Node, whole: Mapping[int, str]) -> str:
-        """N16a, a part of N16 that other quantities share."""
+        """Name a node after the quantity that it is a part of: N16a is a part of N16."""
         of = whole.get(node.index, "K").rstrip(ascii_lowercase + "_") or "K"
         for k in range(len(self.nodes)):
             letters = ascii_lowercase[k % 26] * (k // 26 + 1)
@@ -259,7 +271,7 @@ class Text:
     # --- lines ---
 
     def sections_of(self, nodes: Collection[int]) -> tuple[Section, ...]:
-        """The lines of some of its nodes, under their headings."""
+        """Write the lines of the given nodes, grouped under their headings."""
         circular = [self._positive(n) for n in self.nodes if n.op in (COS, SIN)]
         trigonometry = {n.index for n in reachable(circular)}
 
@@ -274,7 +286,7 @@ class Text:
         return under_titles((title(n), self._line(n)) for n in named)
 
     def _title(self, node: Node) -> str:
-        """The heading under which the derivation made a node."""
+        """Return the heading under which the derivation made a node."""
         return self._marks[bisect_right(self._marks, node.index, key=itemgetter(0)) - 1][1]
 
     def _line(self, node: Node) -> str:
@@ -293,7 +305,7 @@ class Text:
     # --- expressions ---
 
     def expression(self, s: Scalar | int) -> str:
-        """Text of an output."""
+        """Write the value of an output: its name, its expression, or a number."""
         return self._operand(s) if isinstance(s, Scalar) else f"{float(s)}"
 
     def _operand(self, s: Scalar) -> str:
@@ -322,7 +334,9 @@ class Text:
         return f"{minus}{language.calls[node.op]}({operands})"
 
     def _sum(self, s: Scalar) -> str:
-        """Positive terms first: that saves a negation."""
+        """Write a sum with positive terms first, so that it starts with a minus only if all are
+        negative.
+        """
         terms = map(self._operand, self._addends(s))
         first, *rest = sorted(terms, key=lambda t: t.startswith("-"))
         return first + "".join(
@@ -330,7 +344,10 @@ class Text:
         )
 
     def _addends(self, s: Scalar) -> list[Scalar]:
-        """The terms of a sum, those of sums without a line of their own included."""
+        """List the terms of a sum.
+
+        An inner sum that has no line of its own is replaced by its terms.
+        """
         terms: list[Scalar] = []
         for x in s.node.operands:
             x = x if s.sign > 0 else -x

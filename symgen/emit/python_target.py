@@ -1,8 +1,9 @@
-"""The Python module of a robot: one text for NumPy, the arrays of any other package, and CasADi.
+"""The Python module of a robot: one text for NumPy, for other array packages and for CasADi.
 
-A block is a function of plain expressions over a namespace `xp` that fills a container by index:
-NumPy's array in place, a table that is stacked for packages whose arrays cannot be written to,
-matrices of CasADi. What functions share of the motion of the links is a block of its own.
+Each function is written as a block of plain expressions over a namespace `xp`. The block fills a
+container by index: an array of NumPy, or a table that later becomes an array of another package or
+a matrix of CasADi. The steps that functions share, the motion of the links, are a block of their
+own.
 """
 
 from __future__ import annotations
@@ -33,7 +34,10 @@ FEWEST_SHARED = 8  # values of the motion of the links that are worth a function
 
 
 def render(spec: ModuleSpec, *, command: str | None = None) -> str:
-    """The module of `spec`. Same robot file, same version: same bytes."""
+    """Return the text of the Python module of a robot.
+
+    The same robot file and the same version give the same bytes.
+    """
     robot, regrouping, closure = spec.robot, spec.regrouping, spec.derivation.closure
     free = regrouping.constants
     blocks, motion = _blocks(spec)
@@ -119,7 +123,10 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
 
 
 def _blocks(spec: ModuleSpec) -> tuple[dict[str, Block], dict[str, Any] | None]:
-    """The functions of the module, and what those of SHARING share, where they share anything."""
+    """Make the blocks of all functions, and the motion of the links that two of them share.
+
+    The motion is None if the regressor and the inverse dynamics share only few values.
+    """
     names = spec.names(PYTHON.is_word)
     functions = {name: f for name, f in spec.functions.items() if not f.model.case_of}
     sharing = [functions[name] for name in SHARING]
@@ -172,8 +179,10 @@ def _laid_out(spec: ModuleSpec, block: Block) -> dict[str, object]:
 def _filled_at_once(
     steps: Sequence[Section], results: Sequence[Section]
 ) -> tuple[list[Section], list[Section]]:
-    """Steps and results, an entry without a remark that is a step filled in the line of the step,
-    equal ones in one line.
+    """Merge assignments: a result entry that equals a step is assigned in the line of the step.
+
+    Entries with the same value are assigned in one line; entries with a remark are not merged.
+    Return the sections of the steps, and the sections of the results that remain.
     """
     named = {line.partition(" = ")[0] for section in steps for line in section.lines}
     targets: dict[str, list[str]] = {}
@@ -210,8 +219,7 @@ def _filled_at_once(
 
 
 def _passed_constants(robot: Robot, names: Sequence[str]) -> str:
-    """Constants as arguments of `_evaluated`: one tuple, and one of those that are functions of
-    time.
+    """Write the constants as arguments: one tuple, and another one for functions of time, if any.
     """
     timed = [c for c in names if c in robot.channels]
     rest = tuple_of([c for c in names if c not in timed])
@@ -219,7 +227,8 @@ def _passed_constants(robot: Robot, names: Sequence[str]) -> str:
 
 
 def _outputs(spec: ModuleSpec, models: Iterable[Model]) -> list[str]:
-    """{function: (columns that it reads, names of its results)}, for CasADi, as source."""
+    """Write the table of functions for CasADi: arguments of each function and names of its results.
+    """
     names, rows = spec.names(PYTHON.is_word), {"base_parameters": ("standard", "X")}
     own = {result: names.own(result) for result in dict.fromkeys(m.result for m in models)}
     for m in models:
@@ -233,7 +242,10 @@ def _outputs(spec: ModuleSpec, models: Iterable[Model]) -> list[str]:
 
 
 def _constant_entries(f: Function, result: str) -> list[str]:
-    """Assignments of the entries that are numbers other than zero, equal ones together."""
+    """Write the assignments of the entries that are constant numbers other than zero.
+
+    Entries with the same number are assigned together.
+    """
     by_value: dict[float, list[str]] = {}
     for place, value in f.preset:
         by_value.setdefault(value, []).append(f"{result}[{', '.join(map(str, place))}]")
@@ -250,8 +262,10 @@ def _constant_entries(f: Function, result: str) -> list[str]:
 
 
 def _loop_tables(spec: ModuleSpec, slides: bool) -> Iterator[str]:
-    """The start of the loops and its assembly mode; a unit of motion for each independent joint
-    where some slide: 1 rad, and the longest length of the robot file.
+    """Yield the source lines of start configuration, assembly mode and units of the tied joints.
+
+    A unit is a typical motion of an independent joint: 1 rad, or the longest length of the robot
+    file if the joint is prismatic. Units are written only if `slides` is true.
     """
     robot, closure = spec.robot, spec.derivation.closure
     if not spec.tied:
@@ -264,7 +278,7 @@ def _loop_tables(spec: ModuleSpec, slides: bool) -> Iterator[str]:
 
 
 class Heads:
-    """First lines of public functions: signatures with hints."""
+    """Writer of the first lines of public functions: signatures with type hints."""
 
     def __init__(self, regrouping: Regrouping) -> None:
         channels = regrouping.robot.channels
@@ -281,7 +295,10 @@ class Heads:
         returns: str = "Array",
         optional: bool = False,
     ) -> str:
-        """`arguments` are arrays; those behind the first are `optional` or not."""
+        """Write the first line of a function whose `arguments` are arrays.
+
+        If `optional`, all arguments except the first may be None.
+        """
         later = f"{hint('Array | None')} = None" if optional else hint("Array")
         named = [*keywords, *self.constants]
         parameters = [f"{a}: {later if k else hint('Array')}" for k, a in enumerate(arguments)]
@@ -291,12 +308,12 @@ class Heads:
 
 
 def hint(kind: str) -> str:
-    """A hint, quoted where it names arrays, which are of any package."""
+    """Return a type hint, in quotes if it names arrays, because these may be of any package."""
     return f'"{kind}"' if "Array" in kind else kind
 
 
 def signature(start: str, parameters: Sequence[str], end: str = "") -> str:
-    """`start(parameters)end`, on as few lines as it needs."""
+    """Write a signature `start(parameters)end`, on several lines if it is too long for one line."""
     flat = f"{start}({', '.join(parameters)}){end}"
     if len(flat) <= WIDTH:
         return flat
@@ -304,8 +321,11 @@ def signature(start: str, parameters: Sequence[str], end: str = "") -> str:
 
 
 def _unpack(source: str, used: Sequence[tuple[int, str]], count: int) -> list[str]:
-    """`q1, q2 = q`, or a slice of it where those needed stand side by side; else one by one, or all
-    of them where many are.
+    """Write the lines that give names to the used entries of an array, such as `q1, q2 = q`.
+
+    `used` holds index and name of each used entry, `count` is the length of the array. Adjacent
+    entries are unpacked from one slice, others one by one. If many entries are used, the whole
+    array is unpacked.
     """
     if len(used) > MANY and used[-1][0] - used[0][0] >= len(used):
         called = dict(used)
@@ -318,7 +338,7 @@ def _unpack(source: str, used: Sequence[tuple[int, str]], count: int) -> list[st
 
 
 def unpacked(names: Sequence[str], source: str) -> list[str]:
-    """`names = source` on as many lines as it needs."""
+    """Write the assignment `names = source` of a tuple, on several lines if it is long."""
     text = ", ".join(names) + ("," if len(names) == 1 else "")
     if len(text) + len(source) + 3 < WIDTH - 4:
         return [f"{text} = {source}"]
@@ -326,7 +346,8 @@ def unpacked(names: Sequence[str], source: str) -> list[str]:
 
 
 def broken(lines: Iterable[str]) -> list[str]:
-    """Assignments, the values of those that are too long for a line in brackets."""
+    """Enclose the value of each assignment that is too long in brackets, so that it can be broken.
+    """
     return [_bracketed(line) if len(line) > WIDTH - 4 else line for line in lines]
 
 
@@ -341,7 +362,7 @@ def tuple_of(names: Sequence[object]) -> str:
 
 
 def further_arguments(names: Iterable[str]) -> str:
-    """Names as text that follows other arguments: ", D3, RL4"."""
+    """Write names so that they continue a list of arguments: ", D3, RL4"."""
     return "".join(f", {name}" for name in names)
 
 
@@ -350,13 +371,15 @@ def _symbols(expressions: Iterable[Expression]) -> set[str]:
 
 
 def source(e: Expression) -> str:
-    """A constant expression as source, numbers as floats."""
+    """Write a constant expression as Python source; a plain number becomes a float."""
     return repr(float(e.constant)) if e.constant is not None else PYTHON.expression(e)
 
 
 def _moving(robot: Robot, closure: Closure) -> list[str]:
-    """Entries {frame: (antecedent, sigma, ((column, rate), ...))}: how the actuated joints move
-    the joint of each frame.
+    """Write the table of how the independent joints move the joint of each frame, as Python source.
+
+    Entries are {frame: (antecedent, sigma, ((column, rate), ...))}. The rate is the velocity of the
+    joint per velocity of the independent joint that the column counts.
     """
     column = {j: k for k, j in enumerate(closure.independent)}
     entries = []
@@ -368,7 +391,10 @@ def _moving(robot: Robot, closure: Closure) -> list[str]:
 
 
 def _passive_rows(robot: Robot, closure: Closure) -> list[str]:
-    """(origin, rates) of each passive joint over the independent ones, as source."""
+    """Write each passive joint as a linear function of the independent joints, as Python source.
+
+    A row is (position at zero, rate for each independent joint).
+    """
     rows = []
     for j in robot.passive:
         rates = [source(closure.row[j].get(i, ZERO)) for i in closure.independent]
@@ -377,7 +403,11 @@ def _passive_rows(robot: Robot, closure: Closure) -> list[str]:
 
 
 def _element_lines(robot: Robot) -> list[str]:
-    """Entries {parameter: (kind, direction of motion, row or form)} of the elements, as source."""
+    """Write the table of elements (friction, springs, ...) as Python source.
+
+    Entries are {parameter: (kind, direction of motion, row or form)}. The row is linear, the form
+    quadratic in the joint motions.
+    """
     entries = []
     for name, (e, j) in element_names(robot).items():
         text = ", ".join(f"{at}: {source(g)}" for at, g in acting(e, j).items())

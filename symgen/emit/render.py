@@ -1,4 +1,4 @@
-"""Text from templates: the only place where jinja2 lays out an emitted file."""
+"""Layout of emitted files: the only module that fills in jinja2 templates of source files."""
 
 from __future__ import annotations
 
@@ -22,14 +22,17 @@ def _environment() -> Environment:
 
 
 def laid_out(template: str, context: Mapping[str, object]) -> str:
-    """The text of `templates/<template>.jinja` with the values of `context`, in lines that fit."""
+    """Fill in `templates/<template>.jinja` with the values of `context`; break lines that are too
+    long.
+    """
     text = _environment().get_template(f"{template}.jinja").render(context)
     return "\n".join(_lines_that_fit(text.split("\n"), template.endswith((".c", ".h"))))
 
 
 def _lines_that_fit(lines: Iterable[str], in_c: bool) -> Iterator[str]:
-    """Lines of at most WIDTH columns: long ones go on, indented, behind a space that may end
-    one.
+    """Yield the lines, with each line longer than WIDTH columns broken at a space.
+
+    A line stays long if it has no space at which the language allows a break.
     """
     in_text = False
     for line in lines:
@@ -44,8 +47,10 @@ def _lines_that_fit(lines: Iterable[str], in_c: bool) -> Iterator[str]:
 
 
 def _end(line: str, in_text: bool) -> int:
-    """Where a line may end: the last space within WIDTH, in code outside strings and in
-    brackets.
+    """Find the column at which a line may be broken: its last space within WIDTH columns.
+
+    In code, only spaces inside brackets and outside strings count. The result is 0 without such a
+    space.
     """
     start = len(line) - len(line.lstrip())
     free = in_text or line[start:].startswith("# ")

@@ -1,5 +1,8 @@
-"""What the text of a robot has to say, as data without text: its models as values of a graph, what
-each of them reads, its constant entries, its costs. Made once, printed by every target.
+"""The models of a robot as data, before a printer writes them as source code.
+
+For each model: its entries as nodes of an expression graph, the states and parameters that they
+depend on, its constant entries, and its number of operations. The data are made once; every target
+prints them.
 """
 
 from __future__ import annotations
@@ -24,16 +27,17 @@ STATES = {"q": "q", "qd": "QP", "qdd": "QDP", "qdr": "QPR", "qddr": "QDPR"}
 
 @dataclass(frozen=True)
 class Function:
-    """One function: a model over the base parameters, and the array that it fills.
+    """One function of the emitted code: a model of the robot over its base parameters.
 
     Attributes
     ----------
     model : Model
-        What it evaluates.
+        Model that the function computes, such as the inverse dynamics.
     values : Values
-        Its entries.
+        Entries of the result as expressions.
     shape : tuple of int
-        Of its result without samples; column by column, (b, n), where the model is stored so.
+        Shape of the result for one sample. A model that is stored column by column has its axes
+        reversed: (b, n) for the regressor.
     """
 
     model: Model
@@ -42,12 +46,13 @@ class Function:
 
     @cached_property
     def nodes(self) -> list[Node]:
-        """The operations that its entries need."""
+        """Nodes of the expression graph that the entries depend on: inputs, constants, operations.
+        """
         return reachable(self.values.outputs)
 
     @cached_property
     def inputs(self) -> set[Symbol]:
-        """The symbols that its entries need."""
+        """Symbols that the entries depend on: states, parameters and constants."""
         return {node.value for node in self.nodes if node.op == SYM}
 
     def reads(self, kind: str) -> bool:
@@ -55,17 +60,26 @@ class Function:
 
     @property
     def states(self) -> tuple[str, ...]:
-        """The states that the function reads; among them G, the rates of the tied joints."""
+        """States that the function depends on, among q, qd, qdd, qdr, qddr and G.
+
+        G holds the derivatives of the tied joint positions by the actuated joint positions.
+        """
         kinds = {**{state: state for state in STATES}, "G": "rate"}
         return tuple(state for state, kind in kinds.items() if self.reads(kind))
 
     def constants(self, free: Iterable[str]) -> tuple[str, ...]:
-        """The names in `free` that the function reads, in the same order."""
+        """Select from the names `free` the constants that the function depends on, in the given
+        order.
+        """
         read = {symbol.name for symbol in self.inputs if symbol.kind in ("constant", "channel")}
         return tuple(name for name in free if name in read)
 
     def places(self, entry: Entry) -> tuple[Place, ...]:
-        """Where an entry stands in the array: twice beside the diagonal of a symmetric matrix."""
+        """List the indices at which an entry stands in the result array.
+
+        An entry off the diagonal of a symmetric matrix stands at two, (i, k) and (k, i). In a model
+        that is stored column by column the indices are reversed.
+        """
         mirrored = entry.place[::-1]
         if self.model.by_columns:
             return (mirrored,)
@@ -75,34 +89,37 @@ class Function:
 
     @property
     def by_place(self) -> list[tuple[Place, Entry]]:
-        """Every place with its entry, in the order of the places."""
+        """Pairs of array index and entry, sorted by index."""
         pairs = [(place, entry) for entry in self.values.entries for place in self.places(entry)]
         return sorted(pairs, key=lambda pair: pair[0])
 
     @property
     def preset(self) -> list[tuple[Place, float]]:
-        """Entries that are numbers other than zero."""
+        """Array index and value of each entry that is a constant number other than zero."""
         return [
             (p, float(e.value)) for p, e in self.by_place if isinstance(e.value, int) and e.value
         ]
 
     @property
     def computed(self) -> list[Entry]:
-        """Entries that are no numbers, in the order of their places read from the right."""
+        """Entries that the code must compute because they are not constant numbers."""
         return [entry for entry in self.values.entries if isinstance(entry.value, Scalar)]
 
     def count(self, op: str) -> int:
-        """Operations that depend on the sample; those of constants and parameters are none."""
+        """Count the operations of kind `op` that depend on the sample.
+
+        Operations on constants and parameters alone are not counted.
+        """
         return sum(node.op == op and not node.fixed for node in self.nodes)
 
     @property
     def operations(self) -> tuple[int, int]:
-        """(multiplications, additions) per sample."""
+        """Number of multiplications and number of additions per sample."""
         return self.count(MUL), self.count(ADD)
 
     @property
     def cost(self) -> str:
-        """Operations per sample."""
+        """Text with the numbers of multiplications, additions, sines and cosines per sample."""
         return (
             f"{self.count(MUL)} multiplications, {self.count(ADD)} additions, "
             f"{self.count(SIN)} sin, {self.count(COS)} cos"
@@ -111,14 +128,16 @@ class Function:
 
 @dataclass(frozen=True)
 class Signals:
-    """The distinct entries of a function up to sign.
+    """The distinct entries of a function; x and -x count as the same entry.
 
     Attributes
     ----------
     entries : tuple of Entry
-        The first of each, its sign as it stands there, with the comments of all.
+        For each distinct value the first entry that has this value or its negative. Its comment
+        joins the comments of all these entries.
     places : tuple of (place, signal, sign)
-        Every place of the array that is not zero.
+        Array index of every entry, the number of its value in `entries`, and the sign by which this
+        value is multiplied.
     """
 
     entries: tuple[Entry, ...]
@@ -126,7 +145,10 @@ class Signals:
 
 
 def signals(f: Function, entries: Sequence[Entry]) -> Signals:
-    """The signals of some entries of a function; numbers among them are 0, 1 and -1."""
+    """Collect the distinct values of some entries of a function; x and -x count as one value.
+
+    Entries that are plain numbers must be 0, 1 or -1.
+    """
     number: dict[tuple[str, int], tuple[int, int]] = {}  # node or number: signal, its sign
     distinct: list[Entry] = []
     places = []
@@ -148,7 +170,7 @@ def signals(f: Function, entries: Sequence[Entry]) -> Signals:
 
 @dataclass(frozen=True, eq=False)
 class ModuleSpec:
-    """The functions of a robot over its base parameters."""
+    """All functions of the emitted code of one robot, as data that any target can print."""
 
     derivation: Derivation
     regrouping: Regrouping
@@ -160,25 +182,39 @@ class ModuleSpec:
 
     @property
     def tied(self) -> tuple[int, ...]:
-        """Passive joints that only the closure equations tie to the actuated ones."""
+        """Passive joints whose positions only the closure equations define, not an explicit
+        formula.
+        """
         return self.derivation.closure.tied
 
     @cached_property
     def structure(self) -> tuple[tuple[bool, ...], ...]:
-        """[k][row]: whether base parameter k acts on a joint: D is not identically zero there."""
+        """Table structure[k][row]: whether base parameter k can act on the actuated joint of that
+        row.
+
+        It can act if the entry of the regressor D is not identically zero.
+        """
         b, n = self.functions["regressor"].shape
         acts = {place for place, e in self.functions["regressor"].by_place if e.value != 0}
         return tuple(tuple((k, row) in acts for row in range(n)) for k in range(b))
 
     @property
     def sizes(self) -> dict[str, int]:
-        """Actuated, tied, independent joints n, m, k; base, standard parameters b, p; frames."""
+        """Numbers of joints, parameters and frames by name: n, m, k, b, p, frames.
+
+        n actuated joints, m tied joints, k = n + m independent joints, b base parameters, p
+        standard parameters.
+        """
         n, m = len(self.robot.joints), len(self.tied)
         p, frames = len(self.robot.parameters), len(self.robot.frames)
         return {"n": n, "m": m, "k": n + m, "b": len(self.regrouping), "p": p, "frames": frames}
 
     def names(self, is_word: Callable[[str], bool] = lambda name: False) -> Namespace:
-        """The names of one text of this robot."""
+        """Make the table of used names for one source text, so that no two quantities get the same
+        name.
+
+        `is_word` tests whether the language reserves a name.
+        """
         robot = self.robot
         own = (*robot.constants, *robot.parameters, *self.regrouping.names)
         return Namespace(own, is_word)
@@ -189,8 +225,9 @@ SHARING = ("regressor", "inverse_dynamics")
 
 
 def module_spec(regrouping: Regrouping, options: Sequence[str] = ()) -> ModuleSpec:
-    """Every model of an emitted module, over the base parameters of `regrouping`, and those that
-    `options` ask for.
+    """Make all functions of the emitted code of a robot, over the base parameters of `regrouping`.
+
+    Models on request are included if `options` names them.
     """
     d = derive(regrouping.robot)
     printed = [
@@ -215,8 +252,10 @@ def function(
     only: Callable[[str], bool] = lambda own: True,
     graph: Rewrite | None = None,
 ) -> Function:
-    """A model over the base parameters that are called after a standard parameter with `only`; in
-    the `graph` of other models, of all parameters, where one is given.
+    """Make one function: a model over the base parameters.
+
+    Only base parameters named after a standard parameter for which `only` is true take part.
+    `graph` is an expression graph that several models share; it needs all parameters.
     """
     d, model, request = derive(regrouping.robot), MODELS[name], _request(regrouping, only)
     shape = shape_of(model, d, tuple(request.parameters.values()))
@@ -228,25 +267,29 @@ def _request(regrouping: Regrouping, only: Callable[[str], bool] = lambda own: T
 
 
 def shape_of(model: Model, d: Derivation, parameters: tuple[str, ...]) -> tuple[int, ...]:
-    """The shape of the array without samples."""
+    """Return the shape of the result of a model for one sample."""
     shape = tuple(len(labels(d, axis, parameters)) for axis in model.axes)
     return shape[::-1] if model.by_columns else shape
 
 
 @lru_cache(maxsize=2)
 def spec_of(robot: Robot, options: tuple[str, ...] = ()) -> ModuleSpec:
-    """The models of a robot over its base parameters; kept, since its module and its C file are
-    asked for one after the other.
+    """Make all functions of the emitted code of a robot, with a cache.
+
+    The cache saves time if the Python module and the C file of a robot are made one after the
+    other.
     """
     return module_spec(regroup(robot), options)
 
 
 def is_inertial(robot: Robot) -> Callable[[str], bool]:
-    """Whether a standard parameter is one of the ten of a link."""
+    """Return a test whether a standard parameter is one of the ten inertial parameters of a link.
+    """
     return inertial_names(robot).__contains__
 
 
 def is_inertial_or_actuator(robot: Robot) -> Callable[[str], bool]:
-    """Whether a standard parameter is inertial or the inertia of an actuator."""
+    """Return a test whether a standard parameter is an inertial parameter or an actuator inertia.
+    """
     inertial, elements = inertial_names(robot), element_names(robot)
     return lambda own: own in inertial or elements[own][0].kind == "inertia"

@@ -1,5 +1,6 @@
-"""The targets: what is emitted, under which file name, and for which robots. Light: nothing is
-derived or printed here.
+"""Targets of the code generator: the kinds of files it can write, their names, and their limits.
+
+Nothing is derived or printed here, so that the import of this module is fast.
 """
 
 from __future__ import annotations
@@ -9,18 +10,19 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Target:
-    """One use of an emitted file.
+    """One kind of file that the code generator can write, such as a NumPy module or a C file.
 
     Attributes
     ----------
     file : str
-        Name of the file, {} for the robot.
+        Name of the file; {} stands for the name of the robot.
     language : str
-        What it is written for.
+        Language of the file, or the arrays for which it is written.
     use : str
-        How the file {} of a robot is used.
+        Message that tells the user how to use the file; {} stands for the name of the robot.
     iterates : bool
-        Whether it serves joints that only the closure equations tie, by iteration.
+        Whether the file can find the positions of tied joints by iteration. Tied joints are joints
+        whose positions only the closure equations define.
     """
 
     file: str

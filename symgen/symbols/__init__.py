@@ -1,8 +1,7 @@
-"""Models as symbols: closed forms factored by parameter, the recursion as a list of equations.
+"""Symbolic models of a robot, as closed forms or as recursions, in SymPy, LaTeX, MathML or text.
 
-SymPy, LaTeX, MathML, text.
-
-The recursions of `derive` give every model as nodes of one graph, as they do for emitted modules. A
-closed form multiplies the graph out (`expansion`), a listing reads its steps in their order
-(`listing`); both are written by SymPy's printers with the letters of the literature (`printers`).
+The recursions of `derive` give every model as one computation graph, the same graph that emitted
+modules are written from. A closed form expands the graph and factors the result by parameter
+(`expansion`). A listing gives the recursion as equations, in the order in which they are computed
+(`listing`). Both are written by SymPy's printers with the letters of the literature (`printers`).
 """

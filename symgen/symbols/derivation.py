@@ -1,4 +1,7 @@
-"""The source of symbolic models: a robot, its parameters, its closure, and the values given for symbols."""
+"""The source of symbolic models: a robot, its parameters, its closure, and given values of symbols.
+
+The closure gives the joint positions of a closed loop as functions of the independent ones.
+"""
 
 from __future__ import annotations
 
@@ -38,21 +41,22 @@ class Source:
     Attributes
     ----------
     robot : Robot
-        The robot; numbers that were given replace its constants.
+        The robot; given numbers replace its constants.
     closure : Closure
-        Each joint as a function of the independent ones. Passive joints that stay symbols count as
-        tied.
+        Each joint as a function of the independent ones. A passive joint that stays a symbol counts
+        as a joint that only the closure equations determine.
     relations : Closure
-        The relations of the passive joints. They differ from `closure` where all passive joints
-        stay symbols.
+        The relations of the passive joints. They differ from `closure` if all passive joints stay
+        symbols.
     own : mapping
-        Symbol of each parameter, by the standard parameter whose column of the regressor it has.
+        Symbol of each parameter, by the name of the standard parameter that has the same column in
+        the regressor.
     formulas : mapping
-        What each parameter is made of, by its symbol.
+        Each parameter as a combination of standard parameters, by its symbol.
     given : mapping
-        Values in the place of symbols, by symbol.
+        Values that replace symbols, by symbol.
     kind : str
-        base or standard.
+        Kind of the parameters, base or standard.
     """
 
     robot: Robot
@@ -69,13 +73,19 @@ class Source:
 
     @cached_property
     def derivation(self) -> Derivation:
-        """The derivation of the robot. Passive joints that stay symbols are treated as independent."""
+        """The derivation of the robot.
+
+        Passive joints that stay symbols are treated as independent joints.
+        """
         if self.closure is self.relations:
             return derive(self.robot)
         return derived(self.robot, open_tree)
 
     def request(self, of: int = 0, frame: int = 0) -> Request:
-        """The request that derives a model with these parameters and the given values."""
+        """Make the request for a model of frame `of` in components of frame `frame`.
+
+        It holds the parameters and the given values.
+        """
         inputs: dict[Symbol, Input] = {}
         for kind, letter in (("q", "q"), ("qd", "QP"), ("qdd", "QDP")):
             for j in self.robot.moving:
@@ -91,7 +101,11 @@ class Source:
         return Request(self.own, of, frame, inputs)
 
     def _rate(self, u: int, i: int, algebra: GraphAlgebra) -> Scalar:
-        """dq_u/dq_i: the number of a linear relation, a symbol where only the closure equations give it."""
+        """Compute the rate dq_u/dq_i of passive joint u with respect to independent joint i.
+
+        It is a number if a linear relation gives q_u. Rates of joints that only the closure
+        equations determine enter as symbols.
+        """
         row, tied = self.relations.row[u], self.relations.tied
         steps = {k: algebra.rate(k, i) if k in tied else int(k == i) for k in row}
         return linear(algebra, row, steps)
@@ -104,9 +118,10 @@ def source_of(
     passive: str | None = None,
     regrouping: Regrouping | None = None,
 ) -> Source:
-    """The robot with what was asked, see `symgen.symbolic`.
+    """Collect everything that the symbolic models of a robot are derived from.
 
-    `regrouping` is that of the robot if it is known already.
+    The parameters are explained in `symgen.symbolic`. `regrouping` is the regrouping of the robot,
+    if it is already computed.
     """
     _one_of("parameters", parameters, PARAMETERS)
     formulas: dict[str, Formula]
@@ -151,7 +166,10 @@ def _one_of(what: str, given: str, known: Iterable[str]) -> None:
 def _parsed(
     robot: Robot, parameters: Iterable[str], values: Mapping[str, Any]
 ) -> dict[str, Expression]:
-    """Values as exact expressions over pi and the constants of the robot, read by the grammar of robot files."""
+    """Convert the given values to exact expressions in pi and the constants of the robot.
+
+    A text is parsed by the grammar of robot files.
+    """
     moving = [f"{state}{j}" for state in ("q", "QP", "QDP") for j in robot.moving]
     known = [*robot.constants, *moving, *parameters]
     result = {}

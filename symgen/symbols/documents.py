@@ -1,8 +1,9 @@
-"""Models as documents: text, LaTeX, lines of SymPy, plain values for JSON, and the MathML of a robot's page; in closed form or as recursion.
+"""Printed models in closed form or as recursion: text, LaTeX, Python with SymPy, JSON, or MathML.
 
-LaTeX uses amsmath alone; velocities are \\dot{q}, accelerations \\ddot{q}, torques \\Gamma;
-intermediates of a recursion keep the names of SYMORO. Long formulas are cut before + and -, outside
-of brackets first, inside where a term is wider than a line.
+MathML is for the HTML page of a robot. LaTeX needs amsmath alone; velocities are \\dot{q},
+accelerations \\ddot{q}, torques \\Gamma; intermediate variables of a recursion keep the names of
+SYMORO. Long formulas are broken before + and -: outside of brackets first, and inside if a term is
+wider than a line.
 """
 
 from __future__ import annotations
@@ -86,8 +87,10 @@ EXPANDED = 2000  # terms that are multiplied out to see
 
 
 def printed(model: SymbolicModel, form: str, language: str) -> str:
-    """A model as text, latex, sympy or json, in closed or recursive form. Raises SymgenError if
-    the form has too many terms or is none.
+    """Print a model in a form (closed or recursive) and a format (text, latex, sympy, json, ...).
+
+    Raises SymgenError if the form or the format is unknown, or if the model does not have this form
+    or has too many terms in it.
     """
     for what, given, known in (("form", form, FORMS), ("format", language, FORMATS)):
         if given not in known:
@@ -98,7 +101,7 @@ def printed(model: SymbolicModel, form: str, language: str) -> str:
 
 @dataclass(frozen=True)
 class Formulas:
-    """A model as formulas: text where it is printed, typeset in a notebook."""
+    """Formulas of a model: printed as text, shown as typeset formulas in a notebook."""
 
     model: SymbolicModel
     form: str
@@ -113,9 +116,9 @@ class Formulas:
 
 
 def closed_texts(model: SymbolicModel) -> dict[str, str]:
-    """{label: value} of the entries that are not zero.
+    """Return the nonzero entries of the closed form as text, by label, for instance A(1,2).
 
-    The numerators where the model has a denominator.
+    If the model has a denominator, these are the numerators.
     """
     entries = model.closed.entries
     return {model.label(p): plain(entries[p]) for p in model.places if p in entries}
@@ -125,7 +128,11 @@ def closed_texts(model: SymbolicModel) -> dict[str, str]:
 
 
 def notes(model: SymbolicModel) -> list[str]:
-    """Sentences without which a model cannot be read: its parameters, what is left out, its passive joints."""
+    """List the sentences that explain a printed model.
+
+    They name its parameters, the values that replace symbols, the entries that are not shown, the
+    denominator and the passive joints.
+    """
     source = model.source
     lines = []
     if model.model.reads_X or "parameters" in model.model.axes:
@@ -141,7 +148,11 @@ def notes(model: SymbolicModel) -> list[str]:
 
 
 def passive_notes(model: SymbolicModel) -> list[str]:
-    """Which passive joints are functions, which are symbols and where their equations are."""
+    """Describe how each passive joint is determined: by a formula or by the closure equations.
+
+    If only the closure equations determine the joint, its position and its rates are symbols in the
+    model.
+    """
     source = model.source
     robot, closure, relations = source.robot, source.closure, source.relations
     lines = []
@@ -164,7 +175,7 @@ def passive_notes(model: SymbolicModel) -> list[str]:
 
 
 def angle_lines(angles: Mapping[str, Expression]) -> list[str]:
-    """C23 = cos(q2 + q3), S23 = sin(q2 + q3), ..."""
+    """Write the meaning of the symbols C and S, for instance "C23 = cos(q2 + q3)"."""
     told = ", ".join(
         f"{name} = {'cos' if name[0] == 'C' else 'sin'}({e})".replace(" ", "\0")
         for name, e in angles.items()
@@ -176,12 +187,16 @@ def angle_lines(angles: Mapping[str, Expression]) -> list[str]:
 
 
 def text(model: SymbolicModel, form: str) -> str:
-    """Title, conventions, then a line per entry, or per equation of the recursion."""
+    """Write a model as plain text: title, summary, notes, then its entries or its recursion."""
     return "\n".join([model.title, model.summary, *notes(model), "", *text_lines(model, form)])
 
 
 def text_lines(model: SymbolicModel, form: str) -> list[str]:
-    """The angles and the entries of a closed form, or the equations of the recursion under their headings."""
+    """Write the formulas of a model as lines of text.
+
+    For the closed form these are the angles and the entries, for the recursion its equations under
+    their headings.
+    """
     if form == "closed":
         closed = model.closed
         texts = closed_texts(model)
@@ -211,7 +226,11 @@ def text_lines(model: SymbolicModel, form: str) -> list[str]:
 def broken_lines(
     head: str, formula: str, width: int, hanging: str, measure: Callable[[str], int] = len
 ) -> list[str]:
-    """`head` with as much of the formula as fits, then lines that begin with `hanging`."""
+    """Break a formula before + or - into lines of at most `width` characters, if possible.
+
+    The first line starts with `head`, every other line with `hanging`; `measure` gives the printed
+    width of a text.
+    """
     done: list[str] = []
     line, empty = head, True
     for piece in pieces(formula, width, measure):
@@ -226,7 +245,10 @@ def broken_lines(
 def pieces(
     formula: str, width: int, measure: Callable[[str], int] = len, depth: int = 0
 ) -> Iterator[str]:
-    """The formula cut before every + and - at `depth` brackets, pieces that are wider than `width` cut further in."""
+    """Yield the terms of a formula, cut before each + or - that at most `depth` brackets enclose.
+
+    A term that is wider than `width` is cut again, one bracket deeper.
+    """
     for piece in _cut(formula, depth):
         if measure(piece) <= width or depth > 8:
             yield piece
@@ -249,7 +271,7 @@ def _cut(text: str, deepest: int) -> Iterator[str]:
 
 
 def latex_lines(model: SymbolicModel, form: str) -> dict[str, list[str]]:
-    """{heading: lines `left &= right`}."""
+    """Write the equations of a model in LaTeX as lines `left &= right`, by heading."""
     if form == "closed":
         closed = model.closed
         values, listing = closed.entries, None
@@ -276,7 +298,11 @@ def latex_lines(model: SymbolicModel, form: str) -> dict[str, list[str]]:
 def recursion(
     model: SymbolicModel,
 ) -> tuple[dict[str, list[tuple[str, Tree]]], dict[tuple[int, ...], Tree]]:
-    """Equations (name, value) under their headings, and the entries of the model by place."""
+    """Return the recursion of a model as SymPy expressions.
+
+    The first value holds the equations (name, expression) by heading, the second the entries of the
+    model by their indices.
+    """
     listing = model.listing
     objects = Objects(partial(expressions.product, factors=()))
     steps, outputs = listing.steps(objects, expressions.symbol)
@@ -288,7 +314,7 @@ def recursion(
 
 
 def latex_label(model: SymbolicModel, place: Sequence[int]) -> str:
-    """The name of an entry."""
+    """Write the name of an entry of a model in LaTeX, for instance A with subscript 1,2."""
     if model.model.axes == ("parameters",):
         return latex_symbol(model.source.parameters[place[0]])
     letter = model.model.latex or rf"\mathbf{{{model.model.letter}}}"
@@ -302,12 +328,12 @@ def latex_label(model: SymbolicModel, place: Sequence[int]) -> str:
 
 
 def latex_fragment(model: SymbolicModel, form: str) -> str:
-    """The formulas alone, for a document of one's own that has amsmath."""
+    """Write only the formulas of a model in LaTeX, for a document that loads amsmath."""
     return "\n".join(map(aligned, latex_lines(model, form).values()))
 
 
 def latex_document(model: SymbolicModel, form: str) -> str:
-    """A document that compiles: frame table, conventions, formulas."""
+    """Write a complete LaTeX document of a model: frame table, conventions, formulas."""
     body = "\n".join(
         rf"\subsection*{{{escaped(title)}}}" + "\n" + aligned(lines)
         for title, lines in latex_lines(model, form).items()
@@ -322,7 +348,10 @@ def latex_document(model: SymbolicModel, form: str) -> str:
 
 
 def formulas(definitions: Mapping[str, Formula]) -> str:
-    r"""Regrouping formulas in an `aligned` environment: ZZ_{1R} &= ZZ_{1} + I_{a1} + ..."""
+    r"""Write regrouping formulas in an `aligned` environment of LaTeX.
+
+    For instance ZZ_{1R} &= ZZ_{1} + I_{a1} + ...
+    """
     rows = (
         f"{latex_symbol(name)} &= {latex(expressions.formula(f))}"
         for name, f in definitions.items()
@@ -331,13 +360,13 @@ def formulas(definitions: Mapping[str, Formula]) -> str:
 
 
 def aligned(equations: Iterable[str], environment: str = "align*") -> str:
-    """An environment of equations `left &= right`, long ones broken."""
+    """Put equations `left &= right` into a LaTeX environment; long equations are broken."""
     rows = [" \\\\\n".join(broken(line)) for line in equations]
     return f"\\begin{{{environment}}}\n" + " \\\\\n".join(rows) + f"\n\\end{{{environment}}}"
 
 
 def broken(line: str) -> list[str]:
-    """`left &= right`, broken into as many lines as needed."""
+    """Break an equation `left &= right` into as many lines as needed."""
     left, _, right = line.partition(" &= ")
     if width(line) > LATEX_WIDTH:  # brackets that grow cannot be broken
         right = re.sub(r"\\(left|right)\b", "", right)
@@ -345,25 +374,31 @@ def broken(line: str) -> list[str]:
 
 
 def width(text: str) -> int:
-    """Characters as they are printed, about."""
+    """Count the characters of a LaTeX text as they are printed, about."""
     return len(
         re.sub(r"\\(mathbf|operatorname|dot|ddot|left|right|frac|quad|,)|[{}^_&\\]", "", text)
     )
 
 
 def escaped(text: str) -> str:
-    """Plain text in LaTeX; what not every font of it has by \\other, which PREAMBLE defines."""
+    """Escape plain text for LaTeX.
+
+    A letter that many fonts lack is written by the command \\other, which PREAMBLE defines.
+    """
     return "".join(_SPECIAL.get(c) or _written(c) for c in text)
 
 
 def _written(c: str) -> str:
-    """A letter, with its number if it has one."""
+    """Write a character: common ones unchanged, any other by \\other with its Unicode number."""
     common = (c < "\u0180" and c not in "ĦħĸĿŀŉŦŧſ") or c in "–—‘’“”„…•€"
     return c if common else rf"\other{{{ord(c):04X}}}{{{c}}}"
 
 
 def document(title: str, summary: str, robot: Robot, notes: Sequence[str], body: str) -> str:
-    """A document that compiles by itself: the frame table, the conventions, then `body`."""
+    """Write a LaTeX document that compiles by itself.
+
+    It holds the frame table, the direction of gravity, the notes, then `body`.
+    """
     kept = informative_columns(robot)
     head = " & ".join(f"${HEADINGS.get(c, c)}$" for c in kept)
     rows = [" & ".join(f"${cell(getattr(f, c))}$" for c in kept) + r" \\" for f in robot.frames]
@@ -398,7 +433,7 @@ def document(title: str, summary: str, robot: Robot, notes: Sequence[str], body:
 
 
 def cell(value: object) -> str:
-    """A cell of the frame table."""
+    """Write a value of the frame table in LaTeX."""
     return latex(expressions.expression(value)) if isinstance(value, Expression) else str(value)
 
 
@@ -406,7 +441,7 @@ def cell(value: object) -> str:
 
 
 def sympy_lines(model: SymbolicModel, form: str) -> str:
-    """Python that makes the model with SymPy; symbols are real, numbers exact."""
+    """Write Python code that builds the model with SymPy: real symbols, exact numbers."""
     if form == "closed":
         steps: list[tuple[Any, Any]] = []
         value = of_model(model)
@@ -419,7 +454,11 @@ def sympy_lines(model: SymbolicModel, form: str) -> str:
 
 
 def json_text(model: SymbolicModel, form: str) -> str:
-    """Plain values: labels of the axes, entries or equations as text, meaning of C and S, notes on passive joints."""
+    """Write a model as JSON text.
+
+    It holds the labels of rows and columns, the entries or the equations as text, the meaning of C
+    and S, the notes and the frame table.
+    """
     robot = model.source.robot
     values: dict[str, Any] = {
         "name": robot.name,
@@ -450,7 +489,11 @@ def json_text(model: SymbolicModel, form: str) -> str:
 
 @dataclass(frozen=True)
 class ShownModel:
-    """A model on a page: in closed form `entries` (label, terms), else the equations of its recursion under their headings in `steps`."""
+    """A model as shown on the HTML page of a robot.
+
+    A closed form has its `entries` (label, terms). Any other model has in `steps` the equations of
+    its recursion under their headings.
+    """
 
     title: str
     summary: str
@@ -461,7 +504,10 @@ class ShownModel:
 
 
 def shown_models(regrouping: Regrouping) -> tuple[list[ShownModel], list[str]]:
-    """The models of a robot's page, each in the form that can be read, and what is to be known of its passive joints."""
+    """Prepare the models of a robot for its HTML page, and the notes on its passive joints.
+
+    A short closed form is shown as such, a long one as recursion.
+    """
     robot = regrouping.robot
     source = source_of(robot, regrouping=regrouping)
     request = source.request(robot.frames[-1].j, 0)
@@ -474,7 +520,7 @@ def shown_models(regrouping: Regrouping) -> tuple[list[ShownModel], list[str]]:
 
 
 def _shown(model: SymbolicModel) -> ShownModel | None:
-    """None if the robot has neither form of the model."""
+    """Prepare one model for the page; None if the robot has neither form of the model."""
     title = model.model.name.replace("_", " ")
     try:
         closed = model.closed

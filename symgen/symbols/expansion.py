@@ -1,10 +1,12 @@
-"""Closed forms: the graph of a model multiplied out, then collected by parameter,
+"""Closed forms of a model: its computation graph is expanded, then collected by parameter.
 
-    entry = sum_k common_k inside_k chi_k ,
+    entry = sum_k common_k inside_k chi_k
 
-common_k the factors that all terms of a coefficient share. Polynomials are SymPy's, sparse: in the
-parameters over K, and K in cosines and sines, constants, positions of slides and rates. Numbers of
-K are ints where they are whole, which is far faster than QQ, else fractions: rings take both.
+Here chi_k is a parameter, common_k the factors that all terms of its coefficient share, inside_k
+the bracket that is left. The polynomials are SymPy's sparse ones, in the parameters. Their
+coefficients are polynomials of a ring K in cosines and sines, constants, positions of prismatic
+joints, and rates. Numbers of K are ints if they are whole, else fractions. SymPy's rings accept
+both, and ints are far faster than the rationals QQ.
 """
 
 from __future__ import annotations
@@ -35,22 +37,22 @@ CONSTANT, SLIDE, TURN, RATE, DIRECTION = 1, 2, 3, 4, 5  # ranks: the order of fa
 
 
 class TooManyTermsError(SymgenError):
-    """A polynomial with more terms than the limit."""
+    """Error raised if a polynomial has more terms than the limit."""
 
 
 class Expansion:
-    """Polynomials of the nodes of one graph.
+    """Values of one computation graph, expanded as polynomials in the parameters.
 
     Parameters
     ----------
     algebra : GraphAlgebra
-        Where the graph came from: what its angles are.
+        The algebra that made the graph, with the angles of the graph.
     parameters : sequence of str
-        Symbols by which entries are collected, in their order.
+        Symbols by which the entries are collected, in their order.
     outputs : sequence
-        Values of the graph that polynomials are asked of.
+        Values of the graph whose polynomials are needed.
     limit : int
-        Terms that a polynomial may have. Raises TooManyTermsError beyond.
+        Largest number of terms of a polynomial. TooManyTermsError is raised beyond.
     """
 
     def __init__(
@@ -98,7 +100,10 @@ class Expansion:
     # --- generators ---
 
     def _names(self, taken: set[str]) -> dict[Angle, tuple[Tree, Tree]]:
-        """Names of the cosine and the sine of every angle of the graph."""
+        """Name the cosine and the sine of every angle of the graph, for instance C23 and S23.
+
+        A name that a parameter or a constant of the robot already has gets an underscore.
+        """
         names: dict[Angle, tuple[Tree, Tree]] = {}
         for node in self.algebra.graph.nodes:
             if not isinstance(node.value, Angle):
@@ -112,7 +117,11 @@ class Expansion:
         return names
 
     def _generators(self, node: Node) -> Iterable[tuple[Tree, int]]:
-        """Generators of K that a node needs, with its rank."""
+        """Yield the generators of the ring K that a node adds, each with its rank.
+
+        The rank is the place of the generator in a printed product: constants first, then positions
+        of prismatic joints, cosines and sines, rates.
+        """
         name = str(node.value)
         match node.op:
             case "sym":
@@ -132,7 +141,10 @@ class Expansion:
                 yield (node.op, node.index), DIRECTION
 
     def _constant(self, node: Node) -> Expression:
-        """The constant that a square root, or the cosine or sine of a fixed angle, is; else zero."""
+        """Return the constant value of a node: a square root, or a cosine or sine of a fixed angle.
+
+        Zero if the angle depends on joint positions.
+        """
         if node.op == "sqrt":
             root: Expression = node.value
             return root
@@ -188,7 +200,7 @@ class Expansion:
     # --- arithmetic ---
 
     def of(self, x: Scalar | int) -> Polynomial:
-        """The polynomial of a graph value, multiplied out."""
+        """Return the expanded polynomial of a value of the graph."""
         value = self.ring(x) if isinstance(x, int) else self._value[x.node.index]
         return value if isinstance(x, int) or x.sign > 0 else -value
 
@@ -209,7 +221,10 @@ class Expansion:
         return self._each(a, lambda c: c.new({m: number(Fraction(n) / 2) for m, n in c.items()}))
 
     def determinant(self, rows: Sequence[Sequence[Polynomial]]) -> Polynomial:
-        """Laplace's expansion by rows, those with most zeros first; minors are kept."""
+        """Compute the determinant of a square matrix of polynomials by Laplace's expansion.
+
+        Rows with most zeros are expanded first, and every minor is computed only once.
+        """
         size = len(rows)
         order = sorted(range(size), key=lambda k: sum(map(bool, rows[k])))
         odd = sum(order[i] > order[k] for i, k in combinations(range(size), 2)) % 2
@@ -226,13 +241,16 @@ class Expansion:
         return (-1) ** odd * minor(0, tuple(range(size)))
 
     def tidied(self, a: Polynomial) -> Polynomial:
-        """The same with every coefficient in fewer terms."""
+        """Shorten every coefficient of a polynomial by the identities of sines and cosines."""
         return self._each(a, self.identities.tidy)
 
     # --- as expressions ---
 
     def written(self, a: Polynomial) -> Tree:
-        """An entry by parameter, written short; parameters with one coefficient share it."""
+        """Write a polynomial as a short expression, collected by parameter.
+
+        Parameters that have the same coefficient, up to the sign, share one bracket.
+        """
         shared: dict[Coefficient, list[Tree]] = {}
         signs: dict[Coefficient, int] = {}
         for monomial in sorted(a, key=lambda m: (any(m), [-n for n in m])):
@@ -249,5 +267,5 @@ class Expansion:
 
 
 def length(a: Polynomial) -> int:
-    """Number of terms of `a` after expansion."""
+    """Count the terms of an expanded polynomial."""
     return sum(map(len, a.values()))

@@ -1,6 +1,7 @@
-"""SymPy expressions that stay as they are written: sums in their order, products factored.
+"""SymPy expressions that keep their written form: sums in their order, products factored.
 
-SymPy's printers write them so with order="none"; `evaluated` makes ordinary objects of them.
+SymPy's printers print them unchanged with order="none". `evaluated` converts them to ordinary SymPy
+objects.
 """
 
 from __future__ import annotations
@@ -22,28 +23,28 @@ MINUS = sympy.S.NegativeOne
 
 
 class Parameter(sympy.Symbol):  # type: ignore[misc]
-    """A parameter in a formula, which MathML names in `data-p`."""
+    """Symbol of a parameter in a formula; MathML marks it with the attribute `data-p`."""
 
     __slots__ = ()
 
 
 def symbol(name: str) -> Tree:
-    """The real symbol of a name; pi is pi."""
+    """Make the real SymPy symbol of a name; the name pi gives the number pi."""
     return sympy.pi if name == "pi" else sympy.Symbol(name, real=True)
 
 
 def parameter(name: str) -> Tree:
-    """The real symbol of a parameter."""
+    """Make the real SymPy symbol of a parameter."""
     return Parameter(name, real=True)
 
 
 def rational(c: Fraction) -> Tree:
-    """A number, exact."""
+    """Convert a fraction to an exact SymPy number."""
     return sympy.Rational(c.numerator, c.denominator)
 
 
 def product(c: Fraction, factors: Iterable[Tree]) -> Tree:
-    """c times the factors, with a minus in front of the whole product."""
+    """Multiply the number c by the factors; a minus sign stays in front of the whole product."""
     written = [f for f in factors if f != 1]
     if not written:
         return rational(c) if c.denominator == 1 else signed(c, power(Number(abs(c)), 1))
@@ -53,30 +54,33 @@ def product(c: Fraction, factors: Iterable[Tree]) -> Tree:
 
 
 def signed(c: Fraction, x: Tree) -> Tree:
-    """x with the sign of c."""
+    """Return x if c is positive, else -x."""
     return x if c > 0 else negative(x)
 
 
 def negative(x: Tree) -> Tree:
-    """-x, its order kept."""
+    """Negate x without changing the order of its factors."""
     if x.is_Number:
         return -x
     return x.args[1] if is_negative(x) else sympy.Mul(MINUS, x, evaluate=False)
 
 
 def is_negative(x: Tree) -> bool:
-    """Whether x begins with a minus."""
+    """Whether the printed form of x starts with a minus sign."""
     return bool(x.is_negative if x.is_Number else x.is_Mul and x.args[0] is MINUS)
 
 
 def total(terms: Iterable[Tree]) -> Tree:
-    """Sum of the terms in their order; terms of an inner sum stay together."""
+    """Add the terms in their order. A term that is itself a sum is added term by term."""
     flat = [x for term in terms for x in (term.args if term.is_Add else (term,))]
     return sympy.Add(*flat, evaluate=False)
 
 
 def expression(e: Expression) -> Tree:
-    """A constant expression, or one linear in joint positions, in the order of its text."""
+    """Convert a constant expression, or one linear in joint positions, to a SymPy expression.
+
+    The order of its terms is the order of its printed text.
+    """
     return total(product(c, _factors(m)) for m, c in e.ordered)
 
 
@@ -85,7 +89,10 @@ def _factors(m: Monomial) -> list[Tree]:
 
 
 def power(a: str | Number | Call, n: int) -> Tree:
-    """A symbol, a function, or a number as the robot file writes it, to the power n."""
+    """Raise a symbol, a function, or a number to the power n.
+
+    A number is written as in the robot file.
+    """
     if isinstance(a, Number):
         base = sympy.Symbol(a.text)
     elif isinstance(a, str):
@@ -98,12 +105,15 @@ def power(a: str | Number | Call, n: int) -> Tree:
 
 
 def function(op: str, operands: list[Tree]) -> Tree:
-    """A function of expressions, by its name there."""
+    """Apply the function named `op` in robot files to expressions."""
     return getattr(sympy, FUNCTIONS[op].sympy)(*operands, evaluate=False)
 
 
 def formula(f: Formula) -> Tree:
-    """A regrouping formula: parameters with one coefficient share it in brackets, as in eq. (27)."""
+    """Write a regrouping formula as a SymPy expression.
+
+    Parameters with the same coefficient share it in brackets, as in eq. (27).
+    """
     terms = []
     for c, members in f.groups():
         first = members[0][0]
@@ -123,17 +133,20 @@ def formula(f: Formula) -> Tree:
 
 
 def angle(letter: str, e: Expression) -> Tree:
-    """The cosine (C) or sine (S) of an angle."""
+    """Write the cosine (letter C) or the sine (letter S) of an angle."""
     return (sympy.cos if letter == "C" else sympy.sin)(expression(e), evaluate=False)
 
 
 def equation(left: Tree, right: Tree) -> Tree:
-    """left = right."""
+    """Write the equation left = right."""
     return sympy.Eq(left, right, evaluate=False)
 
 
 def evaluated(x: Tree, values: Mapping[str, Any]) -> Any:
-    """The same as an ordinary object of SymPy, with `values` in the place of some symbols."""
+    """Convert an expression to an ordinary, evaluated SymPy object.
+
+    `values` replace some of its symbols, by name.
+    """
     if x.args:
         return x.func(*(evaluated(y, values) for y in x.args))
     if not x.is_Symbol:
@@ -144,7 +157,10 @@ def evaluated(x: Tree, values: Mapping[str, Any]) -> Any:
 
 
 def in_decimals(regrouping: Regrouping) -> Regrouping:
-    """The same formulas to be read: each coefficient without a symbol as a decimal of DIGITS digits."""
+    """Return the regrouping with numerical coefficients as decimals of DIGITS digits, for display.
+
+    Coefficients that contain symbols are not changed.
+    """
 
     def rounded(c: Expression) -> Expression:
         digits = sympy.N(evaluated(expression(c), {}), DIGITS)
@@ -159,7 +175,7 @@ def in_decimals(regrouping: Regrouping) -> Regrouping:
 
 
 def size(x: Tree) -> int:
-    """Terms as they are written."""
+    """Count the terms of an expression as written, not expanded."""
     if x.is_Add:
         return sum(map(size, x.args))
     return 1 + sum(size(y) - 1 for y in x.args) if x.is_Mul else 1

@@ -1,4 +1,4 @@
-"""Coefficients written short: common factors before brackets, as few symbols as can be."""
+"""Short forms of coefficients: common factors before brackets, as few symbols as possible."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ Powers = tuple[int, ...]  # of the generators of a ring
 
 
 class Factors:
-    """How the coefficients of one ring are written.
+    """Writer of short, factored expressions for the coefficients of one polynomial ring.
 
     Parameters
     ----------
     ring : PolyRing
-        Of the coefficients.
+        Ring of the coefficients.
     shown : sequence
-        What each generator is written as.
+        Printed expression of each generator of the ring.
     fields : sequence
-        Generators by whose powers the terms of a coefficient may be collected.
+        Groups of generators; the terms of a coefficient may be collected by their powers.
     decimals : bool
-        Whether numbers are written as decimals, since the robot file has some.
+        Whether numbers are written as decimals, because the robot file has decimals.
     """
 
     def __init__(
@@ -44,7 +44,10 @@ class Factors:
         self._labels = [*map(str, shown)]
 
     def terms(self, c: Coefficient, members: Sequence[Tree]) -> Sequence[Tree]:
-        """c times a sum of parameters, or of 1."""
+        """Multiply the coefficient c by a sum of parameters (or by 1), and write the product short.
+
+        Returns its terms: several if the product is a plain sum, else one.
+        """
         number, factors = self._shortest(c)
         factors = [*factors, *sympy.Mul.make_args(expressions.total(members))]
         factors = [x for x in factors if x != 1]
@@ -56,14 +59,16 @@ class Factors:
         return [self._product(number, factors)]
 
     def _product(self, c: Fraction, factors: Sequence[Tree]) -> Tree:
-        """c times the factors."""
+        """Write the product of the number c and the factors; c may be a decimal."""
         if self.decimals and c.denominator > 1:
             factors, c = [expressions.product(abs(c), ()), *factors], Fraction(1 if c > 0 else -1)
         return expressions.product(c, factors)
 
     def _shortest(self, c: Coefficient) -> tuple[Fraction, list[Tree]]:
-        """(number, factors) of a coefficient: all in one bracket, or a bracket for each of its
-        parts by rates, by what is no rate, or by constants, whatever has the fewest symbols.
+        """Write a coefficient with as few symbols as possible, as a number and a list of factors.
+
+        All terms are put in one bracket, or in several: one bracket for each monomial in the rates,
+        in the variables that are no rates, or in the constants.
         """
         terms = {m: c[m] for m in sorted(c, key=self._order)}
         ways = [[c], *([*self._parts(terms, fields)] for fields in self.fields)]
@@ -77,19 +82,26 @@ class Factors:
         return number * number_of_rest, [*self._powers(common), *factors]
 
     def _symbols(self, c: Coefficient) -> int:
-        """Symbols of a coefficient written with one bracket."""
+        """Count the symbols of a coefficient that is written with one bracket."""
         number, shared = _content(c), sum(map(min, zip(*c, strict=True)))
         inside = sum(sum(m) - shared + (abs(n) != number) for m, n in c.items())
         return int(inside + shared + (number != 1))
 
     def _positive(self, number: Fraction, terms: Sequence[Tree]) -> tuple[Fraction, list[Tree]]:
-        """(number, [sum of the terms]), the first one positive."""
+        """Sum the terms, with the signs chosen so that the first term is positive.
+
+        Returns the number before the sum, negated if the signs were changed, and a list with the
+        sum.
+        """
         if expressions.is_negative(terms[0]):
             number, terms = -number, [*map(expressions.negative, terms)]
         return number, [expressions.total(terms)]
 
     def _bracketed(self, c: Coefficient) -> tuple[Fraction, list[Tree]]:
-        """(number, factors) with the sum of all terms as the last factor, its first one positive."""
+        """Write a coefficient as a number and a list of factors, the last one a sum in brackets.
+
+        The first term in the bracket is positive.
+        """
         number, common, rest = self._split(c)
         terms = [
             self._product(Fraction(rest[m]), self._powers(m)) for m in sorted(rest, key=self._order)
@@ -98,25 +110,31 @@ class Factors:
         return number, [*self._powers(common), *inside]
 
     def _split(self, c: Coefficient) -> tuple[Fraction, Powers, Coefficient]:
-        """The greatest number and monomial that divide every term, and what is left."""
+        """Divide a coefficient by the greatest number and monomial that divide every term.
+
+        Returns this number, the monomial and the quotient.
+        """
         number, common = _content(c), tuple(map(min, zip(*c, strict=True)))
         over = self.ring.monomial_ldiv
         rest = {over(m, common): whole(Fraction(n) / number) for m, n in c.items()}
         return number, common, c.new(rest)
 
     def _parts(self, terms: Mapping[Powers, Any], fields: Sequence[int]) -> Iterable[Coefficient]:
-        """The terms by their powers of some generators."""
+        """Group the terms of a coefficient by their powers of the given generators.
+
+        Each group is a coefficient too.
+        """
         parts: dict[Powers, dict[Powers, Any]] = {}
         for m, value in terms.items():
             parts.setdefault(tuple(m[k] for k in fields), {})[m] = value
         return map(self.ring.zero.new, parts.values())
 
     def _order(self, m: Powers) -> tuple[Any, ...]:
-        """Order of the text: highest degree first."""
+        """Return the sorting key of a monomial in print: highest degree first, then by name."""
         return -sum(m), [(self._labels[k], -n) for k, n in enumerate(m) if n]
 
     def _powers(self, m: Powers) -> list[Tree]:
-        """The factors of a monomial."""
+        """List the factors of a monomial, powers of the printed generators."""
         return [
             x if n == 1 else sympy.Pow(x.as_base_exp()[0], n * x.as_base_exp()[1], evaluate=False)
             for x, n in zip(self.shown, m, strict=True)
@@ -125,8 +143,10 @@ class Factors:
 
 
 def _content(c: Coefficient) -> Fraction:
-    """The number that is taken out of every term: the greatest that divides all; of decimals that
-    differ none, since 0.5 x + 0.8636 y reads better than 0.0004 (1250 x + 2159 y).
+    """Return the number that is factored out of every term of a coefficient.
+
+    It is the greatest number that divides all terms. Different decimals have no common factor: 0.5
+    x + 0.8636 y is easier to read than 0.0004 (1250 x + 2159 y).
     """
     sizes = {abs(n) for n in c.values()}
     if len(sizes) > 1 and any(8 % n.denominator for n in sizes):

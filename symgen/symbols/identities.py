@@ -1,10 +1,12 @@
-"""Cosines and sines of the angles of a model: S**2 becomes 1 - C**2 at once, hence S**2 + C**2 never stays.
-`tidy` writes the other way whatever gets shorter by it:
+"""Identities between the cosines and sines of the angles of a model, to shorten its coefficients.
+
+Every S**2 is replaced by 1 - C**2 at once, so that S**2 + C**2 never remains. At the end `tidy`
+applies these identities from left to right, if the result is shorter:
 
     1 - C**2 = S**2 ,     Ca Cb - Sa Sb = C(a + b) ,     Sa Cb + Ca Sb = S(a + b) ,
 
-and the same with a - b, for the sums and differences that are angles of the model themselves: those
-of joints with parallel axes.
+and the same for a - b. A sum or difference of angles is used only if it is itself an angle of the
+model, as for joints with parallel axes.
 """
 
 from __future__ import annotations
@@ -22,14 +24,14 @@ Coefficient = Any  # of the ring of cosines, sines, constants and rates
 
 
 class Identities:
-    """Known relations between cosines and sines.
+    """The identities between the cosines and sines of one ring of coefficients.
 
     Parameters
     ----------
     ring : PolyRing
-        Of the coefficients.
+        Ring of the coefficients.
     pairs : mapping
-        (cos, sin) of each angle, generators of the ring.
+        (cos, sin) of each angle, as generators of the ring.
     """
 
     def __init__(self, ring: Any, pairs: Mapping[Angle, tuple[Coefficient, Coefficient]]) -> None:
@@ -44,7 +46,7 @@ class Identities:
         ]
 
     def reduced(self, c: Coefficient) -> Coefficient:
-        """c without squares of sines."""
+        """Replace every squared sine in the coefficient c by 1 - C**2."""
         c, times = c.copy(), self.ring.monomial_mul
         for k, less, other in self._circles:
             while squares := [m for m in c if m[k] > 1]:
@@ -56,7 +58,11 @@ class Identities:
         return c
 
     def tidy(self, c: Coefficient) -> Coefficient:
-        """The same function in fewer terms: pairs of terms are put together until none is left."""
+        """Write the coefficient c in fewer terms.
+
+        Pairs of terms that an identity turns into one term are replaced, until no such pair is
+        left.
+        """
         terms, times, over = dict(c), self.ring.monomial_mul, self.ring.monomial_div
         size = 0
         while size != len(terms):
@@ -74,7 +80,10 @@ class Identities:
         return c.new(terms)
 
     def _sums(self) -> Iterable[tuple[Coefficient, Coefficient, int, Coefficient]]:
-        """first + sign second = value."""
+        """Yield the identities `first + sign * second = value`.
+
+        Each is given as (first, second, sign, value).
+        """
         one = self.ring(1)
         for C, S in self.pairs.values():
             yield C**2, one, -1, -(S**2)
@@ -86,7 +95,10 @@ class Identities:
                 yield Sa * Cb, Ca * Sb, way, whole[1]
 
     def _whole(self, a: Angle, b: Angle, way: int) -> tuple[Coefficient, Coefficient] | None:
-        """cos and sin of a + way b, where that is an angle of the model."""
+        """Return the cosine and sine of the angle a + way b, with way 1 or -1.
+
+        None if this sum is not an angle of the model.
+        """
         turn = summed((*a.turn, *((j, way * n) for j, n in b.turn)))
         if not turn:
             return None
@@ -101,16 +113,19 @@ class Identities:
 
 
 def number(c: Fraction) -> Fraction | int:
-    """An integer if it is one."""
+    """Convert a fraction to an int if it is whole."""
     return c.numerator if c.denominator == 1 else c
 
 
 def _ends(monomial: tuple[int, ...]) -> tuple[int, int]:
-    """The first and the last generator in a monomial."""
+    """Return the indices of the first and the last generator in a monomial."""
     inside = [k for k, n in enumerate(monomial) if n]
     return inside[0], inside[-1]
 
 
 def forward(angle: Angle) -> tuple[Angle, int]:
-    """The angle with its first joint positive, and the sign of its sine."""
+    """Return the angle with a positive multiple of its first joint, and the sign of its sine.
+
+    For instance -q1 - q2 becomes q1 + q2 with the sign -1.
+    """
     return (angle, 1) if angle.turn[0][1] > 0 else (-angle, -1)

@@ -1,7 +1,8 @@
-"""The recursion of a model as equations: every intermediate in the order in which it is computed, under the names of SYMORO.
+"""The recursion of a model as a list of equations, in the order in which they are computed.
 
-What has a name of its own, and what is used more than once, has a line; everything else stands
-inside its only user: the rules of emitted code.
+Intermediate variables have the names of SYMORO. As in emitted code, an expression has an equation
+of its own if it has a name or is used more than once; any other expression is written inside the
+only equation that uses it.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from symgen.emit.printers import PLAIN, Text
 
 @dataclass(frozen=True)
 class Equation:
-    """name = expression, both as text, under the heading `section`."""
+    """An equation name = expression, both as text, under the heading `section`."""
 
     section: str
     name: str
@@ -26,18 +27,18 @@ class Equation:
 
 
 class Listing:
-    """The equations that lead to some outputs.
+    """The equations that compute the outputs of a model.
 
     Parameters
     ----------
     algebra : GraphAlgebra
-        Whose graph the outputs are of.
+        The algebra that made the graph of the outputs.
     outputs : mapping
-        Value of each entry, by its label.
+        Value of each entry of the model, by its label.
     places : sequence of tuple
-        Place of each entry in the model.
+        Indices of each entry in the model.
     parameters : iterable of str
-        Their names, which no step may have.
+        Names of the parameters, which no intermediate variable may have.
     """
 
     def __init__(
@@ -55,7 +56,7 @@ class Listing:
 
     @property
     def lines(self) -> list[Equation]:
-        """Every step, then every output that is not zero."""
+        """Equations of all intermediate variables, then those of all nonzero outputs."""
         steps = [
             Equation(section.title, *line.split(" = ", 1))
             for section in self.text.sections
@@ -71,9 +72,13 @@ class Listing:
     def steps(
         self, domain: Domain, symbol: Callable[[str], Any]
     ) -> tuple[dict[str, Any], list[Any]]:
-        """The same in other objects: {name: value} of every step, and the outputs.
+        """Evaluate the recursion in another domain, for instance as SymPy expressions.
 
-        domain : where the values of nodes are. symbol : makes one from a name.
+        Returns the value of each intermediate variable by name, and the list of the outputs. Each
+        value is in terms of the symbols of the inputs and of earlier variables.
+
+        domain : operations on the values of nodes.
+        symbol : function that makes a symbol from its name.
         """
         text = self.text
         value = {n.index: symbol(text.called[n.index]) for n in text.nodes if n.op == SYM}

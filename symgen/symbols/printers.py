@@ -1,8 +1,9 @@
-"""How expressions are written: SymPy's printers with the letters and the order of the literature.
+"""Printers of expressions: SymPy's printers with the letters and the order of the literature.
 
-Sums and products stand in the order in which they were made, a minus and a fraction before their
-product, decimals as decimals. A name is a letter with a subscript: ZZ1R is ZZ with 1R, Ia1 is I
-with a1, FV2 is F with v2, QP1 is q with a dot and 1, C23 is C with 23.
+Terms and factors are printed in the order in which they were made. A minus sign or a fraction is
+printed before its product, and decimals are printed as decimals. The name of a symbol is printed
+as a letter with a subscript: ZZ1R is ZZ with 1R, Ia1 is I with a1, FV2 is F with v2, QP1 is q with
+a dot and 1, C23 is C with 23.
 """
 
 from __future__ import annotations
@@ -49,7 +50,10 @@ INDEXED = re.compile(r"(.*?[^\d_])_?(\d*(?:_\d+)*)(R?)")
 
 
 def letter(name: str) -> tuple[str, str]:
-    """Letter and subscript of a name; both are printed as they are, except Greek letters."""
+    """Split the name of a symbol into letter and subscript, for instance ZZ1R into ZZ and 1R.
+
+    Both are printed unchanged, except that Greek letters are printed as such.
+    """
     if not name[0].isidentifier():  # a number
         return name, ""
     if match := ENTRY.fullmatch(name):
@@ -66,16 +70,20 @@ def letter(name: str) -> tuple[str, str]:
 
 
 def split_sign(x: Tree) -> tuple[Any, Tree]:
-    """(number, rest) of a product with a leading number, -1 or a fraction; else (1, x)."""
+    """Split a product into the number printed in front, -1 or a fraction, and the other factors.
+
+    Returns (number, rest), or (1, x) if no such number leads the product.
+    """
     number, rest = x.as_coeff_Mul()
     before = number == -1 or (not number.is_Integer and rest.free_symbols)
     return (number, rest) if before else (sympy.S.One, x)
 
 
 class Ordered:
-    """Products with their minus and fraction before them, decimals as decimals.
+    """Base of printers that print a minus sign or a fraction first, and exact numbers as decimals.
 
-    A subclass says what stands between factors, and before one that begins with a digit.
+    A subclass sets the text between two factors (`times`), and the text between a number and a
+    factor that starts with a digit (`visible`).
     """
 
     times = visible = "*"
@@ -96,11 +104,11 @@ class Ordered:
 
 
 class Grammar(Ordered, StrPrinter):  # type: ignore[misc]
-    """The grammar of robot files."""
+    """Printer that writes an expression in the grammar of robot files."""
 
 
 def text(x: Tree) -> str:
-    """An expression in the grammar of robot files."""
+    """Write an expression in the grammar of robot files."""
     return str(GRAMMAR.doprint(x))
 
 
@@ -108,7 +116,7 @@ def text(x: Tree) -> str:
 
 
 class Latex(Ordered, LatexPrinter):  # type: ignore[misc]
-    """SymPy's LaTeX with the subscripts of the literature."""
+    """Printer that writes an expression in LaTeX, with the subscripts of the literature."""
 
     times, visible = r"\,", r" \cdot "
 
@@ -117,12 +125,12 @@ class Latex(Ordered, LatexPrinter):  # type: ignore[misc]
 
 
 def latex(x: Tree) -> str:
-    """An expression."""
+    """Write an expression in LaTeX."""
     return str(LATEX.doprint(x))
 
 
 def latex_symbol(name: str) -> str:
-    """A name with its subscript."""
+    """Write the name of a symbol in LaTeX, with its subscript."""
     stem, subscript = letter(name)
     if stem in DOTS:
         symbol = rf"\{DOTS[stem]}{{q}}"
@@ -144,7 +152,7 @@ ENTITY = re.compile(r"&(?!amp;|lt;|gt;|quot;|apos;)\w+;")  # which XML does not 
 
 
 class MathML(str):
-    """Markup that is complete and escaped; templates leave it as it is."""
+    """Complete, escaped MathML markup, which HTML templates insert without escaping it again."""
 
     __slots__ = ()
 
@@ -153,13 +161,13 @@ class MathML(str):
 
 
 class Presentation(MathMLPresentationPrinter):  # type: ignore[misc]
-    """SymPy's presentation MathML with the subscripts of the literature.
+    """Printer that writes an expression in MathML, with the subscripts of the literature.
 
-    Every name is escaped: none can bring in markup.
+    Every name is escaped, so no name can insert markup into a page.
     """
 
     def element(self, tag: str, *children: Any, **attributes: str) -> Any:
-        """A node; texts among its children, and the values of attributes, are escaped."""
+        """Make an XML element. Texts among its children and values of attributes are escaped."""
         made = self.dom.createElement(tag)
         for name, value in attributes.items():
             made.setAttribute(name, value)
@@ -174,11 +182,11 @@ class Presentation(MathMLPresentationPrinter):  # type: ignore[misc]
         return self.element("mo", ")", stretchy="false")
 
     def row(self, *parts: Any) -> Any:
-        """The parts side by side."""
+        """Put the nodes side by side in one row; a single node is returned unchanged."""
         return parts[0] if len(parts) == 1 else self.element("mrow", *parts)
 
     def term(self, x: Tree, *, first: bool = True) -> Any:
-        """A term of a sum with its sign; none before a first one that is added."""
+        """Print a term of a sum with its sign; the first term has no plus sign."""
         minus = is_negative(x)
         inside = self._print(negative(x) if minus else x)
         if first and not minus:
@@ -231,12 +239,15 @@ class Presentation(MathMLPresentationPrinter):  # type: ignore[misc]
 
 
 def math(x: Tree) -> MathML:
-    """An expression on its own."""
+    """Write an expression as one <math> element."""
     return _markup(MATHML._print(x))
 
 
 def math_terms(x: Tree) -> list[MathML]:
-    """The terms of an expression in their order, one <math> each with its sign, so that a browser may break the line between them."""
+    """Write each term of a sum as a <math> element of its own, with its sign.
+
+    A browser can then break the line between two terms.
+    """
     return [_markup(MATHML.term(y, first=not k)) for k, y in enumerate(sympy.Add.make_args(x))]
 
 

@@ -28,34 +28,38 @@ def symbolic(
     passive: str | None = None,
     limit: int = LARGEST,
 ) -> SymbolicRobot:
-    """Models of a robot as exact SymPy objects: closed forms by method, recursions by `equations`.
+    """Prepare the models of a robot as exact SymPy objects.
+
+    The closed form of a model is a method of the result, its recursion comes from `equations`.
 
     Parameters
     ----------
     robot : Robot, str or Path
-        A robot, a packaged name or a file, as of `load_robot`.
+        A robot, the name of a packaged robot or a file, as for `load_robot`.
     parameters : str
         "base": the dynamics in base parameters; "standard": in XX1, ..., M1, Ia1, ...
     values : mapping, optional
         Value of any symbol (constants, q1, QP1, QDP1, parameters), by name: a number, or a text as
-        in robot files ("pi/2"). Zeros leave the recursion.
+        in robot files ("pi/2"). Terms that become zero are removed from the recursion.
     passive : str, optional
-        Of closed loops. "functions": passive joints in terms of the actuated ones, if the
-        relation is linear. "symbols": all of them stay symbols, with `closure` zero. Left out:
-        functions if there are any, symbols for the rest.
+        How passive joints of closed loops are written. "functions": as functions of the actuated
+        joints, if the relation is linear. "symbols": all stay symbols, and their equations are
+        those of the model `closure`, closure = 0. Default: functions where the relation is linear,
+        symbols for the rest.
     limit : int
-        Terms that a closed form may have, multiplied out; a longer one is refused, its recursion
-        never.
+        Largest number of terms of a closed form before it is factored. A longer closed form is
+        refused; a recursion has no limit.
 
     Returns
     -------
     SymbolicRobot
-        Nothing is derived before a model is asked for.
+        The models. Each is derived only when it is called.
 
     Raises
     ------
     SymgenError
-        A value for a symbol that is none, or functions that passive joints do not have.
+        If a value is given for an unknown symbol, or if "functions" is requested and passive joints
+        have no linear relation.
     """
     described = robot if isinstance(robot, Robot) else load_robot(robot)
     return SymbolicRobot(source_of(described, parameters, values, passive), limit)
@@ -63,10 +67,11 @@ def symbolic(
 
 @dataclass(frozen=True)
 class SymbolicRobot:
-    """Models of a robot; each model is a method with its name: `arm.inertia_matrix()` is a SymPy Matrix.
+    """The symbolic models of one robot, for instance `arm.inertia_matrix()` as a SymPy Matrix.
 
-    Frames are numbered as in the robot file, 0 is the base. Twists (velocity, acceleration, rows of
-    the Jacobian) are those of the origin of frame `of` (default: the last frame), then angular, in
+    Each model is a method with the name of the model. Frames are numbered as in the robot file,
+    frame 0 is the base. Twists (velocity, acceleration, rows of the Jacobian) have first the linear
+    part, at the origin of frame `of` (default: the last frame), then the angular part, both in
     components of frame `frame` (default: 0).
     """
 
@@ -76,7 +81,7 @@ class SymbolicRobot:
     def model(
         self, name: str, *, of: int | None = None, frame: int = 0, rows: Sequence[int] | None = None
     ) -> SymbolicModel:
-        """A model in closed and in recursive form.
+        """Return a model, with its closed form and its recursion.
 
         Raises
         ------
@@ -109,14 +114,15 @@ class SymbolicRobot:
 
     @cached_property
     def _models(self) -> dict[tuple[Any, ...], SymbolicModel]:
-        """Models that were asked for: a second form of one is no second computation."""
+        """Models requested so far, so that each model is derived only once."""
         return {}
 
     def equations(
         self, name: str, *, of: int | None = None, frame: int = 0
     ) -> tuple[list[tuple[Any, Any]], Any]:
-        """Recursion of a model as from `sympy.cse`: a list [(symbol, expression)], and the model in these symbols.
+        """Derive the recursion of a model, in the form of `sympy.cse`.
 
+        Returns a list of equations (symbol, expression), and the model in terms of these symbols.
         The symbols have the names of SYMORO.
         """
         return of_listing(self.model(name, of=of, frame=frame))
@@ -131,10 +137,11 @@ class SymbolicRobot:
         frame: int = 0,
         rows: Sequence[int] | None = None,
     ) -> str:
-        """Text of a model, as `symgen show --model` prints it.
+        """Print a model as text, like `symgen show --model`.
 
-        form : closed or recursive. format : text, latex (a document that compiles), latex-fragment
-        (its formulas alone), sympy (Python), json.
+        form : closed or recursive.
+        format : text, latex (a document that compiles), latex-fragment (its formulas alone), sympy
+            (Python), json.
         """
         return printed(self.model(name, of=of, frame=frame, rows=rows), form, format)
 
@@ -147,14 +154,18 @@ class SymbolicRobot:
         frame: int = 0,
         rows: Sequence[int] | None = None,
     ) -> Formulas:
-        """Formulas of a model, typeset in a notebook and plain in print."""
+        """Return the formulas of a model: typeset in a notebook, plain text if printed."""
         return Formulas(self.model(name, of=of, frame=frame, rows=rows), form)
 
     # --- symbols ---
 
     @cached_property
     def symbols(self) -> dict[str, Any]:
-        """Every symbol by name: constants, positions, velocities, accelerations, torques, rates G of tied joints, parameters."""
+        """Every symbol of the models, by name.
+
+        These are the constants, positions, velocities, accelerations, torques and parameters, and
+        the rates G of passive joints that only the closure equations determine.
+        """
         robot = self.source.robot
         joints = [f"{state}{j}" for state in ("q", "QP", "QDP", "GAM") for j in robot.moving]
         rates = [
@@ -190,7 +201,10 @@ class SymbolicRobot:
     # --- models ---
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
-        """A model of the table as SymPy object: arm.inertia_matrix(), arm.pose(of=6, frame=4)."""
+        """Return the method that gives a model as a SymPy object.
+
+        For instance arm.inertia_matrix() or arm.pose(of=6, frame=4).
+        """
         if name not in SYMBOLIC:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         return partial(self._sympy, name)
@@ -201,5 +215,5 @@ class SymbolicRobot:
         return of_model(self.model(name, of=of, frame=frame, rows=rows))
 
     def base_parameters(self) -> dict[Any, Any]:
-        """Formula of each base parameter: {ZZ1R: ZZ1 + Ia1 + ...}."""
+        """Return the formula of each base parameter, {ZZ1R: ZZ1 + Ia1 + ...}."""
         return dict(zip(self.parameters, self._sympy("base_parameters"), strict=True))

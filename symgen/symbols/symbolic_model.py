@@ -1,4 +1,4 @@
-"""One model of one robot: its closed form, multiplied out and factored by parameter, or its recursion as a listing."""
+"""One model of one robot: its closed form, factored by parameter, or its recursion as equations."""
 
 from __future__ import annotations
 
@@ -27,7 +27,11 @@ LARGEST = 10_000  # terms of a model, multiplied out
 
 @dataclass(frozen=True)
 class ClosedModel:
-    """Nonzero entries, over `denominator` if there is one, and the angles of their C and S."""
+    """The closed form of a model.
+
+    It has the nonzero entries by their indices, a common denominator or None, and the angles of the
+    symbols C and S.
+    """
 
     entries: Mapping[Place, Tree]
     denominator: Tree | None
@@ -42,20 +46,20 @@ class ClosedModel:
 
 @dataclass(frozen=True)
 class SymbolicModel:
-    """A model asked of a robot.
+    """One model of a robot, in closed form and as a recursion.
 
     Attributes
     ----------
     model : Model
-        Which one.
+        The kind of model, for instance the inertia matrix.
     source : Source
         The robot with its parameters, closure and given values.
     request : Request
-        Which frame's, in which frame.
+        The frame whose model is meant, and the frame of its components.
     rows : tuple of int or None
         Rows of the Jacobian, from 1, whose determinant is meant.
     limit : int
-        Terms that the closed form may have, multiplied out.
+        Largest number of terms of the expanded closed form.
     """
 
     model: Model
@@ -66,18 +70,24 @@ class SymbolicModel:
 
     @property
     def axes(self) -> tuple[tuple[str, ...], ...]:
-        """Labels of the rows, and of the columns."""
+        """Labels of the rows, then labels of the columns."""
         d, parameters = self.source.derivation, self.source.parameters
         return tuple(labels(d, axis, parameters) for axis in self.model.axes)
 
     @property
     def places(self) -> list[Place]:
-        """All places, row by row; of a symmetric matrix those on and above the diagonal."""
+        """Indices of all entries, row by row.
+
+        For a symmetric matrix, only the entries on and above the diagonal are listed.
+        """
         places = list(product(*(range(len(labels)) for labels in self.axes)))
         return [p for p in places if not self.model.symmetric or p[0] <= p[1]]
 
     def label(self, place: Place) -> str:
-        """The name of an entry: A(1,2), GAM(3), E; the base parameters by theirs."""
+        """Return the name of an entry, for instance A(1,2), GAM(3) or E.
+
+        A base parameter has its own name.
+        """
         if self.model.axes == ("parameters",):
             return self.source.parameters[place[0]]
         inside = ",".join(labels[k] for labels, k in zip(self.axes, place, strict=True))
@@ -85,7 +95,7 @@ class SymbolicModel:
 
     @property
     def title(self) -> str:
-        """Which model of which robot."""
+        """Name of the robot, then name of the model."""
         return (
             f"{self.source.robot.title or self.source.robot.name}: "
             f"{self.model.name.replace('_', ' ')}"
@@ -93,7 +103,7 @@ class SymbolicModel:
 
     @property
     def summary(self) -> str:
-        """Description of the model, with numbers of its frames."""
+        """Description of the model, with the numbers of its frames."""
         text = self.model.summary
         if self.model.of_frames:
             text = text.replace("frame `of`", f"frame {self.request.of}").replace(
@@ -105,8 +115,10 @@ class SymbolicModel:
 
     @cached_property
     def closed(self) -> ClosedModel:
-        """The closed form. Raises SymgenError if it has too many terms, or where the model has
-        none; the message names the form that works.
+        """The closed form of the model.
+
+        Raises SymgenError if the closed form has too many terms or does not exist; the message
+        names the form that works.
         """
         try:
             return self._closed()
@@ -137,7 +149,12 @@ class SymbolicModel:
         return ClosedModel({(k,): expressions.formula(f) for k, f in enumerate(formulas)}, None, {})
 
     def _entries(self, *models: Model, request: Request | None = None) -> tuple[Any, ...]:
-        """A graph whose angles are those of all pairs of frames, and the entries of each model."""
+        """Derive the entries of several models in one computation graph.
+
+        Returns the algebra of the graph, then the entries of each model by their indices. The
+        angles between parallel axes of all pairs of frames are added to the graph, for use in
+        `Identities`.
+        """
         d, request = self.source.derivation, request or self.request
         rewrite = rewriting(d, request)
         entries = [
@@ -180,9 +197,10 @@ class SymbolicModel:
         return ClosedModel(entries, denominator, angles)
 
     def _determinant(self) -> ClosedModel:
-        """Determinant of the whole Jacobian, in the frames that give the fewest terms.
+        """Compute the determinant of the Jacobian, or of its chosen rows.
 
-        Neither the frame nor the point of the last link changes it.
+        The determinant of a whole 6 x 6 Jacobian does not depend on the frame of its components nor
+        on the point of the last link, so the choice with the fewest terms is used.
         """
         robot, n, of = self.source.robot, len(self.source.robot.joints), self.request.of
         if n > 6:
@@ -208,7 +226,11 @@ class SymbolicModel:
         return expansion, {p: expansion.tidied(expansion.of(x)) for p, x in entries.items()}
 
     def _chosen_rows(self, matrix: Sequence[Sequence[Polynomial]], n: int) -> list[int]:
-        """The rows asked for, else those that are not zero, if they make a square matrix."""
+        """Choose the rows of the Jacobian that make a square matrix.
+
+        These are the rows that the user gave, else all rows that are not zero. Raises SymgenError
+        if they do not make a square matrix.
+        """
         if self.rows is not None:
             rows = {k for k in self.rows if 1 <= k <= 6}
             if not len(rows) == len(self.rows) == n:
@@ -230,7 +252,7 @@ class SymbolicModel:
         return moved
 
     def _quotient(self) -> ClosedModel:
-        """qdd = adj(A) (Gamma - H) / det A, by Cramer's rule."""
+        """Solve the direct dynamic model by Cramer's rule, qdd = adj(A) (Gamma - H) / det A."""
         robot = self.source.robot
         n = range(len(robot.joints))
         if robot.loaded:
@@ -259,8 +281,9 @@ class SymbolicModel:
 
     @cached_property
     def listing(self) -> Listing:
-        """The recursion as equations in the order in which they are computed. Raises SymgenError
-        if the model has none.
+        """The recursion as equations, in the order in which they are computed.
+
+        Raises SymgenError if the model has no recursion.
         """
         if self.model.cases is None:
             raise SymgenError(

@@ -1,8 +1,8 @@
-"""Models as SymPy objects.
+"""Models of a robot as SymPy objects.
 
-Every symbol is real and has the name of the robot file or of the recursion: q1, QP1 and QDP1 for
-position, velocity and acceleration of joint 1, GAM1 for its torque. Numbers are exact. Cosines and
-sines are those of the angles: C23 is cos(q2 + q3).
+Every symbol is real and has the name used in the robot file or in the recursion: q1, QP1 and QDP1
+for position, velocity and acceleration of joint 1, GAM1 for its torque. Numbers are exact. Cosines
+and sines are written with their angles: C23 is cos(q2 + q3).
 """
 
 from __future__ import annotations
@@ -25,7 +25,10 @@ FACTORED = 300  # terms of a determinant, up to which it is factored over the ra
 
 
 def of_model(model: SymbolicModel) -> Any:
-    """The closed form of a model: a Matrix, a column of one for vectors, an expression for scalars."""
+    """Convert the closed form of a model to a SymPy object.
+
+    A matrix is a Matrix, a vector a Matrix of one column, a scalar an expression.
+    """
     closed = model.closed
     angles = {name: evaluated(angle(name[0], e), {}) for name, e in closed.angles.items()}
     values = {place: evaluated(x, angles) for place, x in closed.entries.items()}
@@ -38,7 +41,10 @@ def of_model(model: SymbolicModel) -> Any:
 
 
 def of_listing(model: SymbolicModel) -> tuple[list[tuple[Any, Any]], Any]:
-    """The recursion of a model as `sympy.cse` gives it: [(symbol, expression)] and the model in these symbols."""
+    """Convert the recursion of a model to SymPy, in the form of `sympy.cse`.
+
+    Returns a list of equations (symbol, expression), and the model in terms of these symbols.
+    """
     steps, outputs = model.listing.steps(Objects(), symbol)
     values = dict(zip(model.listing.places, map(sympy.sympify, outputs), strict=True))
     return [(symbol(name), x) for name, x in steps.items()], _shaped(model, values)
@@ -57,17 +63,20 @@ def _shaped(model: SymbolicModel, values: Mapping[tuple[int, ...], Any]) -> Any:
 
 
 class Objects:
-    """The domain that evaluates graph nodes to SymPy objects; `rational` converts a rational number."""
+    """Operations that evaluate the nodes of a computation graph to SymPy objects.
+
+    `rational` is the function that converts a rational number.
+    """
 
     def __init__(self, rational: Callable[[Fraction], Any] = rational) -> None:
         self.number = rational
 
     def symbol(self, symbol_: Symbol) -> Any:
-        """An input by its name."""
+        """Make the SymPy symbol of an input, with the same name."""
         return symbol(symbol_.name)
 
     def function(self, node: Node, x: list[Any]) -> Any:
-        """A function of SymPy."""
+        """Apply the function of a node to SymPy objects x."""
         if node.op == INV:
             return 1 / x[0]
         if node.op == POS:
@@ -76,9 +85,10 @@ class Objects:
 
 
 def source_text(name: str, steps: list[tuple[Any, Any]], value: Any) -> str:
-    """Python lines that make `value` under `name`: the symbols, the steps, the value.
+    """Write Python code that builds `value` under the name `name`.
 
-    Rationals stay exact.
+    The code defines the symbols, then the intermediate variables in `steps`, then the value.
+    Rational numbers stay exact.
     """
     made = {x for x, _ in steps}
     atoms = set().union(value.free_symbols, *(e.free_symbols for _, e in steps))
@@ -97,7 +107,7 @@ def source_text(name: str, steps: list[tuple[Any, Any]], value: Any) -> str:
 
 
 def _written(e: Any) -> str:
-    """An expression, or a matrix row by row without the blanks that align its columns."""
+    """Print an expression; a matrix is printed row by row, without aligned columns."""
     if not isinstance(e, sympy.MatrixBase):
         return str(sympy.printing.sstr(e))
     rows = (f"[{', '.join(map(sympy.printing.sstr, row))}]" for row in e.tolist())

@@ -1,1 +1,1 @@
-"""Encoder resolution by the CESTAC method, eqs. (15) to (22), (28)."""
+"""Study of the encoder resolution by the CESTAC method, eqs. (15) to (22), (28)."""

@@ -1,20 +1,23 @@
-"""Encoder resolution by the CESTAC method (chapter, section 3): what would a coarser encoder have done to the estimate?
+"""Study of the encoder resolution by CESTAC: how coarser encoders change the estimated parameters.
+
+Chapter, section 3.
 
     q_CESTAC  every raw sample of the position rounded at random, steps of Delta:
               eqs. (15), (28), `runtime.core.cestac.rounding`
     W_CESTAC = W(q_CESTAC, qd_CESTAC, qdd_CESTAC), through the filters of the study: eq. (16)
     X_CESTAC = least squares of Y on W_CESTAC, Y as measured: eq. (17)
-    X_LS     = the estimate of the identification on these columns, with the median of the study
+    X_LS     = the estimate of the identification on these columns, with the median of its signals
 
-N runs per Delta (`runtime.core.cestac.run`) give the mean (18), the deviation (19), %sigma (20), %e
-(21) and the residual (22); `runtime.core.cestac.result` holds them and their verdict. The rows used
-are those of the measured record in every run. Steps of the motor torque (`torque`, section 4.1.3)
-are studied alone and with the first Delta. Columns are the essential ones of the identification;
-parameters that the settings name are judged alone, in that fit. Rounding is by default two-point,
-on the joint side: those reproduce the chapter's figures.
+N runs per Delta (`runtime.core.cestac.run`) give the mean (18), the standard deviation (19), %sigma
+(20), %e (21) and the residual (22); `runtime.core.cestac.result` holds these numbers and the
+verdict. Every run uses the rows that were selected on the measured record. Steps of the motor
+torque (`torque`, section 4.1.3) are studied alone and with the first Delta. By default the columns
+are the essential parameters of the identification. If the settings name parameters, only these are
+judged, in a fit together with the essential ones. Rounding is by default two-point and on the joint
+side, which reproduces the figures of the chapter.
 
-The bandwidth of the noise decides everything, so sampling rate, cut-off and median window stand in
-the settings of the result.
+The result depends above all on the bandwidth of the noise. The settings of the result therefore
+include the sampling rate, the cut-off and the median window.
 """
 
 from __future__ import annotations
@@ -66,27 +69,31 @@ def cestac(
     checkpoint: Checkpoint | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Cestac:
-    """Change of the estimate with coarser encoders and torque sensors, eqs. (15) to (22), (28).
+    """Find how coarser encoders and torque sensors change the estimated parameters.
 
-    study.cestac has the settings, study.estimate the method.
+    Eqs. (15) to (22), (28). The settings of the study are study.cestac, those of the method are
+    study.estimate.
 
     Parameters
     ----------
     problem : Problem
-        Prepared.
+        Problem with prepared records.
     own_encoder : callable
-        From a record to the encoder that made it, where the law of rounding asks for it.
+        Function of a record, the study and the drives. It returns the encoder that measured the
+        record, or None if the law of rounding does not need it.
     loop_of : callable
-        From a problem to the closed loop that it simulates; None if it simulates none.
+        Function of a problem. It returns the closed loop that the study simulates, or None.
     columns : sequence of str, optional
-        Essential names if they are known; default: those of the problem. Unused where settings.cestac.columns is "all".
+        Names of the essential parameters if they are known; default: those of the problem. Unused
+        if settings.cestac.columns is "all".
     map : callable, optional
-        As the built-in one; computes the runs, in processes (`runtime.parallel.processes.processes`) or by a
-        Dask cluster (`runtime.parallel.cluster.cluster`). The results do not depend on it in any bit.
+        Works like the built-in map and computes the runs, for instance in processes
+        (`runtime.parallel.processes.processes`) or on a Dask cluster
+        (`runtime.parallel.cluster.cluster`). The results are the same in every bit.
     progress : callable, optional
         Called with the number of runs done and their total.
     checkpoint : Checkpoint, optional
-        Where runs are kept while the study lasts; those of an interrupted or shorter study with the
+        Store of the runs while the study lasts. Runs of an interrupted or shorter study with the
         same settings are not repeated.
     provenance : mapping, optional
         Further entries of Cestac.provenance; names and time stamps of the records are there.
@@ -95,10 +102,10 @@ def cestac(
     ------
     SettingsError
         Motor side without drives, a column that is no base parameter, or a closed loop that the
-        study does not tell.
+        settings do not describe.
     InputError
-        A method that finds no estimate, or fewer than two at one of
-        the steps.
+        The method finds no estimate from the measured record, or fewer than two at one of the
+        steps.
     """
     model, study = problem.model, problem.settings
     settings = study.cestac
@@ -182,7 +189,10 @@ def cestac(
 
 
 def _refuse(reference: Estimate) -> None:
-    """InputError if the method finds no estimate that runs could be compared with."""
+    """Raise InputError if the method finds no estimate from the record as measured.
+
+    Estimates from rounded records are compared with this estimate.
+    """
     if reference.status not in (*USABLE, "rank-deficient", "no-redundancy", "singular-weights"):
         raise InputError(
             f"{reference.method} finds no estimate from the record as measured, so rounded records "
@@ -191,9 +201,10 @@ def _refuse(reference: Estimate) -> None:
 
 
 def levels_of(settings: CestacSettings) -> tuple[Level, ...]:
-    """Levels of a study: each Delta alone, then each Phi alone and together with the first Delta.
+    """List the levels of a study; a level is one position step Delta with one torque step Phi.
 
-    In a simulated loop: a level without steps, then each Delta.
+    The order is: each Delta alone, each Phi alone, each Phi with the first Delta. If the encoder of
+    a simulated loop is studied: a level without steps, then each Delta.
     """
     if settings.place == "loop":
         return (Level(0.0), *map(Level, settings.delta))
@@ -207,10 +218,12 @@ def levels_of(settings: CestacSettings) -> tuple[Level, ...]:
 
 
 def key_blocks(keys: Sequence[Key], runs: int, levels: int, common: bool) -> list[tuple[Key, ...]]:
-    """Split the runs into tasks of at most LIMIT.TASK_RUNS runs; the split does not depend on the workers.
+    """Group the runs of a study, given as (level, run) numbers, into tasks for worker processes.
 
-    A task holds contiguous runs of one level, or of all levels if these share their random numbers.
-    Tasks of a study with few runs are small, so that every worker gets some.
+    A task holds successive runs of one level, or of all levels if these share their random numbers.
+    It has at most LIMIT.TASK_RUNS runs, or one run of every level if there are more levels than
+    that. A study with few runs has smaller tasks, so that every worker gets some. The tasks do not
+    depend on the number of workers.
     """
     size = max(1, min(LIMIT.TASK_RUNS, runs // 4) // (levels if common else 1))
 
@@ -232,7 +245,10 @@ def _all_runs(
     progress: Progress | None,
     checkpoint: Checkpoint | None,
 ) -> Runs:
-    """All runs, sorted by level and number; identity : function that identifies this study on disk."""
+    """Compute the runs that are not yet on disk, and return all runs, sorted by level and number.
+
+    identity : function that returns the data that identify this study on disk.
+    """
     runs, levels, b = task.settings.runs, range(len(task.levels)), len(task.names)
     finished = checkpoint.resume(identity(), b) if checkpoint else Runs.of((), b)
     parts = [finished.where((finished.level < len(levels)) & (finished.run < runs))]
@@ -254,7 +270,10 @@ def _all_runs(
 
 
 def _measured(record: PreparedRecord) -> Iterator[memoryview]:
-    """Positions, torques and missing samples of a record."""
+    """Yield the bytes of the positions, torques and missing-sample flags of a record.
+
+    A hash of these bytes identifies the record.
+    """
     missing = () if record.missing is None else (np.packbits(record.missing.samples),)
     return (np.ascontiguousarray(x).data for x in (record.q, record.tau, *missing))
 
@@ -262,7 +281,10 @@ def _measured(record: PreparedRecord) -> Iterator[memoryview]:
 def _identity(
     task: Task, described: Mapping[str, Any], provenance: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Data that determine every bit of every run, as JSON values that identify a study; without the number of runs."""
+    """Return the data that determine every bit of every run, as JSON values that identify a study.
+
+    The number of runs is left out, so that a finished study can continue with more runs.
+    """
     drives = task.drives
     return {
         **{key: value for key, value in described.items() if key != "cestac"},
@@ -285,7 +307,7 @@ def _identity(
 
 
 def resolution(result: Identification, own_encoder: EncoderOf, loop_of: LoopOf) -> Cestac:
-    """Resolution study of an identification, with the steps and columns of settings.cestac.
+    """Study the encoder resolution of a finished identification, by the settings in study.cestac.
 
     own_encoder, loop_of : as for `cestac`.
     """

@@ -1,12 +1,14 @@
-"""Measurements as coarser sensors would have given them, and the system Y = W X + rho that they make, eqs. (15), (16), (28).
+"""Rounding of measurements as by coarser sensors, and the system Y = W X + rho that results.
+
+Eqs. (15), (16), (28).
 
     q_CESTAC = R^-1 rounded(R (q - offset)) + offset
             on the motor side; R = 1 on the joint side
     W_CESTAC = W(q_CESTAC, qd_CESTAC, qdd_CESTAC)   through the filters, on the measured rows
 
-Every record draws from streams of its own (`runtime.core.cestac.rounding.stream`), torques from
-others than positions, so that a draw is the same with and without torques and whatever records
-follow.
+Every record has its own streams of random numbers (`runtime.core.cestac.rounding.stream`), one for
+the positions and one for the torques. A draw is therefore the same with and without steps of the
+torque, and whatever records follow.
 """
 
 from __future__ import annotations
@@ -40,32 +42,35 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class PreparedRecord:
-    """Data of one record that are the same in every run.
+    """One measured record, filtered, with its selected rows: data that are the same in every run.
 
     Attributes
     ----------
     q, tau : ndarray, shape (N, n)
-        As measured, joint side, rad or m, N m or N.
+        Measured positions and torques of the joints, rad or m, N m or N.
     rate : float, Hz
     files : mapping
-        SHA-256 by file name.
+        SHA-256 of the measured files, by file name.
     selection : Selection
-        Rows used: those of the measured record.
+        Rows used, selected on the measured record.
     torque : ndarray, shape (n, K), N m or N
-        Y before rows are left out.
+        Y before the selection of rows.
     states : States or None
-        Of the record as measured, where it can be read as counts; None: by the low-pass.
+        States of the measured record, if its positions can be read as counts; None: the low-pass
+        gives the states.
     own : RecordEncoder or None
-        The encoder that made it, under law phase.
+        Encoder that measured the record, under law phase.
     missing : Missing or None
-        Samples without a position, in every run the same.
+        Samples without a position, the same in every run.
     channels : mapping
-        Functions of time that laws of the model read, (N,) by name.
+        Functions of time on which laws of the model depend, (N,) by name.
     note : str
-        Why the record as measured is not read as counts, where the study asks for counts.
+        Sentence for the user if the study uses counts, but the measured record is read by the
+        low-pass; else "".
     slip : ndarray or None, shape (N, n), rad/s or m/s
-        Recorded velocities less the differences of q, where signals.velocity uses them. A drive takes its velocity from its
-        encoder, so that steps change both and leave this.
+        Recorded velocities minus the differences of q, if signals.velocity uses recorded
+        velocities. A drive computes its velocity from its encoder, so that coarser steps change
+        both alike and leave this difference.
     """
 
     q: Array
@@ -84,24 +89,24 @@ class PreparedRecord:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """Data that every run needs; sent once to each process.
+    """The data that all runs of a study of the encoder resolution share.
 
     Attributes
     ----------
     records : tuple of PreparedRecord
     model : GeneratedModel
     names : tuple of str
-        Columns, as fitted.
+        Columns that the runs fit, in this order.
     estimate, settings : EstimateSettings, CestacSettings
     levels : tuple of Level
     drives : Drives or None
-        Motor side.
+        Drives between motor side and joint side.
     reader : Reader
-        States of a record.
+        Function that computes the states q, qd, qdd of a record.
     methods : mapping of str to Method
-        That of `estimate` among them.
+        Estimation methods by name, that of `estimate` among them.
     loop : Loop or None
-        Closed loop, of a study that simulates one.
+        Closed loop that the study simulates; None if it simulates none.
     """
 
     records: tuple[PreparedRecord, ...]
@@ -117,7 +122,7 @@ class Task:
 
     @property
     def columns(self) -> Columns:
-        """Columns of W for several successive runs."""
+        """New object that computes the columns of the observation matrix W for several runs."""
         return Columns(self.model, self.names)
 
 
@@ -128,10 +133,13 @@ def prepared_record(
     drives: Drives | None = None,
     part: LoopRecord | None = None,
 ) -> PreparedRecord:
-    """Prepare one measured record: rows and torques through the filters of the study, with the median of study.cestac.
+    """Filter one measured record and select its rows, once for all runs of a study.
 
-    own_encoder : callable from a record to the encoder that measured it.
-    part : rows of a simulated loop, selected by its reference; default: by the measured velocities.
+    The filters are those of study.signals, with the median window of study.cestac.
+
+    own_encoder : function that returns the encoder that measured the record, or None.
+    part : record of a simulated loop, whose rows and torque are used; default: rows are selected by
+        the measured velocities.
     """
     signals, record = replace(study.signals, median=study.cestac.median), own.record
     encoder, counts, note = own_encoder(record, study, drives), None, ""
@@ -192,7 +200,11 @@ def prepared_records(
     drives: Drives | None = None,
     loop: Loop | None = None,
 ) -> tuple[PreparedRecord, ...]:
-    """Prepare every measured record; empty if the encoder is in a simulated loop, which makes new records."""
+    """Filter every measured record and select its rows, once for all runs of a study.
+
+    The result is empty if the study rounds the encoder of a simulated loop, because the loop makes
+    new records.
+    """
     if study.cestac.place == "loop":
         return ()
     parts = [None] * len(records) if loop is None else list(loop.parts)
@@ -208,13 +220,13 @@ def study_columns(
     columns: Sequence[str] | None,
     loop: Loop | None = None,
 ) -> tuple[str, ...]:
-    """Columns that the runs fit: all, or the essential ones.
+    """Choose the parameters that every run fits: all base parameters, or the essential ones.
 
     Names of settings.cestac.columns come first. The other essential columns are fitted too, because
     without them their torques would change the named parameters.
 
-    columns : essential names if they are known.
-    Raises SettingsError for a name that is no base parameter, and for poses at rest.
+    columns : names of the essential parameters, if they are known.
+    Raises SettingsError for a name that is no base parameter, and for static poses.
     """
     settings, asked = problem.settings, problem.settings.cestac.columns
     require_motion(settings.signals, "the study of encoders")
@@ -229,7 +241,11 @@ def study_columns(
 
 
 def _measured(problem: Problem, records: Sequence[Prepared]) -> Observation:
-    """Rows of the records as measured; by the low-pass where positions are no counts that the study could read."""
+    """Build the system Y = W X + rho of the measured records, without any rounding.
+
+    If the study reads encoder counts and the positions are no counts, the low-pass gives the
+    states.
+    """
     try:
         return stacked(problem.model, records)
     except InputError:
@@ -242,9 +258,10 @@ def _measured(problem: Problem, records: Sequence[Prepared]) -> Observation:
 
 
 def stream_keys(draw: tuple[int, ...], k: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Keys of the random streams of record k: (*draw, 2 k) for positions, (*draw, 2 k + 1) for torques.
+    """Return the keys of the two random streams of record k: for positions and for torques.
 
-    Positions of record 0 have the key `draw` itself.
+    They are (*draw, 2 k) and (*draw, 2 k + 1); the positions of record 0 have the key `draw`
+    itself.
     """
     return ((*draw, 2 * k) if k else draw), (*draw, 2 * k + 1)
 
@@ -252,9 +269,9 @@ def stream_keys(draw: tuple[int, ...], k: int) -> tuple[tuple[int, ...], tuple[i
 def perturbed_position(
     q: Array, level: Level, settings: CestacSettings, drives: Drives | None, key: Sequence[int]
 ) -> Array:
-    """Perturbed positions q_CESTAC of eqs. (15), (28), shape (N, n), from measured q.
+    """Round the measured positions q at random to q_CESTAC, shape (N, n), eqs. (15), (28).
 
-    key : of the random stream.
+    key : key of the random stream.
     """
     if not level.delta:
         return q
@@ -269,7 +286,7 @@ def perturbed_position(
 def perturbed_torque(
     tau: Array, level: Level, settings: CestacSettings, drives: Drives | None, key: Sequence[int]
 ) -> Array:
-    """Joint torques, shape (N, n), after rounding motor torques (N m) in steps of Phi.
+    """Round the motor torques at random in steps of Phi, and return joint torques, shape (N, n).
 
     Without drives, joint torques are rounded.
     """
@@ -283,7 +300,10 @@ def perturbed_torque(
 
 
 def torque_rows(task: Task, record: PreparedRecord, level: Level, key: Sequence[int]) -> Array:
-    """Y of one record, shape (n, K), before the selection of rows: as measured, or rounded in steps of Phi."""
+    """Compute Y of one record in one run, shape (n, K), before the selection of rows.
+
+    The torques are as measured, or rounded in steps of Phi if the level has a torque step.
+    """
     if not level.torque:
         return record.torque
     return decimated_torque(
@@ -292,7 +312,12 @@ def torque_rows(task: Task, record: PreparedRecord, level: Level, key: Sequence[
 
 
 def perturbed(columns: Columns, task: Task, level: Level, draw: tuple[int, ...]) -> Observation:
-    """System of equations with perturbed measurements; without steps, that of the measurements."""
+    """Build the system Y = W X + rho of one run from rounded measurements.
+
+    Without steps, it is the system of the measurements.
+
+    draw : numbers that identify the random draw.
+    """
     loop = task.loop
     if loop is not None and task.settings.place == "loop":
         rows = loop.rows(level, draw) if draw else loop.measured()
@@ -309,9 +334,10 @@ def perturbed(columns: Columns, task: Task, level: Level, draw: tuple[int, ...])
 
 
 def measured_rows(task: Task, records: Sequence[Prepared]) -> Observation:
-    """Rows of the measured records, as the identification has them.
+    """Build the system Y = W X + rho of the measured records, as the identification uses it.
 
-    They are the rows of a run without steps if the loop is simulated, or if a counts reader takes the positions as exact.
+    It is the system of a run without steps if a loop is simulated, or if a record that should be
+    read as counts is read by the low-pass.
     """
     if task.loop is not None or any(record.note for record in task.records):
         return perturbed(task.columns, task, Level(0.0), ())
@@ -319,10 +345,10 @@ def measured_rows(task: Task, records: Sequence[Prepared]) -> Observation:
 
 
 def run_position(task: Task, record: PreparedRecord, level: Level, key: Sequence[int]) -> Array:
-    """q_CESTAC of one run.
+    """Compute the rounded positions q_CESTAC of one record in one run, shape (N, n).
 
-    It starts from the measured positions. If the steps are hardly coarser than those of the record,
-    it starts from a random motion that the recorded counts allow.
+    The measured positions are rounded. If the steps are hardly coarser than those of the record, a
+    random motion that agrees with the recorded counts is rounded instead.
     """
     q = record.q
     if level.delta and record.own is not None:
@@ -331,9 +357,9 @@ def run_position(task: Task, record: PreparedRecord, level: Level, key: Sequence
 
 
 def run_states(task: Task, record: PreparedRecord, q: Array, level: Level) -> States:
-    """States of joint positions q, shape (N, n), by the reader of the study.
+    """Compute the states q, qd, qdd of one run from its positions q, shape (N, n).
 
-    The reader knows the steps of the level, but not their phase.
+    A reader of counts knows the steps of the level, but not their phase.
     """
     signals = record.selection.signals
     if signals.reader == "lowpass" or not level.delta:
@@ -351,7 +377,7 @@ def run_states(task: Task, record: PreparedRecord, q: Array, level: Level) -> St
 
 
 def _moved(task: Task, record: PreparedRecord, q: Array) -> Record:
-    """A record of the positions q of one run, for a reader."""
+    """Make a record with the positions q of one run, to compute its states from encoder counts."""
     origin = Origin(drives=task.drives)
     t = np.arange(len(q)) / record.rate
     return Record(t, q, record.tau, rate=record.rate, missing=record.missing, origin=origin)
@@ -364,8 +390,9 @@ def system_of(
     torques: Sequence[Array],
     level: Level | None = None,
 ) -> Observation:
-    """System of all records from positions, shape (N, n), and torque rows, shape (n, K), of each.
+    """Build the system Y = W X + rho of all records from positions and torques of each record.
 
+    positions : shape (N, n) each. torques : rows of Y, shape (n, K) each.
     level : steps for the counts reader; default: none, positions as they are.
     """
     observations = [

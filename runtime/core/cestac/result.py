@@ -1,4 +1,4 @@
-"""Results of a resolution study, and its verdict.
+"""Results of a study of the encoder resolution: errors of the parameters, residuals, verdict.
 
 With N runs X_k at one level and X_LS from the unperturbed record, by parameter:
 
@@ -6,22 +6,22 @@ With N runs X_k at one level and X_LS from the unperturbed record, by parameter:
     %sigma    (20)  = 100 sigma / |X|               %e     (21)  = 100 |1 - X / X_LS|
     interval        X +- t sigma / sqrt(N), t of Student's law with N - 1 degrees of freedom
 
-and for the residual, where rho_LS = Y - W X_LS, two readings of rho_CESTAC and two measures of
-each:
+For the residual, with rho_LS = Y - W X_LS, there are two forms of rho_CESTAC, and two measures of
+each form:
 
-    printed   rho_CESTAC = Y - W X, the measured W, as printed below (22)      own
-            Y - W_CESTAC X_k, mean of the norms over the runs
+    printed   rho_CESTAC = Y - W X, the measured W, as printed below (22)
+    own       rho_CESTAC = Y - W_CESTAC X_k, mean of the norms over the runs
     %e(rho)   (22)  = 100 |1 - ||rho_CESTAC|| / ||rho_LS|| |
-            increase = 100 (||rho_CESTAC|| - ||rho_LS||) / ||Y||
+    increase        = 100 (||rho_CESTAC|| - ||rho_LS||) / ||Y||
 
 As printed, (22) grows to hundreds of per cent where Table 3 says about ten; the increase relative
-to ||Y|| has the printed order.
+to ||Y|| has the printed order of magnitude.
 
-Verdict of the chapter: all %e and %e(rho) below 1 %: practically unbiased; above 5 %: biased;
-between: doubtful. Parameters whose own %sigma (11)
-is large do not decide; the result says which ones did. Section 4.1.4 calls the residual the best
-single indicator, as it sees the whole model:
-`residual_verdict` applies the same two limits to its increase alone.
+The verdict of the chapter is "practically unbiased" if all %e and %e(rho) are below 1 %, "biased"
+if one of them is above 5 %, and "doubtful" between. Parameters whose own %sigma (11) is large do
+not decide; the result names the parameters that did. Section 4.1.4 calls the residual the best
+single indicator, because it covers the whole model: `residual_verdict` applies the same two limits
+to its increase alone.
 """
 
 from __future__ import annotations
@@ -74,14 +74,16 @@ Verdict = Literal["unbiased", "doubtful", "biased"]
 
 @dataclass(frozen=True, eq=False)
 class LevelResult:
-    """Results of one level of steps. Arrays are in the order of the names.
+    """The results at one level of a study, that is for one position step and one torque step.
+
+    Arrays are in the order of the names.
 
     Attributes
     ----------
     level : Level
-        Steps.
+        Steps of position and torque.
     runs : Runs
-        The runs.
+        Estimates of the single runs.
     mean : ndarray, shape (b,), SI
         Mean of the runs, eq. (18).
     sigma : ndarray, shape (b,), SI
@@ -101,7 +103,7 @@ class LevelResult:
     increase : float, %
         Increase of the residual norm over the norm of Y.
     increase_own : float, %
-        The same with the W of each run.
+        The same increase with the W of each run.
     verdict : str
         unbiased, doubtful or biased.
     residual_verdict : str
@@ -109,7 +111,8 @@ class LevelResult:
     decided_by : mapping of float, %
         Errors that decided the verdict, by name (rho for the residual), largest first.
     runs_needed : int
-        Runs after which the intervals of the deciding parameters are narrower than 1 % of X_LS.
+        Number of runs that makes the intervals of the deciding parameters narrower than 1 % of
+    X_LS.
     message : str
         The verdict in words.
     """
@@ -135,21 +138,21 @@ class LevelResult:
 
 @dataclass(frozen=True, eq=False)
 class Cestac(Result, Part):
-    """Result of a resolution study.
+    """The result of a study of the encoder resolution, level by level.
 
     Attributes
     ----------
     names : tuple of str
         Parameters, b of them.
     reference : Estimate
-        X_LS, of the record as measured.
+        X_LS, the estimate from the measured record.
     levels : tuple of LevelResult
     settings : mapping
-        Signals, rows, estimator, study and sampling rate, complete: the bandwidth of the noise
-        decides the result.
+        All settings of signals, rows, estimator and study, and the sampling rate: the result
+        depends on the bandwidth of the noise.
     provenance : mapping
     notes : tuple of str
-        What the figures do not say.
+        Remarks for the user, a sentence each.
     """
 
     names: tuple[str, ...]
@@ -164,15 +167,16 @@ class Cestac(Result, Part):
 
     @cached_property
     def deciding(self) -> tuple[str, ...]:
-        """Parameters that decide the verdict.
+        """Names of the parameters that decide the verdict: those with a small %sigma (11).
 
-        Their %sigma (11) is at most LIMIT.DECIDING, and study.cestac.columns names them or is "essential" or "all".
+        Their %sigma is at most LIMIT.DECIDING, and study.cestac.columns names them or is
+        "essential" or "all".
         """
         return deciding_names(self.reference)
 
     @property
     def verdict(self) -> Verdict:
-        """The worst verdict of the levels."""
+        """Worst verdict of all levels: unbiased, doubtful or biased."""
         return max(
             (result.verdict for result in self.levels),
             key=get_args(Verdict).index,
@@ -181,19 +185,22 @@ class Cestac(Result, Part):
 
     @property
     def encoder_steps(self) -> list[LevelResult]:
-        """The levels that round positions alone."""
+        """Results of the levels that have a position step and no torque step."""
         return [r for r in self.levels if r.level.delta and not r.level.torque]
 
     @property
     def enough(self) -> Level | None:
-        """The coarsest step of the encoders that is practically unbiased, as are all finer ones."""
+        """Coarsest encoder step up to which all steps leave the estimate practically unbiased.
+
+        None if the finest step is not practically unbiased.
+        """
         finest_first = sorted(self.encoder_steps, key=lambda r: r.level.delta)
         fine = list(takewhile(lambda r: r.verdict == "unbiased", finest_first))
         return fine[-1].level if fine else None
 
     @property
     def finer_for_values(self) -> str:
-        """Sentence if single parameters need a finer step than the residual does, else ""."""
+        """Sentence on a parameter that needs a finer encoder step than the residual does, or ""."""
         apart = (
             level
             for level in self.levels
@@ -215,7 +222,7 @@ class Cestac(Result, Part):
 
     @property
     def message(self) -> str:
-        """One sentence: the verdict of every step and the parameter that changes most."""
+        """Sentence with the verdict of every level and the parameter that changes most."""
         if not self.levels:
             return "Nothing was perturbed."
         by_verdict: dict[str, list[str]] = {}
@@ -232,53 +239,56 @@ class Cestac(Result, Part):
 
     @property
     def estimator(self) -> str:
-        """Short name of the method for tables; LS for least squares with any weights."""
+        """Short name of the estimation method in tables: LS for least squares with any weights."""
         return "LS" if self.reference.method in LINEAR else self.reference.method.upper()
 
     @property
     def lists_runs(self) -> bool:
-        """Whether the JSON text holds every run."""
+        """Whether the JSON text lists every run; a large study gives only the number of runs."""
         return bool(sum(len(level.runs) for level in self.levels) <= LIMIT.RUNS_LISTED)
 
     def brief(self) -> str:
-        """The verdict of every step, then the table of changes."""
+        """Return a short text: the verdict of every level, then the table of the errors %e."""
         errors = self.error_table()
         return "\n".join([self.message, "", errors.caption, errors.to_text(), *self.notes])
 
     def to_table(self) -> str:
-        """Means as in Table 3 of the chapter, residual and verdict, %e with %sigma, then the verdicts as text."""
+        """Return the full report as text: tables of means, residuals and errors, and verdicts."""
         means, residual, errors = self.mean_table(), self.residual_table(), self.error_table()
         notes = "\n".join([*(f"{r.level.label}: {r.message}" for r in self.levels), *self.notes])
         below = f"{errors.caption}\n{errors.to_text()}"
         return f"{means.to_text()}\n\n{residual.to_text()}\n\n{notes}\n\n{below}"
 
     def text(self) -> str:
-        """How to read the verdicts, then the verdict of every step."""
+        """Return the text that explains the two verdicts and gives the verdict of every level."""
         verdicts = [f"{r.level.label}: {r.message}" for r in self.levels]
         return "\n".join([VERDICTS, *verdicts, *self.notes])
 
     def tables(self) -> list[Table]:
-        """Tables of means, changes, residuals and verdicts."""
+        """Return three tables: the means, the errors %e, and the residuals with the verdicts."""
         return [self.mean_table(), self.error_table(), self.residual_table()]
 
     def figures(self) -> tuple[Figure, ...]:
-        """Figure of %e against Delta; no figure without a step of the encoders."""
+        """Return the figure of the error %e against the encoder step Delta.
+
+        There is no figure without a level of the encoder alone.
+        """
         return (error_against_resolution(self),) if self.encoder_steps else ()
 
     def entries(self) -> dict[str, Any]:
-        """Empty: the study is written to its own file, cestac.json."""
+        """Return no entries for estimate.json: the study has a file of its own, cestac.json."""
         return {}
 
     def files(self) -> dict[str, str]:
-        """The files cestac.json and cestac.csv."""
+        """Return the texts of the files cestac.json and cestac.csv, by file name."""
         return {"cestac.json": self.to_json(), "cestac.csv": cestac_csv(self)}
 
     def arrays(self) -> dict[str, dict[str, Array]]:
-        """Arrays for NPZ and MAT files: names, levels and results."""
+        """Return names, levels and results as arrays for NPZ and MAT files."""
         return {"cestac": cestac_arrays(self)}
 
     def mean_table(self) -> Table:
-        """Mean over the runs for every parameter and level."""
+        """Return the table of the mean estimate over the runs, by parameter and level."""
         rows = [
             (name, number(self.reference.X[i]), *(number(r.mean[i]) for r in self.levels))
             for i, name in enumerate(self.names)
@@ -290,7 +300,10 @@ class Cestac(Result, Part):
         )
 
     def error_table(self) -> Table:
-        """%e (21) and, in brackets, %sigma (20) for every parameter and level; `*` marks parameters that do not decide."""
+        """Return the table of the error %e (21), with %sigma (20) in brackets, for all levels.
+
+        It has one line per parameter; `*` marks parameters that do not decide the verdict.
+        """
         rows = [
             (
                 name if name in self.deciding else f"{name} *",
@@ -310,7 +323,10 @@ class Cestac(Result, Part):
         )
 
     def residual_table(self) -> Table:
-        """Table with one column per level: both forms of %e(rho), the increase of the norm, the verdict."""
+        """Return the table of residual errors and verdicts, with one column per level.
+
+        It has both forms of %e(rho), the increase of the residual norm, and the verdicts.
+        """
         levels = self.levels
         rows = [
             (
@@ -342,7 +358,7 @@ class Cestac(Result, Part):
         )
 
     def summary(self) -> dict[str, Any]:
-        """The content of `to_json` as a mapping."""
+        """Return the content of the JSON text as a mapping."""
         return {
             "schema": SCHEMA,
             "names": self.names,
@@ -358,14 +374,19 @@ class Cestac(Result, Part):
         }
 
     def _level_summary(self, level: LevelResult) -> dict[str, Any]:
-        """The fields of one level; for many runs only their number."""
+        """Return the fields of one level for JSON, without the runs if the study has many.
+
+        The number of runs is always given.
+        """
         shown = {f.name: getattr(level, f.name) for f in fields(level)}
         runs = list(level.runs) if self.lists_runs else None
         return {**shown, "runs": runs, "run_count": len(level.runs)}
 
 
 def error_against_resolution(result: Cestac, names: Sequence[str] = ()) -> Figure:
-    """Draw %e (21) against Delta on logarithmic axes, with the limits of the verdict and the increase of the residual.
+    """Draw the error %e (21) against the encoder step Delta, on logarithmic axes.
+
+    The limits of the verdict and the increase of the residual are drawn too.
 
     names : parameters drawn in colour; default: the six deciding ones that change most. The others
     are grey.
@@ -414,7 +435,10 @@ def error_against_resolution(result: Cestac, names: Sequence[str] = ()) -> Figur
 
 
 def cestac_arrays(result: Cestac) -> dict[str, Array]:
-    """Names, levels and results of a study as arrays of shape (b,), (levels,) and (levels, b)."""
+    """Collect names, levels and results of a study in arrays, for NPZ and MAT files.
+
+    Their shapes are (b,), (levels,) and (levels, b).
+    """
     reference, levels, b = result.reference, result.levels, len(result.names)
     by_parameter = ("mean", "sigma", "relative_sigma", "e", "half_width", "half_width_percent")
     by_level = ("e_rho", "e_rho_own", "increase", "increase_own", "runs_needed")
@@ -441,9 +465,9 @@ def cestac_arrays(result: Cestac) -> dict[str, Array]:
 
 
 def cestac_csv(result: Cestac) -> str:
-    """Text of cestac.csv: one line for each level and parameter, then one for the residual.
+    """Write the text of cestac.csv: one line per parameter and level, one line per residual.
 
-    The residual is called "rho"; its e is %e(rho), and the next column is its increase.
+    The residual is called "rho"; its e is %e(rho), and the last column is its increase.
     """
     reference, numbers = result.reference, ("mean", "sigma", "relative_sigma", "e", "half_width")
     rows: list[Sequence[Any]] = []
@@ -459,17 +483,17 @@ def cestac_csv(result: Cestac) -> str:
 
 
 def texts(words: Iterable[str]) -> Array:
-    """Strings as an array."""
+    """Convert strings to a NumPy array of strings."""
     return np.array(list(words), dtype=np.str_)
 
 
 def names_judged(settings: CestacSettings) -> dict[str, tuple[str, ...]]:
-    """Names of the judged parameters as an entry of the provenance, if not all of them are judged."""
+    """Return the provenance entry that lists the parameters to judge, if the settings name some."""
     return {} if isinstance(settings.columns, str) else {JUDGED: settings.columns}
 
 
 def deciding_names(reference: Estimate) -> tuple[str, ...]:
-    """Judged names whose %sigma (11) is at most LIMIT.DECIDING."""
+    """Find the parameters that decide the verdict: judged ones with %sigma (11) up to LIMIT.DECIDING."""
     asked = reference.provenance.get(JUDGED, reference.names)
     return tuple(
         name
@@ -481,7 +505,7 @@ def deciding_names(reference: Estimate) -> tuple[str, ...]:
 def level_result(
     level: Level, runs: Runs, measured: Observation, reference: Estimate
 ) -> LevelResult:
-    """Eqs. (18) to (22) and the verdict of one level.
+    """Compute means, standard deviations, errors and verdict of one level, eqs. (18) to (22).
 
     measured : the unperturbed system with the columns of the runs.
     """
@@ -544,7 +568,7 @@ def level_result(
 
 
 def runs_needed(spread: float) -> int:
-    """Smallest number of runs for a Student interval of the mean within LIMIT.NEGLIGIBLE.
+    """Find how many runs give means with confidence intervals of +-1 % (LIMIT.NEGLIGIBLE).
 
     spread : 100 sigma / |X_LS|.
     """
@@ -559,9 +583,9 @@ def runs_needed(spread: float) -> int:
 
 
 def _verdict(errors: Mapping[str, float]) -> tuple[Verdict, dict[str, float]]:
-    """Verdict, and the errors that decided it, largest first.
+    """Return the verdict, and the errors that decided it, by name, largest first.
 
-    The largest one alone when all are negligible.
+    If all errors are negligible, only the largest is returned.
     """
     ordered = sorted(errors.items(), key=lambda item: -item[1])
     verdict = _verdict_of_error(ordered[0][1])
@@ -572,7 +596,7 @@ def _verdict(errors: Mapping[str, float]) -> tuple[Verdict, dict[str, float]]:
 
 
 def _verdict_of_error(error: float) -> Verdict:
-    """Verdict of one error, in %."""
+    """Return the verdict of one error, in %: unbiased, doubtful or biased."""
     return (
         "unbiased" if error < LIMIT.NEGLIGIBLE else "biased" if error > LIMIT.BIASED else "doubtful"
     )
@@ -616,5 +640,5 @@ def _message(
 
 
 def _relative_change(norm: float, of: float) -> float:
-    """Eq. (22), in %."""
+    """Compute the relative change of a residual norm against the norm `of`, %, eq. (22)."""
     return 100 * abs(1 - norm / of) if of > 0 else float("inf" if norm > 0 else 0.0)

@@ -10,13 +10,13 @@
     phase       phi + Delta round((x - phi) / Delta), phi uniform in [0, Delta), one for each column
             variance Delta^2 / 12
 
-The first three add Delta xi to the measurement, with xi the same for every Delta; the last two
-replace it. `phase` is what a real encoder does: its error is a sawtooth along the motion, not
-white, and its edges say when the position passed a known value, which the other laws destroy. Its
-lines, at phi + (k + 1/2) Delta, may be uneven: each is displaced by its own normal number of
-deviation `uneven` Delta; where a whole number of steps makes one turn the pattern repeats with
-every turn. Every draw has its own stream, a Philox generator keyed by (seed, level, run): its
-numbers do not depend on who draws, or when.
+The first three laws add Delta xi to the measurement, with xi the same for every Delta; the last two
+replace the measurement. `phase` is what a real encoder does. Its error is a sawtooth along the
+motion, not white noise, and its edges show when the position passed a known value; the other laws
+destroy this information. Its lines, at phi + (k + 1/2) Delta, may be uneven: each line is displaced
+by a normal random number of standard deviation `uneven` Delta. If a whole number of steps makes one
+turn, the pattern repeats with every turn. Every draw has its own stream, a Philox generator with
+the key (seed, level, run): its numbers do not depend on the process that draws, or on the order.
 """
 
 from __future__ import annotations
@@ -37,16 +37,20 @@ ADDED = ("two-point", "gaussian", "uniform")  # Modes that add Delta xi
 
 
 def stream(seed: int, *key: int) -> np.random.Generator:
-    """Random generator of one draw: equal for equal seed and key, independent for others."""
+    """Return the random generator of one draw, which depends on seed and key alone.
+
+    Generators of different keys are independent.
+    """
     return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=key)))
 
 
 def rounded(
     x: Array, step: float, mode: Mode, rng: np.random.Generator, uneven: float = 0.0
 ) -> Array:
-    """Perturb x, shape (N, n) or (N,), like an encoder with steps of `step` (in the unit of x).
+    """Round x at random by the law `mode`, as an encoder with steps of `step` would.
 
-    uneven : deviation of the lines of law phase from even spacing, in steps.
+    x : shape (N, n) or (N,); step : in the unit of x.
+    uneven : standard deviation of the lines of law phase from even spacing, in steps.
     """
     if mode in ADDED:
         return np.asarray(x + step * noise(x.shape, mode, rng))
@@ -67,7 +71,10 @@ def rounded(
 
 
 def counted(x: Array, step: float, phase: float, uneven: float, rng: np.random.Generator) -> Array:
-    """Positions, shape (N,), that an encoder with these lines shows for the motion x."""
+    """Compute the positions, shape (N,), that an incremental encoder shows for the motion x.
+
+    step, phase, uneven : distance, phase and unevenness of its lines, as of law phase.
+    """
     cell = (x - phase) / step
     if not uneven:
         return np.asarray(phase + step * np.floor(cell + 0.5))
@@ -87,23 +94,29 @@ def counted(x: Array, step: float, phase: float, uneven: float, rng: np.random.G
 
 
 def noise(shape: tuple[int, ...], mode: Mode, rng: np.random.Generator) -> Array:
-    """Additive perturbation xi, shape (N, n)."""
+    """Draw random numbers xi, shape (N, n); Delta xi is then added to the measurement."""
     if mode == "two-point":
         return signs(shape, rng)
     return rng.standard_normal(shape) if mode == "gaussian" else rng.uniform(-1.0, 1.0, shape)
 
 
 def signs(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
-    """Random +1.0 or -1.0 with probability 1/2; columns are contiguous, as the filters need."""
+    """Draw random numbers +1.0 or -1.0, with probability 1/2 each, in an array of the given shape.
+
+    Its columns are contiguous in memory, as the filters need.
+    """
     return np.take([-1.0, 1.0], np.ascontiguousarray(bits(shape, rng).T)).T
 
 
 def bits(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
-    """Random 1 or 0 with probability 1/2."""
+    """Draw random numbers 1 or 0, with probability 1/2 each, in an array of the given shape."""
     size = int(np.prod(shape))
     return np.unpackbits(packed_bits(size, rng), count=size).reshape(shape)
 
 
 def packed_bits(size: int, rng: np.random.Generator) -> Array:
-    """`size` random bits in bytes, high bits first, and one byte more."""
+    """Draw at least `size` random bits, eight in each byte of the returned array.
+
+    High bits are first; there is one byte more than needed.
+    """
     return np.frombuffer(rng.bytes(-(-size // 8) + 1), dtype=np.uint8)

@@ -1,6 +1,7 @@
-"""One run of a resolution study, from perturbed positions to the estimate of Y on W_CESTAC, eqs. (15)-(17): by the way of the identification, every method alike.
+"""One run of a study of the encoder resolution: rounded measurements and the estimate from them.
 
-What does not change from run to run is made once for each block of runs. Times:
+Eqs. (15)-(17). The filters and the method are those of the identification, for every method alike.
+Data that do not change from run to run are computed once for each block of runs. Times:
 benchmarks/performance.md, `benchmarks/cestac_run.py`.
 """
 
@@ -24,15 +25,15 @@ USABLE = ("ok", "weak-instruments")  # Status of an estimate that counts as a ru
 
 
 def run_block(task: Task, keys: Sequence[tuple[int, int]]) -> Runs:
-    """Compute several runs one after the other; key = (level, run)."""
+    """Compute several runs one after the other, each given by its level number and run number."""
     columns = task.columns
     return Runs.of([one_run(columns, task, key) for key in keys], len(task.names))
 
 
 def one_run(columns: Columns, task: Task, key: tuple[int, int]) -> Run:
-    """Estimate from perturbed measurements, eq. (17); key = (level, run).
+    """Estimate the parameters once from randomly rounded measurements, eq. (17).
 
-    X is nan if the method finds no estimate.
+    key : number of the level and of the run. X is nan if the method finds no estimate.
     """
     level = task.levels[key[0]]
     draw = key[1:] if task.settings.common else key
@@ -48,7 +49,7 @@ def one_run(columns: Columns, task: Task, key: tuple[int, int]) -> Run:
 
 
 def _estimated(task: Task, observation: Observation) -> Array:
-    """X of the method of the task, shape (b,); of nan if it finds no estimate."""
+    """Estimate X, shape (b,), by the method of the task; nan if the method finds no estimate."""
     if task.estimate.method in LINEAR:
         return linear_system(observation, task.estimate).solve().X
     try:

@@ -1,4 +1,4 @@
-"""Levels of a resolution study and their runs."""
+"""Levels (sensor steps) of a study of the encoder resolution, and the runs at each level."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Run:
-    """One run.
+    """One run of a study: the parameters estimated from one random rounding of the measurements.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Runs(Sequence[Run]):
-    """R runs as arrays, for transfer between processes and for files.
+    """R runs of a study, stored as arrays for files and for transfer between processes.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Runs(Sequence[Run]):
 
     @classmethod
     def of(cls, runs: Sequence[Run], b: int) -> Runs:
-        """Arrays of single runs with b parameters each."""
+        """Collect single runs, with b parameters each, in arrays."""
         return cls(
             np.array([run.level for run in runs], dtype=np.int64),
             np.array([run.run for run in runs], dtype=np.int64),
@@ -60,7 +60,7 @@ class Runs(Sequence[Run]):
 
     @classmethod
     def joined(cls, parts: Sequence[Runs], b: int) -> Runs:
-        """All runs of several parts, sorted by level and number; a repeated run is kept once."""
+        """Join several groups of runs, sorted by level and number; a repeated run is kept once."""
         parts = [cls.of((), b), *parts]
         fields = [
             np.concatenate([getattr(part, name) for part in parts])
@@ -70,12 +70,12 @@ class Runs(Sequence[Run]):
         return cls(*(field[first] for field in fields))
 
     def where(self, selected: Array) -> Runs:
-        """Select runs by a mask of shape (R,) or by their numbers."""
+        """Select runs by a mask of shape (R,) or by their indices."""
         return Runs(*(getattr(self, name)[selected] for name in self.__dataclass_fields__))
 
     @property
     def keys(self) -> set[tuple[int, int]]:
-        """(level, run) of every run."""
+        """Pairs (level number, run number) of all runs."""
         return set(zip(self.level.tolist(), self.run.tolist(), strict=True))
 
     def __len__(self) -> int:
@@ -92,7 +92,7 @@ class Runs(Sequence[Run]):
 
 @dataclass(frozen=True)
 class Level:
-    """Steps of one level of a study; 0 means not perturbed.
+    """One level of a study: the steps by which positions and torques are rounded; 0: not rounded.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class Level:
 
     @property
     def label(self) -> str:
-        """Label of the level: `2*pi/10000` for a position, `Phi 0.01` for a torque."""
+        """Name of the level in tables: `2*pi/10000` for a position, `Phi 0.01` for a torque."""
         parts = []
         if self.delta:
             counts = 2 * np.pi / self.delta

@@ -1,4 +1,8 @@
-"""What a study of encoders is told of the encoder that made a record, and of a closed loop that is simulated anew: features give both."""
+"""Interfaces of the objects that a study of encoders gets from other packages.
+
+They are the encoder that measured a record, a closed loop that is simulated again in each run, and
+a store of runs on disk.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +26,7 @@ Array = np.ndarray
 class RecordEncoder(Protocol):
     """Encoder that measured one record.
 
-    step : ndarray, shape (n,), rad or m.   read : whether its counts have been read.
+    step : ndarray, shape (n,), rad or m.   read : whether the counts of the record have been read.
     """
 
     @property
@@ -32,11 +36,14 @@ class RecordEncoder(Protocol):
     def read(self) -> bool: ...
 
     def positions(self, q: Array, delta: float, rng: np.random.Generator) -> Array:
-        """Joint positions, shape (N, n), from which a coarser encoder of step delta can be simulated."""
+        """Return joint positions, shape (N, n), to be rounded as an encoder of step delta would.
+
+        They are the measured q, or a random motion that agrees with the recorded counts.
+        """
 
 
 class LoopRecord(Protocol):
-    """Rows of one record of a simulated loop.
+    """One record of a simulated closed loop: its prepared data, its selected rows and its torque.
 
     torque : ndarray, shape (n, K), before the selection of rows.
     """
@@ -52,9 +59,10 @@ class LoopRecord(Protocol):
 
 
 class Loop(Protocol):
-    """Closed loop that a study simulates again in each run.
+    """Closed loop of robot and controller that a study simulates again in each run.
 
-    estimate : settings of the estimate without those of the loop.   described : description for JSON.   notes : sentences for the user.
+    estimate : settings of the estimate without those of the loop.
+    described : description for JSON.   notes : sentences for the user.
     """
 
     @property
@@ -70,26 +78,26 @@ class Loop(Protocol):
     def notes(self) -> tuple[str, ...]: ...
 
     def measured(self) -> Observation:
-        """Rows of the measured records."""
+        """Build the system Y = W X + rho of the measured records."""
 
     def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
-        """`observation` from the perturbed positions of every record, with this loop attached."""
+        """Attach this loop, with the rounded positions in its records, to `observation`."""
 
     def rows(self, level: Level, draw: tuple[int, ...]) -> Observation:
-        """Rows of a record that is simulated with encoder steps of level.delta."""
+        """Simulate a record with encoder steps level.delta, and build its system Y = W X + rho."""
 
 
 class Checkpoint(Protocol):
-    """Store for the runs of a study that may be interrupted."""
+    """Store on disk for the runs of a study, so that an interrupted study can continue."""
 
     def resume(self, identity: Mapping[str, Any], b: int) -> Runs:
-        """Runs, with b parameters each, that an interrupted study with the same identity has stored."""
+        """Return the stored runs, b parameters each, of an earlier study with the same identity."""
 
     def add(self, runs: Runs) -> None:
-        """Add new runs."""
+        """Add new runs to the store."""
 
     def flush(self) -> None:
-        """Write all added runs."""
+        """Write all added runs to disk."""
 
 
 EncoderOf: TypeAlias = Callable[[Record, Study, Drives | None], RecordEncoder | None]

@@ -1,1 +1,1 @@
-"""Y = W X + rho, eqs. (6) and (14), and its triangular factor."""
+"""The linear system Y = W X + rho, eqs. (6) and (14), its rows and its triangular factor."""

@@ -1,4 +1,4 @@
-"""The triangular factor of [W Y], from which every linear estimate is read.
+"""The triangular factor R of [W Y], from which every linear estimate is computed.
 
     [W Y] = Q R,    R = [[R_11, r_12], [0, r_22]]
 
@@ -13,7 +13,7 @@ more (structured TSQR):
                                             ||Y_j - W_j X|| = ||R_j [X[C_j]; -1]||
 
 Weights of a joint multiply R_j, removing a parameter deletes a column of R and of the R_j, and
-parts of a record combine by stacking their R_j: none of them passes over W again.
+parts of a record are combined by stacking their R_j. None of these operations uses W again.
 
 References: Golub and Van Loan, Matrix Computations, sections 5.2 and 6.5; Demmel, Grigori, Hoemmen
 and Langou (2012) for TSQR.
@@ -30,7 +30,10 @@ Array = np.ndarray
 
 
 def triangularise(A: Array) -> Array:
-    """Upper triangular R, shape (n, n), of A, shape (m, n), with A'A = R'R; m < n is allowed."""
+    """Compute the upper triangular R, shape (n, n), with R'R = A'A, of A, shape (m, n).
+
+    m < n is allowed.
+    """
     m, n = A.shape
     R = np.zeros((n, n))
     if m:
@@ -40,9 +43,11 @@ def triangularise(A: Array) -> Array:
 
 @dataclass(frozen=True)
 class JointFactor:
-    """Triangular factor of the rows of one joint: `R` has the Gram matrix of [W_j[:, columns] Y_j].
+    """Triangular factor R_j of the rows of one joint, with the columns that act on this joint.
 
-    columns : ndarray of int, shape (c,), positions in the names of the Factor.
+    R'R is the Gram matrix of [W_j[:, columns] Y_j].
+
+    columns : ndarray of int, shape (c,), their numbers in the names of the Factor.
     R : ndarray, shape (k, c + 1), k <= c + 1 after factoring; not triangular once columns were
     deleted.
     rows : number of rows of this joint.
@@ -53,18 +58,18 @@ class JointFactor:
     rows: int
 
     def spread(self, b: int) -> Array:
-        """R with columns for all b parameters and for Y, shape (k, b + 1)."""
+        """Expand R to columns for all b parameters and for Y, shape (k, b + 1), with zeros."""
         block = np.zeros((len(self.R), b + 1))
         block[:, [*self.columns, b]] = self.R
         return block
 
     def residual_norm(self, X: Array) -> float:
-        """||Y_j - W_j X|| of X, shape (b,)."""
+        """Compute the residual norm ||Y_j - W_j X|| of this joint for the parameters X, shape (b,)."""
         return float(np.linalg.norm(self.R[:, :-1] @ X[self.columns] - self.R[:, -1]))
 
     @property
     def measured_norm(self) -> float:
-        """||Y_j||."""
+        """Norm ||Y_j|| of the measured torques of this joint."""
         return float(np.linalg.norm(self.R[:, -1]))
 
 
@@ -83,7 +88,7 @@ class Factor:
 
     @classmethod
     def of(cls, names: Sequence[str], joints: Sequence[JointFactor]) -> Factor:
-        """Factor of all joints from the factors of the joints."""
+        """Combine the factors of the single joints into the factor of all rows."""
         b = len(names)
         R = (
             triangularise(np.vstack([joint.spread(b) for joint in joints]))
@@ -113,14 +118,14 @@ class Factor:
         return float(abs(self.R[-1, -1]))
 
     def weighted(self, weights: Sequence[float] | Array) -> Factor:
-        """The factor after the rows of joint j are multiplied by weights[j]."""
+        """Return the factor after the rows of joint j are multiplied by weights[j]."""
         return Factor.of(
             self.names,
             [replace(joint, R=joint.R * w) for joint, w in zip(self.joints, weights, strict=True)],
         )
 
     def select(self, names: Sequence[str]) -> Factor:
-        """The factor of the columns `names`, in this order, and of Y."""
+        """Return the factor of the columns `names`, in this order, and of Y."""
         unknown = [name for name in names if name not in self.names]
         if unknown:
             raise ValueError(
@@ -131,10 +136,10 @@ class Factor:
         return Factor(tuple(names), R, tuple(selected(joint, kept) for joint in self.joints))
 
     def drop(self, name: str) -> Factor:
-        """The factor without one parameter: without column k, R stays triangular above row k.
+        """Return the factor without the column of one parameter.
 
-        Only the trailing block, an upper Hessenberg matrix of order b - k, is made triangular
-        again.
+        Without column k, R stays triangular above row k. Only the trailing block, an upper
+        Hessenberg matrix of order b - k, is made triangular again.
         """
         k = self.names.index(name)
         b = len(self.names)
@@ -150,7 +155,10 @@ class Factor:
 
 
 def selected(joint: JointFactor, kept: Sequence[int]) -> JointFactor:
-    """The columns at the positions `kept` of the Factor, renumbered in this order."""
+    """Reduce the factor of one joint to the columns whose numbers are in `kept`.
+
+    kept : numbers of columns of the Factor, in their new order.
+    """
     place = {int(column): position for position, column in enumerate(joint.columns)}
     places = [(new, place[old]) for new, old in enumerate(kept) if old in place]
     columns = np.array([new for new, _ in places], dtype=np.intp)
@@ -162,7 +170,7 @@ def selected(joint: JointFactor, kept: Sequence[int]) -> JointFactor:
 
 
 def factor(W: Array, Y: Array, rows: Sequence[int], names: Sequence[str]) -> Factor:
-    """Triangular factor of [W Y], joint by joint.
+    """Compute the triangular factor of [W Y], joint by joint.
 
     Parameters
     ----------
@@ -183,12 +191,14 @@ def factor(W: Array, Y: Array, rows: Sequence[int], names: Sequence[str]) -> Fac
 def joint_factors(
     W: Array, Y: Array, rows: Sequence[int], parts: Array
 ) -> list[tuple[JointFactor, ...]]:
-    """Factors by joint for each part of the rows, with a copy of W for one part of one joint only.
+    """Compute the triangular factor of every joint, separately for each part of the rows.
+
+    To save memory, only the rows of one part of one joint are copied at a time.
 
     Parameters
     ----------
     W, Y, rows
-        As of `factor`.
+        As for `factor`.
     parts : ndarray of int, shape (r,)
         Number of the part of each row, from 0.
     """
@@ -212,7 +222,10 @@ def joint_factors(
 
 
 def merged(parts: Iterable[Sequence[JointFactor]]) -> tuple[JointFactor, ...]:
-    """Factors by joint of all rows, from those of several sets of rows with the same columns."""
+    """Merge the joint factors of several parts of the rows into the joint factors of all rows.
+
+    All parts have the same columns.
+    """
     return tuple(
         same[0]
         if len(same) == 1

@@ -1,7 +1,8 @@
-"""The observed linear system Y = W X + rho, eqs. (6) and (14), with the bookkeeping of its rows.
+"""The linear system Y = W X + rho of measured records, eqs. (6) and (14), and its rows.
 
-Estimators read `factor`, `norms`, `block_rows`, `columns`, `between` and `of_record`. Where a record
-is long, the rows of every block of residuals are factored on their own:
+Estimators use `factor`, `norms`, `block_rows`, `columns`, `between` and `of_record`. If a record is
+long, the rows of every block of residuals (an interval of time) are factored separately, and the
+factors R_j of the block replace its rows:
 
     ||Y_j - W_j X||            ||R_j [X[C_j]; -1]||
     Gram matrix of a block     sum of R_j'R_j over the joints
@@ -35,7 +36,10 @@ filter, at the rate of eq. (13).
 
 @dataclass(frozen=True, eq=False)
 class LoopRows:
-    """Closed loop that made the records (`runtime.loop.closed_loop`), and its rows in an observation, shape (r,)."""
+    """The closed loop that made the records, and the numbers of its rows that an observation has.
+
+    loop : `runtime.loop.closed_loop`. rows : shape (r,).
+    """
 
     loop: Any
     rows: Array
@@ -61,17 +65,19 @@ class Observation:
     rate : float, Hz
         Rows per second of one joint after decimation, of the fastest record.
     dropped : mapping of str to tuple of int
-        Rows left out, per joint, by reason ("trim", "low_speed", "mask"), counted after decimation.
+        Number of rows left out, per joint, by reason ("trim", "low_speed", "mask"), counted after
+        decimation.
     settings : mapping
-        Signals and rows used, complete (to_mapping), with the factor that "auto" became.
+        All settings of signals and rows (to_mapping), with the decimation factor that was chosen
+        for "auto".
     files : mapping of str to str
         SHA-256 of the measured files, by name.
     closed_loop : LoopRows or None
-        What can simulate the same rows with other parameters, if it is known.
+        Closed loop that can simulate the same rows with other parameters, if it is known.
     findings : tuple of str
-        What the reader of counts says of the encoders, a sentence each.
+        Sentences of the reader of counts about the encoders.
     rates : tuple of float, Hz
-        Rows per second of each record; none of an observation of one record.
+        Rows per second of each record; empty for an observation of one record.
     """
 
     W: Array
@@ -120,7 +126,7 @@ class Observation:
         return float(self.t.min()), float(self.t.max())
 
     def joint(self, j: int) -> slice:
-        """The rows of the j-th joint, j from 0."""
+        """Return the slice of the rows of joint j, counted from 0."""
         start = sum(self.rows[:j])
         return slice(start, start + self.rows[j])
 
@@ -133,30 +139,34 @@ class Observation:
 
     @cached_property
     def block_factors(self) -> list[tuple[JointFactor, ...]] | None:
-        """Triangular factors of every block of residuals, joint by joint; computed once.
+        """Triangular factors of [W Y] in every block of time, joint by joint; computed once.
 
-        None if such a block of one joint has hardly more rows than columns.
+        None for a short record, in which such a block of one joint has hardly more rows than
+        columns.
         """
         if max(self.rows) < 2 * BLOCKS * (len(self.names) + 1):
             return None
         return joint_factors(self.W, self.Y, self.rows, self.blocks())
 
     def columns(self, names: Sequence[str]) -> Observation:
-        """The same rows with the named columns only, in the given order."""
+        """Return the same rows with the named columns only, in the given order."""
         if tuple(names) == self.names:
             return self
         kept = column_numbers(names, self.names)
         return replace(self, W=np.asfortranarray(self.W[:, kept]), names=tuple(names))
 
     def equal_parts(self, count: int) -> Array:
-        """Number, from 0, of the part of each row, shape (r,): `count` parts of equal duration."""
+        """Divide the time span into `count` equal parts and return the part number of each row.
+
+        Shape (r,); numbers start from 0.
+        """
         start, end = self.span  # the same of rows of one instant
         return np.asarray(
             (count * (self.t - start) / ((end - start) or 1.0)).astype(int).clip(max=count - 1)
         )
 
     def where(self, mask: Array) -> Observation:
-        """The rows for which `mask`, bool of shape (r,), is true."""
+        """Return the observation of the rows for which `mask`, bool of shape (r,), is true."""
         if mask.shape != self.Y.shape or mask.dtype != np.bool_:
             raise InputError(f"mask {mask.dtype} {mask.shape}; expected bool {self.Y.shape}")
         rows = tuple(int(np.count_nonzero(mask[self.joint(j)])) for j in range(self.n))
@@ -177,7 +187,7 @@ class Observation:
         )
 
     def between(self, t0: float | None, t1: float | None) -> Observation:
-        """The rows with t0 <= t <= t1, s; None leaves an end open."""
+        """Return the observation of the rows with t0 <= t <= t1, s; None leaves an end open."""
         first = -np.inf if t0 is None else t0
         last = np.inf if t1 is None else t1
         part = self.where((self.t >= first) & (self.t <= last))
@@ -188,12 +198,15 @@ class Observation:
         return part
 
     def of_record(self, number: int) -> Observation:
-        """The rows of one record, number from 0."""
+        """Return the observation of the rows of one record, its number counted from 0."""
         rate = self.rates[number] if self.rates else self.rate
         return replace(self.where(self.record == number), rate=rate, rates=())
 
     def norms(self, names: Sequence[str], X: Array) -> tuple[Array, Array]:
-        """||Y_j - W_j X|| with the columns `names`, and ||Y_j||, for every joint, N m or N, shape (n,) each."""
+        """Compute the norms ||Y_j - W_j X|| and ||Y_j|| of every joint, N m or N, shape (n,) each.
+
+        X : values of the columns `names`; other columns count as zero.
+        """
         whole = np.zeros(len(self.names))
         whole[column_numbers(names, self.names)] = X
         residual = self.Y - self.W @ whole
@@ -208,9 +221,10 @@ class Observation:
         return float(max(max(self.rows) / BLOCKS, SHORTEST) / self.rate)
 
     def blocks(self, length: float | None = None) -> Array:
-        """Number, from 0, of the block of residuals of every row, shape (r,).
+        """Divide the records into intervals of `length` seconds and return the interval of each row.
 
-        A block is an interval of `length` seconds of one record.
+        Shape (r,), numbers from 0. Such an interval is a block of residuals. An interval never
+        extends over two records.
         """
         _, record = np.unique(self.record, return_inverse=True)
         first = np.full(record.max() + 1, np.inf)
@@ -225,16 +239,17 @@ class Observation:
     def block_rows(
         self, names: Sequence[str], weights: Array, length: float, whitener: Array | None = None
     ) -> Iterator[Array]:
-        """Weighted rows [W Y] of every block of residuals, shape (rows, b + 1).
+        """Yield the weighted rows [W Y] of every block of residuals, shape (rows, b + 1).
 
-        Rows from `block_factors` have the same Gram matrix.
+        For a long record, factors from `block_factors` replace the rows: their Gram matrix is the
+        same.
 
         Parameters
         ----------
         names : sequence of str
             The b columns of W.
         weights : ndarray, shape (n,)
-            Factors of the rows of each joint.
+            Factors by which the rows of each joint are multiplied.
         length : float, s
             Length of a block.
         whitener : ndarray, shape (n, n), optional
@@ -261,18 +276,27 @@ class Observation:
 
 
 def split_rows(A: Array, blocks: Array) -> Iterator[Array]:
-    """Rows of A, shape (r, c), of every block; blocks : number of the block of each row, shape (r,)."""
+    """Yield the rows of A, shape (r, c), block by block.
+
+    blocks : number of the block of each row, shape (r,).
+    """
     return (A[rows] for rows in rows_by_block(blocks))
 
 
 def rows_by_block(blocks: Array) -> list[Array]:
-    """Row numbers of every block; blocks : number of the block of each row, shape (r,)."""
+    """List the row numbers of every block.
+
+    blocks : number of the block of each row, shape (r,).
+    """
     order = np.argsort(blocks, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(blocks[order])) + 1)
 
 
 def whitened(A: Array, whitener: Array) -> Array:
-    """A, shape (n*N, c), joint-major, with the n rows of each instant multiplied by `whitener`, shape (n, n)."""
+    """Multiply the n rows of each instant in A by the matrix `whitener`, shape (n, n).
+
+    A : shape (n*N, c), joint-major.
+    """
     n = len(whitener)
     return np.asarray(
         np.einsum("ij,jNc->iNc", whitener, A.reshape(n, -1, A.shape[1])).reshape(A.shape)
@@ -280,13 +304,16 @@ def whitened(A: Array, whitener: Array) -> Array:
 
 
 def halves(t0: float, t1: float) -> tuple[Window, Window]:
-    """The two halves of [t0, t1], s, without a common instant."""
+    """Split the interval [t0, t1], s, into two halves without a common instant."""
     middle = (t0 + t1) / 2
     return (t0, middle), (float(np.nextafter(middle, t1)), t1)
 
 
 def stack(observations: Sequence[Observation]) -> Observation:
-    """Stack several records of one robot into one system, joint-major; `record` has the record of each row."""
+    """Stack the observations of several records of one robot into one system, joint-major.
+
+    `record` of the result has the number of the record of each row.
+    """
     if not observations:
         raise InputError("no observation to stack")
     first = observations[0]
@@ -326,14 +353,15 @@ def stack(observations: Sequence[Observation]) -> Observation:
 
 
 def same_settings(settings: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
-    """Settings of all records; one by one if they differ."""
+    """Return the settings that all records share, or the list of their settings if they differ."""
     return settings[0] if all(s == settings[0] for s in settings) else {"records": list(settings)}
 
 
 def all_files(hashes: Sequence[Mapping[str, str]]) -> dict[str, str]:
-    """Hashes by file name.
+    """Merge the SHA-256 hashes of the files of all records, by file name.
 
-    If a later record has another file with the same name, the name gets the number of that record.
+    If a later record has another file with the same name, the number of that record is added to the
+    name.
     """
     files: dict[str, str] = {}
     for k, of_record in enumerate(hashes, start=1):

@@ -1,9 +1,9 @@
-"""Deviations that the parameters of an observation will have, from W alone.
+"""Prediction of the standard deviations of the parameters from the observation matrix W alone.
 
-    W_w = diag(1/s_j) W diag(|X_i|)               rows of joint j over the deviation s_j of its torque
+    W_w = diag(1/s_j) W diag(|X_i|)               s_j: standard deviation of the torque of joint j
     C = A W_w'Omega W_w A,  A = (W_w'W_w)^-1      predicted covariance of X_i/|X_i|
 
-Omega is what the decimation makes of white torque noise: neighbouring rows are correlated, which
+Omega is the covariance of decimated white torque noise: neighbouring rows are correlated, which
 costs a tenth of the precision or more.
 """
 
@@ -31,9 +31,9 @@ class Weights:
     names : tuple of str
         Columns, c of them.
     s : ndarray, shape (n,), N m or N
-        Deviation of each torque.
+        Standard deviation of each torque.
     size : ndarray, shape (c,), SI
-        Of each parameter.
+        Size of each parameter.
     """
 
     names: tuple[str, ...]
@@ -41,23 +41,23 @@ class Weights:
     size: Array
 
     def matrix(self, observation: Observation) -> Array:
-        """W_w, shape (r, c)."""
+        """Compute the weighted observation matrix W_w, shape (r, c)."""
         return np.asarray(
             observation.columns(self.names).W / self.s[observation.joints][:, None] * self.size
         )
 
     def condition(self, observation: Observation) -> float:
-        """Condition number of W_w; inf if singular."""
+        """Compute the condition number of W_w; inf if W_w is singular."""
         values = np.linalg.svd(np.linalg.qr(self.matrix(observation), mode="r"), compute_uv=False)
         return float(values[0] / values[-1]) if values[-1] > 0 else float("inf")
 
     def relative_sigma(
         self, observation: Observation, correlation: Sequence[float] | Array = (1.0,)
     ) -> Array:
-        """Predicted %sigma of the parameters, shape (c,), relative to their size.
+        """Predict %sigma of the parameters, shape (c,), relative to their size.
 
-        correlation : of the torque noise of a joint between rows 0, 1, 2 ... sampling periods apart
-        (`kept_correlation`).
+        correlation : correlation of the torque noise of a joint between rows that are 0, 1, 2 ...
+            sampling periods apart (`kept_correlation`).
         """
         W = self.matrix(observation)
         inverse = np.linalg.inv(np.linalg.qr(W, mode="r"))
@@ -84,7 +84,10 @@ class Weights:
 
 
 def kept_correlation(signals: Signals, rate: float) -> Array:
-    """Correlation between rows 0, 1, 2 ... kept samples apart, for torque noise that is white at `rate`, Hz."""
+    """Compute the correlation of decimated torque noise between rows 0, 1, 2 ... instants apart.
+
+    The noise is white before the decimation, at the sampling rate `rate`, Hz.
+    """
     factor = decimation_factor(signals, rate)
     kept = (
         bandwidth(replace(signals, median=1), rate).decimation[::factor]

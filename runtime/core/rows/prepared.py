@@ -1,4 +1,4 @@
-"""One record as a study reads it: filtered, selected and decimated once, for whoever asks.
+"""One record with its filtered states, selected rows and decimated torques, each computed once.
 
     own = problem.prepared[0]
     own.states                                q, qd, qdd, by the reader of the study
@@ -6,9 +6,9 @@
     own.torque                                Y before rows are left out, shape (n, K)
     own.observation(model)                    Y = W X + rho
 
-A study that perturbs the positions (CESTAC) takes `selection` and `torque` of the measured record
-and repeats `observed_states` and `observation_from_states` with perturbed positions: Y and the
-choice of rows stay those of the record, so that a row is never kept or dropped because of noise.
+A study that perturbs the positions (CESTAC) uses `selection` and `torque` of the measured record
+and repeats `observed_states` and `observation_from_states` with perturbed positions. Y and the
+choice of rows stay those of the record, so that noise never decides whether a row is used.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ class Prepared:
     record : Record
         Joint side, SI.
     study : Study
-        Signals and rows, with numbers for what was automatic.
+        Settings of signals and rows, with numbers in place of "auto".
     reader : Reader
-        States of the record.
+        Function that computes the states of the record.
     keep : ndarray of bool, shape (N,) or (N, n), or None
         Samples (and joints) that may be used; None: all.
     """
@@ -58,40 +58,40 @@ class Prepared:
 
     @property
     def drives(self) -> Drives | None:
-        """Drives of a record on the motor side."""
+        """Drives of the robot if the record was measured on the motor side, else None."""
         return self.record.origin.drives
 
     @cached_property
     def states(self) -> States:
-        """q, qd, qdd by the reader, shape (N, n) each."""
+        """Filtered joint states q, qd, qdd of the record, shape (N, n) each."""
         states = self.reader(self.record, self.study.signals)
         return replace(states, channels=self.channels)
 
     @property
     def channels(self) -> dict[str, Array]:
-        """Channels with one column, shape (N,), such as temperatures."""
+        """Further recorded signals of one column, shape (N,), by name, such as temperatures."""
         given = self.record.channels.items()
         return {c: x[:, 0] for c, x in given if c not in JOINT_CHANNELS and x.shape[1] == 1}
 
     @cached_property
     def selection(self) -> Selection:
-        """Window, decimated instants, and the rows after trim, low speed and `keep`."""
+        """Rows of the record that are used, after window, decimation, trim, low speed and `keep`."""
         signals, rows = self.study.signals, self.study.rows
         return select_rows(self.record, self.states.qd, signals, rows, keep=self.keep)
 
     @cached_property
     def torque(self) -> Array:
-        """Y before the selection of rows, shape (n, K), N m or N."""
+        """Decimated measured torques Y before the selection of rows, shape (n, K), N m or N."""
         return decimated_torque(self.record.torque, self.selection)
 
     def certain(self, model: GeneratedModel) -> Selection:
-        """The selection without rows of unknown state or uncertain direction of friction."""
+        """Return the selection without rows of unknown state or of uncertain friction direction."""
         return certain(model, self.states, self.selection)
 
     def observation(
         self, model: GeneratedModel, columns: Sequence[str] | None = None
     ) -> Observation:
-        """Y = W X + rho of the selected rows."""
+        """Build the system Y = W X + rho of the selected rows."""
         return observation_from_states(
             model,
             self.states,
@@ -102,7 +102,10 @@ class Prepared:
         )
 
     def by(self, study: Study) -> Prepared:
-        """The same record with another study; common results are shared."""
+        """Return the same record prepared with the settings of another study.
+
+        States that were computed are reused if the signals are the same.
+        """
         if study.signals == self.study.signals and study.rows == self.study.rows:
             return self
         other = replace(self, study=study)
@@ -111,7 +114,7 @@ class Prepared:
         return other
 
     def take_states(self, other: Prepared) -> None:
-        """Reuse the states of another preparation with the same positions."""
+        """Reuse the states of another preparation, if it has the same positions and signals."""
         same = self.record.q is other.record.q and self.record.missing is other.record.missing
         same &= self.record.channels.get("qd") is other.record.channels.get("qd")
         same &= self.reader is other.reader and self.study.signals == other.study.signals
@@ -119,12 +122,12 @@ class Prepared:
             vars(self)["states"] = replace(other.states, channels=self.channels)
 
     def __getstate__(self) -> dict[str, Any]:
-        """State for other processes, without computed results."""
+        """Return the fields to send to another process, without computed results."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
 
 def common_drives(model: GeneratedModel, records: Sequence[Prepared]) -> Drives | None:
-    """Drives of all records, or of the model without records.
+    """Return the drives of the records, or those of the model if there are no records.
 
     InputError if the records were read with different couplings.
     """
@@ -135,7 +138,10 @@ def common_drives(model: GeneratedModel, records: Sequence[Prepared]) -> Drives 
 
 
 def decimated_torque(tau: Array, selection: Selection) -> Array:
-    """Y before the selection of rows, shape (n, K), from joint torques tau, shape (N, n): median, window, decimation."""
+    """Filter and decimate joint torques tau, shape (N, n), to the rows of Y, shape (n, K).
+
+    Median, window, decimation; rows are not yet selected.
+    """
     tau = median_filtered(tau, selection.signals.window_of_torques)
     windowed = np.ascontiguousarray(tau[selection.samples].T)
     return windowed if selection.plan is None else decimate(windowed, selection.plan)
@@ -150,7 +156,7 @@ def observation_from_states(
     files: Mapping[str, str] | None = None,
     columns: Sequence[str] | None = None,
 ) -> Observation:
-    """Observation with W from the given states, shape (N, n) each, and decimated torques Y, shape (n, K).
+    """Build the system Y = W X + rho from given states, shape (N, n), and torques Y, shape (n, K).
 
     columns : names of the columns wanted; the others are neither filtered nor stored. Default: all.
     """
@@ -166,11 +172,11 @@ def observation_of(
     *,
     files: Mapping[str, str] | None = None,
 ) -> Observation:
-    """Observation with columns that many records share.
+    """Build the system Y = W X + rho of one record with `columns`, an evaluator of W for all records.
 
-    Where errors of the velocities are known, rows in which missing positions leave the state
-    unknown ("missing") or the direction of dry friction is uncertain ("direction") are left out as
-    well.
+    If errors of the velocities are known, two more kinds of rows are left out: rows in which
+    missing positions leave the state unknown ("missing"), and rows in which the direction of dry
+    friction is uncertain ("direction").
     """
     model = columns.model
     check_states(model, q=states.q, qd=states.qd, qdd=states.qdd)
@@ -210,7 +216,7 @@ def certain(
     states: States,
     selection: Selection,
 ) -> Selection:
-    """The selection without rows of unknown state or uncertain direction of dry friction.
+    """Remove the rows of unknown state or of uncertain direction of dry friction from a selection.
 
     Missing positions make a state unknown ("missing"); a direction is uncertain ("direction") near
     zero speed. Without known errors of the velocities, the selection does not change.
@@ -229,7 +235,10 @@ def certain(
 def stacked(
     model: GeneratedModel, records: Sequence[Prepared], columns: Sequence[str] | None = None
 ) -> Observation:
-    """Y = W X + rho of several records as one system; columns : default: all."""
+    """Build the system Y = W X + rho of several records as one.
+
+    columns : names of the columns; default: all.
+    """
     if not records:
         raise InputError("no record to observe")
     parts = [record.observation(model, columns) for record in records]
@@ -239,7 +248,7 @@ def stacked(
 def with_torques(
     observation: Observation, records: Sequence[Prepared], torques: Sequence[Array]
 ) -> Observation:
-    """The same rows of W with other torques, shape (N, n), of the same records."""
+    """Replace Y of an observation by other torques, shape (N, n), of the same records."""
     Y = np.empty_like(observation.Y)
     for number, (own, tau) in enumerate(zip(records, torques, strict=True)):
         rows = observation.record == number

@@ -1,9 +1,9 @@
-"""The columns of W, decimated: only the entries of the regressor that are not identically zero, and equal ones once.
+"""Decimated columns of W: entries that are always zero are skipped, equal ones computed once.
 
 Most entries of W are structurally zero or repeat each other up to the sign, and decimation is
-linear: filter the signals, then place them. They are evaluated in pieces of samples, by the
-operations of the module that they need (`runtime.core.rows.tape`), and decimated piece by piece:
-the signals are not stored.
+linear. Therefore only the distinct signals are filtered and then copied to their entries of W. They
+are evaluated in pieces of samples, by the operations of the module that they need
+(`runtime.core.rows.tape`), and decimated piece by piece: the signals are not stored.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ PROBES = 64  # random states that tell signals apart
 
 @dataclass(frozen=True, eq=False)
 class Entries:
-    """Places of the distinct signals: model store[k[m], j[m]] = sign[m] * signal[which[m]].
+    """Table of the nonzero entries of the regressor; entries that are equal up to sign share a signal.
 
-    Signal s first occurs at entry source[s].
+    Model store[k[m], j[m]] = sign[m] * signal[which[m]]. Signal s first occurs at entry source[s].
 
-    row : row of each entry in the wanted store; row = k where every column is wanted.
+    row : row of each entry in the wanted store; row = k if every column is wanted.
     place : row of each signal in the store, shape (b n, N).
     """
 
@@ -47,14 +47,14 @@ class Entries:
 
 
 class Columns:
-    """Columns of W of one model, with everything that does not change from record to record.
+    """Evaluator of the columns of the observation matrix W of one model, for all its records.
 
     Parameters
     ----------
     model : GeneratedModel
     names : sequence of str, optional
-        Base parameters of the columns wanted, in the order wanted; default: all b. Others are not
-        filtered.
+        Base parameters of the columns wanted, in the order wanted; default: all b. Other columns
+        are not filtered.
     """
 
     def __init__(
@@ -69,21 +69,23 @@ class Columns:
 
     @cached_property
     def entries(self) -> Entries:
-        """Places of the distinct signals of these columns."""
+        """Table of the entries of these columns and of the distinct signals in them."""
         numbers = np.array(column_numbers(self.names, self.model.BASE_PARAMETERS), dtype=int)
         return distinct_entries(self.model, numbers)
 
     @cached_property
     def tape(self) -> Tape | None:
-        """Operations that compute the distinct signals; None if the module must be called."""
+        """Recorded operations that compute the distinct signals; None if the module must be called."""
         n = len(self.model.JOINTS)
         return recorded(self.model, [divmod(int(place), n) for place in self.entries.place])
 
     def decimated(self, states: States, plan: Plan | None, instants: slice = slice(None)) -> Array:
-        """Decimated columns, shape (b, n, K), from the states (N, n) of the window: column k of joint j.
+        """Compute the decimated columns of W, shape (b, n, K), from the states of the window.
 
-        plan : of the decimation; None keeps every sample.
-        instants : those of the K that are stored.
+        Entry [k, j] has column k in the rows of joint j. The states have shape (N, n).
+
+        plan : plan of the decimation; None keeps every sample.
+        instants : which of the K instants are stored.
         """
         entries = self.entries
         first, last, _ = instants.indices(len(states) if plan is None else plan.K)
@@ -98,11 +100,11 @@ class Columns:
         return store
 
     def signals(self, states: States, plan: Plan | None) -> Iterator[tuple[slice, Array]]:
-        """Iterate over consecutive instants of the window and the decimated distinct signals there, shape (S, instants).
+        """Yield the decimated distinct signals, shape (S, instants), for successive slices of instants.
 
         Arrays are valid until the next ones are requested.
 
-        plan : None keeps every sample.
+        plan : plan of the decimation; None keeps every sample.
         """
         if plan is not None:
             yield from decimated_parts(
@@ -114,7 +116,10 @@ class Columns:
             yield slice(t0, t1), self._evaluated(states[t0:t1])
 
     def _evaluated(self, states: States) -> Array:
-        """Distinct signals of the states (B, n), shape (S, B), until the next call."""
+        """Compute the distinct signals, shape (S, B), at states of shape (B, n).
+
+        The array is valid until the next call.
+        """
         B = len(states)
         if B not in self._signals:
             self._signals[B] = np.empty((len(self.entries.place), B))
@@ -137,7 +142,10 @@ class Columns:
 
 
 def in_time(model: GeneratedModel, states: States) -> dict[str, Any]:
-    """Channels that laws of the model read, shape (N,); InputError if the states lack them."""
+    """Return the recorded signals on which laws of the model depend, shape (N,), by name.
+
+    InputError if the states lack one of them.
+    """
     channels = channels_of(model)
     if missing := [c for c in channels if c not in states.channels]:
         read = ", ".join(channels[missing[0]])
@@ -149,11 +157,14 @@ def in_time(model: GeneratedModel, states: States) -> dict[str, Any]:
 
 
 def distinct_entries(model: GeneratedModel, columns: Array | None = None) -> Entries:
-    """Group the entries of STRUCTURE in the columns (default: all) by equal values, up to the sign, at random states.
+    """Group the nonzero entries of the regressor that are equal up to sign, at random states.
 
-    The emitted text copies equal rows, so equal signals agree in every bit; different ones do not
-    agree at 64 random states. Where the random states are out of reach (loops that do not close),
-    each entry is its own signal.
+    The attribute STRUCTURE of the model marks the entries that are not identically zero. The
+    emitted text copies equal rows, so equal signals agree in every bit; different signals do not
+    agree at 64 random states. If random states are out of reach (loops that do not close), each
+    entry is its own signal.
+
+    columns : numbers of the columns; default: all.
     """
     columns = np.arange(len(model.BASE_PARAMETERS)) if columns is None else columns
     row, j = np.nonzero(np.asarray(model.STRUCTURE)[columns])
@@ -172,7 +183,7 @@ def distinct_entries(model: GeneratedModel, columns: Array | None = None) -> Ent
 
 
 def _probed(model: GeneratedModel) -> Array:
-    """The regressor at PROBES random states, shape (b, n, PROBES).
+    """Evaluate the regressor at PROBES random states, shape (b, n, PROBES).
 
     nan if a loop does not close at one of them.
     """

@@ -1,7 +1,7 @@
-"""Which rows of Y = W X + rho are used: a window before evaluation, then decimated rows by their place and speed.
+"""Choice of the rows of Y = W X + rho that are used: by window, decimation, trim and speed.
 
-The choice is made once, on the measured record, and shared by every run of a study, so that a row
-is never kept or dropped because of noise.
+The choice is made once, on the measured record, and shared by every run of a study, so that noise
+never decides whether a row is used.
 """
 
 from __future__ import annotations
@@ -46,7 +46,9 @@ Chosen on simulated records (docs/theory/counts.md).
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """Samples that are evaluated and decimated rows that are kept; the same in every run of a study.
+    """The samples of a record that are evaluated, and the decimated rows that are used.
+
+    It is the same in every run of a study.
 
     samples : the window, in raw samples.
     kept : shape (K,), kept instants, from the start of the window.
@@ -65,13 +67,13 @@ class Selection:
 
     @cached_property
     def settings(self) -> dict[str, Any]:
-        """All settings of signals and rows, with the factor that "auto" has chosen."""
+        """All settings of signals and rows, with the decimation factor that was chosen for "auto"."""
         signals, rows = to_mapping(self.signals), to_mapping(self.rows)
         return {"signals": signals, "rows": rows, "factor": self.factor}
 
     @property
     def plan(self) -> Plan | None:
-        """Decimation of the window; None if every sample is kept."""
+        """Plan of the decimation of the window; None if every sample is kept."""
         window, settings = self.samples, self.signals.decimate
         return decimation_plan(window.stop - window.start, self.factor, settings, int(self.kept[0]))
 
@@ -85,8 +87,8 @@ class Instants:
     start, stop : int
         Raw samples of the window, [start, stop).
     factor, first, kept : int
-        Decimation keeps one sample in `factor` from `first` on, counted from `start`, `kept` in
-        all.
+        Decimation keeps one sample in `factor`, from sample `first` of the window on; `kept` is
+        the number of samples kept.
     trim : int
         Kept instants whose rows are left out at each end.
     """
@@ -102,7 +104,8 @@ class Instants:
 def window_of(
     t: Array, window: tuple[float | None, float | None], file: str, margin: int = 0
 ) -> tuple[int, int]:
-    """Samples [start, stop) with t0 <= t <= t1, s; None leaves an end open.
+    """Find the samples [start, stop) with t0 <= t <= t1, s; None leaves an end open.
+
     margin : samples left out at each end of the record, a tenth of it at most.
     """
     t0, t1 = window
@@ -122,17 +125,19 @@ EXCERPT = 2**16
 
 
 def excerpt(record: Record, rows: Rows) -> slice:
-    """The first EXCERPT samples of a record in the window of the rows."""
+    """Return the slice of the first EXCERPT samples in the window, for automatic settings."""
     start, stop = window_of(record.t, rows.window, record.name)
     return slice(start, min(stop, start + EXCERPT))
 
 
 def instants_of(t: Array, rate: float, signals: Signals, rows: Rows, file: str) -> Instants:
-    """Window and decimation of a record at the times t, shape (N,), s, at a rate, Hz.
+    """Choose the window and the decimated instants of a record.
+
+    t : times, shape (N,), s. rate : Hz.
 
     The regressor near an end of the record is that of a low-pass which starts there. Decimation
-    spreads it over 27 instants (benchmarks/truth.md, Ends of records), so that rows.trim: auto leaves
-    out END_PERIODS/cutoff ahead of the decimation, and TRIM instants after it.
+    spreads this error over 27 instants (benchmarks/truth.md, Ends of records), so that rows.trim:
+    auto leaves out END_PERIODS/cutoff before the decimation, and TRIM instants after it.
     """
     auto, low = rows.trim == "auto", signals.lowpass
     trim = LIMIT.TRIM if rows.trim == "auto" else rows.trim
@@ -157,7 +162,7 @@ def instants_of(t: Array, rate: float, signals: Signals, rows: Rows, file: str) 
 def select_rows(
     record: Record, qd: Array, signals: Signals, rows: Rows, *, keep: Array | None = None
 ) -> Selection:
-    """Select window, decimated instants and rows by trim, low speed and `keep`.
+    """Select the rows of a record by window, decimation, trim, low speed and `keep`.
 
     qd : ndarray, shape (N, n), filtered velocities.
     """
@@ -192,7 +197,10 @@ def select_rows(
 
 
 def nothing_left(dropped: Mapping[str, Sequence[int]], K: int) -> str:
-    """Reason, in words, why none of the K rows of every joint is used; dropped : rows left out by reason and joint."""
+    """Explain in words why none of the K rows of every joint is used.
+
+    dropped : rows left out by reason and joint.
+    """
     left_out = ", ".join(
         f"{LEAVES_OUT.get(reason, reason)} leaves out {max(counts)}"
         for reason, counts in dropped.items()
@@ -207,7 +215,7 @@ def nothing_left(dropped: Mapping[str, Sequence[int]], K: int) -> str:
 def unused_joints(
     rows: Sequence[int], dropped: Mapping[str, Sequence[int]], joints: Sequence[str]
 ) -> str:
-    """Name in one sentence the joints without used rows, and the main reason; "" if every joint has rows.
+    """Name in one sentence the joints without used rows and the main reason; "" if there are none.
 
     Parameters
     ----------
@@ -216,7 +224,7 @@ def unused_joints(
     dropped : mapping of str to sequence of int
         Rows left out, by reason and joint.
     joints : sequence of str
-        What results call them.
+        Names of the joints in results.
     """
     bare = [j for j, count in enumerate(rows) if not count]
     if not bare or not dropped:
@@ -253,10 +261,12 @@ def certain_rows(
     model: GeneratedModel,
     states: States,
 ) -> Array:
-    """Rows with known state and known direction of dry friction, bool, shape (n, K), from states (K, n) with known errors.
+    """Find the rows with known state and known direction of dry friction, bool, shape (n, K).
 
-    A row of joint j is uncertain where |s| is below UNCERTAIN deviations of s, s = G qd the speed of a
-    column that switches and acts on j.
+    A row of joint j is uncertain if |s| is below UNCERTAIN standard deviations of s; s = G qd is
+    the speed of a column that switches and acts on j.
+
+    states : shape (K, n), with known errors.
     """
     certain = np.ones(states.q.T.shape, dtype=bool)
     if states.errors is not None:

@@ -1,4 +1,6 @@
-"""Columns of W that switch with the direction of motion: dry friction, and viscous friction of one direction.
+"""Friction columns of W that switch with the direction of motion.
+
+They are dry friction, and viscous friction of one direction:
 
 f(s) = linear s + jump sign(s) + kink |s| + a constant,  s = G qd
 """
@@ -28,7 +30,9 @@ SHAPES = {
 
 @dataclass(frozen=True, eq=False)
 class Switch:
-    """One column f(s), s = G qd, that acts on joint j as G_j f(s), f(s) = linear s + jump sign(s) + kink |s| + constant.
+    """One friction column of W that switches with the sign of a speed s = G qd.
+
+    It acts on joint j as G_j f(s), f(s) = linear s + jump sign(s) + kink |s| + constant.
 
     column : its number.   G : ndarray, shape (n,).
     """
@@ -41,7 +45,7 @@ class Switch:
 
     @property
     def joints(self) -> tuple[int, ...]:
-        """Joints, from 0, whose rows contain it."""
+        """Numbers, from 0, of the joints on which the column acts."""
         return tuple(int(j) for j in np.flatnonzero(self.G))
 
 
@@ -50,7 +54,9 @@ def switches(
     names: Sequence[str],
     passive: Literal["refused", "left out"] = "refused",
 ) -> tuple[Switch, ...]:
-    """Columns of `names` that jump with the sign of a velocity; ModelError if the model describes no elements.
+    """Find the columns among `names` that switch with the sign of a velocity, such as dry friction.
+
+    ModelError if the model describes no elements.
 
     passive : whether such a column along a passive joint is refused or left out.
     """

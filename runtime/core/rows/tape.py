@@ -1,12 +1,13 @@
-"""The regressor of a model as operations on rows of samples, of which those are done that wanted entries need.
+"""Recorded operations of an emitted regressor, of which only the needed ones are repeated.
 
     tape = recorded(model, [(k, j), ...])       # entries of D, column k, joint j
     tape.evaluate(q, qd, qdd, out)              # out, shape (S, B)
 
-An emitted module writes D by operations on whole rows. They are recorded once, by calling the module with rows that
-remember what is done to them. An operation that no wanted entry needs is left out, and a row is written over once
-nothing reads it any more, so that all rows stay in the cache. What is left is done in the order of the module: the
-results agree with its own in every bit.
+An emitted module writes D by operations on whole rows. They are recorded once, by calling the
+module with rows that remember what is done to them. An operation that no wanted entry needs is left
+out, and a row is overwritten once no later operation uses it, so that all rows stay in the cache.
+The remaining operations are done in the order of the module: the results agree with its own in
+every bit.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ class NotRecordedError(Exception):
 
 @dataclass(eq=False)
 class Row:
-    """A row of samples: a state, or the result of an operation on rows and numbers.
+    """A symbolic row of samples that records its computation: a state, or an operation on rows.
 
     function : None for a state, whose arguments are its array (0 for q) and its joint.
     """
@@ -81,7 +82,7 @@ class Row:
 
 
 class Functions:
-    """NumPy functions for rows and numbers."""
+    """Replacement of the NumPy module: functions of rows are recorded, functions of numbers computed."""
 
     def __getattr__(self, name: str) -> Any:
         function = getattr(np, name)
@@ -98,13 +99,13 @@ class Functions:
 
 
 class Tape:
-    """Operations that compute selected entries of D.
+    """The list of operations that compute selected entries of the regressor D.
 
     Parameters
     ----------
     entries : sequence of Row or float
     n : int
-        Joints.
+        Number of joints.
     """
 
     def __init__(self, entries: Sequence[Row | float], n: int) -> None:
@@ -128,7 +129,11 @@ class Tape:
         return out
 
     def _bound(self, B: int) -> tuple[Array, list[Any], list[Any]]:
-        """States, operations and entries on rows of B samples."""
+        """Allocate rows of B samples for the states and for the results of the operations.
+
+        Returns the rows of the states, the operations with their rows, and the rows of the entries.
+        A row that no later operation uses is used again.
+        """
         states = np.empty((len(STATES), self.n, B))
         rows: dict[int, Array] = {}
 
@@ -154,7 +159,7 @@ class Tape:
 
 
 def in_order(entries: Sequence[Row | float]) -> list[Row]:
-    """Operations that the entries need, each after its arguments."""
+    """List the operations that the entries need, each one after its arguments."""
     order: list[Row] = []
     done: set[int] = set()
     stack = _operations(entries)
@@ -178,7 +183,7 @@ def _operations(values: Sequence[Any]) -> list[Row]:
 def recorded(model: GeneratedModel, places: Sequence[tuple[int, int]]) -> Tape | None:
     """Record how an emitted module computes the entries (k, j) of its regressor D.
 
-    Returns None if the module does anything else than operations on rows, or reads measured
+    Returns None if the module does anything else than operations on rows, or depends on measured
     functions of time.
     """
     block = getattr(model, "_regressor_block", None)
