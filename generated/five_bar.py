@@ -51,7 +51,7 @@ Names       family, then component digits, then link: W12 is component 1 of link
     N    moment that moves a link, about the origin of its frame
     NE   moment transmitted to a link by its antecedent, about the origin of its frame
     FDI  the transmitted force, in the antecedent's frame
-    JP   inertia tensor of a link with all that it carries, about the origin of its frame
+    JP   inertia tensor of a link and all links after it, about the origin of its frame
     AS   the first moments MSP in the antecedent's frame
     GAM  joint torque or force
     DG   contribution of a base parameter to a joint torque
@@ -76,7 +76,7 @@ with probability below 8e-15; base_parameters, regressor, observation_matrix, in
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints, elements
 at random states, parameters and random constants agree with Lagrange's equations and products of
 frames to 1e-09, on NumPy's arrays.
-sha256 of all but these lines: 2babde241544e4322be30fb4ead1a069fededff9c781d2a87020595c16a25f8f
+sha256 of all but these lines: 2a018c35a8b9337ef9bd5f262b27736e5e75249b27d4ad0d01e9e8809bc269fe
 """
 
 import numpy as np

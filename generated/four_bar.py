@@ -49,7 +49,7 @@ Names       family, then component digits, then link: W12 is component 1 of link
     N    moment that moves a link, about the origin of its frame
     NE   moment transmitted to a link by its antecedent, about the origin of its frame
     FDI  the transmitted force, in the antecedent's frame
-    JP   inertia tensor of a link with all that it carries, about the origin of its frame
+    JP   inertia tensor of a link and all links after it, about the origin of its frame
     AS   the first moments MSP in the antecedent's frame
     GAM  joint torque or force
     DG   contribution of a base parameter to a joint torque
@@ -74,7 +74,7 @@ with probability below 6e-15; base_parameters, regressor, observation_matrix, in
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints, elements
 at random states, parameters and random constants agree with Lagrange's equations and products of
 frames to 1e-09, on NumPy's arrays.
-sha256 of all but these lines: 0c6e7cb0a23ed446a73907c893fa446ed5d7ec6a69b26f8455a296de1cb4c9b0
+sha256 of all but these lines: 48e5ffda2d512bedb69c52c3c0467f1262672064d68e2cc72efb62040df6b7be
 """
 
 import numpy as np

@@ -59,8 +59,8 @@ Names       family, then component digits, then link: W12 is component 1 of link
     E    force transmitted to a link by its antecedent, in its frame
     NE   moment transmitted to a link by its antecedent, about the origin of its frame
     FDI  the transmitted force, in the antecedent's frame
-    JP   inertia tensor of a link with all that it carries, about the origin of its frame
-    MSP  first moments of a link with all that it carries, in its frame
+    JP   inertia tensor of a link and all links after it, about the origin of its frame
+    MSP  first moments of a link and all links after it, in its frame
     AS   the first moments MSP in the antecedent's frame
     GAM  joint torque or force
     DG   contribution of a base parameter to a joint torque
@@ -89,7 +89,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: d334c7578e11c7d9b5227c939e867f33d50a5084c4538df0289cdab2a90bb529
+sha256 of all but these lines: 8e710dbe34ee917e196b0cffbeb3bb1654a6bdb2e2e47d19edaac81dd91cb51e
 """
 
 import numpy as np

@@ -49,8 +49,8 @@ Names       family, then component digits, then link: W12 is component 1 of link
     E    force transmitted to a link by its antecedent, in its frame
     NE   moment transmitted to a link by its antecedent, about the origin of its frame
     FDI  the transmitted force, in the antecedent's frame
-    JP   inertia tensor of a link with all that it carries, about the origin of its frame
-    MSP  first moments of a link with all that it carries, in its frame
+    JP   inertia tensor of a link and all links after it, about the origin of its frame
+    MSP  first moments of a link and all links after it, in its frame
     AJA  the inertia tensor JP by the axes of the antecedent's frame
     AS   the first moments MSP in the antecedent's frame
     GAM  joint torque or force
@@ -80,7 +80,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 86e0a0cb1aa2b4a525f8ff9d4f4aa02a9142fc94412a523000fb6d6ed7d51edc
+sha256 of all but these lines: 1dd6245194f011bd9f7771980083ecbca2a1a5c4140d26f7cf5f1cc564d9f3a4
 """
 
 import numpy as np

@@ -40,7 +40,7 @@ Names       family, then component digits, then link: W12 is component 1 of link
     N    moment that moves a link, about the origin of its frame
     NE   moment transmitted to a link by its antecedent, about the origin of its frame
     FDI  the transmitted force, in the antecedent's frame
-    JP   inertia tensor of a link with all that it carries, about the origin of its frame
+    JP   inertia tensor of a link and all links after it, about the origin of its frame
     AS   the first moments MSP in the antecedent's frame
     GAM  joint torque or force
     DG   contribution of a base parameter to a joint torque
@@ -67,7 +67,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: edd10c4e5019d479090462ff3ae991caf7a2bc6bde4ed44e6e1036b6dcd2bc19
+sha256 of all but these lines: 67b32625fd752625033ee03ed7e2800206fedb4519269e133ddfb48dc7ff9fbd
 """
 
 import numpy as np

@@ -49,8 +49,8 @@ Names       family, then component digits, then link: W12 is component 1 of link
     E    force transmitted to a link by its antecedent, in its frame
     NE   moment transmitted to a link by its antecedent, about the origin of its frame
     FDI  the transmitted force, in the antecedent's frame
-    JP   inertia tensor of a link with all that it carries, about the origin of its frame
-    MSP  first moments of a link with all that it carries, in its frame
+    JP   inertia tensor of a link and all links after it, about the origin of its frame
+    MSP  first moments of a link and all links after it, in its frame
     AJA  the inertia tensor JP by the axes of the antecedent's frame
     AS   the first moments MSP in the antecedent's frame
     GAM  joint torque or force
@@ -80,7 +80,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 5d94e9ce966049304d7072b8f39843cee03a43483a2a8fbfd1d0b34f050d1e88
+sha256 of all but these lines: b42fb097764bf07aa14bbf32cb38f55a45c5b35b899f9e288c70b04b6791a0cc
 """
 
 import numpy as np

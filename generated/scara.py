@@ -45,8 +45,8 @@ Names       family, then component digits, then link: W12 is component 1 of link
     E    force transmitted to a link by its antecedent, in its frame
     NE   moment transmitted to a link by its antecedent, about the origin of its frame
     FDI  the transmitted force, in the antecedent's frame
-    JP   inertia tensor of a link with all that it carries, about the origin of its frame
-    MSP  first moments of a link with all that it carries, in its frame
+    JP   inertia tensor of a link and all links after it, about the origin of its frame
+    MSP  first moments of a link and all links after it, in its frame
     AS   the first moments MSP in the antecedent's frame
     GAM  joint torque or force
     DG   contribution of a base parameter to a joint torque
@@ -73,7 +73,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: a027ff0a7b7c4efdc54896e14418398961eee17db7b0ad76604f63e8d3bce8bc
+sha256 of all but these lines: b1a24abb9a7af4e55063e3a21eba5fcf015ff9aacd64ba4abe425e87169dacfb
 """
 
 import numpy as np

@@ -57,8 +57,8 @@ Names       family, then component digits, then link: W12 is component 1 of link
     E    force transmitted to a link by its antecedent, in its frame
     NE   moment transmitted to a link by its antecedent, about the origin of its frame
     FDI  the transmitted force, in the antecedent's frame
-    JP   inertia tensor of a link with all that it carries, about the origin of its frame
-    MSP  first moments of a link with all that it carries, in its frame
+    JP   inertia tensor of a link and all links after it, about the origin of its frame
+    MSP  first moments of a link and all links after it, in its frame
     AJA  the inertia tensor JP by the axes of the antecedent's frame
     AS   the first moments MSP in the antecedent's frame
     GAM  joint torque or force
@@ -88,7 +88,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: d35a079ca47715e0494a191b6f41ff7e36c7f3ebc3b11d2c53f7daab530f8d7c
+sha256 of all but these lines: a664b60dc1ff8d04aeca7937fc078155f36ceff2e8dccb9b540fb74e39805283
 """
 
 import numpy as np

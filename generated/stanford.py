@@ -47,8 +47,8 @@ Names       family, then component digits, then link: W12 is component 1 of link
     E    force transmitted to a link by its antecedent, in its frame
     NE   moment transmitted to a link by its antecedent, about the origin of its frame
     FDI  the transmitted force, in the antecedent's frame
-    JP   inertia tensor of a link with all that it carries, about the origin of its frame
-    MSP  first moments of a link with all that it carries, in its frame
+    JP   inertia tensor of a link and all links after it, about the origin of its frame
+    MSP  first moments of a link and all links after it, in its frame
     AJA  the inertia tensor JP by the axes of the antecedent's frame
     AS   the first moments MSP in the antecedent's frame
     GAM  joint torque or force
@@ -78,7 +78,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: f064ba1bcbf97e25a4c40b8b48dd5bf77419ca7ce8257ceadb5cf9a76ecd7dcb
+sha256 of all but these lines: c7fba2a61b92b0a7500de4409d19d6fa6ec88425aaaf818ac71d5b344fec424c
 """
 
 import numpy as np

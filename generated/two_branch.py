@@ -53,8 +53,8 @@ Names       family, then component digits, then link: W12 is component 1 of link
     E    force transmitted to a link by its antecedent, in its frame
     NE   moment transmitted to a link by its antecedent, about the origin of its frame
     FDI  the transmitted force, in the antecedent's frame
-    JP   inertia tensor of a link with all that it carries, about the origin of its frame
-    MSP  first moments of a link with all that it carries, in its frame
+    JP   inertia tensor of a link and all links after it, about the origin of its frame
+    MSP  first moments of a link and all links after it, in its frame
     AJA  the inertia tensor JP by the axes of the antecedent's frame
     AS   the first moments MSP in the antecedent's frame
     GAM  joint torque or force
@@ -85,7 +85,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 86561f84b3583a2ea6fe53d081b39ccf60a790c5e77b3812f12f93e14c63ac88
+sha256 of all but these lines: a438e39a4fbe4461db3ccf109a554195cfa5be0c504687ff8b40e4cdde929e67
 """
 
 import numpy as np

@@ -81,7 +81,9 @@ class Elasticity(Result, Part):
         ):
             behind = f"the encoder behind it is {1e3 * lag:.2f} ms late (FV/K less)"
             if not np.isfinite(K):
-                texts.append(f"Gear of joint {j}: no stiffness can be told from this; {behind}.")
+                texts.append(
+                    f"Gear of joint {j}: this record does not determine the stiffness; {behind}."
+                )
                 continue
             text = (
                 f"Gear of joint {j}: stiffness {K:.3g} +- {1.96 * s:.2g}, damping {D:.2g} +- "

@@ -389,8 +389,8 @@ def _table_3(demo: Demonstration) -> Section:
         [(text, f"{r.increase:.2f}") for text, r in zip(TABLE_3_RESIDUAL, levels, strict=True)],
     )
     text = (
-        f"Means of {len(levels[0].runs)} runs. %e(rho) is set beside the increase of the residual "
-        "norm in per cent of |Y|, the reading with the printed order; all four readings are "
+        f"Means of {len(levels[0].runs)} runs. %e(rho) is compared with the increase of the residual "
+        "norm in per cent of |Y|, the reading that gives the printed order; all four readings are "
         "below. Parameters that do not stay essential here have no column in the study and are "
         "left out.",
     )

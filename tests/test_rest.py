@@ -142,7 +142,7 @@ def test_the_command_writes_poses_that_are_read_as_a_record(tmp_path):
     out = CliRunner().invoke(
         app, ["excite", "planar_2r", "--poses", "12", "-o", str(tmp_path / "out")]
     )
-    assert out.exit_code == 0 and "12 poses at rest tell 6 parameters" in out.stdout
+    assert out.exit_code == 0 and "12 static poses determine 6 parameters" in out.stdout
     head, *rows = (tmp_path / "out/poses.csv").read_text().splitlines()
     assert head == "t,q1,q2" and len(rows) == 12
     assert (tmp_path / "out/report.html").exists()

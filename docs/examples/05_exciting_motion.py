@@ -1,4 +1,4 @@
-"""A motion that tells the parameters apart, within the limits of the robot: values of the robot
+"""A motion that separates the parameters, within the limits of the robot: values of the robot
 file stand for those not yet identified.
 """
 

@@ -1,1 +1,1 @@
-"""How coarse may an encoder be? Predicted, not sampled."""
+"""Predict how coarse an encoder may be before the estimated parameters are biased."""

@@ -1,4 +1,4 @@
-"""What the resolution advisor answers: steps, curves, sampled confirmation, and the verdict in words."""
+"""Results of the resolution advisor: encoder steps, curves, confirming runs, and the verdict."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ NAMES = {"lowpass": "positions", "counts": "counts"}  # of the readers, in words
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """CESTAC at one step.
+    """Result of several CESTAC runs with one encoder step.
 
     Attributes
     ----------
     delta : float, rad or m
     runs : int
     change : ndarray, shape (b,), %
-        Of the mean of the estimates, signed.
+        Change of the mean of the estimates, signed.
     half_width : ndarray, shape (b,), %
-        Of its Student interval.
+        Half width of the Student interval of this change.
     """
 
     delta: float
@@ -50,7 +50,10 @@ class Sampled:
 
 
 def sampled(delta: float, ratios: Array) -> Sampled:
-    """Change of each run's estimate from that of the record, eqs. (18), (21); shape (runs, b)."""
+    """Compute the mean change of the estimate over several runs, eqs. (18), (21).
+
+    ratios : estimate of each run over that of the record, shape (runs, b).
+    """
     N = len(ratios)
     half = float(stdtrit(N - 1, (1 + LIMIT.STUDENT_PROBABILITY) / 2)) / np.sqrt(N)
     change = 100 * (ratios.mean(axis=0) - 1)
@@ -59,17 +62,18 @@ def sampled(delta: float, ratios: Array) -> Sampled:
 
 @dataclass(frozen=True, eq=False)
 class Limit:
-    """The step at which %e reaches `percent`, and the parameter that reaches it first.
+    """Encoder step at which the change %e of the first parameter reaches `percent`.
 
     Attributes
     ----------
     percent : float, %
     delta : float, rad or m
-        inf if no step does.
+        inf if no step reaches it; nan if even the finest step exceeds it, or if no parameter is
+        judged.
     parameter : str
-        "" if no step does.
+        The first parameter that reaches it; "" if there is none.
     sampled : Sampled or None
-        CESTAC at that step; None without runs.
+        CESTAC runs at that step; None without runs.
     error, half_width : float, %
         %e of the parameter in the runs, and half width of its Student interval.
     """
@@ -83,9 +87,10 @@ class Limit:
 
     @property
     def agrees(self) -> bool:
-        """Sampled and predicted %e differ by no more than the interval and 30 %, which is 15 % in Delta.
+        """Whether the runs confirm the predicted %e.
 
-        True without runs.
+        The difference may be the Student interval plus 30 % of %e, which is 15 % in Delta. True
+        without runs.
         """
         return (
             self.sampled is None
@@ -96,22 +101,22 @@ class Limit:
 
 @dataclass(frozen=True, eq=False)
 class EncoderAdvice:
-    """Advice on some encoders that are coarse, the others exact.
+    """Advice for one choice of coarse encoders, all others being exact.
 
     Attributes
     ----------
     label : str
         "all", or the joint.
     limits : tuple of Limit
-        The coarsest steps.
+        The coarsest steps for 1 % and 5 %.
     delta : ndarray, shape (m,), rad or m
         Steps of the curve.
     change : ndarray, shape (m, b), %
         Predicted change of the estimate, signed.
     sampled : tuple of Sampled
-        CESTAC at some steps of the curve.
+        CESTAC runs at some steps of the curve.
     unit : str
-        Of the steps: "rad", "m", or "rad or m" where encoders of both kinds are coarse.
+        Unit of the steps: "rad", "m", or "rad or m" if encoders of both kinds are coarse.
     """
 
     label: str
@@ -122,26 +127,26 @@ class EncoderAdvice:
     unit: str = "rad"
 
     def reached(self, percent: float) -> Array:
-        """Step at which the |change| of every parameter first reaches `percent`, shape (b,).
+        """Find the step at which the |change| of each parameter first reaches `percent`.
 
-        nan if it does not within the curve.
+        Return the steps, shape (b,); nan if the curve does not show this step.
         """
         return np.array([crossing(self.delta, np.abs(e), percent) for e in self.change.T])
 
 
 @dataclass(frozen=True, eq=False)
 class ReaderAdvice:
-    """Advice on real encoders, whose law is phase, by one reader.
+    """Advice on real encoders whose signals are read in one way: as positions, or as counts.
 
     Attributes
     ----------
     reader : str
-        lowpass: read as positions; counts.
+        lowpass if read as positions, or counts.
     encoders : tuple of EncoderAdvice
         All together first, then one at a time.
     notes : tuple of str
     steps : ndarray, shape (len(asked), b), %
-        Change at the steps asked for, of all encoders; nan if the records do not show it.
+        Change at the requested steps of all encoders; nan if the records do not show it.
     """
 
     reader: str
@@ -152,23 +157,26 @@ class ReaderAdvice:
 
 @dataclass(frozen=True, eq=False)
 class Advice(Result, Part):
-    """Largest encoder steps that keep the estimate of one robot unbiased, and the effect of torque noise.
+    """Largest encoder steps that leave the estimate of one robot unbiased, and effect of torque
+    noise.
 
     Attributes
     ----------
     names : tuple of str
-        Parameters, b of them.
+        Names of the b parameters.
     reference : Estimate
-        From the record as measured.
+        Estimate from the record as measured.
     encoders : tuple of EncoderAdvice
         All together first, then one at a time.
     asked : tuple of float, rad or m
-        Further steps, of all encoders.
+        Requested steps, of all encoders.
     steps : ndarray, shape (len(asked), b), %
-        Change predicted there by the chapter's law; under law phase, of real encoders read as the
-        study reads them, nan if the records do not show it.
+        Change predicted at the requested steps by the chapter's rounding law. Under law phase, it
+        is the change with real encoders, read as the study reads them; nan if the records do not
+        show it.
     torque_sigma : ndarray, shape (b,)
-        Deviation of the parameters per N m (N) of deviation of the motor torques.
+        Standard deviation of the parameters for white torque noise of the motors of standard
+        deviation 1 N m (N).
     real : tuple of ReaderAdvice
         Real encoders read as positions, and as counts; empty if they were not asked for.
     assumptions : tuple of str
@@ -190,36 +198,36 @@ class Advice(Result, Part):
     title = "Resolution advice"
 
     def text(self) -> str:
-        """The verdict, the changes at the requested steps, and the assumptions."""
+        """Write the verdict, the changes at the requested steps, and the assumptions."""
         return "\n".join([self.verdict, *self.asked_lines(), *self.assumptions])
 
     def figures(self) -> tuple[Figure, ...]:
-        """%e against Delta of every deciding parameter; no figure without such a parameter."""
+        """Plot %e against the step Delta for every deciding parameter; no figure without one."""
         return (advice_figure(self),) if self.deciding else ()
 
     def checks(self) -> tuple[Check, ...]:
-        """Check of the verdict: does the encoder resolve enough?"""
+        """Return the check whether the encoder resolves enough."""
         return (answer(self),)
 
     def entries(self) -> dict[str, Any]:
-        """Empty: the advice is written to its own file, advice.json."""
+        """Return no entries: the advice is written to its own file, advice.json."""
         return {}
 
     def files(self) -> dict[str, str]:
-        """The file advice.json."""
+        """Return the text of the file advice.json, by name."""
         return {"advice.json": self.to_json()}
 
     @property
     def deciding(self) -> tuple[str, ...]:
-        """Parameters that decide the verdict: those with %sigma (11) of at most 10."""
+        """Names of the parameters that decide the verdict: their %sigma (11) is at most 10."""
         return deciding_names(self.reference)
 
     @property
     def ways(self) -> tuple[tuple[str, tuple[EncoderAdvice, ...], Array], ...]:
-        """Label, advice and changes at the requested steps for each rounding law.
+        """Label, advice by encoder and changes at requested steps, for each rounding law or reader.
 
-        The chapter's law comes first, without a label, unless only real encoders were judged.
-        Real encoders follow, once for each reader.
+        The chapter's law is first, with an empty label, unless only real encoders were judged. Real
+        encoders follow, once for each reader.
         """
         real = tuple((NAMES[one.reader], one.encoders, one.steps) for one in self.real)
         if self.real and self.encoders is self.real[0].encoders:
@@ -228,19 +236,25 @@ class Advice(Result, Part):
 
     @property
     def unit(self) -> str:
-        """Unit of the first steps: "rad", "m", or "rad or m" if the group has encoders of both kinds."""
+        """Unit of the steps of the first advice, usually that on all encoders: "rad", "m" or both.
+
+        It is "rad or m" if encoders of both kinds are coarse.
+        """
         return self.encoders[0].unit
 
     @property
     def place(self) -> str:
-        """Side of the encoders, motor or joint, in words."""
+        """Side of the encoders in words: "at the joints" or "at the motors"."""
         return {"joint": "at the joints", "motor": "at the motors"}[
             self.settings.get("cestac", {}).get("side", "joint")
         ]
 
     def worst(self, step: int, steps: Array | None = None) -> tuple[str, float]:
-        """The deciding parameter with the largest %e at a requested step, and this %e.
+        """Find the deciding parameter with the largest %e at a requested step.
 
+        Return its name and this %e.
+
+        step : number of the requested step, from 0.
         steps : changes at the requested steps; default: those of the advice.
         """
         decisive = [self.names.index(name) for name in self.deciding]
@@ -250,14 +264,15 @@ class Advice(Result, Part):
 
     @property
     def negative(self) -> bool:
-        """Whether least squares would be biased at a requested step, or the runs contradict the prediction."""
+        """Whether a requested step would bias least squares, or runs contradict the prediction."""
         several = (encoder for _, encoders, _ in self.ways for encoder in encoders)
         contradicted = any(not limit.agrees for encoder in several for limit in encoder.limits)
         return contradicted or any(self.worst(k)[1] > LIMIT.BIASED for k in range(len(self.asked)))
 
     @property
     def verdict(self) -> str:
-        """The verdict in one text."""
+        """The verdict in sentences: coarsest steps of all encoders, and the most critical encoder.
+        """
         parts: list[str] = []
         for name, encoders, _ in self.ways:
             parts += [f"Real encoders read as {name}:"] if name else []
@@ -266,13 +281,16 @@ class Advice(Result, Part):
         return " ".join(parts)
 
     def _answers(self, encoders: Sequence[EncoderAdvice]) -> list[str]:
-        """The sentences of the verdict on some encoders; those on all encoders together come first."""
+        """Write the sentences of the verdict for one rounding law or reader.
+
+        The first sentences are about all encoders together.
+        """
         if not self.deciding:
             return [
                 (
                     f"no parameter has a %sigma of at most {LIMIT.DECIDING:g} %, so no step can be "
                     "judged; "
-                    "more motion, or fewer columns, tell more."
+                    "record a motion that excites the joints more, or identify fewer columns."
                 )
             ]
         first, single = encoders[0], encoders[1:]
@@ -329,12 +347,12 @@ class Advice(Result, Part):
         return text + ")."
 
     def brief(self) -> str:
-        """The verdict, then the steps of each encoder, then the changes at the requested steps."""
+        """Write the verdict, the steps of each encoder, and the changes at the requested steps."""
         steps = [f"{table.caption}\n{table.to_text()}" for table in self.tables()[:-1]]
         return "\n\n".join([self.verdict, *steps, *self.asked_lines()])
 
     def to_table(self) -> str:
-        """Tables of the steps by encoder and by parameter, then the assumptions."""
+        """Write the tables of steps by encoder and by parameter, then the assumptions."""
         tables = [table.to_text() for table in self.tables()]
         notes = [note for reader in self.real for note in reader.notes]
         return "\n\n".join(
@@ -346,7 +364,7 @@ class Advice(Result, Part):
         )
 
     def tables(self) -> list[Table]:
-        """Tables: steps by encoder for each rounding law and reader, then steps by parameter."""
+        """Tabulate the steps by encoder for each rounding law and reader, then by parameter."""
         law, real = ([way for way in self.ways if bool(way[0]) == real] for real in (False, True))
         captions = (
             "Coarsest step of each encoder, the others exact; sampled: %e of that parameter with "
@@ -364,7 +382,10 @@ class Advice(Result, Part):
     def _step_table(
         self, caption: str, ways: Sequence[tuple[str, tuple[EncoderAdvice, ...], Array]]
     ) -> Table:
-        """Table of the coarsest steps by encoder; each rounding law or reader has columns of its own."""
+        """Tabulate the coarsest step of each encoder.
+
+        Each rounding law or reader has its own columns.
+        """
         headers, rows = ["encoder"], []
         for name, encoders, _ in ways:
             for limit in encoders[0].limits:
@@ -383,7 +404,11 @@ class Advice(Result, Part):
         return Table(caption, headers, rows)
 
     def parameter_table(self) -> Table:
-        """For each parameter: %sigma, steps of all encoders at the limits, deviation in % per N m (N) of torque noise."""
+        """Tabulate for each parameter %sigma, the steps at the limits and the effect of noise.
+
+        The steps are those of all encoders together. The effect is %sigma added by torque noise,
+        per N m (N) of its standard deviation.
+        """
         first = self.encoders[0]
         reached = [first.reached(limit.percent) for limit in first.limits]
         header = (
@@ -408,7 +433,10 @@ class Advice(Result, Part):
         return Table(caption, header, rows)
 
     def asked_lines(self) -> list[str]:
-        """One line for each requested step."""
+        """Write one line for each requested step and rounding law: the largest predicted change.
+
+        Return one text with all lines in a list, or an empty list without requested steps.
+        """
         lines = []
         for k, delta in enumerate(self.asked):
             for reader, _, steps in self.ways:
@@ -423,7 +451,7 @@ class Advice(Result, Part):
         return ["\n".join(lines)] if lines else []
 
     def to_json(self) -> str:
-        """JSON text of all fields."""
+        """Write the advice as JSON text."""
         return json_text(
             {
                 "schema": 1,
@@ -451,10 +479,10 @@ class Advice(Result, Part):
 
 
 def advice_figure(advice: Advice) -> Figure:
-    """Plot %e against Delta for every parameter that matters, with one step for all encoders.
+    """Plot %e against the step Delta of all encoders, for every deciding parameter.
 
-    Lines are predicted; points are CESTAC samples with their Student intervals. Where real encoders
-    were judged, both readers are shown; otherwise the rounding law of the paper is.
+    Lines are predicted; points are CESTAC runs with their Student intervals. If real encoders were
+    judged, both readers are shown, otherwise the rounding law of the paper.
     """
     curves = [("", advice.encoders[0], BLUE, ORANGE)]
     if advice.real:
@@ -510,10 +538,10 @@ def _panel(ax: Any, reader: str, encoder: EncoderAdvice, line: str, points: str,
     f"bias below {LIMIT.NEGLIGIBLE:g} % (usable to {LIMIT.BIASED:g} %)",
 )
 def answer(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer:
-    """The answer of the advisor, and of the step in use if it is given.
+    """Answer whether the encoder resolves enough, from the advice or from steps seen in positions.
 
-    steps, share : where no advice was asked for, the steps that the positions show, in words, and the
-    share of an acceleration that they make.
+    steps : without an advice, a sentence on the steps that the positions show.
+    share : share of the mean square of an acceleration that these steps make.
     """
     if advice is None:
         ask = "ask with symgen report, or symgen cestac --advise"
@@ -552,7 +580,7 @@ def answer(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer
 
 @dataclass(frozen=True, eq=False)
 class NoAdvice(Part):
-    """What the steps that the positions show do to the estimate, where no advice was asked for."""
+    """Part of the report if no advice was requested: it judges steps seen in the positions."""
 
     result: Identification
 
@@ -560,7 +588,7 @@ class NoAdvice(Part):
     title = "Resolution advice"
 
     def checks(self) -> tuple[Check, ...]:
-        """Whether the encoder resolves enough."""
+        """Return the check whether the encoder resolves enough."""
         simulated = self.result.study.estimate.method in ("iv", "didim")
         return (answer(None, *(("", 0.0) if simulated else visible_steps(self.result))),)
 
@@ -580,9 +608,11 @@ def _summary(advice: EncoderAdvice) -> dict[str, Any]:
 def confirm_by_runs(
     advice: EncoderAdvice, reference: Estimate, level: Callable[[float], Sampled]
 ) -> EncoderAdvice:
-    """Add runs at the steps of the limits.
+    """Add CESTAC runs at the steps of the limits, which confirm or contradict the prediction.
 
-    Where all encoders are alike, runs between these steps and above them are added, too.
+    If all encoders are coarse together, runs between these steps and above them are added, too.
+
+    level : makes the runs at a step.
     """
     made = {limit.delta: level(limit.delta) for limit in advice.limits if np.isfinite(limit.delta)}
     limits = []
@@ -629,9 +659,10 @@ def limits_of(delta: Array, change: Array, reference: Estimate) -> tuple[Limit, 
 
 
 def crossing(delta: Array, e: Array, percent: float) -> float:
-    """First step at which e reaches `percent`; between points, straight lines on logarithmic axes.
+    """Find the first step at which the change e reaches `percent`.
 
-    nan if it does not.
+    Between the points of the curve, lines are straight on logarithmic axes. nan if no point reaches
+    it, or if the first point is already above.
     """
     above = np.flatnonzero(e >= percent)
     if not len(above) or (above[0] == 0 and e[0] > percent):
@@ -645,11 +676,14 @@ def crossing(delta: Array, e: Array, percent: float) -> float:
 
 
 def counts(delta: float) -> str:
-    """Write a step as a share of a turn, such as 2*pi/5236."""
+    """Write an angle step as a share of a turn, for instance 2*pi/5236."""
     return f"2*pi/{2 * np.pi / delta:.0f}" if 0 < delta < np.pi else ""
 
 
 def step_text(delta: float, unit: str) -> str:
-    """Write a step with its unit and, if it is an angle, as a share of a turn: 9.16e-05 rad (2*pi/68626)."""
+    """Write a step with its unit, for instance 9.16e-05 rad (2*pi/68626).
+
+    An angle is also written as a share of a turn.
+    """
     text = counts(delta) if unit == "rad" else ""
     return f"{delta:.3g} {unit}" + (f" ({text})" if text else "")

@@ -1,25 +1,25 @@
-"""Resolution advisor: the coarsest encoder that keeps the change of the estimate below 1 % and below 5 %, predicted without sampling.
+"""Resolution advisor: predict the coarsest encoder that changes the estimate by at most 1 % or 5 %.
 
-CESTAC rounds every position at random, many times, and asks how far the mean estimate moves. That
-mean is known to first order in the variance v of the rounding (errors in variables), from the
-expected normal equations of `runtime.advisor.position_errors`:
+No sampling is needed. CESTAC rounds every position at random, many times, and measures how far the
+mean estimate moves. This mean is known to first order in the variance v of the rounding (errors in
+variables), from the expected normal equations of `runtime.advisor.position_errors`:
 
     X(v) = E[W_c' W_c]^-1 E[W_c' Y]                %e (21) = 100 |1 - X(v) / X(0)|
 
     v = Delta^2 (two-point, gaussian), Delta^2 / 3 (uniform, quantise)
 
-so that one set of sensitivities gives the curve of every parameter, for all encoders together and
-for one at a time with the others exact. The step at which the first parameter that matters reaches
-a limit is confirmed by runs of CESTAC, with Student intervals. Parameters matter when their %sigma
-(11) is at most 10, as in CESTAC's verdict; small parameters with a large %sigma do not decide.
+So one set of sensitivities gives the curve of every parameter, for all encoders together and for
+one at a time with the others exact. Runs of CESTAC, with Student intervals, confirm the step at
+which the first parameter that matters reaches a limit. Parameters matter if their %sigma (11) is at
+most 10, as in CESTAC's verdict; small parameters with a large %sigma do not decide.
 
-Noise of the torques does not move the mean: Y is linear in it. What it adds to sigma is, for white
+Noise of the torques does not change the mean: Y is linear in it. It increases sigma; for white
 noise of the motors
 
     C = A^-1 (sum_ij Omega_ij W_i'W_j) A^-1,  A = W'W,  Omega = c R'R,  c = G(0)^2 / n_d of the
     decimation (the noise that slow columns see)
 
-Weights of the joints (method wls) are those of the unperturbed fit.
+Weights of the joints (method wls) are those of the fit without errors.
 """
 
 from __future__ import annotations
@@ -66,15 +66,16 @@ from runtime.core.study import Study
 Array = np.ndarray
 Progress = Callable[[int, int], None]
 
-FIRST_ORDER = "first order in the variance of the errors, motion slow beside the filters; "
+FIRST_ORDER = "to first order in the variance of the errors, for a motion that is slow compared with the filters; "
 
 
 @dataclass(frozen=True, eq=False)
 class Predictor:
-    """X as a function of the step, for the encoders of several records of one robot.
+    """Prediction of the estimate X as a function of the encoder step, for records of one robot.
 
-    parts : the records.   weights : ndarray, shape (n,), 1/s_j.
-            share : variance of the rounding over Delta^2.
+    parts : effect of position errors on each record.
+    weights : weight 1/s_j of the rows of each joint, shape (n,).
+    share : variance of the rounding over Delta^2.
     """
 
     parts: tuple[Perturbation, ...]
@@ -82,18 +83,24 @@ class Predictor:
     share: float
 
     def change(self, delta: float, encoders: Sequence[int]) -> Array:
-        """100 (X(v)/X(0) - 1), shape (b,), in %."""
+        """Predict the change of X if these encoders have the step `delta`, shape (b,), %.
+
+        It is 100 (X(v)/X(0) - 1).
+        """
         X = solution(self._total(self.share * delta**2, encoders), self.weights)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(100 * (X / self.exact - 1))
 
     @cached_property
     def exact(self) -> Array:
-        """X with exact encoders, shape (b,)."""
+        """Estimate X with exact encoders, shape (b,)."""
         return solution(self._total(0.0, ()), self.weights)
 
     def rate(self, encoders: Sequence[int]) -> Array:
-        """Change in % per Delta^2 at Delta = 0, without columns that switch sign; shape (b,)."""
+        """Compute how fast X changes with the squared step Delta^2 at Delta = 0, shape (b,), %.
+
+        Errors of columns that switch sign are left out.
+        """
         moved, X = self._total(0.0, ()), self.exact
         added = reduce(add, [part.smooth[i] for part in self.parts for i in encoders])
         moved[..., -1] = added @ np.append(-X, 1.0)
@@ -118,9 +125,8 @@ def advise(
 ) -> Advice:
     """Predict the coarsest encoders that change the estimate by less than 1 % and by less than 5 %.
 
-    Side, rounding law, columns and number of runs are those of study.cestac.
-
-    Real encoders, law phase, are judged by each of `readers`: read as positions, read as counts
+    Side, rounding law, columns and number of runs are those of study.cestac. Real encoders (law
+    phase) are judged for each of `readers`: their signals are read as positions, or read as counts
     (`runtime.advisor.readers`).
 
     Parameters
@@ -128,26 +134,27 @@ def advise(
     problem : Problem
         Prepared.
     columns : sequence of str, optional
-        Essential names if they are known; default: by study.cestac.columns.
+        Names of the essential parameters, if they are known; default: by study.cestac.columns.
     asked : sequence of float, rad or m
         Further steps whose change is predicted.
     encoders : sequence of str, optional
-        "all" and numbers of joints whose encoder alone is coarse; default: "all", then every one.
+        Which encoders are coarse: "all" together, or numbers of joints, each alone; default: "all",
+        then every joint.
     confirm : bool
-        Sample at the steps of the limits, study.cestac.runs times each.
+        Whether CESTAC runs confirm the steps of the limits, study.cestac.runs at each.
     progress : callable, optional
         Called with the number of choices of encoders done and their total.
     provenance : mapping, optional
-        Further entries of Advice.provenance; names and time stamps of the records are there.
+        Further entries of Advice.provenance, besides the names and time stamps of the records.
     readers : sequence of "lowpass" or "counts", optional
-        By which real encoders are judged; default: both where study.cestac.rounding is phase, else
-        none.
+        Readers for which real encoders are judged; default: both if study.cestac.rounding is phase,
+        otherwise none.
 
     Raises
     ------
     SettingsError
-        A method that is not linear least squares, or a median filter, which no prediction goes
-        through.
+        The method is not linear least squares, or there is a median filter, for which no prediction
+        is possible.
     """
     if any(is_axis(joint) for joint in problem.model.JOINTS):
         raise InputError(
@@ -241,7 +248,7 @@ def advise(
 
 
 def _selections(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str, tuple[int, ...]]:
-    """The sets of coarse encoders (numbers from 0) that are judged, by label."""
+    """Choose the sets of coarse encoders that are judged: encoder numbers from 0, by label."""
     n = len(model.JOINTS)
     every = {ALL: tuple(range(n)), **{str(joint): (i,) for i, joint in enumerate(model.JOINTS)}}
     labels = tuple(wanted) if wanted is not None else tuple(every)[: n + 1 if n > 1 else 1]
@@ -257,9 +264,10 @@ def _selections(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str
 def _advice(
     predictor: Predictor, label: str, encoders: Sequence[int], reference: Estimate, unit: str
 ) -> EncoderAdvice:
-    """Find the limits by trying steps in geometric progression.
+    """Compute the curve and the limits for one set of coarse encoders.
 
-    The curve of all encoders goes on beyond them.
+    Steps are tried in geometric progression until both limits are passed; the curve of all encoders
+    extends beyond them.
     """
     decisive = [reference.names.index(name) for name in deciding_names(reference)]
     rate = np.abs(predictor.rate(encoders)[decisive]).max(initial=0.0)
@@ -293,7 +301,10 @@ def _advice(
 
 
 def torque_sigma(predictor: Predictor, drives: Drives | None) -> Array:
-    """Standard deviation of X per unit deviation of white noise on every motor torque; shape (b,)."""
+    """Compute the standard deviation of X for white noise on every motor torque, shape (b,).
+
+    The standard deviation of the noise is 1 N m (N).
+    """
     n = predictor.parts[0].observation.n
     R = np.eye(n) if drives is None else drives.ratio
     w = predictor.weights
@@ -319,7 +330,10 @@ def assumptions(
     *,
     real: bool = False,
 ) -> tuple[str, ...]:
-    """Assumptions of the prediction, in words. real : real encoders were judged too."""
+    """Write the assumptions of the prediction, one sentence or more for each.
+
+    real : whether real encoders were judged, too.
+    """
     cestac, low = study.cestac, study.signals.lowpass
     law = {
         "two-point": "+-Delta, variance Delta^2",
@@ -355,10 +369,10 @@ def assumptions(
     if real:
         encoders.append(
             f"Real encoders: counts of steps Delta, lines {lines}, the phase random by encoder and "
-            f"run, {place}. The reader knows the step, not the phase. Curves are a quadrature over "
+            f"run, {place}. The reader is given the step, not the phase. Curves are a quadrature over "
             f"the phase, without first order; steps of fewer than {LIMIT.LINES_IN_MOTION} in the "
-            "motion of a joint are not judged. Both estimates stand on the rows that the reader "
-            "leaves in; rows in which dry friction has no certain direction are not among them. "
+            "motion of a joint are not judged. Both estimates use the rows that the reader keeps; "
+            "rows in which the direction of dry friction is uncertain are not among them. "
             f"Steps are tried in the ratio {LIMIT.READER_RATIO:g}, read as positions more closely "
             "where constant speeds of the record lock to the sampling and change more; between "
             "these, ask for the step of the encoder itself."
@@ -385,8 +399,8 @@ def assumptions(
         f"Parameters matter whose %sigma (11) is at most {LIMIT.DECIDING:g} %"
         + (f"; not: {', '.join(out)}." if out else ", here all of them."),
         (
-            "Torques: white noise of the motors does not bias X, to first order and beyond, since "
-            "Y is linear in it and W does not know it; it adds to sigma."
+            "Torques: white noise of the motors does not bias X, since Y is linear in it and W does "
+            "not depend on it; it only increases sigma."
         ),
     )
 
@@ -399,13 +413,13 @@ def _refuse(study: Study) -> None:
         )
     if study.estimate.weights == "covariance":
         raise SettingsError(
-            "'covariance'; the prediction knows weights by joint, use joint or iterated",
+            "'covariance'; the prediction supports only weights by joint: use joint or iterated",
             path=("estimate", "weights"),
         )
 
 
 def advice_of(result: Identification, encoder: Sequence[float] = ()) -> Advice:
-    """The advice on the essential parameters of an identification.
+    """Predict the coarsest encoders for the essential parameters of an identification.
 
     encoder : steps of the encoders in use, rad or m.
     """

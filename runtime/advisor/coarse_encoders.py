@@ -1,4 +1,4 @@
-"""Runs of CESTAC with some encoders coarse and the others exact, by one law and one reader.
+"""Simulate some encoders as coarse and the others as exact, with one rounding law and one reader.
 
     error of encoder i, as read
             e_i = reader(rounded(x_i)) - reader of the record, filtered alike
@@ -6,15 +6,15 @@
     change at Delta
             mean of the least squares, over that of the record on the same rows, less 1
 
-The reader of counts leaves out rows in which dry friction has no certain direction. What that alone
-does to the estimate is no error of the encoder and is not in the change;
-`runtime.core.cestac.cestac`, which compares with all rows of the record, has both.
+The reader of counts leaves out rows in which dry friction has no certain direction. The effect of
+this choice of rows is no error of the encoder and is not part of the change;
+`runtime.core.cestac.cestac`, which compares with all rows of the record, includes both.
 
-The mean over the random phase of law phase is a quadrature. Its nodes are equidistant, shuffled
-from encoder to encoder, so that the harmonics of the sawtooth cancel that are linear in the
-estimate; what is left is the bias. Further nodes are as many again, in the middle between those
-before. One reading of all encoders serves every choice S, and the first phase read tells the errors
-of the counts and the knots of the motion for the others.
+The mean over the random phase of law phase is a quadrature. Its nodes (phases) are equidistant, and
+shuffled from encoder to encoder, so that harmonics of the sawtooth that are linear in the estimate
+cancel; the bias is left. Further nodes are as many again, in the middle between the known ones. One
+reading of all encoders serves every choice S. The first phase gives the errors of the counts and
+the knots of the motion, which the other phases use again.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ QUADRATURE = 1 << 20  # number of the first stream of the nodes: beyond those of
 
 @dataclass(frozen=True, eq=False)
 class Encoders:
-    """The encoders of one record.
+    """The encoders of one record: their positions, and the states computed from them.
 
     Attributes
     ----------
@@ -66,11 +66,12 @@ class Encoders:
     x : ndarray, shape (N, n), rad or m
         Positions at the encoders as measured.
     states : States
-        Of the joints, as measured.
+        States of the joints, as measured.
     at_encoders : States
-        The same at the encoders.
+        The same states on the side of the encoders.
     starts : mapping
-        By step and encoders, what the first phase told of the counts of the others.
+        By step and encoders, results of the first phase that make reading counts of other phases
+        faster.
     """
 
     record: PreparedRecord
@@ -81,7 +82,10 @@ class Encoders:
 
 
 class CoarseEncoders:
-    """Coarser encoders on several records of one robot, by a law and a reader in place of those of the study."""
+    """Simulation of coarser encoders on the records of one robot.
+
+    A given rounding law and a given reader replace those of the study.
+    """
 
     def __init__(
         self,
@@ -127,22 +131,30 @@ class CoarseEncoders:
 
     @property
     def coarsest(self) -> Array:
-        """Largest step of each encoder, shape (n,): LIMIT.LINES_IN_MOTION of them in its motion.
+        """Largest step of each encoder that can be judged, shape (n,), rad or m.
 
-        inf for an encoder at rest.
+        LIMIT.LINES_IN_MOTION steps of this size are in the motion of the encoder; inf for an
+        encoder at rest.
         """
         spans = np.min([np.ptp(part.x, axis=0) for part in self.parts], axis=0)
         return np.where(spans > 0, spans / LIMIT.LINES_IN_MOTION, np.inf)
 
     @property
     def finest(self) -> float:
-        """Smallest step at which the positions of the records are exact in comparison, rad or m."""
+        """Smallest step that can be judged, rad or m.
+
+        It is LIMIT.EXACT_FROM times the largest step of the encoders that made the records, so that
+        the recorded positions are exact in comparison; 0 if those encoders are unknown.
+        """
         own = (part.record.own for part in self.parts)
         steps = (float(encoder.step.max()) for encoder in own if encoder is not None)
         return float(LIMIT.EXACT_FROM * max(steps, default=0.0))
 
     def asked(self, delta: float) -> Array:
-        """Mean change if all moving encoders have this step, shape (b,), %; nan if the records do not allow it."""
+        """Compute the mean change of the estimate if all moving encoders have the step `delta`.
+
+        Return the change, shape (b,), %; nan if the records do not allow this step.
+        """
         moving = [i for i, most in enumerate(self.coarsest) if np.isfinite(most)]
         if self.finest * (1 - 1e-9) <= delta <= self.coarsest.min():
             try:
@@ -152,15 +164,17 @@ class CoarseEncoders:
         return np.full(len(self.reference), np.nan)
 
     def locking(self, delta: Array) -> Array:
-        """Power of the rounding error that passes the low-pass, relative to white noise, shape (m,).
+        """Compute how much power of the rounding error passes the low-pass, relative to white
+        noise.
 
-        The rounding error is a sawtooth; of all records and speeds the largest power is taken.
+        The rounding error is a sawtooth. The result, shape (m,), is the largest power of all
+        records and speeds.
 
-        delta, shape (m,).
+        delta : steps of the encoders, shape (m,).
 
-        Harmonic h of the error of a count has the frequency h |qd|/Delta and a power as 1/h^2;
-        sampled, it is as slow as its distance from a multiple of the rate. Where a joint keeps a
-        speed that is a simple fraction of a step per sample, the error is constant.
+        Harmonic h of the error of a count has the frequency h |qd|/Delta and a power as 1/h^2.
+        After sampling, it is as slow as its distance from a multiple of the rate. If a joint keeps
+        a speed that is a simple fraction of a step per sample, the error is constant.
         """
         h = np.arange(1, LIMIT.SAWTOOTH_HARMONICS + 1)
         weight, most = 1 / h**2 / np.sum(1 / h**2), np.zeros(len(delta))
@@ -176,11 +190,12 @@ class CoarseEncoders:
         return most
 
     def nodes(self, delta: float, moving: Sequence[int], read: int = 0) -> list[list[Array]]:
-        """Errors of every record at the first PHASES nodes of the quadrature.
+        """Compute the errors of every record at some phases, the nodes of the quadrature.
 
-        If `read` nodes are known already, there are as many, in the middle between those.
+        At first there are PHASES nodes. If `read` nodes are known already, as many new ones are
+        computed, in the middle between the known ones.
 
-        The encoders `moving` coarse.
+        moving : numbers of the coarse encoders.
         """
         few, seed, n = PHASES[self.reader], self.task.settings.seed, len(self.root)
         count, first = read or few, stream(seed, QUADRATURE).random(n)
@@ -192,12 +207,16 @@ class CoarseEncoders:
         ]
 
     def ratios(self, nodes: Sequence[Sequence[Array]], encoders: Sequence[int]) -> Array:
-        """X with these encoders coarse, divided by X without, at every node; shape (count, b)."""
+        """Compute the ratio of X with these encoders coarse to X without, at every node.
+
+        Return the ratios, shape (count, b).
+        """
         return np.array([self._ratio(errors, encoders) for errors in nodes])
 
     def sampled(self, encoders: Sequence[int], delta: float, runs: int | None = None) -> Sampled:
-        """CESTAC with these encoders coarse, eqs. (17), (18), (21). runs : default: as many as the
-        settings say.
+        """Run CESTAC with these encoders coarse, eqs. (17), (18), (21).
+
+        runs : number of runs; default: that of the settings.
         """
         draw = self._counted_at_random if self.task.settings.rounding == "phase" else self._rounded
         ratios = [
@@ -207,9 +226,9 @@ class CoarseEncoders:
         return sampled(delta, np.array(ratios))
 
     def _rounded(self, delta: float, encoders: Sequence[int], run: int) -> list[Array]:
-        """Errors of every record under a law that rounds each sample independently.
+        """Draw errors of every record for a law that rounds each sample independently.
 
-        The streams of an encoder do not depend on which others are coarse.
+        The random numbers of an encoder do not depend on which other encoders are coarse.
         """
         seed, law = self.task.settings.seed, self.task.settings.rounding
         drawn = [
@@ -219,15 +238,16 @@ class CoarseEncoders:
         return self._read(drawn, encoders, delta)
 
     def _counted_at_random(self, delta: float, encoders: Sequence[int], run: int) -> list[Array]:
-        """Errors of every record under the law `phase`, with random phases."""
+        """Draw errors of every record for the law `phase`, with random phases of the encoders."""
         phases = stream(self.task.settings.seed, run, *encoders).random(len(self.root))
         return self._counts(delta, delta * phases, encoders, (run, *encoders, 0))
 
     def _counts(
         self, delta: float, phases: Array, encoders: Sequence[int], key: tuple[int, ...]
     ) -> list[Array]:
-        """Errors of every record whose encoders have steps of these phases. key : of the stream of
-        uneven lines, which are those of the encoder in every record.
+        """Compute the errors of every record for encoders that count steps, with given phases.
+
+        key : selects the random numbers of uneven lines, which are the same in every record.
         """
         seed, uneven = self.task.settings.seed, self.task.settings.uneven
         drawn = [
@@ -239,9 +259,12 @@ class CoarseEncoders:
     def _read(
         self, drawn: Sequence[Sequence[Array]], encoders: Sequence[int], delta: float
     ) -> list[Array]:
-        """Errors of q, qd, qdd as read from `drawn` positions, shape (N,) of each of the encoders
-        in every record, and the deviation of qd, at the encoders, shape (4, n, N). Zero where
-        exact.
+        """Compute the errors of the states that are read from simulated positions.
+
+        drawn : for every record, the positions of each coarse encoder, shape (N,).
+
+        Return for every record the errors of q, qd, qdd and the standard deviation of qd, on the
+        side of the encoders, shape (4, n, N); zero for exact encoders.
         """
         of_records, key, chosen = [], (delta, *encoders), list(encoders)
         for part, columns in zip(self.parts, drawn, strict=True):
@@ -260,7 +283,10 @@ class CoarseEncoders:
         return of_records
 
     def _ratio(self, errors: Sequence[Array], encoders: Sequence[int]) -> Array:
-        """X with the errors of some encoders divided by X without them, on the same rows; shape (b,)."""
+        """Compute the ratio of X with some encoders in error to X without errors, shape (b,).
+
+        Both are estimated on the same rows.
+        """
         chosen = np.isin(np.arange(len(self.root)), list(encoders))
         coarse, exact = [], []
         for part, error in zip(self.parts, errors, strict=True):
@@ -278,7 +304,7 @@ class CoarseEncoders:
         return np.asarray(self._solved(coarse) / (self.reference if every else self._solved(exact)))
 
     def _solved(self, parts: Sequence[tuple[States, Array]]) -> Array:
-        """Solve for X from the states of every record and the mask of its rows, bool, shape (n, K)."""
+        """Solve for X from the states of every record and the mask of its rows, bool (n, K)."""
         rows = [
             observation_of(
                 self.columns,
@@ -294,6 +320,11 @@ class CoarseEncoders:
 
 
 def mean_change(ratios: Array) -> Array:
-    """Mean change of the estimate, of its ratios at nodes, shape (count, b), and the deviation of that mean, as if the nodes were independent, shape (2, b), %."""
+    """Compute the mean change of the estimate and its standard deviation, shape (2, b), %.
+
+    The standard deviation is that of the mean, if the nodes were independent.
+
+    ratios : estimates at the nodes over the exact estimate, shape (count, b).
+    """
     deviation = ratios.std(axis=0, ddof=1) / np.sqrt(len(ratios))
     return np.asarray(100 * np.array([ratios.mean(axis=0) - 1, deviation]))

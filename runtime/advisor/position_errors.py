@@ -1,7 +1,7 @@
-"""What errors of the position do to the normal equations, on average and without sampling.
+"""Predict how errors of the position change the normal equations, on average and without sampling.
 
-With e the errors of the encoders, independent from sample to sample and of variance v, and filters
-that are linear (`runtime.core.signals.noise_gain`), the columns of W move by dW = sum_i W_qi dq_i +
+Let e be the errors of the encoders, independent from sample to sample and of variance v. Filters
+are linear (`runtime.core.signals.noise_gain`), so the columns of W change by dW = sum_i W_qi dq_i +
 W_qdi dqd_i + W_qddi dqdd_i + second order. Over the rows t of joint j that are used
 
     E[dW_j' dW_j] = v sum_i sum_t S_i(t) C S_i(t)'
@@ -12,10 +12,10 @@ W_qdi dqd_i + W_qddi dqdd_i + second order. Over the rows t of joint j that are 
     E[W_c' W_c] = W'W + E[dW'dW] + W'E[dW] + E[dW]'W          E[W_c' Y] = W'Y + E[dW]'Y
 
 Decimation filters the products S(t) e(t). S varies with the motion, the errors with the filters'
-cut-off, ten times faster by the rule of the chapter: S is taken as constant over one impulse
-response, the correlation of the errors in time is exact. Sensitivities are central differences of
-the emitted regressor along the principal axes of C_0, at the kept instants alone. Columns that
-switch with the sign of a speed: `runtime.advisor.sign_errors`.
+cut-off, ten times faster by the rule of the chapter. So S is assumed to be constant over one
+impulse response, while the correlation of the errors in time is exact. Sensitivities are central
+differences of the generated regressor along the principal axes of C_0, at the kept instants alone.
+For columns that switch with the sign of a speed, see `runtime.advisor.sign_errors`.
 """
 
 from __future__ import annotations
@@ -51,18 +51,20 @@ NODE = 1.5
 
 @dataclass(frozen=True, eq=False)
 class Perturbation:
-    """One record under position errors. Gram matrices are those of [W_j Y_j], by joint, shape (n, b
-    + 1, b + 1).
+    """Effect of position errors on the normal equations of one record.
 
-    observation : the unperturbed rows.
-    clean : their Gram matrices.
-    smooth : by encoder, what errors of variance 1 add to them, switching columns left out.
-    speeds : by encoder, sensitivity of the rows to dqd of that encoder, times the root of its
-    variance, shape (encoders, n, b, K).
-    root : ndarray, shape (n, encoders), joint position error per encoder error.
-    along : s = G qd over the window, shape (N,), by column that switches.
-    used : bool, shape (n, N), instants of the window nearest to a row that is used.
-    known : switches computed so far.
+    Gram matrices are those of [W_j Y_j], one for each joint, shape (n, b + 1, b + 1).
+
+    observation : the rows without errors.
+    along : for each column that switches sign, s = G qd over the window, shape (N,).
+    root : joint position error per encoder error, shape (n, encoders).
+    clean : Gram matrices of the rows without errors.
+    smooth : for each encoder, what errors of variance 1 add to the Gram matrices, without the
+        columns that switch sign.
+    speeds : for each encoder, sensitivity of the rows to the error dqd of its velocity, times the
+        standard deviation of dqd for errors of variance 1, shape (encoders, n, b, K).
+    used : instants of the window nearest to a row that is used, bool (n, N).
+    known : effects on switching columns that were computed so far.
     """
 
     observation: Observation
@@ -79,7 +81,10 @@ class Perturbation:
     known: dict[tuple[int, int], Switched] = field(default_factory=dict)
 
     def expected(self, variance: float, encoders: Sequence[int]) -> Array:
-        """Expected Gram matrices with errors of that variance on the encoders named (from 0), the others exact."""
+        """Compute the Gram matrices expected if errors of that variance are on the named encoders.
+
+        The encoders are numbered from 0; all others are exact.
+        """
         coarse = list(encoders)
         gram = self.clean + variance * self.smooth[coarse].sum(axis=0)
         if variance:
@@ -87,7 +92,10 @@ class Perturbation:
         return np.asarray(gram)
 
     def _add_switches(self, gram: Array, variance: float, encoders: list[int]) -> None:
-        """Add the expectations of the columns that switch sign: means, covariances and variances."""
+        """Add to the Gram matrices the expected effect of the errors on columns that switch sign.
+
+        This is the change of their means, covariances and variances.
+        """
         before, after = self.band.before[1, 1], self.band.after[1, 1]
         acting = []
         for switch in self.switches:
@@ -115,7 +123,10 @@ class Perturbation:
             gram[j][np.ix_(columns, columns)] += shift.T @ shift + both
 
     def _at(self, switch: Switch, sigma: float) -> Switched:
-        """Interpolate the switch between nodes to one deviation of its speed."""
+        """Interpolate the effect of an error of standard deviation sigma in the speed of a switch.
+
+        The effect is computed at two neighbouring standard deviations (nodes).
+        """
         node = floor(log(sigma) / log(NODE))
         return self._node(switch, node).between(self._node(switch, node + 1), sigma)
 
@@ -137,9 +148,9 @@ class Perturbation:
 
 
 def solution(gram: Array, weights: Array) -> Array:
-    """X, shape (b,), of least squares with the rows of joint j multiplied by weights[j].
+    """Solve least squares for X, shape (b,), with the rows of joint j multiplied by weights[j].
 
-    Columns are scaled first. gram : by joint, shape (n, b + 1, b + 1).
+    gram : Gram matrices of [W_j Y_j], shape (n, b + 1, b + 1). Columns are scaled first.
     """
     total = np.einsum("j,jab->ab", weights**2, gram)
     D = 1 / np.sqrt(np.diag(total)[:-1])
@@ -155,10 +166,13 @@ def perturbation(
     *,
     drives: Drives | None = None,
 ) -> Perturbation:
-    """The record under errors of its encoders on the side study.cestac.side, through the filters of the study with the median of study.cestac.
+    """Prepare the effect of encoder errors on one record.
 
-    names : columns, as fitted.
-    drives : motor side; default: those of the record.
+    Encoders are on the side study.cestac.side. Filters are those of the study, with the median of
+    study.cestac.
+
+    names : columns of W that are fitted.
+    drives : drives for encoders on the motor side; default: those of the record.
     """
     signals = replace(study.signals, median=study.cestac.median)
     positions = replace(signals, reader="lowpass", step=None, side="joint")
@@ -202,7 +216,7 @@ def perturbation(
 
 
 def _rows(observation: Observation, j: int) -> Array:
-    """The rows [W_j Y_j] of every joint."""
+    """Rows [W_j Y_j] of joint j."""
     own = observation.joint(j)
     return np.column_stack([observation.W[own], observation.Y[own]])
 
@@ -217,8 +231,12 @@ def _smooth(
     root: Array,
     switching: Sequence[Switch],
 ) -> tuple[Array, Array]:
-    """Per encoder: what errors of variance 1 add to the Gram matrices, and the sensitivities to the speed; of the states at the kept instants, of which mask, bool (n, K), is
-    used.
+    """Compute what errors of variance 1 of each encoder add to the Gram matrices.
+
+    Return these matrices, and the sensitivities of the rows to the error of the velocity.
+
+    kept : states at the kept instants.
+    mask : rows used, bool (n, K).
     """
     columns = np.array([model.BASE_PARAMETERS.index(name) for name in names])
     rigid = np.array(model.STRUCTURE)[columns].T & ~np.isin(

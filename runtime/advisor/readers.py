@@ -1,10 +1,11 @@
-"""How coarse a real encoder may be, read as positions and read as counts: the change of the
-estimate along steps of law phase, by both readers (`runtime.advisor.coarse_encoders`).
+"""Predict how coarse a real encoder may be, with its signal read as positions and read as counts.
 
-White noise does not describe a sawtooth that is locked to the motion, still less what a reader of
-counts leaves of it, so no first-order law is used: the curve is a quadrature over the phase.
-Limits are where it crosses 1 % and 5 %; at the steps on either side the nodes are doubled until the
-means tell the limit to LIMIT.CURVE_SHARPNESS. Runs of random phase confirm the limits.
+The change of the estimate is computed along steps of law phase, for both readers
+(`runtime.advisor.coarse_encoders`). White noise does not describe a sawtooth that is locked to the
+motion, still less what a reader of counts leaves of it. So no first-order law is used: each point
+of the curve is a mean over phases of the encoder (a quadrature). Limits are the steps at which the
+curve crosses 1 % and 5 %. At the steps on either side, the number of phases is doubled until the
+limit is certain to LIMIT.CURVE_SHARPNESS. Runs of random phase confirm the limits.
 """
 
 from __future__ import annotations
@@ -43,13 +44,15 @@ def reader_advice(
     confirm: bool = True,
     progress: Callable[[], None] = lambda: None,
 ) -> ReaderAdvice:
-    """Advice on real encoders by one reader.
+    """Compute the advice on real encoders for one reader (positions or counts).
 
     reference : estimate of the records as measured, whose deciding parameters decide here.
-            selections : encoders (from 0) by label.   units : of
-    each label.   start : rad or m, a step about which the walk begins.
-            asked : further steps, of all encoders.   progress : called after each choice of
-            encoders.
+    selections : numbers (from 0) of the coarse encoders, by label.
+    units : unit of the steps, by label.
+    start : a step about which the curve begins, rad or m.
+    asked : further steps, of all encoders.
+    confirm : whether random runs confirm the limits.
+    progress : called after each choice of encoders.
     """
     decisive = [reference.names.index(name) for name in deciding_names(reference)]
     by_label, encoders = curves(real, selections, start, decisive), []
@@ -79,7 +82,14 @@ def curves(
     start: float,
     decisive: Sequence[int],
 ) -> dict[str, tuple[Array, Array]]:
-    """Steps and changes by label: from `start` down until all is below the first limit, up until all is above the last; finer where steps lock."""
+    """Compute the curve of each label: steps, and changes of the estimate at these steps.
+
+    Steps go from `start` down until all changes are below the first limit, and up until all are
+    above the last limit. They are finer where constant speeds of the record lock to the sampling.
+
+    Return for each label the steps, shape (m,), and the changes with their standard deviations,
+    shape (m, 2, b), %.
+    """
     known: dict[str, dict[float, Array]] = {label: {} for label in selections}
     finest, coarsest = real.finest, real.coarsest
     start = min(max(start, finest), float(coarsest.min()))
@@ -91,7 +101,10 @@ def curves(
         return float(np.abs(mean_change(known[label][k])[0, decisive]).max(initial=0.0))
 
     def read(k: float, labels: Iterable[str], nodes: int = 0) -> list[str]:
-        """Nodes at a step, the first or as many as there are; the labels that the step suits."""
+        """Compute the changes at step number k, at the first phases or at `nodes` more phases.
+
+        Return the labels for which this is possible.
+        """
         delta = start * LIMIT.READER_RATIO**k
         labels = [label for label in labels if (delta <= coarsest[[*selections[label]]]).all()]
         moving = {i for label in labels for i in selections[label] if np.isfinite(coarsest[i])}
@@ -151,11 +164,14 @@ def curves(
 def vague_steps(
     changes: Mapping[float, Array], decisive: Sequence[int], limit: float
 ) -> list[float]:
-    """Of the two steps between which the first parameter crosses a limit, those whose deviation
-    moves the crossing by more than LIMIT.CURVE_SHARPNESS of it, by straight lines on logarithmic
-    axes; of the finest step, if it is above, one that is as uncertain.
+    """Find the steps of a curve next to a limit at which the change is not yet certain enough.
 
-    changes : change and its deviation, shape (2, b), %, by exponent of the step, ascending.
+    The limit is between two steps. A step is returned if the standard deviation of its change moves
+    the limit by more than LIMIT.CURVE_SHARPNESS of it, by straight lines on logarithmic axes. If
+    even the finest step is above the limit, only this step is judged.
+
+    changes : change and its standard deviation, shape (2, b), %, by exponent of the step,
+        ascending.
     """
     steps, e = list(changes), [np.abs(change[0]) for change in changes.values()]
     over = [j for j, own in enumerate(e) if own[decisive].max(initial=0.0) >= limit]
@@ -176,9 +192,9 @@ def vague_steps(
 def uncertain(
     reader: ReaderName, advice: EncoderAdvice, error: Array, names: Sequence[str]
 ) -> list[str]:
-    """Sentences on the limits about which the change hardly depends on the step, or scatters as much.
+    """Write a sentence for each limit near which the curve is too flat to determine the step.
 
-    error : deviation of the change, shape (m, b), %.
+    error : standard deviation of the change, shape (m, b), %.
     """
     found = []
     for limit in advice.limits:

@@ -1,8 +1,8 @@
-"""Friction that switches with the direction of motion, under a noisy velocity.
+"""Mean and variance of friction that switches with the direction of motion, if velocity is noisy.
 
-Columns of sign(s), s = G qd, have no derivative. With s known up to a normal error of deviation
-sigma (filters sum many raw errors, so it is normal whatever their law), u = s/sigma, phi and erf of
-the normal law, He_n Hermite's polynomials,
+Columns of sign(s), s = G qd, have no derivative. Let s be known up to a normal error of standard
+deviation sigma (filters add many raw errors, so it is normal whatever their law), u = s/sigma, phi
+and erf of the normal law, He_n Hermite's polynomials:
 
     E sign(s + sigma z) = erf(u/sqrt 2)
         c_n = E[sign(s + sigma z) He_n(z)] = 2 phi(u) He_(n-1)(-u)
@@ -11,11 +11,11 @@ the normal law, He_n Hermite's polynomials,
     Cov(f(t), f(t')) = sum_n c_n(t) c_n(t') rho^n / n!
         rho the correlation of the two errors
 
-c_1/sigma is what takes the place of a derivative: Cov(f, x) = c_1/sigma Cov(s, x) for every x
-normal with s. Four orders are summed one by one. Where the speed passes zero quickly the others
-cancel over the passage; where it stays near zero c_n^2/n! falls as n^(-3/2) and their spectrum
-widens as n^(1/2), so that all of them together weigh half of what their variance does at order
-five.
+c_1/sigma replaces a derivative: Cov(f, x) = c_1/sigma Cov(s, x) for every x normal with s. Four
+orders are added one by one. If the speed passes zero quickly, the higher orders cancel over the
+passage. If it stays near zero, c_n^2/n! falls as n^(-3/2) and the spectrum of order n widens as
+n^(1/2), so that all higher orders together have half of the weight that their variance would have
+at order five.
 
 References: Price (1958) and Bussgang (1952) for the covariances; Mehler's expansion.
 """
@@ -48,12 +48,13 @@ FAR = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Switched:
-    """A switch under noise of deviation sigma.
+    """Effect of a velocity error of standard deviation sigma on a column that switches sign.
 
-    shift : ndarray, shape (K,), E f - f after decimation.
-    slope : ndarray, shape (K,), c_1/sigma at the kept instants.
+    shift : change of the mean, E f - f, after decimation, shape (K,).
+    slope : c_1/sigma at the kept instants, shape (K,); it replaces the derivative.
     variance : sum of Var f after decimation over the rows used of each joint, shape (n,).
-        All for G_j = 1.
+
+    All values are for G_j = 1.
     """
 
     sigma: float
@@ -62,10 +63,11 @@ class Switched:
     variance: Array
 
     def between(self, other: Switched, sigma: float) -> Switched:
-        """At a deviation between those of two: shift, slope*sigma and variance/sigma are interpolated linearly.
+        """Interpolate the effect linearly to a standard deviation between those of self and other.
 
-        Exact where the speed rests (slope as 1/sigma, variance as sigma) and where it passes zero
-        quickly (slope constant, variance as sigma^2).
+        The interpolated quantities are shift, slope*sigma and variance/sigma. This is exact if the
+        speed rests (slope as 1/sigma, variance as sigma) or passes zero quickly (slope constant,
+        variance as sigma^2).
         """
         share = (sigma - self.sigma) / (other.sigma - self.sigma)
         here = (self.shift, self.slope * self.sigma, self.variance / self.sigma)
@@ -86,11 +88,11 @@ def switch_with_error(
     settings: Decimate | None,
     used: Array,
 ) -> Switched:
-    """The switch with an error of s of deviation `sigma`.
+    """Compute the effect of an error of s, of standard deviation `sigma`, on a switching column.
 
-    s : ndarray, shape (N,), G qd of the filtered velocities of the window.
-    factor, settings : decimation.
-    used : bool, shape (n, N): instants that count in the rows of joint j.
+    s : G qd of the filtered velocities of the window, shape (N,).
+    factor, settings : factor and settings of the decimation.
+    used : instants that count in the rows of each joint, bool (n, N).
     """
     near = np.arange(len(s)) if switch.kink else np.flatnonzero(np.abs(s) < FAR * sigma)
     u = s[near] / sigma
@@ -112,10 +114,10 @@ def switch_with_error(
 
 
 def _coefficients(switch: Switch, u: Array, m: Array, phi: Array, sigma: float) -> Array:
-    """Scaled Hermite coefficients c_n/sqrt(n!), n = 1 ... ORDERS; shape (ORDERS + 1, len(u)).
+    """Compute the scaled Hermite coefficients c_n/sqrt(n!) of a switch, n = 1 ... ORDERS.
 
-    The last row is the square root of the variance that they leave, with the sign of the next
-    coefficient.
+    Return them with one more row, shape (ORDERS + 1, len(u)). This row stands for all higher
+    orders: the square root of the variance they contribute, with the sign of the next coefficient.
     """
     He = [np.ones_like(u), -u]
     for n in range(1, ORDERS):
@@ -134,10 +136,11 @@ def _coefficients(switch: Switch, u: Array, m: Array, phi: Array, sigma: float) 
 
 @dataclass(frozen=True, eq=False)
 class Kernels:
-    """Transforms of rho_k^n r_k, n = 1 ... ORDERS + 1, shape (ORDERS + 1, length//2 + 1), for
-    `bins` sums of `bin` samples each, padded to `length`.
+    """Fourier transforms of rho_k^n r_k, with which the variances of switching columns are added.
 
-    Frequencies between 0 and the Nyquist frequency count twice.
+    spectra : transforms for n = 1 ... ORDERS + 1, shape (ORDERS + 1, length//2 + 1). Frequencies
+        between 0 and the Nyquist frequency count twice.
+    bin, bins, length : there are `bins` sums of `bin` samples each, padded with zeros to `length`.
     """
 
     bin: int
@@ -147,7 +150,11 @@ class Kernels:
 
 
 def kernels(band: Bandwidth, N: int, factor: int) -> Kernels:
-    """Kernels for series of N samples that are decimated by `factor`: they change little over an eighth of it, so that sums over that many do."""
+    """Compute the kernels for series of N samples that are decimated by `factor`.
+
+    They change little over an eighth of `factor` samples, so sums over this number of samples
+    suffice.
+    """
     size = max(1, factor // 8)
     bins = -(-N // size)
     rho, r = band.speed[::size], band.decimation[::size]
@@ -164,9 +171,9 @@ def kernels(band: Bandwidth, N: int, factor: int) -> Kernels:
 
 
 def _summed_variance(coefficients: Array, near: Array, known: Kernels) -> float:
-    """sum_n sum_t,t' c_n(t) c_n(t') rho^n r, by Parseval.
+    """Add c_n(t) c_n(t') rho^n r over all orders n and instants t, t', by Parseval's theorem.
 
-    coefficients, shape (ORDERS + 1, len(near)), over sqrt(n!), at the samples `near`.
+    coefficients : c_n/sqrt(n!) at the samples `near`, shape (ORDERS + 1, len(near)).
     """
     sums = np.array(
         [np.bincount(near // known.bin, weights=c, minlength=known.bins) for c in coefficients]

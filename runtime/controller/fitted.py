@@ -279,8 +279,8 @@ def _text(
     open_ones = [j for j, x in zip(labels, kd, strict=True) if not np.isfinite(x)]
     if law.kd == "fit" and open_ones:
         parts.append(
-            f"kd and FV of joint {', '.join(open_ones)} cannot be told apart on these records: FV "
-            "is the sum of both; say kd, or move the reference velocity"
+            f"kd and FV of joint {', '.join(open_ones)} cannot be separated on these records: FV "
+            "is the sum of both; give kd, or change the reference velocity"
         )
     if np.isfinite(late_by[0]):
         which = " without kd" if law.kd == "fit" and open_ones else ""

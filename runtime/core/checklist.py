@@ -239,7 +239,7 @@ def rank_and_condition(estimate: Estimate, fit: Estimate) -> Answer:
             groups = "; ".join(", ".join(group) for group in one.groups)
             return Answer(
                 "no",
-                f"No: rank {one.rank} for {len(one.names)} parameters, not told apart: {groups}",
+                f"No: rank {one.rank} for {len(one.names)} parameters; these cannot be separated: {groups}",
                 "record a motion that excites these parameters (symgen excite), or leave them out "
                 "(estimate: columns)",
             )
@@ -313,7 +313,7 @@ def lost_joints(estimate: Estimate, fit: Estimate) -> str:
     by_essential = " and ".join(f"{joint.relative_error:.1f} %" for joint in lost)
     return (
         f"all parameters leave {by_all} unexplained, the essential ones {by_essential}: "
-        f"parameters of small torques were removed beside large forces; {remedy}"
+        f"parameters with small torques were removed because other joints have large forces; {remedy}"
     )
 
 
@@ -378,8 +378,8 @@ def signs(negative: Sequence[str]) -> Answer:
 @Question(
     "Is every value certain?",
     f"{LIMIT.LARGE_DEVIATION:g} % of the value",
-    "do not use these values one by one: the torques know their combination better; a "
-    "longer record, or one that excites them",
+    "use only the predicted torques, not these single values; record longer, or a motion that "
+    "excites them",
 )
 def certain(fit: Estimate, bootstrap: Mapping[str, float]) -> Answer:
     """Check that the standard deviation of each parameter is small compared with its value.
@@ -405,9 +405,9 @@ def certain(fit: Estimate, bootstrap: Mapping[str, float]) -> Answer:
 
 
 @Question(
-    "Can the values be told apart?",
+    "Can the values be separated?",
     f"|correlation| below {LIMIT.CORRELATION:g}",
-    "use them together or not at all; a motion that moves them apart tells them (symgen excite)",
+    "use these values only together, or record a motion that separates them (symgen excite)",
 )
 def separate(fit: Estimate) -> Answer:
     """Check that no two estimates are strongly correlated by the covariance of eq. (10)."""

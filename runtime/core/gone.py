@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 RATIO = (
-    "gear ratios belong into the robot file, drives: {ratio: [100, 80]}; record.side: motor says that "
-    "the columns are those of motors"
+    "write gear ratios in the robot file, drives: {ratio: [100, 80]}; record.side: motor means that "
+    "the columns are those of the motors"
 )
 WENT: Mapping[str, str] = {
     "estimate.options.prior: entropic": "the distance entropic went; set euclidean, or none",

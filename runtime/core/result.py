@@ -319,7 +319,7 @@ class Identification:
             return (
                 f"The {self._of_record} does not determine {self.model.NAME}: rank "
                 f"{self.estimate.rank} for {len(self.estimate.names)} "
-                f"parameters, cannot be told apart: {names}."
+                f"parameters; these cannot be separated: {names}."
             )
         fit = self.model_estimate
         if not self.usable:

@@ -83,8 +83,7 @@ class Lowpass(Settings):
 
 
 class Decimate(Settings):
-    """Parallel decimation of Y and of every column of W: a low-pass filter, then one sample in
-    `factor`.
+    """Parallel decimation of Y and of every column of W: filter, then one sample kept in `factor`.
 
     The filter is Chebyshev I of order 8, 0.05 dB, 0.8/factor, zero phase.
 
@@ -217,8 +216,7 @@ class EstimateSettings(Settings):
 
 
 class EssentialSettings(Settings):
-    """Elimination of parameters while sigma_rho stays below a threshold (section 4.1.1 of the
-    chapter).
+    """Elimination of parameters while sigma_rho stays below a threshold (section 4.1.1).
 
     Attributes
     ----------

@@ -1,5 +1,4 @@
-"""A table of texts, for print as aligned text, in a notebook as HTML, or on the page of a report.
-"""
+"""A table of texts, printed as aligned text, in a notebook as HTML, or on the page of a report."""
 
 from __future__ import annotations
 
@@ -136,8 +135,7 @@ def with_intervals(
 
 
 def interval(value: float, half: float) -> tuple[str, str]:
-    """Write a value and half of its interval as text, both up to the second digit of the interval.
-    """
+    """Write a value and half of its interval as text, both to the second digit of the interval."""
     if not (isfinite(half) and half > 0 and isfinite(value)):
         return f"{value:.4g}", f"{half:.2g}"
     place = floor(log10(half)) - 1

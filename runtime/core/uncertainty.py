@@ -169,7 +169,7 @@ class Uncertainty(Result):
                 f"{self.bootstrap.runs} draws."
             ),
             (
-                f"Residuals are {white} (Ljung-Box, 5 %); the rows are worth {share:.0f} % of "
+                f"Residuals are {white} (Ljung-Box, 5 %); the effective number of rows is {share:.0f} % of "
                 "their number."
             ),
             (
@@ -212,7 +212,7 @@ class Uncertainty(Result):
                 "Residuals by joint: correlation of neighbours, Ljung-Box, rows that count, "
                 "spectrum",
                 (
-                    *("joint", "rows", "rho_1", "Q", "p", "worth rows", "peak Hz"),
+                    *("joint", "rows", "rho_1", "Q", "p", "effective rows", "peak Hz"),
                     "half of the power below Hz",
                 ),
                 [
@@ -345,10 +345,10 @@ def f_tests(essential: Essential, share: float = 1.0) -> tuple[FTest, ...]:
 
 
 def sets(essential: Essential) -> tuple[tuple[float, int, tuple[str, ...]], ...]:
-    """Return three values for each elimination threshold: itself, a count and a difference.
+    """Compare the essential sets of all thresholds with the set that is used.
 
-    The count is the number of parameters left. The difference has the names that were removed in
-    addition to those of the used set ("-"), or not removed ("+").
+    Return for each threshold: the threshold, the number of parameters left, and the names that
+    differ from the used set ("-": removed in addition, "+": not removed).
     """
     steps = [*essential.trail, *essential.further]
     names = essential.all_parameters.names

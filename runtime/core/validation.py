@@ -337,9 +337,9 @@ class WeakDirections(Result, keys="threshold pairs groups directions", schema=1)
             between = f"{strongest.first}, {strongest.second} " if len(group) > 2 else ""
             sentences.append(
                 f"{', '.join(group[:-1])} and {group[-1]} trade against each other on this record "
-                f"(correlation {between}{strongest.correlation:+.2f}): what they do together is "
-                "known better than each value. Set one of them to a value known otherwise, or "
-                "record a motion that tells them apart (symgen excite)."
+                f"(correlation {between}{strongest.correlation:+.2f}): their combined "
+                "effect is more certain than each value. Set one of them to a value from another "
+                "source, or record a motion that separates them (symgen excite)."
             )
         return tuple(sentences)
 

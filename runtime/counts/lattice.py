@@ -287,7 +287,7 @@ def _off(x: Array, off: float, step: float, own: bool) -> str:
         if part > 1.5 and abs(part - round(part)) < 0.01:
             return (
                 f"{text} and on one {round(part)} times finer: {remedy}, or, if a driver "
-                "averaged so many samples, record the counts"
+                "averaged that number of samples, record the counts"
             )
         return f"{text} and on one of step {suggested:.6g}: {remedy}"
     return (
@@ -309,8 +309,8 @@ def _speed(change: Array, label: str) -> list[str]:
     if len(moving) and (fast := float(np.median(moving))) > FAST:
         return [
             (
-                f"{label}: the count changes by {fast:.0f} a sample; no edge is seen, counts tell "
-                "as much as positions here, log faster"
+                f"{label}: the count changes by {fast:.0f} a sample; no single edge is visible, "
+                "so counts say no more than positions here; log faster"
             )
         ]
     return []

@@ -339,11 +339,11 @@ class Gaps:
             )
             + (
                 (
-                    "where the counts around a gap do not tell the position to half a step, rows "
+                    "where the counts around a gap do not fix the position to half a step, rows "
                     f"are left out ({self.unknown[j]} samples)"
                 )
                 if self.unknown[j]
-                else "the counts around them tell the motion there"
+                else "the counts around them determine the motion there"
             )
             for j in np.flatnonzero(self.samples)
         )

@@ -358,12 +358,12 @@ def _error_notes(errors: Errors, least: float, sites: int) -> list[str]:
     said = []
     if errors.count > least and sites > FEWEST:
         said.append(
-            f"counts are off by {errors.count:g} steps (rms) beside their rounding, by uneven "
-            "lines or noise; bounds and stated deviations are widened"
+            f"counts are off by {errors.count:g} steps (rms) in addition to rounding, from uneven "
+            "lines or noise; bounds and standard deviations are widened"
         )
     if errors.time > CLOCK_ERRORS[0] and sites > FEWEST:
         said.append(
-            f"time stamps are off by {errors.time:g} periods (rms); bounds and stated deviations "
+            f"time stamps are off by {errors.time:g} periods (rms); bounds and standard deviations "
             "are widened where the joint is fast"
         )
     return said

@@ -83,10 +83,10 @@ class StaticPoses(Result, keys="poses condition sigma compared s taken_in"):
             [(str(k), *(f"{x:.4f}" for x in q)) for k, q in enumerate(self.poses, start=1)],
         )
         return (
-            f"{len(self.poses)} poses at rest tell {len(self.sigma)} parameters of "
+            f"{len(self.poses)} static poses determine {len(self.sigma)} parameters of "
             f"{self.model.NAME}: cond(W) {self.condition[0]:.1f}, by {self.compared} "
             f"{self.condition[1]:.1f}."
-            f"{f' Left out, since others take them in at rest: {lost}.' if lost else ''}\n\n"
+            f"{f' Not estimated, because at rest they cannot be separated from others: {lost}.' if lost else ''}\n\n"
             f"{sigma.to_text()}\n\n{poses.to_text()}\n\n"
             f"SI units, for torque deviations of {', '.join(f'{x:.3g}' for x in self.s)}. "
             "Ranges of the joints are kept; collisions and limits of torque were not looked at. "

@@ -156,7 +156,7 @@ class Excitation(Result):
             return ""
         if not worse:
             return (
-                f" It tells each of these {len(before)} parameters better than the motion of "
+                f" It determines each of these {len(before)} parameters better than the motion of "
                 "the record."
             )
         named = ", ".join(

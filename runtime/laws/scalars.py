@@ -135,7 +135,7 @@ class FittedLaws(Part):
                 "Scalars of laws", ("scalar", "law of", "value ± 95 %, SI", "other minima"), said
             ),
             Table(
-                "What the laws are worth",
+                "Do the laws improve the prediction?",
                 ("law of", "value ± 95 %", "p", "unseen without %", "unseen with %", "earned"),
                 tests,
             ),
@@ -151,7 +151,11 @@ class FittedLaws(Part):
             f"{s.name} {s.doubt or f'{s.value:.4g} ± {1.96 * s.sigma:.2g}'}" for s in self.scalars
         ]
         idle = [t.parameter for t in self.tests if not t.earned]
-        worth = f"; not worth their scalars on unseen data: {', '.join(idle)}" if idle else ""
+        worth = (
+            f"; these laws do not improve the prediction of unseen data: {', '.join(idle)}"
+            if idle
+            else ""
+        )
         return f"Scalars of laws (± 95 %): {', '.join(said)}{worth}"
 
     def summary(self) -> dict[str, Any]:

@@ -136,11 +136,11 @@ class Loop:
             )
         elif method == "didim":
             notes.append(
-                "didim reads of the recorded positions the first alone; rounding them says nothing of an encoder in the loop, whose controller answers its steps: place: loop does."
+                "didim uses only the first recorded position, so rounding the record says nothing about an encoder in the loop, whose steps the controller answers; place: loop studies that."
             )
         elif method == "iv":
             notes.append(
-                "The instruments of iv know no rounding of recorded positions; what an encoder in the loop does to them: place: loop."
+                "The instruments of iv do not depend on the rounding of recorded positions; place: loop studies an encoder in the loop."
             )
         return tuple(notes)
 
@@ -216,7 +216,7 @@ def loop_of(problem: Problem, simulator: Simulator | None = None) -> Loop | None
     if study.controller is None:
         asked = "place: loop" if study.cestac.place == "loop" else study.estimate.method
         raise SettingsError(
-            f"{asked} simulates the closed loop, and this study tells none; give a section "
+            f"{asked} simulates the closed loop, but this study describes none; add a section "
             "`controller` with law, rate and reference, "
             "or use ols, wls or irls on recorded positions",
             path=("cestac", "place") if study.cestac.place == "loop" else ("estimate", "method"),

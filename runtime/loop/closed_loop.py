@@ -57,10 +57,9 @@ if TYPE_CHECKING:
 Array = np.ndarray
 
 ASSUMED = (
-    "The reference of this record is not known; the measured motion through the filters stands for "
-    "it. Instruments then carry the noise of the same run, "
-    "and a simulated motion is compared with itself: bias is removed only as far as the noise does "
-    "not pass the loop."
+    "The reference of this record is not known; the filtered measured motion is used instead. "
+    "Instruments then contain the noise of the same run, and a simulated motion is compared with "
+    "itself: bias is removed only as far as the noise does not pass through the loop."
 )
 
 
@@ -371,7 +370,7 @@ def loop_of(observation: Observation, method: str) -> ClosedLoop:
     """The loop of an observation; raises SettingsError if `method` was asked for and there is none."""
     if observation.closed_loop is None:
         raise SettingsError(
-            f"{method} simulates the closed loop of the record, and this study tells none; give a "
+            f"{method} simulates the closed loop of the record, but this study describes none; add a "
             "section `controller` with law, rate and reference "
             "(symgen identify then makes it), or use ols, wls or irls",
             path=("estimate", "method"),

@@ -172,7 +172,7 @@ def parameters_of(model: GeneratedModel, controller: Controller | None = None) -
         )
         if controller is None:
             raise InputError(
-                f"{message} (0 where one is zero), or a record whose estimate tells the parameters"
+                f"{message} (0 for each that is zero), or give a record from which they are estimated"
             )
         raise SettingsError(f"{message} or here, 0 where one is zero", path=where)
     if unknown := sorted(set(changed) - set(emitted.STANDARD_PARAMETERS)):

@@ -270,7 +270,7 @@ class Controller(Settings):
 
     def __post_init__(self) -> None:
         given = {key: x for key in ("kp", "kd") if (x := getattr(self, key)) is not None}
-        message = "given beside law; they are short for law: {kp: ..., kd: ...}"
+        message = "given together with law; kp and kd are short for law: {kp: ..., kd: ...}; leave one out"
         require(not given or self.law == Law(), message, *list(given)[:1])
         if given:
             object.__setattr__(self, "law", Law(**given))

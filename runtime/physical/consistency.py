@@ -140,7 +140,7 @@ def consistency(result: Identification) -> Consistency:
     """
     if not result.determined:
         groups = "; ".join(", ".join(group) for group in result.estimate.groups)
-        raise InputError(f"the record does not tell apart {groups}")
+        raise InputError(f"the record does not separate {groups}")
     return Consistency(result.estimate, result.model_estimate, _judged(result))
 
 

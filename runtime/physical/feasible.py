@@ -121,9 +121,7 @@ def fit(start: Beginning) -> Fitted:
     least-squares estimate.
     """
     if start.model is None:
-        raise InputError(
-            "method feasible needs the model: it knows which parameters belong to one link"
-        )
+        raise InputError("method feasible needs the model, since it groups the parameters by link")
     observation = start.observation
     system = start.system
     free = start.solution

@@ -58,8 +58,7 @@ ENTRY = re.compile(r"free_(alpha|[drb])(\d+)")
 
 @dataclass(frozen=True, eq=False)
 class Cause:
-    """One possible error of a study, a robot file or a log, and the change that corrects this
-    error.
+    """One possible error of a study, a robot file or a log, and the change that corrects it.
 
     Attributes
     ----------
@@ -103,9 +102,7 @@ class Cause:
 
     @property
     def on_torques(self) -> bool:
-        """Whether only torques change, not positions, rate or table of frames: W then stays the
-        same.
-        """
+        """Whether only torques change: positions, rate and table of frames stay, and so does W."""
         still = np.array_equal(self.P, np.eye(len(self.p))) and not self.p.any()
         return still and self.rate == 1 and not self.constants
 
@@ -121,7 +118,9 @@ class Cause:
         return np.asarray(samples.tau @ self.T.T - self.subtracted(samples))
 
     def subtracted(self, samples: Samples) -> Array:
-        """Compute the torques outside the model, which are subtracted: s known + rho, shape (K, n).
+        """Compute the torques outside the model that are subtracted, shape (K, n).
+
+        They are s known + rho.
         """
         known = np.asarray(self.known_factor * samples.tau_known)
         if np.ndim(self.unmodelled) == 0:
@@ -190,8 +189,7 @@ class Robot:
         return np.where(np.arange(self.n) == j, value, others)
 
     def positions(self, E: Array) -> Maps:
-        """Apply the matrix E to the position columns of the files; return P and p of the joint
-        positions.
+        """Apply the matrix E to the position columns of the files; return P and p.
 
         For files on the side of the motors, q' = R^-1 E R (q - offset) + offset, with R the gear
         ratio.
@@ -202,15 +200,17 @@ class Robot:
         return {"P": E}
 
     def torques(self, E: Array) -> Maps:
-        """Apply the matrix E to the torque columns of the files; return T of the joint torques."""
+        """Apply the matrix E to the torque columns of the files; return T.
+
+        For files on the side of the motors, T = R' E R'^-1, with R the gear ratio.
+        """
         if self.sides[1] == "motor":
             E = self.R.T @ E @ np.linalg.inv(self.R.T)
         return {"T": E}
 
     @property
     def gravity(self) -> Array:
-        """Gravity vector of the robot file in frame 0, shape (3,), m/s^2; zeros without `variants`.
-        """
+        """Gravity of the robot file in frame 0, shape (3,), m/s^2; zeros without `variants`."""
         return np.array([self.free.get(key, 0.0) for key in GRAVITY])
 
     @property
@@ -546,8 +546,7 @@ def conventions(robot: Robot) -> Iterator[Item]:
 
 
 def entries(robot: Robot, names: str) -> Iterator[Item]:
-    """Yield the entries of the table of frames with these names; lengths only if they are not zero.
-    """
+    """Yield the entries of the table of frames with these names; lengths only if not zero."""
     for key, value in robot.free.items():
         entry = ENTRY.fullmatch(key)
         if entry and entry[1] in names.split() and (value or entry[1] == "alpha"):
@@ -640,8 +639,7 @@ def gravity(item: Item) -> Maps:
 
 
 def chosen(item: Item) -> Array:
-    """Make a diagonal matrix: the factor of an item for its chosen joints, 1 for the other joints.
-    """
+    """Make a diagonal matrix: the factor of an item for its chosen joints, 1 for all others."""
     return np.diag(np.where(item["chosen"], item["factor"], 1.0))
 
 

@@ -50,7 +50,7 @@ def jumps(case: Case) -> Answer:
                 return Answer(
                     "no",
                     f"Positions of joints {' and '.join(case.labels[j] for j in two)} are the same",
-                    "one column stands for both: look at record.columns.q",
+                    "one column is used for both joints: check record.columns.q",
                 )
         usual = _usual(steps)
         around = median_filter(np.diff(q, axis=0), (2 * LIMIT.JUMP_STEPS + 1, 1))
@@ -212,10 +212,12 @@ def cut_torques(case: Case) -> Answer | None:
     )
     if not asked.any():
         return Answer(
-            "good", f"{text}: the drive knows these two alone, which is no clipped signal"
+            "good", f"{text}: an on-off drive has only these two values, so this is no clipping"
         )
     if few[j]:
-        return Answer("doubtful", f"{text}: too few others are left to tell what it was")
+        return Answer(
+            "doubtful", f"{text}: too few other samples remain to judge whether it was clipped"
+        )
     return Answer(
         "no" if clipped[j] else "good",
         f"{text}; fitted to the others, the model goes beyond it by {missing[j]:.2g} "

@@ -46,7 +46,7 @@ def rest(case: Case) -> Answer:
     model, study = case.model, case.study
     share = standing_share(case.samples, study)
     worst = int(np.argmax(share))
-    text = f"Joint {case.labels[worst]} stands in {100 * share[worst]:.0f} % of its rows"
+    text = f"Joint {case.labels[worst]} is at rest in {100 * share[worst]:.0f} % of its rows"
     proposed = low_speed_of_rest(case.samples, study)
     if proposed is None:
         return Answer("good", text)
@@ -139,7 +139,9 @@ def excited(observation: Observation, signals: Signals, rate: float) -> Answer |
     order = sorted(shares, key=lambda name: -shares[name])
     unseen = [name for name in order if shares[name] > LIMIT.UNEXCITED]
     if unseen:
-        return Answer("doubtful", f"It cannot tell {first_names(unseen)}, whatever their values")
+        return Answer(
+            "doubtful", f"It does not determine {first_names(unseen)}, whatever their values"
+        )
     text = f"Least excited is {order[0]}, {shares[order[0]]:.2g} %"
     if weak := [name for name in order if shares[name] > LIMIT.LARGE_DEVIATION]:
         listed = ", ".join(weak[: LIMIT.PARAMETERS_NAMED])

@@ -66,9 +66,9 @@ def physics(case: Case) -> Answer | None:
 
 @Question(
     "Were the torques measured?",
-    f"{100 * LIMIT.LEAST_FRICTION:g} % of friction in a joint, and noise",
-    "log torques or currents as they were measured: what a controller computes from its model "
-    "tells of that model, not of the robot",
+    f"{100 * LIMIT.LEAST_FRICTION:g} % of friction in a joint, and visible noise",
+    "log torques or currents as they were measured: torques that a controller computes "
+    "from its model describe that model, not the robot",
 )
 def measured(case: Case) -> Answer | None:
     """Check whether the torques were measured: they must show friction and noise.
@@ -143,7 +143,9 @@ def values(case: Case) -> Answer | None:
         return Answer("doubtful", f"No: {'; '.join(off[:4])}")
     ratios = [x for x in (*case.robot_values.gravity, *case.robot_values.inertia) if np.isfinite(x)]
     if not ratios:
-        return Answer("good", "Too small beside friction to tell")
+        return Answer(
+            "good", "Gravity and inertia torques are too small compared with friction to judge"
+        )
     return Answer(
         "good", f"Ratios of gravity and inertia torques from {min(ratios):.2f} to {max(ratios):.2f}"
     )
@@ -151,7 +153,7 @@ def values(case: Case) -> Answer | None:
 
 @Question(
     "Do positions and torques belong to the same instants?",
-    f"shift below {1e3 * LIMIT.LATE:g} ms, or not beyond what the record tells",
+    f"shift below {1e3 * LIMIT.LATE:g} ms, or less than the record can show",
 )
 def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
     """Check for a time shift between positions and torques.
@@ -177,7 +179,7 @@ def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
     beyond = (
         ""
         if own.any() or np.abs(shift).max() <= LIMIT.LATE
-        else ", more than the record tells for certain"
+        else ", but the record does not show this for certain"
     )
     return Answer(
         state,

@@ -145,7 +145,7 @@ class Plausibility(
 
     def text(self) -> str:
         """List the possible errors of the study that no fit of the record can reveal."""
-        return "\n".join(f"No record can tell: {change}." for change in self.equivalent)
+        return "\n".join(f"No record can show: {change}." for change in self.equivalent)
 
     def to_text(self) -> str:
         """Write the findings that are not good, then the errors that no fit can reveal."""
@@ -184,7 +184,9 @@ def plausibility_of(result: Identification, variants: GeneratedModel | None = No
     if result.study.signals.reader == "static":
         raise InputError("not judged for poses at rest")
     if any(is_axis(joint) for joint in result.model.JOINTS):
-        raise InputError("not judged beside force sensors; identify without them too")
+        raise InputError(
+            "not judged for a robot with force sensors; identify once without their columns"
+        )
     return plausibility(result.problem, variants=variants)
 
 
@@ -205,7 +207,8 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
     require_motion(problem.settings.signals, "a check of slips")
     if any(is_axis(joint) for joint in problem.model.JOINTS):
         raise InputError(
-            "plausibility of the record: not judged beside force sensors; identify without them too"
+            "plausibility of the record: not judged for a robot with force sensors; identify once "
+            "without their columns"
         )
     at("plausibility of the record")
     first = times(problem.records)

@@ -59,8 +59,7 @@ Change = Callable[[float], Cause]
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One cause (a possible error of the study), and the fit of the study with this error
-    corrected.
+    """One cause (a possible error of the study), and the fit with this error corrected.
 
     Attributes
     ----------
@@ -239,8 +238,9 @@ class Baseline:
         return score
 
     def beyond(self, V: Array) -> float:
-        """Compute the largest relative part of the torques V that no parameters of the study
-        explain.
+        """Compute the largest relative part of the torques V outside the span of W.
+
+        No parameters of the study explain this part.
 
         V : m sets of torques on the side of the files, shape (K, n, m).
         """
@@ -358,12 +358,12 @@ def baseline_of(
 def regressor(model: GeneratedModel, states: tuple[Array, Array, Array], **constants: Any) -> Array:
     """Evaluate the regressor D at given states, shape (K, n, b).
 
+    Columns that contain only rounding errors, such as those of cos(pi/2), are set to zero.
+
     Raises
     ------
     ValueError
         A loop does not close, or D is not finite.
-
-    Columns that contain only rounding errors, such as those of cos(pi/2), are set to zero.
     """
     with np.errstate(all="ignore"):
         D = np.asarray(model.regressor(*states, out=None, **constants))
@@ -622,8 +622,7 @@ def takes_away(given: Fit, fit: Fit) -> Array:
 
 
 def leaves_values(fit: Fit, baseline: Baseline) -> bool:
-    """Whether the bodies of a fit need far larger or far smaller torques than those of the robot
-    file.
+    """Whether a fit needs far larger or far smaller torques than the robot file's bodies.
 
     The ratio of the torques is then outside LIMIT.CAD_RATIOS. False if the file does not give every
     body.
@@ -674,7 +673,7 @@ def loads(baseline: Baseline) -> list[Trial]:
         baseline.samples.n,
         kind="load",
         says=f"link {link} has other values than those of the robot file: a load?",
-        remedy=f"say what link {link} carries: payload, or values of the file that hold it",
+        remedy=f"declare the load of link {link} as `payload`, or correct its values in the robot file",
     )
     known = {f"{family}{link}" for family in INERTIAL}
     values = {name: x for name, x in baseline.physical.values.items() if name not in known}

@@ -1,1 +1,1 @@
-"""From the files of a measurement to Records: formats, columns, units, the clock, public data sets."""
+"""Conversion of measurement files to Records: formats, columns, units, clock, public data sets."""

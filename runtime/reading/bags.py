@@ -1,11 +1,19 @@
-"""ROS 1 bags (.bag), ROS 2 bags (a folder with metadata.yaml, or its .db3), and MCAP files, by rosbags (pip install symgen[bags]): the messages sensor_msgs/JointState of one topic as columns.
+"""Reading of ROS 1 bags (.bag), ROS 2 bags (a folder, or its .db3) and MCAP files as tables.
+
+The library is rosbags (pip install symgen[bags]). The messages sensor_msgs/JointState of one topic
+give the columns:
 
     t                        s from the first message that is read
     shoulder.position        of the joint `shoulder`; so velocity and effort
 
-In `record.columns` the name of the joint is enough: q means position, tau effort. A message names its joints itself, so that their order may change from message to message. Where several nodes publish on a topic, such as those of an arm and of its gripper, messages that hold none of the joints that are asked for are skipped and counted; one that holds some of them is an error.
+In `record.columns` the name of the joint is enough: q means position, tau effort. Each message
+names its joints, so that their order may change from message to message. If several nodes publish
+on a topic, such as those of an arm and of its gripper, messages without any of the requested joints
+are skipped and counted; a message with only some of them is an error.
 
-Messages are read by the definition of JointState that ROS has, never by one that a bag brings along: rosbags would turn that into code and run it. A bag whose JointState is another one is refused. Time is the stamp of the header, or the time of the log where every stamp is zero.
+Messages are decoded by the definition of JointState in ROS, never by a definition in the bag,
+because rosbags would convert that to code and run it. A bag with another JointState is refused.
+Time is the stamp of the header, or the time of the log if every stamp is zero.
 """
 
 from __future__ import annotations
@@ -40,18 +48,18 @@ NANOSECONDS = 1_000_000_000  # per second
 
 @dataclass(frozen=True)
 class JointState:
-    """One message.
+    """One message JointState of a bag: its time, the names of the joints, and their values.
 
     Attributes
     ----------
     number : int
-        Of the message on its topic, from 1.
+        Number of the message on its topic, from 1.
     stamp : int, ns
         Time.
     joints : tuple of str
         Names of the joints.
     position, velocity, effort : ndarray
-        One value by joint (rad or m, rad/s or m/s, N m or N), or none.
+        One value per joint (rad or m, rad/s or m/s, N m or N), or none.
     """
 
     number: int
@@ -64,14 +72,15 @@ class JointState:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class JointTable(Table):
-    """The messages of a topic; `columns` has no numbers until the joints are chosen."""
+    """Table of the messages of one topic; its columns are empty until the joints are chosen."""
 
     messages: tuple[JointState, ...]
 
     def chosen(self, names: Sequence[str]) -> Table:
-        """Table of the messages that hold a joint of these columns.
+        """Make the table of the messages that contain a joint of these columns.
 
-        If none does, all messages, so that the first one shows what is missing.
+        If no message contains such a joint, all messages are used, so that the error names the
+        missing joint.
         """
         joints = {name.rpartition(".")[0] for name in names} - {""}
         some = [message for message in self.messages if joints.intersection(message.joints)]
@@ -120,7 +129,7 @@ class JointTable(Table):
 
 
 def read_bag(path: Path, options: Options) -> JointTable:
-    """Table of the messages of a topic."""
+    """Read the messages of one topic of a bag as a table."""
     from rosbags import rosbag1, rosbag2
     from rosbags.typesys import Stores, get_typestore
 
@@ -155,7 +164,11 @@ def read_bag(path: Path, options: Options) -> JointTable:
 
 
 def digest_of(path: Path) -> str:
-    """SHA-256 of a bag: of its file, or of the list of those of a folder, each of which has to lie in it."""
+    """Compute the SHA-256 of a bag.
+
+    For a folder, it is that of the list of the hashes and names of its files, which must be inside
+    the folder.
+    """
     if not path.is_dir():
         return sha256_of(path)
     return sha256(
@@ -164,7 +177,7 @@ def digest_of(path: Path) -> str:
 
 
 def stored_files(folder: Path) -> list[Path]:
-    """Files of a ROS 2 bag, a folder with metadata.yaml."""
+    """Return the paths of the files of a ROS 2 bag, which is a folder with metadata.yaml."""
     from runtime.documents.yaml_text import yaml_values
 
     where = f"{folder.name}/metadata.yaml"
@@ -187,9 +200,9 @@ def stored_files(folder: Path) -> list[Path]:
 
 
 def _inside(folder: Path, name: str, where: str) -> Path:
-    """Path of the file `name`, which must lie in the folder.
+    """Return the path of the file `name`; raise InputError if it is not inside the folder.
 
-    Bags of the first ROS 2 versions write it behind the name of the folder.
+    Bags of the first ROS 2 versions write the name of the folder before the name of the file.
     """
     stored = name.removeprefix(f"{folder.name}/")
     path = folder / stored
@@ -209,7 +222,10 @@ def _inside(folder: Path, name: str, where: str) -> Path:
 
 
 def _topic(connections: list[Any], wanted: str | None, file: str) -> str:
-    """The topic that is read; it is one of JointState, as ROS defines it."""
+    """Return the name of the topic that is read: `wanted`, or the only topic with JointState.
+
+    Raise InputError if there is no such topic, or if its messages are not defined as in ROS.
+    """
     topics = sorted({c.topic for c in connections if c.msgtype == MESSAGE})
     others = sorted({f"{c.topic} ({c.msgtype})" for c in connections if c.msgtype != MESSAGE})
     if wanted is None and len(topics) > 1:
@@ -232,9 +248,9 @@ def _topic(connections: list[Any], wanted: str | None, file: str) -> str:
 
 
 def _as_defined(definition: Any) -> bool:
-    """Whether a definition in the bag has the fields of JointState; only .msg text is compared.
+    """Whether a message definition in the bag has the fields of JointState.
 
-    Other languages go by their hash.
+    Only .msg text is compared. A definition in another language is checked by its hash instead.
     """
     if definition.format.name != "MSG":
         return True
@@ -242,7 +258,10 @@ def _as_defined(definition: Any) -> bool:
 
 
 def _messages(reader: Any, topic: str, decode: Any) -> list[JointState]:
-    """Messages of the topic in the order of the log, with the stamp of the header, or the time of the log where every stamp is zero."""
+    """Read the messages of the topic in the order of the log.
+
+    Their time is the stamp of the header, or the time of the log if every stamp is zero.
+    """
     connections = [c for c in reader.connections if c.topic == topic]
     states = []
     logs = []

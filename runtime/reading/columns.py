@@ -1,6 +1,8 @@
-"""From the columns of a file to positions and torques of the joint side, SI: names, then scale, units and drives.
+"""Conversion of the columns of a file to joint positions and torques in SI units.
 
-Units and side are explicit in the settings, never guessed. A file whose columns are called t, q1 ... qn, tau1 ... taun needs no column names.
+First the columns are found by name, then scale, units and drives are applied. Units and side (joint
+or motor) are explicit in the settings, never guessed. A file whose columns are called t, q1 ... qn,
+tau1 ... taun needs no column names.
 """
 
 from __future__ import annotations
@@ -32,16 +34,19 @@ def column_names(
     joints: Sequence[str] = (),
     motors: Sequence[bool] = (),
 ) -> Columns:
-    """The names in the settings, or t, q1 ... qn, tau1 ... taun where they are left out; of a bag: the joints of its messages.
+    """Find the names of the columns that are read: those in the settings, or the default names.
+
+    Default names are t, q1 ... qn, tau1 ... taun; in a bag, the joints of its messages.
 
     Parameters
     ----------
     first, last : Table
         Files of the positions and of the torques.
     joints : sequence of str
-        Names of the joints of the robot, in its order: what `names` means in the settings, and what of a bag is read where they are left out.
+        Names of the joints of the robot, in its order. They are used for `names` in the settings,
+        and for a bag without names in the settings.
     motors : sequence of bool
-        Whether each joint of the robot has a motor; none: they all have.
+        Whether each joint of the robot has a motor; empty: all joints have a motor.
     """
     given = settings.columns
     t = given.t
@@ -81,7 +86,11 @@ def column_names(
 
 
 def _of_motors(names: tuple[str, ...], motors: Sequence[bool]) -> tuple[str, ...]:
-    """Columns of the torques, of all joints or of those with a motor: NONE of a joint without one."""
+    """Complete the columns of the torques with NONE for each joint without a motor.
+
+    names : columns of all joints, or of the joints with a motor only. Other names are returned
+    unchanged.
+    """
     if len(names) == len(motors):
         names = tuple(name for name, motor in zip(names, motors, strict=True) if motor)
     if len(names) != sum(motors):
@@ -93,7 +102,10 @@ def _of_motors(names: tuple[str, ...], motors: Sequence[bool]) -> tuple[str, ...
 def _meant(
     table: Table, key: str, quantity: str, names: Sequence[str], joints: Sequence[str]
 ) -> tuple[str, ...]:
-    """Columns that `names` mean, of q, tau or qr (`key`), which bags call `quantity`."""
+    """Find the columns that the setting `names` means, for positions, torques or references.
+
+    key : "q", "tau" or "qr". quantity : name of the same quantity in bags, such as "effort".
+    """
     if names == BY_NAME and not joints:
         raise InputError(
             f"record.columns.{key} is {BY_NAME[0]}, but the robot has no name for every joint; add labels to the robot file",
@@ -109,7 +121,9 @@ def _meant(
 
 
 def _numbered(quantity: str, table: Table, joints: Sequence[str]) -> tuple[str, ...]:
-    """The columns q1, q2 ... in the order of their numbers."""
+    """Find the columns q1, q2 ... (or tau1, tau2 ...) and return them in the order of their
+    numbers.
+    """
     matches = [re.fullmatch(rf"{quantity}([0-9]{{1,4}})", name) for name in table.names]
     numbered = sorted((int(match[1]), match[0]) for match in matches if match)
     if not numbered:
@@ -122,7 +136,10 @@ def _numbered(quantity: str, table: Table, joints: Sequence[str]) -> tuple[str, 
 
 
 def _numbered_joints(table: Table) -> tuple[str, ...]:
-    """Joints of a bag whose names differ in a number only, 1, 2 ... or 0, 1 ..., in this order."""
+    """Return the joints of a bag in the order of the numbers in their names.
+
+    The names must differ in a number only, 1, 2 ... or 0, 1 ...; otherwise InputError.
+    """
     joints = table.joints or ()
     matches = [re.fullmatch(r"(.*?)(\d{1,3})", joint) for joint in joints]
     numbers = sorted((match[1], int(match[2]), match[0]) for match in matches if match)
@@ -137,7 +154,10 @@ def _numbered_joints(table: Table) -> tuple[str, ...]:
 
 
 def _of_joint(table: Table, key: str, joint: str) -> str:
-    """Column of a joint by its name, alone or with a word for the quantity: q_elbow, elbow.pos, effort/elbow."""
+    """Find the column of a joint by its name, alone or with a word for the quantity.
+
+    For instance q_elbow, elbow.pos or effort/elbow.
+    """
     forms = {
         form
         for word in WORDS[key]
@@ -160,20 +180,20 @@ def _of_joint(table: Table, key: str, joint: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Conversion:
-    """Conversion of the columns of a record to the joint side and SI.
+    """Conversion of the columns of a record to the joint side and SI units.
 
     Attributes
     ----------
     positions, commands : ndarray, shape (n,)
-        Factors of the columns of positions (to rad or m) and of commands.
+        Factors on the columns of positions (to rad or m) and of commands.
     of_positions, of_torques : Drives or None
-        Drives behind which each was measured; None: joint side.
+        Drives between the joints and the place of measurement; None: measured at the joints.
     drives : Drives or None
-        Those of the robot, coupled as the record says.
+        Drives of the robot, with the coupling of the settings of the record.
     constant : ndarray, shape (n,), N m/A or N m/V, or None
         Torque constants, of commands that are currents or voltages.
     turns : ndarray of bool, shape (n,)
-        Which columns of positions are angles that start anew at a full turn.
+        Which columns of positions are angles that jump back after a full turn.
     """
 
     positions: Array
@@ -185,33 +205,36 @@ class Conversion:
     turns: Array | None = None
 
     def position(self, q: Array) -> Array:
-        """Joint positions, rad or m; q, shape (N, n), as in the file."""
+        """Convert positions q of the file, shape (N, n), to joint positions, rad or m."""
         return self._at_joints(self.continued(q * self.positions))
 
     def _at_joints(self, q: Array) -> Array:
         return q if self.of_positions is None else self.of_positions.joint_position(q)
 
     def continued(self, q: Array) -> Array:
-        """Angles, rad, shape (N, n), without the jumps of a full turn where they start anew."""
+        """Remove jumps of a full turn from angles q, rad, shape (N, n)."""
         if self.turns is None:
             return q
         return np.asarray(np.where(self.turns, np.unwrap(q, axis=0), q))
 
     @property
     def follows(self) -> Array | None:
-        """Joint j follows from column i of the positions, bool, shape (n, n); None: columns are joints."""
+        """Whether the position of joint j depends on column i of the file, bool, shape (n, n).
+
+        None means that the columns are joints.
+        """
         if self.of_positions is None:
             return None
         root = np.linalg.inv(self.of_positions.motion)
         return np.asarray(np.abs(root) > 1e-12 * np.abs(root).max(axis=1, keepdims=True))
 
     def velocity(self, qd: Array) -> Array:
-        """Joint velocities, rad/s or m/s; qd, shape (N, n), as in the file."""
+        """Convert velocities qd of the file, shape (N, n), to joint velocities, rad/s or m/s."""
         qd = qd * self.positions
         return np.asarray(self._at_joints(qd) - self._at_joints(np.zeros_like(qd[:1])))
 
     def torque(self, tau: Array) -> Array:
-        """Joint torques, N m or N; tau, shape (N, n), as in the file."""
+        """Convert torques or commands tau of the file, shape (N, n), to joint torques, N m or N."""
         tau = tau * self.commands
         return tau if self.of_torques is None else self.of_torques.joint_torque(tau)
 
@@ -219,12 +242,12 @@ class Conversion:
 def conversion(
     settings: RecordSettings, drives: Drives | None, first: Table, last: Table, n: int
 ) -> Conversion:
-    """How the columns of a record become joint side, SI.
+    """Find how the columns of a record are converted to the joint side and SI units.
 
     Parameters
     ----------
     drives : Drives or None
-        Of the robot.
+        Drives of the robot.
     first, last : Table
         Files of the positions and of the torques.
     n : int
@@ -260,7 +283,10 @@ def conversion(
 def require_alike(
     names: Columns, first: Table, last: Table, q: tuple[int, ...], tau: tuple[int, ...]
 ) -> None:
-    """Raise InputError unless the shapes of positions and torques fit one record."""
+    """Raise InputError unless positions and torques have the same shape and belong to one record.
+
+    q, tau : shapes of the positions and of the torques.
+    """
     if (
         first is not last
         and not set(names.q) & set(names.tau)
@@ -305,7 +331,8 @@ def _units(units: str | tuple[str, ...], n: int, key: str) -> tuple[str, ...]:
 
 
 def _position_units(settings: RecordSettings, n: int) -> tuple[Array, Array]:
-    """Factors to rad or m, shape (n,), and which are of angles."""
+    """Return the factors from the units of positions to rad or m, shape (n,), and which are angles.
+    """
     units = [position_unit(unit) for unit in _units(settings.units.q, n, "units.q")]
     counts = np.ones(n)
     if settings.counts_per_revolution is not None:
@@ -318,7 +345,11 @@ def _position_units(settings: RecordSettings, n: int) -> tuple[Array, Array]:
 def _torque_constant(
     settings: RecordSettings, drives: Drives | None, n: int
 ) -> tuple[Array, Array | None]:
-    """Factors from the unit of tau to SI, shape (n,), and torque constants, 1 if the unit is one of torques; None if all are."""
+    """Return the factors from the units of tau to SI, shape (n,), and the torque constants.
+
+    The torque constant is 1 for a joint whose unit is one of torque or force. If this is so for all
+    joints, None replaces the constants.
+    """
     names = _units(settings.units.tau, n, "units.tau")
     units = [torque_unit(name) for name in names]
     factors = np.array([factor for _, factor in units])

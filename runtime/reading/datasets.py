@@ -1,11 +1,11 @@
-"""Measured records that are public: where they are, what they hash to, and the settings that go with them.
+"""Public measured records: their addresses, their hashes, and the settings for their use.
 
     fetch("tx40", "pos_read_data.csv")       path of the file
     dataset_study("tx40")                    settings as read from a study file
 
-A file is looked for in the folder SYMGEN_DATA as <name>/<file> or <name>/<file>.gz (never written
-to), then in the user's cache, then at its source. Hashes are of the uncompressed bytes. The records
-belong to their authors and are not part of this package.
+A file is searched in the folder SYMGEN_DATA as <name>/<file> or <name>/<file>.gz (which is never
+changed), then in the cache of the user, then at its source. Hashes are of the uncompressed bytes.
+The records belong to their authors and are not part of this package.
 """
 
 from __future__ import annotations
@@ -25,8 +25,10 @@ TIMEOUT = 10.0  # s, for a connection and between two packets
 
 @dataclass(frozen=True)
 class Dataset:
-    """A public record. url : folder of the files.   files : SHA-256 of the uncompressed bytes, by
-    name.   study : its settings.
+    """A public measured record: its source, its licence, its files and its settings.
+
+    url : folder of the files. files : SHA-256 of the uncompressed bytes, by name. study : settings
+    for this record.
     """
 
     title: str
@@ -127,7 +129,11 @@ DATASETS: Mapping[str, Dataset] = {"tx40": TX40, "emps": EMPS}
 
 
 def listing() -> list[dict[str, Any]]:
-    """Every dataset as JSON values: name, title, source, licence and files, each with its address, hash and path, null if it is not here."""
+    """List all datasets as JSON values: name, title, source, licence and files.
+
+    Each file has its address, its hash and its path, which is None if the file is not on this
+    machine.
+    """
     rows: list[dict[str, Any]] = []
     for name, dataset in DATASETS.items():
         files = []
@@ -141,20 +147,23 @@ def listing() -> list[dict[str, Any]]:
 
 
 def dataset_study(name: str) -> dict[str, Any]:
-    """Settings of a dataset, as a mapping for `study_from_mapping`; the caller may change it."""
+    """Return a copy of the settings of a dataset, a mapping for `study_from_mapping`."""
     return copy.deepcopy(dict(_dataset(name).study))
 
 
 def locate(name: str, file: str, *, cache: Path | None = None) -> Path | None:
-    """Path of a file that is already on this machine, its hash checked, or None."""
+    """Return the path of a file of a dataset that is on this machine; None if it is not here.
+
+    The hash of the file is checked.
+    """
     path, _ = _local(name, file, cache)
     return path
 
 
 def fetch(name: str, file: str, *, cache: Path | None = None) -> Path:
-    """Path of a file of a dataset: from SYMGEN_DATA, the cache, or its source.
+    """Return the path of a file of a dataset, from SYMGEN_DATA, the cache, or its source.
 
-    Raises DataUnavailableError if none answers.
+    Raise DataUnavailableError if the file is at none of these places.
     """
     path, tried = _local(name, file, cache)
     if path is not None:
@@ -182,7 +191,7 @@ def fetch(name: str, file: str, *, cache: Path | None = None) -> Path:
 
 
 def _local(name: str, file: str, cache: Path | None) -> tuple[Path | None, list[str]]:
-    """The file on this machine, and what was tried."""
+    """Search a file of a dataset on this machine; return its path or None, and the places tried."""
     expected = _digest(name, file)
     tried: list[str] = []
     data = os.environ.get("SYMGEN_DATA")

@@ -1,4 +1,4 @@
-"""A study with what the names of a file show, for a person to complete."""
+"""Draft of a study file, made from the column names of a measured file."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from runtime.reading.settings import RecordSettings
 
 
 def draft(settings: RecordSettings, path: Path, joints: Sequence[str]) -> str:
-    """Write a study file of one record; `# ?` and candidates stand before what is open.
+    """Write a draft of a study file for one record; `# ?` marks the settings that the user must
+    complete.
 
-    "" where the file cannot be read.
+    Candidates for a column are listed behind the mark. The draft is "" if the file cannot be read.
 
     path : of the first file. joints : names of the joints in the robot file.
     """

@@ -1,4 +1,4 @@
-"""Bytes of a measured file, plain or compressed by gzip, their hash, and how much a file may unpack to."""
+"""Bytes of a measured file, plain or compressed by gzip: reading, hash and limit of size."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ GZIP = b"\x1f\x8b"  # first bytes
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is a file of that name; False for names that no file can have."""
+    """Whether there is a file of that name; False also for an impossible name."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -30,7 +30,8 @@ def is_file(path: Path) -> bool:
 
 
 def require_size(unpacked: int, size: int, file: str) -> None:
-    """Raise InputError if a file of `size` bytes would hold `unpacked` ones, more than a measured record ever does."""
+    """Raise InputError if a file of `size` bytes unpacks to more bytes than a measured record has.
+    """
     if unpacked > max(ALWAYS, RATIO * size):
         raise InputError(
             f"unpacks to {unpacked / 2**20:.0f} MiB or more from {size / 2**20:.3g} MiB; a record may be {ALWAYS // 2**20} MiB or {RATIO} times the size of its file: store it without compression if it is genuine",
@@ -40,7 +41,7 @@ def require_size(unpacked: int, size: int, file: str) -> None:
 
 @contextmanager
 def opened(path: Path) -> Iterator[BinaryIO]:
-    """The uncompressed bytes of a file as a stream; an error while it is read names the file."""
+    """Yield the uncompressed bytes of a file as a stream; errors of reading name the file."""
     require_file(path)
     try:
         with path.open("rb") as plain:
@@ -56,14 +57,17 @@ def opened(path: Path) -> Iterator[BinaryIO]:
 
 
 def unpacked(path: Path) -> Path | BytesIO:
-    """Path for libraries that read paths or files, or the uncompressed bytes of a compressed file."""
+    """Return the path of a plain file, or the uncompressed bytes of a compressed file.
+
+    Both forms suit libraries that read paths or files.
+    """
     with opened(path) as stream:
         packed = isinstance(stream, gzip.GzipFile)
     return BytesIO(read_bytes(path)) if packed else path
 
 
 def read_bytes(path: Path) -> bytes:
-    """The uncompressed bytes of a file."""
+    """Read the uncompressed bytes of a file."""
     if require_file(path) > WHOLE:
         raise InputError(
             f"more than {WHOLE // 2**30} GiB; cut it into shorter records", file=str(path)
@@ -72,7 +76,10 @@ def read_bytes(path: Path) -> bytes:
 
 
 def sha256_of(path: Path) -> str:
-    """SHA-256 of the uncompressed bytes of a file, 64 hexadecimal digits. A file that unpacks to more than a record holds is refused, part by part."""
+    """Compute the SHA-256 of the uncompressed bytes of a file, as 64 hexadecimal digits.
+
+    A file that unpacks to more bytes than a record has is refused while it is read.
+    """
     digest = hashlib.sha256()
     for part in _parts(path):
         digest.update(part)
@@ -80,12 +87,12 @@ def sha256_of(path: Path) -> str:
 
 
 def sha256(data: bytes) -> str:
-    """SHA-256 of bytes, 64 hexadecimal digits."""
+    """Compute the SHA-256 of bytes, as 64 hexadecimal digits."""
     return hashlib.sha256(data).hexdigest()
 
 
 def _parts(path: Path) -> Iterator[bytes]:
-    """The uncompressed bytes of a file, part by part."""
+    """Yield the uncompressed bytes of a file, part by part; InputError if there are too many."""
     size = require_file(path)
     total = 0
     with opened(path) as stream:

@@ -1,4 +1,5 @@
-"""The formats of measured files, one line each, and how a file is read."""
+"""The file formats of measurements, in one list, and the function that reads a file of any format.
+"""
 
 from __future__ import annotations
 
@@ -18,22 +19,22 @@ from runtime.reading.text import read_text
 
 @dataclass(frozen=True)
 class Format:
-    """How one format is read.
+    """One file format: its name, its file endings, and the function that reads it.
 
     Attributes
     ----------
     title : str
-        What a file of it is, in messages.
+        Name of a file of this format, in messages.
     endings : tuple of str
-        Of file names, in lower case.
+        Endings of file names, in lower case.
     read : callable
-        The table of a file.
+        Function that reads a file as a Table.
     install : str
-        Command that brings what reads it beyond NumPy and SciPy, if anything.
+        Command that installs the library for this format; "" if NumPy and SciPy are enough.
     packed : bool
-        Whether it may be compressed by gzip.
+        Whether a file may be compressed by gzip.
     digest : callable
-        SHA-256 of a file.
+        Function that computes the SHA-256 of a file.
     """
 
     title: str
@@ -58,16 +59,19 @@ BAG = ".db3"  # a folder is read as one
 
 
 def read_table(path: Path, topic: str | None = None, decimal: str = ".") -> Table:
-    """Table of a measured file; its hash is computed first, so that nothing that unpacks to more than a record holds is read.
+    """Read a measured file as a Table.
+
+    The hash is computed first, so that a file that unpacks to too many bytes is refused.
 
     Parameters
     ----------
     path : Path
-        A file whose name ends as one of `endings`, perhaps followed by .gz, or the folder of a ROS 2 bag.
+        A file whose name ends with one of `endings`, perhaps followed by .gz, or the folder of a
+        ROS 2 bag.
     topic : str, optional
-        Of a bag; default: the only one that holds sensor_msgs/JointState.
+        Topic of a bag; default: the only topic with sensor_msgs/JointState.
     decimal : str
-        "." or ",", of the numbers of a text file.
+        Decimal sign of a text file, "." or ",".
     """
     format_ = format_of(path)
     if path.suffix.lower() == ".gz" and not format_.packed:
@@ -89,7 +93,10 @@ def read_table(path: Path, topic: str | None = None, decimal: str = ".") -> Tabl
 
 
 def endings(*, packed: bool | None = None) -> tuple[str, ...]:
-    """Endings of all formats, or of those that may be compressed by gzip, or may not."""
+    """Return the file endings of all formats.
+
+    packed : True for formats that may be compressed by gzip only, False for the others only.
+    """
     return tuple(
         ending
         for format_ in FORMATS
@@ -104,7 +111,7 @@ def is_measured(path: Path) -> bool:
 
 
 def format_of(path: Path) -> Format:
-    """Format of a file by its ending; a folder is a bag."""
+    """Return the format of a file, found by its ending; a folder is a bag."""
     suffixes = [BAG] if path.is_dir() else [s.lower() for s in path.suffixes if s.lower() != ".gz"]
     kind = suffixes[-1] if suffixes else ""
     for format_ in FORMATS:

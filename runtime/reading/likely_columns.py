@@ -1,12 +1,13 @@
-"""Which columns of a file are likely to be time, positions and torques, by their names: a proposal, for a study that a person looks at.
+"""Proposal of the columns of time, positions and torques by their names, for the user to check.
 
     actual_q_0 ... actual_q_5    one family: a stem, and numbers in it
     A1 Ist-Position [Grad]       also before a unit in brackets, or within; in other languages
     elbow_pos, /joints/elbow/effort, elbow    or the names of the joints, in the order of the robot
     positions (N, n)             or an array, or a field of a structure
 
-`WORDS` says what the words of a name mean; a new word is an entry there. A measured family goes before
-one without such a word, and that before targets.
+`WORDS` gives the meaning of the words in a name; a new word is an entry there. A family is a group
+of columns with the same stem. A family with a word for "measured" is preferred to one without such
+a word, and this one to a family of targets.
 """
 
 from __future__ import annotations
@@ -76,17 +77,18 @@ UNITS = {"grad": "deg", "gradi": "deg", "degrés": "deg", "degres": "deg", "sek"
 
 @dataclass(frozen=True)
 class Family:
-    """Columns of one quantity: a common stem, and the part of the name that varies with the joint.
+    """Columns of one quantity, one per joint: their names differ only by the joint.
 
     Attributes
     ----------
     quantity : "t", "q", "tau", "qd", "other" or ""
     word : int
-        Place of its word among those of the quantity.
+        Place of the word in the names among the words of the quantity in `WORDS`.
     target : int
-        0 measured, 1 without a word, 2 a target.
+        0 measured, 1 without such a word, 2 a target.
     names : tuple of str
     stem : str
+        Common part of the names.
     """
 
     quantity: str
@@ -97,22 +99,26 @@ class Family:
 
     @property
     def order(self) -> tuple[int, int, int, int, str]:
-        """Sort key; the smallest comes first: measured, the better word, more joints, joints before a single array."""
+        """Sort key: the family with the smallest key is the best candidate.
+
+        Preferred are, in this order, measured columns, a better word, more columns, and a shorter
+        stem.
+        """
         return self.target, self.word, -len(self.names), len(self.stem), self.stem
 
 
 def likely_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str, Any]:
-    """Settings of a record from the names of its columns: t, q, tau and units.
+    """Propose settings of a record from the names of its columns: t, q, tau and units.
 
-    Currents are in A unless names say mA. {} if names do not give positions and as many torques.
-    joints : their names in the robot file.
+    Currents are in A unless names say mA. The result is {} if the names do not show positions and
+    as many torques. joints : names of the joints in the robot file.
     """
     found = known_columns(names, joints)
     return found if {"q", "tau"} <= {*found.get("columns", ())} else {}
 
 
 def known_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str, Any]:
-    """Settings as `likely_columns`, as far as the names allow.
+    """Propose settings like `likely_columns`, but also for some of the columns only.
 
     Torques are left out if their number differs from that of the positions.
     """
@@ -141,7 +147,9 @@ def known_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str,
 
 
 def candidates(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str, list[str]]:
-    """First names of the families that may be t, q or tau, the likeliest first."""
+    """List columns that may be t, q or tau, the likeliest first; a family is listed by its first
+    name.
+    """
     families = sorted(families_of(names, joints), key=lambda family: family.order)
     return {
         key: [f.names[0] for f in families if f.quantity in (key, "")][:8]
@@ -150,7 +158,10 @@ def candidates(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str, li
 
 
 def families_of(names: Sequence[str], joints: Sequence[str] = ()) -> Iterator[Family]:
-    """Group column names that differ only by a joint's name or number; other names stay by themselves."""
+    """Yield families of column names that differ only by the name or number of a joint.
+
+    Another name with a known word is a family of one column.
+    """
     stems: dict[str, list[str]] = {}
     for joint, name in product(joints, names):
         stem, found = re.subn(rf"(?<![^\W_]){re.escape(joint)}(?![^\W_])", "#", name)
@@ -173,7 +184,10 @@ def families_of(names: Sequence[str], joints: Sequence[str] = ()) -> Iterator[Fa
 
 
 def _quantity(stem: str) -> tuple[str, int]:
-    """Quantity that the words of a stem mean, and the place of the word; ("", 0) if they mean none."""
+    """Find the quantity that the words of a stem mean, and the place of the word in `WORDS`.
+
+    Return ("", 0) if the words mean no quantity.
+    """
     words = _words(stem)
     for exact in (True, False):
         for key in ("other", "qd", "tau", "q", "t"):
@@ -190,7 +204,10 @@ def _target(stem: str) -> int:
 
 
 def _unit(name: str, read: Any) -> str:
-    """The unit that a name states in brackets or as a word; "" if it states none."""
+    """Find the unit that a column name states in brackets or as a word; "" if there is none.
+
+    read : function that raises InputError for a unit of another quantity.
+    """
     words = re.split(r"[\W\d_]+", name.lower())
     stated = [*re.findall(r"[\[(]([^\])#]+)[\])]", name)]
     for unit in (*stated, *(unit for unit in NAMED_UNITS if unit.lower() in words)):

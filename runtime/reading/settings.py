@@ -131,7 +131,9 @@ class Columns(Settings):
             not {*self.channels} & {*QUANTITIES}, "channels are called as constants are", "channels"
         )
         require(
-            not (self.qr and self.q_ref), "given beside q_ref; it is the same, leave it out", "qr"
+            not (self.qr and self.q_ref),
+            "given together with q_ref, which is the same; leave qr out",
+            "qr",
         )
         object.__setattr__(self, "q_ref", self.q_ref or self.qr)
         object.__setattr__(self, "qr", ())

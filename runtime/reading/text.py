@@ -118,7 +118,7 @@ def _parsed(path: Path, has_header: bool, delimiter: str | None, decimal: str) -
 def _with_point(line: str, decimal: str) -> str:
     """The line with decimal points; ValueError if it has some already: 1.234 may be a thousand."""
     if "." in line:
-        raise ValueError("a point beside decimal commas")
+        raise ValueError("a decimal point in a file with decimal commas")
     return line.replace(decimal, ".")
 
 

@@ -103,7 +103,7 @@ def excitation_page(excitation: Excitation) -> Page:
                 images=[draw_figure("The motion", motion_figure(excitation), shown, "motion")],
                 tables=[excitation.usage_table()],
             ),
-            Section("What it will tell", tables=[excitation.sigma_table()]),
+            Section("Expected standard deviations", tables=[excitation.sigma_table()]),
             Section("Search", tables=[excitation.starts_table()]),
         ],
     )

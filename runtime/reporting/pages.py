@@ -124,7 +124,9 @@ def settings_section(study: str) -> Section:
     lines = [line for line in study.splitlines() if not line.endswith(": null")]
     return Section(
         "Settings",
-        ("Settings of this study, defaults included; study.yaml beside this file names all.",),
+        (
+            "Settings of this study, defaults included; study.yaml in the same folder has all of them.",
+        ),
         listing="\n".join(lines),
         folded=True,
     )

@@ -84,10 +84,9 @@ def every_section(result: Identification) -> Section:
         sortable=True,
     )
     text = (
-        "± 95 %: 1.96 deviations over blocks of time, whose residuals are taken as independent. "
-        "It holds the truth about 95 times in 100 or more while the model is right and the "
-        "residuals do not remember for longer than two blocks. parameters.csv has σ of eq. (10) "
-        "beside it, which takes every residual as independent.",
+        "± 95 % is 1.96 corrected standard deviations. It is a 95 % interval if the model is right "
+        "and residuals further apart than two blocks of time are uncorrelated. parameters.csv "
+        "also has σ of eq. (10), which assumes that all residuals are independent.",
         *(
             [
                 "Robot file: its values through the same formulas; the difference to it is left "
@@ -173,7 +172,7 @@ def correlation_matrix(fit: Estimate, most: int = LIMIT.CORRELATIONS_SHOWN) -> M
     correlation = fit.covariance / np.outer(deviation, deviation)
     strongest = np.abs(correlation - np.diag(np.diag(correlation))).max(axis=1)
     shown = np.sort(np.argsort(-strongest, kind="stable")[:most])
-    caption = "Correlation of the estimates that carry the model" + (
+    caption = "Correlation of the estimates of the parameters that are used" + (
         f", the {most} strongest" if len(fit.names) > most else ""
     )
     return Matrix(

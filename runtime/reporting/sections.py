@@ -175,8 +175,8 @@ def motion_section(result: Identification) -> Section:
     """Whether the simulated loop follows the record."""
     text = (
         (
-            "The loop of the study with the parameters found, beside the record. Parameters of a "
-            "simulation that does not follow the record are those of nothing."
+            "The control loop of the study, simulated with the parameters found, compared with the "
+            "record. If the simulation does not follow the record, the parameters mean nothing."
         ),
     )
     return Section("Simulated motion", text, tables=[result.motion_table()])
@@ -201,10 +201,10 @@ def trail_section(result: Identification) -> Section:
         for row, t in zip(rows, tests, strict=True):
             row += [f"{t.F:.3g}", probability(t.p), f"{t.F_step:.3g}", probability(t.p_step)]
     text = (
-        "The parameter of largest %sigma is removed and the rest fitted again while sigma_rho "
+        "The parameter with the largest %sigma is removed and the rest is fitted again, as long as sigma_rho "
         f"stays below {essential.threshold:g} times its first value: {len(essential.names)} of "
-        f"{first} remain. An F-test asks whether the removals up to a line tell, as many rows as "
-        "are worth one. Without a %sigma: zero is within the interval.",
+        f"{first} remain. The F-tests judge the removals up to each line, with the effective number "
+        "of rows. No %sigma: the interval contains zero.",
     )
     tables = [Table("Trail", header, rows), *trust.tables()[3:]]
     return Section("Essential parameters", text, tables=tables)

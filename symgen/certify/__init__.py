@@ -1,1 +1,1 @@
-"""Certificates: formulas by identities over F_p, every text that leaves by independent dynamics, and the modules that hold one, imported from a cache."""
+"""Certificates: checks of regrouping formulas and emitted code, and import of checked modules."""

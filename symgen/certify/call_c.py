@@ -1,8 +1,9 @@
-"""Functions of a compiled C file, called in a process of its own, which a wrong index may end.
+"""Call functions of a compiled C file in a process of its own, which a wrong index may crash.
 
 `python call_c.py` reads {"library": path, "calls": [[name, arguments, size, before]]} as JSON. The
-argument null is the result, whose `size` numbers are all `before` when the call begins, or those of
-the library that `before` names. It prints [status, numbers] of every call.
+argument null stands for the result. Its `size` numbers are all equal to `before` when the call
+begins, or are copied from the array of the library that `before` names. The program prints [status,
+numbers] of every call.
 """
 
 from __future__ import annotations

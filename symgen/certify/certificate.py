@@ -1,24 +1,28 @@
-"""The certificate of regrouping formulas: two independent routes, one exact, one numeric.
+"""The certificate of regrouping formulas: one exact check over finite fields, one numeric check.
 
-Exact, over F_p at fresh random lengths and states, for two or more primes:
+Exact, over F_p at new random lengths and states, for two or more primes:
 
     D_chi = sum_k coefficient_k,chi D_base,k   for every standard parameter chi,
             rank_p(D_base) = number of base parameters.
 
 The primes are drawn anew, so that no coefficient is checked over the prime that gave it. The rank
-over F_p is never above the generic rank, so equality proves that no further relation exists. A
-false identity is a nonzero rational function of the geometry and of each state; with its degree
-bounded by d (`degree`: every angle counts 2 per multiple, numerator and denominator together) it
+over F_p is never above the generic rank, so equality proves that no further relation exists.
+
+A false identity is a nonzero rational function of the geometry and of each state. Its degree is at
+most d (`degree`: every angle counts 2 per multiple, numerator and denominator together). Then it
 vanishes at a random geometry, or at every state of one, with probability at most 2 d/p (Schwartz
-1980, Zippel 1979). Draws are repeated until (2 d/p)**draws is below SURE. Numbers are not random: a
-false identity among them is a fixed nonzero number, which only its own few prime factors divide.
+1980, Zippel 1979). Draws are repeated until (2 d/p)**draws is below SURE. Numbers in the robot file
+are not random: a false identity between numbers is a fixed nonzero number, which only its own few
+prime factors divide.
 
-General loops: the same identities at random points of the closed mechanism (`regroup.closed_draw`),
-lengths that are numbers of the file at their values; the rank at random ones.
+General loops: the same identities are checked at random points of the closed mechanism
+(`regroup.closed_draw`), with the values of lengths that are numbers in the robot file. The rank is
+checked at random lengths.
 
-Numeric, in floats at the lengths of the robot file: the standard regressor W of a dynamics by
-energies (`derive.lagrange`), which shares no code with the recursions, has the rank of the base
-parameters (SVD), and W chi = W_base X for random chi and X of the formulas.
+Numeric, in floating point at the lengths of the robot file: the standard regressor W is that of a
+dynamics by energies (`derive.lagrange`), which shares no code with the recursions. W has the rank
+of the base parameters (by SVD), and W chi = W_base X for random chi and the X that the formulas
+give.
 """
 
 from __future__ import annotations
@@ -70,12 +74,12 @@ CLEAR = 1e9
 
 @dataclass(frozen=True)
 class Certificate:
-    """Results of the checks of base parameters, and of the texts emitted from them.
+    """Results of all checks of the base parameters of a robot and of the code emitted from them.
 
     Attributes
     ----------
     name, method : str
-        Robot, and how the formulas were derived.
+        Name of the robot, and how the formulas were derived.
     count, rank : int
         Number of base parameters, and exact rank of their columns (the smallest over the primes).
     primes : tuple of int
@@ -87,18 +91,18 @@ class Certificate:
     numeric_rank : int
         Rank by SVD of the independent regressor.
     numeric_gap : float
-        Its smallest singular value that counts over the largest that does not.
+        Smallest singular value that counts for the rank, divided by the largest that does not.
     torque_error : float
-        Largest difference of torques by base and by standard parameters on the independent
-        regressor, of the largest torque.
+        Largest difference between torques by base parameters and torques by standard parameters, on
+        the independent regressor, relative to the largest torque.
     texts : mapping
-        What ran of each text, by file; empty if none was given.
+        Check of each emitted file, by file name; empty if no file was given.
     rank_in_floats : bool
-        Whether `rank` is that of the independent regressor: loops of which F_p gives no points of
-        one geometry.
+        Whether `rank` is the rank of the independent regressor, because F_p gives no closed states
+        at one geometry of the loops.
     error_probability : float
         Bound on the probability that a false identity passes the exact checks; 1 if coefficients
-        are numbers, which are checked in floats.
+        are numbers, which are checked in floating point.
     """
 
     name: str
@@ -129,7 +133,7 @@ class Certificate:
 
     @property
     def formulas(self) -> str:
-        """Kind of proof of the formulas, in words."""
+        """Text that states how the formulas were checked: exactly modulo primes, or in floats."""
         if not self.primes:
             return "checked in floats"
         sure = f", a false one passes with probability below {self.error_probability:.0e}"
@@ -139,7 +143,7 @@ class Certificate:
 
     @property
     def errors(self) -> dict[str, float]:
-        """Error of every function and table of every text, as in `TextCheck.errors`."""
+        """Error of every function and table of every emitted file; a name is `bias of arm.py`."""
         return {
             f"{name} of {file}": error
             for file, text in self.texts.items()
@@ -148,7 +152,7 @@ class Certificate:
 
     @property
     def checks(self) -> list[tuple[bool, str]]:
-        """Every check: whether it holds, and its description."""
+        """List of all checks: whether each holds, and a text that describes it."""
         where = "in floats" if self.rank_in_floats or not self.primes else "modulo the primes"
         columns = any(text.startswith("column") for text in self.failures)
         checks = [
@@ -171,12 +175,12 @@ class Certificate:
         return checks + [check for file, text in self.texts.items() for check in text.checks(file)]
 
     def mapping(self) -> dict[str, Any]:
-        """The certificate as plain values for JSON; null for nan and infinity."""
+        """Return the certificate as plain values for JSON, with null for NaN and infinity."""
         values = {"valid": self.valid, "numeric_valid": self.numeric_valid, **asdict(self)}
         return dict(_plain(values))
 
     def brief(self) -> str:
-        """The verdict, then one line for each failed check."""
+        """Return the verdict in one line, then one line for each failed check."""
         verdict = "valid" if self.valid else "FALSE"
         head = (
             f"{self.name}: certificate {verdict}, {self.count} base parameters of "
@@ -186,7 +190,7 @@ class Certificate:
         return "\n".join([head, *wrong, *self.failures])
 
     def __str__(self) -> str:
-        """A line per check, marked `ok` or FALSE, then the verdict."""
+        """Return one line per check, marked `ok` or FALSE, then the verdict."""
         head = f"{self.name}: {self.count} base parameters of {self.identities}, {self.method}"
         lines = [f"{'ok   ' if holds else 'FALSE'} {text}" for holds, text in self.checks]
         verdict = f"certificate {'valid' if self.valid else 'FALSE'}"
@@ -194,7 +198,7 @@ class Certificate:
 
 
 def _plain(value: Any) -> Any:
-    """The mapping with null in place of numbers that are not finite."""
+    """Replace numbers that are not finite by None in a nested mapping, since JSON has no NaN."""
     if isinstance(value, Mapping):
         return {key: _plain(x) for key, x in value.items()}
     return None if isinstance(value, float) and not math.isfinite(value) else value
@@ -205,16 +209,16 @@ def certify_formulas(
 ) -> Certificate:
     """Check the formulas of `regrouping` and return the certificate.
 
-    `certify.modules.certify` adds the emitted module.
+    `certify.modules.certify` checks the emitted module too.
 
     Parameters
     ----------
     regrouping : Regrouping
         Base parameters with their formulas.
     seed : int
-        Of the random lengths and states over F_p.
+        Seed of the random lengths and states over F_p.
     sampler : callable
-        Gives the standard regressor over F_p at the states of a draw.
+        Computes the standard regressor over F_p at the states of a draw.
 
     Raises
     ------
@@ -295,7 +299,7 @@ def certify_formulas(
 
 
 def _special(robot: Robot, gap: float, W: Array) -> str:
-    """Explain why the rank of the base columns W at the file's constants is below that elsewhere."""
+    """Explain why the rank of the base columns W is smaller at the constants of the robot file."""
     if roots := independent_roots(robot):
         return (
             f"{', '.join(roots)} {'count' if len(roots) > 1 else 'counts'} as any number: the rank "
@@ -313,28 +317,37 @@ def _special(robot: Robot, gap: float, W: Array) -> str:
 
 
 def independent_roots(robot: Robot) -> list[str]:
-    """Square roots of expressions that are not rational numbers; over F_p each is an independent unknown."""
+    """List the square roots of expressions that are not rational numbers.
+
+    Over F_p each of these roots is an independent unknown.
+    """
     return [root.text for root in roots_of(robot) if root.argument.constant is None]
 
 
 def _too_small(W: Array) -> str:
-    """Count the directions of the base parameters that act by less than 1e-9 of the largest."""
+    """Write how many combinations of base parameters have almost no effect.
+
+    Their singular values in W are below 1e-9 of the largest.
+    """
     s = np.linalg.svd(W, compute_uv=False)
     return f"{np.sum(s < 1e-9 * s[0])} combinations of base parameters"
 
 
 def hair_off(robot: Robot, what: str) -> str:
-    """Message about a geometry that is so near to a special one that floats cannot distinguish them."""
+    """Write the message for a geometry that is almost, but not exactly, a special geometry.
+
+    An example is an angle that differs from pi/2 by rounding; floats cannot separate the two.
+    """
     angles = "; ".join(nearly_round(robot, WITHIN)) or "round the numbers that are meant round"
     return (
         f"the file is a hair off a special geometry: {what} of it act by less than 1e-9 of the "
-        f"others, which no record can tell; {angles}; --at-values takes angles within 1e-6 rad of "
+        f"others, which no record can show; {angles}; --at-values takes angles within 1e-6 rad of "
         "a multiple of pi/12 as that"
     )
 
 
 def vanishing_denominators(regrouping: Regrouping) -> list[str]:
-    """Find coefficients whose denominator is zero at the robot file's constants; one sentence each."""
+    """Describe each formula whose denominator is zero at the constants of the robot file."""
     values, texts = regrouping.robot.constants, []
     for b in regrouping.base:
         below = {
@@ -357,10 +370,11 @@ def vanishing_denominators(regrouping: Regrouping) -> list[str]:
 
 
 def degree(regrouping: Regrouping) -> int:
-    """A bound on the degree of the column identities in all random variables: half-angle tangents, lengths, rates, directions.
+    """Compute a bound on the degree of the column identities in all random variables.
 
-    An entry of the regressor passes each frame of a path at most three times: outwards in products
-    of two velocities, and back.
+    The variables are half-angle tangents, lengths, rates and directions of motion. An entry of the
+    regressor passes each frame of a path at most three times: outwards in products of two
+    velocities, and back.
     """
     robot, closure = regrouping.robot, close(regrouping.robot)
     units = units_of(numbered(robot))
@@ -401,10 +415,10 @@ def degree(regrouping: Regrouping) -> int:
 def _modulo(
     regrouping: Regrouping, seed: int, p: int, sampler: Sampler
 ) -> tuple[int | None, list[str]]:
-    """Check rank and formulas over F_p.
+    """Check the rank of the base columns and all formulas over F_p.
 
-    Returns the rank of the base columns, None if one geometry gives no points, and the columns
-    that differ from their formulas.
+    Return the rank, None if F_p gives no closed states at one geometry, and the columns that differ
+    from their formulas.
     """
     robot = regrouping.robot
     names, own = robot.parameters, [robot.parameters.index(name) for name in regrouping.own]
@@ -433,9 +447,9 @@ def _modulo(
 
 
 def _false_in_floats(regrouping: Regrouping, W: Array, base: list[int]) -> list[str]:
-    """Find columns of the independent regressor that the formulas miss.
+    """List the columns of the independent regressor W that the formulas do not reproduce.
 
-    A column counts if the error exceeds ROUNDED of the largest entry.
+    A column is listed if its error exceeds ROUNDED times the largest entry.
     """
     robot = regrouping.robot
     K = base_values(regrouping, np.eye(len(robot.parameters)), robot.constants)
@@ -446,9 +460,9 @@ def _false_in_floats(regrouping: Regrouping, W: Array, base: list[int]) -> list[
 
 @lru_cache(maxsize=4)
 def independent(robot: Robot) -> Sample:
-    """The regressor by energies at random states of `robot`.
+    """Compute the regressor of `robot` from its energies, at random states.
 
-    It is kept for further certificates of the robot.
+    The result is cached for further certificates of the robot.
     """
     from symgen.derive.lagrange import (
         in_one_mode,
@@ -460,10 +474,10 @@ def independent(robot: Robot) -> Sample:
 
 
 def numeric_rank(W: Array, *, tolerance: float = 1e-9, proved: int = 0) -> tuple[int, float]:
-    """Rank of a float matrix by SVD after scaling its columns, and the gap s_rank / s_(rank+1).
+    """Compute the rank of a matrix by SVD after scaling its columns, and its gap.
 
-    Where the rank is `proved`, singular values below the tolerance count as far as a gap of SEEN
-    stands behind them.
+    The gap is s_rank / s_(rank+1). If `proved` is a larger rank that was proved exactly, it is the
+    result, provided that its last singular value exceeds the next by a factor of SEEN.
     """
     norms = np.linalg.norm(W, axis=0)
     acts = (

@@ -1,6 +1,6 @@
-"""What a certificate claims, as plain values that a program of others can verify.
+"""The content of a certificate as plain values, which other programs can verify.
 
-`docs/examples/check_certificate.py` does so from the frame table, with nothing of ours.
+`docs/examples/check_certificate.py` does this from the frame table, without the code of symgen.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ ENTRIES_OF_FRAMES = ("gamma", "b", "alpha", "d", "theta", "r")
 
 
 def claim(regrouping: Regrouping, certificate: Certificate) -> dict[str, Any]:
-    """State the claim that others can check.
+    """Return all that a certificate states, as plain values that others can check.
 
-    It holds robot, relations, rank, primes, formulas, and what ran of each text with its hash.
+    These are the robot, relations, rank, primes, formulas, and for each emitted file its hash and
+    its check.
 
     Expressions are texts in the grammar of robot files. The identities are those of the columns of
     all standard parameters, D_chi = sum_k coefficient_k,chi D_own,k, at random points over F_p.
@@ -59,7 +60,11 @@ def claim(regrouping: Regrouping, certificate: Certificate) -> dict[str, Any]:
 
 
 def _element(robot: Robot, e: Element) -> dict[str, Any]:
-    """Rows and forms by key, and the sign of each row's first coefficient for the actuated joints in the robot file, which directions of motion go by."""
+    """Describe a family of elements, such as friction or springs, as plain values.
+
+    For each row the sign of its first coefficient of an actuated joint is included, at the
+    constants of the robot file. It defines which direction of motion is positive.
+    """
     closure = close(robot)
     active = {j: closure.in_independent(row) for j, row in e.along.items()}
     return {
@@ -80,5 +85,5 @@ def _element(robot: Robot, e: Element) -> dict[str, Any]:
 
 
 def _has_energy(e: Element) -> bool:
-    """Whether a column that the robot file defines is an energy."""
+    """Whether the robot file defines the law of an element by an energy."""
     return e.is_own and any(str(e.potential(j)) != "0" for j in e.along)

@@ -1,9 +1,10 @@
-"""Certified texts as files of a cache, and as Python modules.
+"""Cache of certified source files, and import of emitted Python modules.
 
-A file lies in a cache by content: its folder is called after the SHA-256 of the text without the
-lines of its certificate, so that an entry never gets old; one whose text is another is written
-anew, whole, under another name first. A folder called after the whole text says that it is
-certified. Where the cache cannot be written, a folder that lives as long as this process serves.
+The folder of a file in the cache is named after the SHA-256 of the text without the lines of its
+certificate, so that an entry is never out of date. A file with another text is replaced as a whole:
+written under another name first. A second folder, named after the whole text, marks the text as
+certified. If the cache cannot be written, a folder is used that exists only as long as this
+process.
 """
 
 from __future__ import annotations
@@ -33,7 +34,10 @@ CERTIFICATE = re.compile(
 
 
 def cache_folder() -> Path:
-    """Folder of the emitted modules: SYMGEN_CACHE/modules, or the cache folder of the platform."""
+    """Return the folder of the emitted modules.
+
+    It is SYMGEN_CACHE/modules, or else a folder in the cache folder of the platform.
+    """
     if given := os.environ.get("SYMGEN_CACHE"):
         return Path(given) / "modules"
     if sys.platform == "win32":
@@ -48,9 +52,9 @@ def cache_folder() -> Path:
 
 
 def cached_path(file: str, text: str) -> Path | None:
-    """Path of the cache entry of a file that holds the certified `text`.
+    """Return the path of the cached file whose text without its certificate is `text`.
 
-    None if there is none, or another text.
+    Return None if there is no such file.
     """
     path = _entry(text)
     try:
@@ -64,12 +68,11 @@ def cached_path(file: str, text: str) -> Path | None:
 
 
 def stored_path(file: str, text: str) -> Path:
-    """Path of a file that holds `text`.
+    """Write `text` to a file in the cache, and return the path of the file.
 
-    It lies in the cache, under a name made from the certified part and from the whole text; if
-    the cache cannot be written, in a folder of this process.
-
-    Raises SymgenError if no file can be written at all.
+    The names of its folders depend on the certified part and on the whole text. If the cache cannot
+    be written, the file is in a folder of this process. SymgenError is raised if no file can be
+    written at all.
     """
     folder, whole = _entry(without_certificate(text)), _entry(text)
     if folder is not None and whole is not None:
@@ -88,12 +91,12 @@ def stored_path(file: str, text: str) -> Path:
 
 
 def without_certificate(text: str) -> str:
-    """Text that the certificate covers: all lines except its own."""
+    """Return the text without the lines of its certificate."""
     return CERTIFICATE.sub("", text, count=1)
 
 
 def imported(path: Path) -> ModuleType:
-    """Import an emitted file as the module generated_ROBOT."""
+    """Import an emitted file ROBOT.py as the module generated_ROBOT."""
     name = f"generated_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path, loader=_TextLoader(name, str(path)))
     if spec is None or spec.loader is None:
@@ -104,7 +107,7 @@ def imported(path: Path) -> ModuleType:
 
 
 class _TextLoader(SourceFileLoader):
-    """Loader that reads the text only: bytecode of an earlier text is neither read nor written."""
+    """Module loader that always compiles the source text; it neither reads nor writes bytecode."""
 
     text = ""
 
@@ -118,9 +121,9 @@ class _TextLoader(SourceFileLoader):
 
 
 def is_writable_by_others(folder: Path) -> bool:
-    """Whether others may write into the folder, or put another in its place.
+    """Whether other users may write into the folder or replace it.
 
-    Files there prove nothing.
+    Files in such a folder cannot be trusted.
     """
     if os.name != "posix":
         return False
@@ -142,9 +145,10 @@ def _key(text: str) -> str:
 
 
 def _entry(text: str) -> Path | None:
-    """Folder of a text in the cache; None without a home folder, or where others may write.
+    """Return the folder of a text in the cache.
 
-    Raises SymgenError if SYMGEN_CACHE names such a folder.
+    Return None if there is no home folder, or if other users may write to the cache. SymgenError is
+    raised instead if SYMGEN_CACHE names such a folder.
     """
     try:
         folder = cache_folder().absolute()
@@ -162,7 +166,7 @@ def _entry(text: str) -> Path | None:
 
 
 def _write(path: Path, text: str) -> Path:
-    """Write the file whole, or not at all."""
+    """Write a file completely or not at all, and return its path."""
     path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
     with NamedTemporaryFile(
         "w", encoding="utf-8", newline="\n", dir=path.parent, prefix=f".{path.stem}-", delete=False

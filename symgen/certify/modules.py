@@ -1,4 +1,4 @@
-"""Texts that are certified before they leave, and modules that are imported from them."""
+"""Certify emitted source files before they are returned, and import certified modules."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ def certify(
     files: Mapping[str, str] | None = None,
     options: Sequence[str] = (),
 ) -> Certificate:
-    """Certify the formulas of `regrouping` and the texts made from it, as `symgen check` does.
+    """Check the formulas of `regrouping` and the code made from them, as `symgen check` does.
 
     Parameters
     ----------
     regrouping : Regrouping
         Base parameters with their formulas.
     files : mapping, optional
-        Texts by the file names of their targets. Default: the NumPy module.
+        Source texts by file name. Default: the NumPy module.
     options : sequence of str
-        What the texts have on request.
+        Names of the functions on request that the texts contain.
 
     Raises
     ------
@@ -64,11 +64,11 @@ def certified_files(
     command: str | None = None,
     options: Sequence[str] = (),
 ) -> dict[str, str]:
-    """{file name: text} of every target as `generate_files`, below what their certificate says.
+    """Generate the files of a robot, check them, and return {file name: text with certificate}.
 
-    They then lie in the cache of texts that runtime runs.
+    The files are also stored in the cache from which runtime imports modules.
 
-    Raises CertificateError, in one sentence, where the certificate does not hold.
+    CertificateError is raised, in one sentence, if the certificate does not hold.
     """
     regrouping = regroup(robot)
     files = generate_files(
@@ -104,20 +104,22 @@ def require_valid(certificate: Certificate) -> None:
 
 
 def model(robot: str | Path | Robot, *, options: Sequence[str] = ()) -> ModuleType:
-    """Derive, certify and import the module of a robot; a cache keeps it by content.
+    """Derive, certify and import the Python module of a robot.
+
+    A module that is already in the cache is not certified again.
 
     Parameters
     ----------
     robot : str, Path or Robot
         Name of a packaged robot, path of a robot file (.yaml, .par, .urdf, MJCF), or a Robot.
     options : sequence of str
-        Functions on request, as of `symgen generate --with`.
+        Names of functions on request, as for `symgen generate --with`.
 
     Returns
     -------
     module
-        What `import` of the emitted file gives; other processes can load the file `__file__` as
-        long as this one lives.
+        The imported module. Other processes can load its file `__file__` as long as this process
+        lives.
 
     Raises
     ------
@@ -133,7 +135,10 @@ def model(robot: str | Path | Robot, *, options: Sequence[str] = ()) -> ModuleTy
 
 
 def _certified_path(robot: Robot, target: str, options: Sequence[str] = ()) -> Path | None:
-    """Path of a certified text in the cache; None if the target makes no text of the robot."""
+    """Return the path of the certified file of a robot for one target, in the cache.
+
+    Return None if the target cannot serve the robot.
+    """
     for file, text in generate_files(robot, targets=(target,), options=options).items():
         cached = cached_path(file, text)
         return cached or stored_path(file, _certified(regroup(robot), {file: text}, options)[file])

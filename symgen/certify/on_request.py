@@ -1,4 +1,7 @@
-"""What functions on request have to give, from the regressor and the energies of Lagrange alone."""
+"""Expected values of the functions on request.
+
+They follow from the regressor and the energies of Lagrange's equations alone.
+"""
 
 from __future__ import annotations
 
@@ -24,10 +27,10 @@ States = tuple[Array, Array, Array]
 def requested_values(
     model: Lagrange, regrouping: Regrouping, chi: Array, states: States, tree: States, qddr: Array
 ) -> dict[str, Callable[[], Array]]:
-    """Independent values (N, ...) of the models that are emitted on request, by name.
+    """Return, by name, functions that compute the expected values (N, ...) of models on request.
 
-    states : q, qd, qdd of the actuated joints, (N, n); qdd is qdr too. tree : those of all moving
-    joints. qddr : reference accelerations.
+    states : q, qd, qdd of the actuated joints, shape (N, n); qdd serves as qdr too. tree :
+    position, rate and acceleration of all moving joints. qddr : reference accelerations.
     """
     robot, (q, qd, qdr), zero = regrouping.robot, states, 0 * states[0]
     own = [robot.parameters.index(name) for name in regrouping.own]
@@ -40,7 +43,10 @@ def requested_values(
         return np.asarray((columns(q, qd, zero) - columns(q, zero, zero)) * rubs)
 
     def slotine_li() -> Array:
-        """Torque A qddr + C qdr + Q + friction, with C qdr as a difference of squares."""
+        """Compute the regressor of the torque A qddr + C qdr + Q + friction.
+
+        C qdr is a difference of torques that are quadratic in the velocities.
+        """
         h = [columns(q, u, zero) for u in (qd + qdr, qd, qdr, zero)]
         rubs = of_elements(robot, lambda e: e.is_friction)[own]
         C = (h[0] - h[1] - h[2] + h[3]) / 2 * ~rubs
@@ -50,7 +56,7 @@ def requested_values(
         return np.asarray(columns(q, zero, qd) - columns(q, zero, zero))
 
     def momentum_rate() -> Array:
-        """d(qd' p)/dq / 2 - Q - friction."""
+        """Compute the regressor of d(qd' p)/dq / 2 - Q - friction, with the momentum p = A qd."""
         slope = np.zeros((*q.shape, len(own)))
         for i, e in enumerate(np.eye(q.shape[1])):
             for m, c in SIX_POINTS.items():
@@ -74,6 +80,6 @@ def requested_values(
 
 
 def of_elements(robot: Robot, which: Callable[[Element], bool]) -> Array:
-    """Whether each standard parameter belongs to one of these elements."""
+    """Whether each standard parameter belongs to an element that `which` selects, shape (p,)."""
     own = {parameter(e.family, j) for e in robot.elements if which(e) for j in e.keys}
     return np.array([name in own for name in robot.parameters])

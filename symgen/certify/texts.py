@@ -1,8 +1,8 @@
-"""Texts that leave, run and compared with the witness, function by function.
+"""Run emitted source files and compare each function with independent values (the witness).
 
-A Python module is imported and used in three ways: on NumPy's arrays, on arrays that it may not
-write to (NumPy's again), and by CasADi. C is compiled, and called in a process of its own. What
-cannot be run here, for want of a compiler, is said to be not run.
+A Python module is imported and used in three ways: with arrays of NumPy, with arrays that it may
+not write to, and by CasADi. A C file is compiled and called in a process of its own. A file that
+cannot run here, for instance without a compiler, is reported as not run.
 """
 
 from __future__ import annotations
@@ -53,28 +53,28 @@ TILES = 71  # samples of the functions in C: some tiles, the last not full
 
 @dataclass(frozen=True)
 class TextCheck:
-    """Results of the run of a text.
+    """Result of running one emitted source file and comparing its functions with the witness.
 
     Attributes
     ----------
     target : str
-        Which one the text is of.
+        Target of the file, such as numpy or c.
     sha256 : str
-        Hash of the text below its header.
+        Hash of the text without the lines of its certificate.
     errors : mapping
-        Largest difference of each function from the witness, of the largest entry; infinite if
-        it does not run, has another shape, or other values than the file's where no constants are
-        given.
+        Largest difference of each function from the witness, relative to the largest entry. It is
+        infinite if the function fails, if its result has another shape, or if a call without
+        constants differs from a call with the constants of the robot file.
     constants : str
         Which constants the functions were called with.
     left_out : tuple of str
-        Functions that this robot gives no sense to.
+        Functions that have no meaning for this robot.
     uses : tuple of str
-        The ways in which a module ran.
+        The ways in which a Python module was run.
     not_run : str
-        Why nothing ran; empty if it did.
+        Reason why nothing was run; empty if the file was run.
     raised : mapping
-        What functions of a module raised in place of a result.
+        Error message of each function of a Python module that failed.
     """
 
     target: str
@@ -88,7 +88,7 @@ class TextCheck:
 
     @property
     def wrong(self) -> list[str]:
-        """Functions that disagree; NaN counts as disagreement."""
+        """Functions that differ from the witness; NaN counts as a difference."""
         return [name for name, error in self.errors.items() if not error < TOLERANCE]
 
     @property
@@ -96,7 +96,7 @@ class TextCheck:
         return not self.wrong and bool(self.errors or self.not_run)
 
     def checks(self, file: str) -> list[tuple[bool, str]]:
-        """Whether each function agrees with the witness."""
+        """List for each function whether it agrees with the witness, and a text with its error."""
         if self.not_run:
             return [(True, f"{file} {self.sentence}")]
         return [
@@ -114,7 +114,7 @@ class TextCheck:
 
     @property
     def sentence(self) -> str:
-        """Say in one sentence what ran, and with which result."""
+        """Sentence that names the functions that ran and their agreement, or why nothing ran."""
         if self.not_run:
             return f"not run: {self.not_run}"
         uses = ", ".join(self.uses)
@@ -127,7 +127,10 @@ class TextCheck:
 
 
 def text_check(file: str, text: str, target: str, witness: Witness) -> TextCheck:
-    """Run every function of a text, below its header, and compare it with the witness."""
+    """Run every function of a source file and compare the results with the witness.
+
+    The lines of a certificate in the text are removed first.
+    """
     text = without_certificate(text)
     key = sha256(text.encode("utf-8")).hexdigest()
     compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc")
@@ -152,7 +155,10 @@ def text_check(file: str, text: str, target: str, witness: Witness) -> TextCheck
 
 
 def with_certificate(text: str, check: TextCheck, formulas: str) -> str:
-    """The text with what its certificate says: at the end of the docstring of a module, else in comments before it."""
+    """Add the certificate to a source text: in the docstring of a Python module, else in comments.
+
+    In a docstring the certificate stands at the end; comments stand before the text.
+    """
     said = f"{HEAD}{VERSION}: formulas {formulas}; {check.sentence}."
     if not text.startswith('"""'):
         mark = f"{EMITTERS[check.target].language.comment} "
@@ -169,9 +175,10 @@ def with_certificate(text: str, check: TextCheck, formulas: str) -> str:
 def module_errors(
     path: Path, witness: Witness
 ) -> tuple[dict[str, float], dict[str, str], tuple[str, ...]]:
-    """Run the functions of a Python module.
+    """Run the functions of a Python module and compare them with the witness.
 
-    Returns their errors, the exceptions they raised, and how they were called.
+    Return the error of each function, the messages of functions that failed, and the ways in which
+    the module was run.
     """
     try:
         module, stacked = imported(path), imported(path)
@@ -223,9 +230,10 @@ def largest(
     call: Use,
     witness: Witness,
 ) -> tuple[float, str]:
-    """Largest error of a function in all its checks, and what it raised.
+    """Compute the largest error of a function in all its checks.
 
-    Infinite if it has other constants than the file by itself.
+    Return the error, and the message if the function failed. The error is infinite if the defaults
+    of the function are not the constants of the robot file.
     """
     try:
         errors = [
@@ -243,7 +251,7 @@ def largest(
 def outcome(
     call: Use, module: ModuleType, name: str, check: Check, constants: Mapping[str, float]
 ) -> bytes | str:
-    """Result of a function as bytes, or its exception as text."""
+    """Return the result of a function as bytes, or the message of its exception."""
     try:
         return call(module, name, check, constants).tobytes()
     except Exception as error:  # a text may fail in any way
@@ -251,7 +259,10 @@ def outcome(
 
 
 def difference(value: Any, expected: Array, scale: Array | float) -> float:
-    """Largest difference relative to `scale`; infinite for other shapes and for NaN."""
+    """Compute the largest difference between `value` and `expected`, relative to `scale`.
+
+    The result is infinite if the shapes differ, or if a difference is NaN.
+    """
     value = np.asarray(value, dtype=float)
     if value.shape != expected.shape:
         return float("inf")
@@ -268,7 +279,7 @@ def _called(module: ModuleType, name: str, check: Check, constants: Mapping[str,
 def _by_casadi(
     module: ModuleType, name: str, check: Check, constants: Mapping[str, float]
 ) -> Array:
-    """Run a function by CasADi, sample by sample, and stack the results as NumPy's."""
+    """Run a function by CasADi at all samples, and arrange the results as NumPy does."""
     function, arguments = _function(module, name, *check.keywords.values()), check.arguments
     alone, ndim = arguments[0].ndim == 1, check.expected.ndim
     N = 1 if alone else len(arguments[0])
@@ -290,7 +301,10 @@ def _function(module: ModuleType, name: str, *frame: int) -> Any:
 
 
 def _derivative_error(module: ModuleType, witness: Witness) -> float:
-    """Error of those derivatives of the torques that are known: by qdd it is A, by X it is D."""
+    """Compute the error of two derivatives of the torques that are known.
+
+    The derivative by qdd is the inertia matrix A, the derivative by X is the regressor D.
+    """
     function = module.casadi(DERIVATIVES)
     states = (witness.q[0], witness.qd[0], witness.qdd[0], witness.X)
     *_, A, D = map(np.asarray, function(*states, *witness.keywords.values()))
@@ -301,7 +315,11 @@ def _derivative_error(module: ModuleType, witness: Witness) -> float:
 
 
 def same_elements(table: Any, constants: Mapping[str, float], witness: Witness) -> bool:
-    """Whether every element has the kind, the direction of motion, and the row or form of the robot file."""
+    """Whether the table of elements of a module agrees with the robot file.
+
+    An element is a friction, a spring or the like. Its kind, its direction of motion, and its row
+    or form are compared.
+    """
     expected = element_names(witness.robot)
     if list(table) != [name for name in witness.robot.parameters if name in expected]:
         return False
@@ -319,7 +337,10 @@ def same_elements(table: Any, constants: Mapping[str, float], witness: Witness) 
 
 
 def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str, float]:
-    """Errors of the functions of a C file: of several states, and of one."""
+    """Compile a C file, run its functions, and return the error of each function.
+
+    Functions of several samples and functions of one state are both run.
+    """
     name, library = witness.robot.name, path.with_suffix(".so")
     rows = np.arange(TILES) % STATES
     constants = [*witness.keywords.values(), 0.0]
@@ -333,7 +354,7 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
             return {f"{CLOSED}1": float("inf")}
 
         def given(f: str, check: Check, k: Any) -> list[list[float]]:
-            """Arguments at the states k; for a closed mechanism this is one struct."""
+            """List the arguments at the states k; a closed mechanism has one struct of states."""
             named = dict(zip(MODELS[f].arguments, check.arguments, strict=True))
             if closed is not None:
                 named = {"s": closed} | {x: a for x, a in named.items() if x not in STATE_NAMES}
@@ -382,7 +403,10 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
 
 
 def _closed(library: Path, witness: Witness, constants: list[float]) -> Array:
-    """Close the mechanism by the C file at every state; NaN where Newton's method fails."""
+    """Close the loops at every state with the function of the C file, and return the structs.
+
+    A struct is NaN if Newton's method fails.
+    """
     name, closure = witness.robot.name, close(witness.robot)
     n, m = len(witness.robot.joints), len(closure.tied)
     calls: list[Call] = [
@@ -399,13 +423,16 @@ def _closed(library: Path, witness: Witness, constants: list[float]) -> Array:
 
 
 def _results(library: Path, calls: list[Call]) -> Any:
-    """Call functions of a library; returns [status, numbers] of each call."""
+    """Call functions of a C library in another process; return status and numbers of each call."""
     job = {"library": str(library), "calls": calls}
     return json.loads(_run([sys.executable, "-I", call_c.__file__], json.dumps(job)))
 
 
 def _of_one_state(name: str, text: str, witness: Witness) -> Iterator[tuple[str, Check]]:
-    """The functions of one state, with the values that they must give at every state."""
+    """Yield each C function of one state, with the check that holds its expected values.
+
+    A function with a frame as argument has one check per frame.
+    """
     for f in _one_state(name, text):
         every = [c for c in witness.checks.get(f, ()) if c.arguments[0].ndim > 1]
         framed = [c for c in every if c.keywords.get("frame")]
@@ -418,7 +445,7 @@ def _one_state(name: str, text: str) -> list[str]:
 
 
 def _stored(f: str, shape: tuple[int, ...]) -> tuple[int, ...]:
-    """Shape of a result as it is stored: with the columns first if the model says so."""
+    """Return the shape in which a result is stored; a model stored by columns has reversed axes."""
     return shape[::-1] if MODELS[f].by_columns else shape
 
 
@@ -427,7 +454,10 @@ def _flat(a: Array) -> list[float]:
 
 
 def _run(command: list[str], given: str = "") -> str:
-    """Output of a command; SubprocessError if it fails or takes too long."""
+    """Run a command and return its output.
+
+    SubprocessError is raised if the command fails or needs too much time.
+    """
     return subprocess.run(
         command, input=given, capture_output=True, text=True, timeout=LONGEST_RUN, check=True
     ).stdout

@@ -1,14 +1,19 @@
-"""One module in which the whole table of frames is free: what a robot would be with another angle, length or gravity, without another derivation.
+"""Python module of a robot whose frame table and gravity are constants that can be changed.
+
+It shows how the robot would behave with another angle, length or gravity, without another
+derivation.
 
     free = symgen.variants("arm.yaml")
     free.regressor(q, qd, qdd, free_alpha4=pi/2)       frame 4 turned the other way
     free.observation_matrix(q, qd, qdd, free_gx=9.81, free_gz=0.0)
 
-Its columns are all standard parameters: which of them regroup depends on the geometry, and is left
-to the numbers. `runtime.identify` takes it as `variants` and tries with it whether another table
-explains a record better. A robot with closed loops keeps its table, which the loops have to close;
-gravity alone is free there. Frames between joints that a constraint ties keep their entries: it
-holds for this geometry.
+Its columns are all standard parameters, because the base parameters depend on the geometry.
+`runtime.identify` accepts it as `variants` and tests whether another frame table explains a record
+better.
+
+A robot with closed loops has a fixed frame table, because the loops must close; only gravity is
+free. Frames between joints that a constraint ties are fixed too, because the constraint holds for
+this geometry.
 """
 
 from __future__ import annotations
@@ -32,7 +37,9 @@ FREE = "free_"
 
 
 def variants(robot: str | Path | Robot) -> ModuleType:
-    """Module of a robot whose frame table and gravity are constants, with all standard parameters as columns.
+    """Make the module of a robot whose frame table and gravity are constants that can be changed.
+
+    The columns of its regressor are all standard parameters.
 
     Parameters
     ----------
@@ -42,9 +49,9 @@ def variants(robot: str | Path | Robot) -> ModuleType:
     Returns
     -------
     module
-        Constants free_alpha1, free_d1, free_theta1, free_r1 ... (gamma and b where a frame has
-        them), free_gx, free_gy, free_gz, in addition to those of the robot file; their defaults are its
-        entries.
+        The constants of the robot file, and free_alpha1, free_d1, free_theta1, free_r1 ... (gamma
+        and b if a frame has them), free_gx, free_gy, free_gz. Their defaults are the values in the
+        robot file.
     """
     robot = freed(robot if isinstance(robot, Robot) else load_robot(robot))
     regrouping = ungrouped(robot)
@@ -59,7 +66,10 @@ def variants(robot: str | Path | Robot) -> ModuleType:
 
 
 def freed(robot: Robot) -> Robot:
-    """Replace the angles, lengths and gravity of a robot by symbols; with loops, gravity alone."""
+    """Replace the angles, lengths and gravity of a robot by constants that can be changed.
+
+    If the robot has loops, only gravity is replaced.
+    """
     constants = dict(robot.constants)
     tied = {  # frames on the paths between the joints that constraints tie to each other
         frame

@@ -1,12 +1,13 @@
-"""What every function has to give, at states, parameters and constants drawn at random.
+"""Independent expected values of every function, at random states, parameters and constants.
 
-The dynamics are those of energies, the poses products of the frames' matrices (`derive.lagrange`):
-neither shares code with the recursions, the regrouping or the printers. X is what the formulas
-make of random standard parameters, those of bodies, so that A is positive definite.
+The dynamics follow from energies, the poses from products of the matrices of the frames
+(`derive.lagrange`). Neither shares code with the recursions, the regrouping or the printers. The
+formulas give X from random standard parameters of real bodies, so that A is positive definite.
 
-Constants are drawn around those of the file. Where loops do not close for them, and where a
-regrouping formula holds for one sign of a ratio, they are drawn nearer; else they are the file's,
-as they are where formulas are numbers, which hold for these alone.
+Constants are drawn around their values in the robot file. They are drawn closer to these values if
+the loops do not close, or if a regrouping formula holds only for one sign of a ratio. The values of
+the robot file itself are used if this fails too, or if coefficients of formulas are numbers, which
+hold for these values alone.
 """
 
 from __future__ import annotations
@@ -43,20 +44,20 @@ RANDOM, OF_THE_FILE = "random constants", "the constants of the file"
 
 @dataclass(frozen=True)
 class Check:
-    """Expected values of a function.
+    """One call of a function, and the result that the function must give.
 
     Attributes
     ----------
     arguments : tuple of ndarray
         States, with or without an axis of samples, or parameters.
     expected : ndarray
-        The result.
+        The expected result.
     scale : ndarray or float
-        What a difference is divided by.
+        Size by which a difference is divided.
     keywords : mapping
         Keyword arguments besides the constants.
     compared : callable
-        Makes of the result what is compared with `expected`.
+        Converts the result before it is compared with `expected`.
     """
 
     arguments: tuple[Array, ...]
@@ -67,17 +68,17 @@ class Check:
 
 
 class Witness:
-    """Independent values of every function of a robot.
+    """Independent expected values of every function of a robot.
 
     Parameters
     ----------
     regrouping : Regrouping
         Base parameters with their formulas.
     fixed : mapping, optional
-        Values of constants, of q1, QP1, QDP1 ... of actuated joints, and of parameters, in the
-        place of drawn ones.
+        Values of constants, of q1, QP1, QDP1 ... of actuated joints, and of parameters, which
+        replace random values.
     options : sequence of str
-        Models on request that are asked for.
+        Options whose models on request are needed.
     """
 
     def __init__(
@@ -114,60 +115,66 @@ class Witness:
         }
 
     def torque(self, q: Array, qd: Array, qdd: Array, chi: Array | None = None) -> Array:
-        """Gamma of the actuated joints, (..., n)."""
+        """Compute the torques Gamma of the actuated joints, shape (..., n).
+
+        `chi` are the standard parameters. Default: the ones of the witness.
+        """
         return np.asarray(
             self.model.actuated_regressor(q, qd, qdd) @ (self.chi if chi is None else chi)
         )
 
     @property
     def X(self) -> Array:
-        """Base parameters of chi by the formulas."""
+        """Base parameters X, shape (b,), computed from the standard parameters by the formulas."""
         return base_values(self.regrouping, self.chi, self.constants)
 
     @property
     def keywords(self) -> dict[str, float]:
-        """Constants that the functions take by keyword."""
+        """Constants that the functions accept as keyword arguments, with their drawn values."""
         return {name: self.constants[name] for name in self.regrouping.constants}
 
     @property
     def defaults(self) -> dict[str, float]:
-        """Values of these constants in the file."""
+        """Values in the robot file of the constants that the functions accept as keywords."""
         return {name: self.robot.constants[name] for name in self.regrouping.constants}
 
     @property
     def tied(self) -> bool:
-        """Whether closure equations alone tie some joints."""
+        """Whether some joints are tied to others by closure equations alone, not by a formula."""
         return bool(close(self.robot).tied)
 
     @cached_property
     def own(self) -> Array:
-        """Columns of the parameters that give the base parameters their names, (N, n, b)."""
+        """Regressor columns of the base parameters, shape (N, n, b).
+
+        They are the columns of the standard parameters that give the base parameters their names.
+        """
         return self.D[:, :, [self.robot.parameters.index(name) for name in self.regrouping.own]]
 
     @cached_property
     def poses(self) -> Array:
-        """0T0, then 0Tj of every frame, (N, 1 + frames, 4, 4)."""
+        """Transformation matrices 0T0 and 0Tj of every frame, shape (N, 1 + frames, 4, 4)."""
         base = np.broadcast_to(np.eye(4), (len(self.q), 1, 4, 4))
         return np.concatenate([base, self.model.poses(self.x)], axis=1)
 
     @cached_property
     def tau(self) -> Array:
-        """Gamma, (N, n)."""
+        """Torques Gamma of the actuated joints, shape (N, n)."""
         return np.asarray(self.D @ self.chi)
 
     @cached_property
     def rest(self) -> Array:
-        """Gamma at rest, (N, n)."""
+        """Torques Gamma at rest, qd = qdd = 0, shape (N, n)."""
         return self.torque(self.q, 0 * self.q, 0 * self.q)
 
     @cached_property
     def H(self) -> Array:
-        """Gamma at qdd = 0, (N, n)."""
+        """Torques Gamma at qdd = 0, shape (N, n)."""
         return self.torque(self.q, self.qd, 0 * self.q)
 
     @cached_property
     def checks(self) -> dict[str, list[Check]]:
-        """The values that each function must give, by name."""
+        """Calls of each function with the results that it must give, by function name."""
         q, qd, qdd, X = self.q, self.qd, self.qdd, self.X
         N, _, b = self.own.shape
         columns = np.abs(self.own).max(axis=(0, 1))
@@ -234,9 +241,10 @@ class Witness:
     def value(
         self, name: str, of: int = 0, frame: int = 0, rows: Sequence[int] | None = None
     ) -> Array:
-        """Value of a model, (N, ...), for frame `of`, with components in frame `frame`.
+        """Compute the value of a model, shape (N, ...).
 
-        A determinant uses the given rows, from 1, or else those that are not zero.
+        The model is that of frame `of`, with components in frame `frame`. A determinant uses the
+        given rows of the Jacobian, counted from 1, or else all rows that are not zero.
         """
         N, chi, T, friction = len(self.q), self.chi, self.poses, lambda e: e.is_friction
         R = T[:, frame, :3, :3].swapaxes(1, 2)
@@ -259,7 +267,10 @@ class Witness:
             return np.asarray(np.linalg.det(square))
 
         def coriolis() -> Array:
-            """C e_j = (h(qd + e_j) - h(qd) - h(e_j))/2 of the quadratic h = C(qd) qd."""
+            """Compute the Coriolis matrix C from the torque h = C(qd) qd, which is quadratic in qd.
+
+            With the unit vectors e_j, C e_j = (h(qd + e_j) - h(qd) - h(e_j))/2.
+            """
             q, qd, still = self.q, self.qd, chi * ~of_elements(self.robot, friction)
             at_rest = self.torque(q, 0 * q, 0 * q, still)
             h = [
@@ -299,21 +310,22 @@ class Witness:
 
 
 def ungrouped(robot: Robot) -> Regrouping:
-    """A regrouping in which every standard parameter stands for itself."""
+    """Make a regrouping in which every standard parameter is a base parameter by itself."""
     return Regrouping(
         robot, tuple(BaseParameter(name, name, {name: ONE}) for name in robot.parameters), ()
     )
 
 
 def is_assumed(robot: Robot) -> Array:
-    """Whether each standard parameter is one that the robot file says is zero."""
+    """Whether the robot file assumes each standard parameter to be zero, shape (p,)."""
     return np.array([name in robot.assume for name in robot.parameters])
 
 
 def bodies(robot: Robot, rng: np.random.Generator) -> Array:
-    """Draw standard parameters (p,) of real bodies.
+    """Draw random standard parameters of real bodies, shape (p,).
 
-    Every link is made of four points of mass; all other parameters lie between 0.1 and 1.
+    Every link is made of four points of mass. All other parameters lie between 0.1 and 1, except
+    those that the robot file assumes zero.
     """
     chi = rng.uniform(0.1, 1.0, len(robot.parameters))
     for j in robot.links:
@@ -325,7 +337,7 @@ def bodies(robot: Robot, rng: np.random.Generator) -> Array:
 
 
 def base_values(regrouping: Regrouping, chi: Array, constants: Mapping[str, float]) -> Array:
-    """X (b, ...) of standard parameters chi (p, ...) by the formulas."""
+    """Compute base parameters X (b, ...) from standard parameters chi (p, ...) by the formulas."""
     value = dict(zip(regrouping.robot.parameters, chi, strict=True))
     return np.array(
         [
@@ -342,7 +354,10 @@ def _at(robot: Robot, constants: Mapping[str, float]) -> Sample:
 
 
 def _sampled(regrouping: Regrouping, fixed: Mapping[str, float]) -> tuple[Sample, str]:
-    """Draw states, with other constants where that is possible; returns them and the constants in words."""
+    """Draw random states, if possible with random constants.
+
+    Return the states, and a text that names the constants: random, or the ones of the file.
+    """
     robot, rng = regrouping.robot, np.random.default_rng(8)
     spreads = SPREADS[2 * bool(close(robot).tied) :]
     for spread, zero in spreads if robot.constants and regrouping.method == EXACT else ():
@@ -357,6 +372,9 @@ def _sampled(regrouping: Regrouping, fixed: Mapping[str, float]) -> tuple[Sample
 
 
 def _torque(A: Array, qdd: Array, H: Array) -> Array:
-    """Compute A qdd + H; accelerations may be infinite, if a wrong text made them."""
+    """Compute the torque A qdd + H without a warning if an acceleration is infinite.
+
+    A wrong emitted function may give infinite accelerations.
+    """
     with np.errstate(over="ignore", invalid="ignore"):
         return np.asarray((A @ qdd[..., None])[..., 0] + H)

@@ -286,7 +286,7 @@ def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
     except InputError as e:
         if text := draft(study, model):
             write_all(folder, {path.name: text})
-            hint = f"{path} holds what the names tell; complete the lines marked # ?"
+            hint = f"{path} has what the column names show; complete the lines marked # ?"
             raise InputError(f"{e}; {hint}") from e
         raise
     write_all(folder, {path.name: study_text(study, folder, defaults=False)})

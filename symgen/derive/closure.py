@@ -1,12 +1,13 @@
-"""Closing the loops: which joints are functions of which.
+"""Closure of the loops: the passive joints as functions of the independent joints.
 
-The moving joints of the tree are written as linear functions of the *independent* ones,
+The moving joints of the tree are linear functions of the *independent* joints,
 
     q_j = sum_i n_ji q_i + c_j ,     qd_j = sum_i n_ji qd_i ,     qdd_j = sum_i n_ji qdd_i
 
-with constant n_ji and c_j. Serial robots and trees: every joint is independent. Parallelograms: the
-actuated joints are, and G = (n_ji). General loops: the passive joints that no linear relation gives
-are independent too, and tied to the actuated ones by the closure equations, qd_u = G_u qd_a. Then
+with constant n_ji and c_j. In serial robots and trees every joint is independent. In parallelograms
+the actuated joints are independent, and G = (n_ji). In general loops, the passive joints that no
+linear relation gives are independent too. They are called tied: the closure equations relate them
+to the actuated joints, qd_u = G_u qd_a. Then
 
     Gamma_a = G' Gamma_tree
 
@@ -31,18 +32,18 @@ Relation = tuple[Mapping[int, Expression], Expression]  # row and constant
 
 @dataclass(frozen=True)
 class Closure:
-    """Every moving joint in the independent ones.
+    """All moving joints of a robot as linear functions of its independent joints.
 
     Attributes
     ----------
     robot : Robot
         The mechanism.
     row : mapping
-        {j: {i: n_ji}}.
+        {j: {i: n_ji}}, the coefficients.
     offset : mapping
-        {j: c_j}, rad or m.
+        {j: c_j}, the constants, rad or m.
     tied : tuple of int
-        Independent passive joints: those of general loops.
+        Independent passive joints: joints of general loops that only closure equations give.
     start : mapping
         A configuration of all moving joints that closes the loops, rad or m; it picks the assembly
         mode of a general loop.
@@ -59,11 +60,14 @@ class Closure:
         return (*self.robot.joints, *self.tied)
 
     def formula(self, j: int) -> Expression:
-        """q_j by q of the independent joints."""
+        """Return q_j as an expression of the independent joint positions."""
         return sum((g * Expression.symbol(f"q{i}") for i, g in self.row[j].items()), self.offset[j])
 
     def turn(self, j: int) -> tuple[Turn, Expression]:
-        """The angle of revolute joint j: multiples of independent angles, and a constant."""
+        """Return the angle of revolute joint j as multiples of independent angles, and a constant.
+
+        Raises DescriptionError if a multiple is not a number.
+        """
         turn = []
         for i, g in sorted(self.row[j].items()):
             c = g.constant
@@ -82,7 +86,10 @@ class Closure:
         return tuple(turn), self.offset[j]
 
     def relation(self, row: Mapping[int, Expression], c: Expression = ZERO) -> Relation:
-        """s = row q + c in the independent joints: its row, and its constant."""
+        """Write s = row q + c in the independent joints; return the new row and the new constant.
+
+        The given row may contain any moving joints.
+        """
         total: dict[int, Expression] = {}
         for j, g in row.items():
             for i, h in self.row[j].items():
@@ -91,11 +98,11 @@ class Closure:
         return {i: g for i, g in sorted(total.items()) if g}, c
 
     def in_independent(self, row: Mapping[int, Expression]) -> ActiveRow:
-        """The row of s = row q in the independent joints."""
+        """Return the row of s = row q, rewritten in the independent joints, as pairs (joint, G)."""
         return tuple(self.relation(row)[0].items())
 
     def project(self, algebra: GraphAlgebra, torque: Mapping[int, Scalar]) -> dict[int, Scalar]:
-        """G' Gamma_tree, by actuated joint."""
+        """Return the torques G' Gamma_tree of the actuated joints, from the torques of the tree."""
         if not self.robot.passive:
             return dict(torque)
         total: dict[int, Scalar] = dict.fromkeys(self.independent, 0)
@@ -109,9 +116,10 @@ class Closure:
 
 
 def parts(robot: Robot) -> int:
-    """D, so that every passive angle is a whole multiple of q_i/D: the least common denominator of
-    the declared relations between angles, or their product where one relation is put into another,
-    or a loop may do so.
+    """Return an integer D such that every passive angle is a sum of whole multiples of q_i/D.
+
+    D is the least common denominator of the declared ratios between angles. It is the product of
+    the denominators if one relation is put into another, or if a loop may do so.
     """
     joints, relations = {f"q{j}" for j in robot.moving}, robot.constraints
     chained = robot.loops or {f"q{j}" for j in relations} & {
@@ -127,7 +135,7 @@ def parts(robot: Robot) -> int:
 
 
 def open_tree(robot: Robot) -> Closure:
-    """Every moving joint on its own, loops cut."""
+    """Return the closure of the open tree, its loops cut: every moving joint is independent."""
     moving = robot.moving
     passive = tuple(j for j in moving if j not in robot.joints)
     return Closure(robot, {j: {j: ONE} for j in moving}, dict.fromkeys(moving, ZERO), passive)

@@ -1,23 +1,29 @@
-"""C(q, qd) by composite links, with the Christoffel symbols of A: Ad - 2C is skew symmetric.
+"""Coriolis matrix C(q, qd) by composite links, from the Christoffel symbols of A.
 
-A mass point at r in frame j has the velocity rd = w_j x r relative to its origin. Of a link, and of all that it carries, the
-recursion of `derive.composite` carries further
+With these, Ad - 2C is skew symmetric. A mass point at r in frame j has the velocity rd = w_j x r
+relative to the origin of the frame. For each composite link (a link with all links mounted on it),
+the recursion of `derive.composite` also computes
 
     HP  = sum m rd         rate of the first moments
-    BP  = sum m r rd'      3x3; of one link by rows, BP_a = w_j x K_a, K = sum m r r' = tr(J)/2 E - J
+    BP  = sum m r rd'      3x3; of one link by rows, BP_a = w_j x K_a,
+                           K = sum m r r' = tr(J)/2 E - J
 
-from the tips to the base, PP the velocity of O_j relative to O_i, all in frame i:
+from the tips to the base. With PP the velocity of O_j relative to O_i, all in frame i:
 
-    BP_i <- BP_i + iRj BP_j jRi + P (iRj HP_j)' + (AS + MP_j P) PP' ,   HP_i <- HP_i + iRj HP_j + MP_j PP ,   PP = w_i x P + qd_j z_j (prismatic)
+    BP_i <- BP_i + iRj BP_j jRi + P (iRj HP_j)' + (AS + MP_j P) PP'
+    HP_i <- HP_i + iRj HP_j + MP_j PP
+    PP    = w_i x P + qd_j z_j (prismatic)
 
-Per unit rate of joint k a point moves with z x r, revolute, or z, prismatic. Its rate of change is zd x r + z x rd, or zd, with zd = w_k x z.
-The wrench of composite link k at these rates, carried inward, is column k of C above the diagonal:
+Per unit rate of joint k, a point moves with z x r (revolute) or z (prismatic). The rate of change
+of this velocity is zd x r + z x rd, or zd, with zd = w_k x z. The wrench of composite link k at
+these rates, propagated to the base, is column k of C above the diagonal:
 
     E = zd x MSP + z x HP ,   NE = JP zd + tr(BP) z - BP' z       revolute
     E = MP zd ,               NE = MSP x zd                       prismatic
 
-Below it C_ki = x_k . (zd_i x r + z_i x rd) summed over the same points, x_k = z_k x r or z_k: with F = sum m x_k, N = sum m r x x_k of the unit
-acceleration and ND = sum m rd x x_k, carried inward by ND_i = iRj ND_j + PP x F_i,
+Below the diagonal, C_ki = x_k . (zd_i x r + z_i x rd) summed over the same points, x_k = z_k x r or
+z_k. With F = sum m x_k, N = sum m r x x_k of the unit acceleration, and ND = sum m rd x x_k,
+propagated to the base by ND_i = iRj ND_j + PP x F_i,
 
     C_ki = zd_i . N + z_i . ND (revolute) ,   zd_i . F (prismatic)
 
@@ -52,7 +58,10 @@ HALF = Expression.number(Fraction(1, 2))
 
 
 class CompositeRates(CompositeLinks):
-    """HP and BP of every composite link, with its parameters.
+    """The sums HP = sum m rd and BP = sum m r rd' over each composite link.
+
+    A composite link is a link with all links mounted on it. r is the position of a mass point in
+    the frame of the link, rd its velocity relative to the origin of the frame.
 
     Parameters
     ----------
@@ -87,7 +96,7 @@ class CompositeRates(CompositeLinks):
         return v
 
     def _link(self, d: Derivation, j: int) -> None:
-        """HP and BP of link j alone."""
+        """Compute the sums HP and BP of link j alone."""
         w, half = self.motion.link[j].w, self.algebra.constant(HALF)
         XX, XY, XZ, YY, YZ, ZZ = self.own[j][:6]
         K = (
@@ -100,7 +109,7 @@ class CompositeRates(CompositeLinks):
         self.BP[j] = (cross(w, K[0]), cross(w, K[1]), cross(w, K[2]))
 
     def _take_rates(self, j: int, i: int) -> None:
-        """Add those of composite link j to the frame i that carries it."""
+        """Add the sums HP and BP of composite link j to those of its antecedent i."""
         R, P, PP = self.geometry.rotation[j], self.geometry.P[j], self.PP[j]
         ABA, AH = turned(R, self.BP[j]), R.up(self.HP[j])
         moved = vadd(R.up(self.MSP[j]), scale(self.MP[j], P))
@@ -112,7 +121,7 @@ class CompositeRates(CompositeLinks):
         self.HP[i] = vadd(self.HP[i], vadd(AH, scale(self.MP[j], PP)))
 
     def coriolis(self) -> dict[tuple[int, int], Scalar]:
-        """{(i, k): C_ik} of all moving joints of the open tree."""
+        """Return the Coriolis matrix {(i, k): C_ik} of all moving joints of the open tree."""
         moving = self.robot.moving
         C: dict[tuple[int, int], Scalar] = {(i, k): 0 for i in moving for k in moving}
         for k in moving:
@@ -120,7 +129,7 @@ class CompositeRates(CompositeLinks):
         return C
 
     def _joint(self, k: int) -> dict[tuple[int, int], Scalar]:
-        """C_ik and C_ki of the joints i on the path to joint k."""
+        """Return the entries C_ik and C_ki for all joints i between the base and joint k."""
         self.algebra.section(f"Unit rate of joint {k}")
         x, y, _ = self.MSP[k]
         B, H = self.BP[k], self.HP[k]
@@ -155,13 +164,13 @@ class CompositeRates(CompositeLinks):
         return C
 
     def _axis_rate(self, k: int) -> Vector:
-        """zd_k = w_k x z_k."""
+        """Return the rate of change of joint axis k, zd_k = w_k x z_k, in frame k."""
         w = self.motion.link[k].w
         return (w[1], sub(0, w[0]), 0)
 
 
 def turned(R: Rotation, B: Matrix) -> Matrix:
-    """iRj B jRi: about z by cos**2 and cos sin, then by the fixed part."""
+    """Rotate a 3x3 matrix B from frame j to frame i: return iRj B jRi."""
     cc, cs = mul(R.c, R.c), mul(R.c, R.s)
     difference, sum_ = sub(B[0][0], B[1][1]), add(B[0][1], B[1][0])
     x = sub(mul(cc, difference), mul(cs, sum_))
@@ -182,5 +191,8 @@ def turned(R: Rotation, B: Matrix) -> Matrix:
 
 
 def coriolis(d: Derivation) -> dict[tuple[int, int], Scalar]:
-    """{(i, k): C_ik} of the actuated joints: G' C G, G constant."""
+    """Return the Coriolis matrix {(i, k): C_ik} of the actuated joints.
+
+    It is G' C G with the matrix C of all moving joints and a constant G.
+    """
     return projected_twice(d.geometry.closure, d.algebra, CompositeRates(d).coriolis())

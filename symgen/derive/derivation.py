@@ -1,12 +1,14 @@
-"""The derivation of a robot: every recursion once, in standard parameters, as nodes of one graph.
+"""Derivation of a robot: torques, regressor, inertia matrix and poses as nodes of one graph.
+
+Every recursion runs once, in standard parameters:
 
     Gamma(q, qd, qdd, g, chi)        torques of the actuated joints, linear in chi
     D_k(q, qd, qdd, g)               their columns, Gamma = sum_k D_k chi_k
     A_0j, P_0j                       poses of the frames
     r(q), dr/dq, Jd qd               closure equations of general loops
 
-Regrouping, emission, symbols and pages read it. A model is one of these values with inputs
-replaced (`derive.rewrite`), and the table of models (`derive.models`) says which.
+Regrouping, code generators, symbols and pages use this graph. A model is one of these values with
+some inputs replaced (`derive.rewrite`); the table of models (`derive.models`) defines which inputs.
 """
 
 from __future__ import annotations
@@ -34,14 +36,16 @@ ABSORBED = ("YY", "MZ", "M")
 
 @dataclass(frozen=True)
 class Derivation:
-    """Result of `derive`. Later models may add nodes to its graph, but change none.
+    """The derived formulas of a robot, as nodes of one graph.
+
+    Models may later add nodes to this graph, but change none.
 
     Attributes
     ----------
     robot : Robot
         The robot.
     closure : Closure
-        Its moving joints in the independent ones.
+        The moving joints as functions of the independent joints.
     algebra : GraphAlgebra
         The graph, its angles, its headings.
     geometry : Geometry
@@ -72,23 +76,28 @@ class Derivation:
     poses: Mapping[int, tuple[Matrix, Vector]]
 
     def actuated(self, torque: Mapping[int, Scalar]) -> dict[int, Scalar]:
-        """G' Gamma of the moving joints: by actuated joint, all of them."""
+        """Return the torques G' Gamma of the actuated joints, from torques of the moving joints.
+
+        Every actuated joint has an entry, also if its torque is zero.
+        """
         projected = self.geometry.closure.project(self.algebra, torque)
         return {i: projected.get(i, 0) for i in self.robot.joints}
 
 
 @lru_cache(maxsize=8)
 def derive(robot: Robot) -> Derivation:
-    """The derivation of `robot`, made once. Raises DescriptionError if its loops cannot
-    close.
+    """Derive the formulas of a robot; a second call returns the stored result.
+
+    Raises DescriptionError if the loops of the robot cannot close.
     """
     return derived(robot, close)
 
 
 def derived(robot: Robot, closing: Callable[[Robot], Closure]) -> Derivation:
-    """The derivation with the joints of the closure that `closing` makes as the independent ones.
+    """Derive the formulas of a robot with the closure that the function `closing` returns.
 
-    Numbers of the file stay as they are written, inputs of the graph: formulas have them so.
+    The closure defines the independent joints. Decimal numbers of the robot file stay inputs of the
+    graph, so that formulas show them as written.
     """
     written = numbered(robot)
     closure, algebra = closing(written), GraphAlgebra(written)
@@ -115,7 +124,8 @@ def derived(robot: Robot, closing: Callable[[Robot], Closure]) -> Derivation:
 def projected_twice(
     closure: Closure, algebra: GraphAlgebra, A: Mapping[tuple[int, int], Scalar]
 ) -> dict[tuple[int, int], Scalar]:
-    """{(i, k): (G' A G)_ik} of the actuated joints, A that of all moving joints."""
+    """Return {(i, k): (G' A G)_ik} of the actuated joints, from the matrix A of all moving joints.
+    """
     robot = closure.robot
     AG = {j: closure.project(algebra, {k: A[j, k] for k in robot.moving}) for j in robot.moving}
     columns = {

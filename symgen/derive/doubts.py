@@ -1,5 +1,7 @@
-"""What is valid in a robot but probably not meant: angles a hair off a round one, equal sides of a
-loop under two names, a start at which it does not close, numbers in degrees or mm.
+"""Warnings about values of a robot that are valid but probably wrong, such as lengths in mm.
+
+Further examples: angles very near to a round one, equal sides of a loop with two names, a start at
+which a loop does not close, angles in degrees.
 """
 
 from __future__ import annotations
@@ -21,7 +23,10 @@ UNLIMITED = 1000.0  # ... unless it stands for none at all
 
 
 def doubts(robot: Robot) -> list[str]:
-    """A sentence for each. Raises DescriptionError if a loop does not close."""
+    """Return one warning, a sentence, for each doubtful value of a robot.
+
+    Raises DescriptionError if a loop does not close.
+    """
     return [
         *nearly_round(robot),
         *other_units(robot),
@@ -31,7 +36,11 @@ def doubts(robot: Robot) -> list[str]:
 
 
 def nearly_round(robot: Robot, within: float = CLOSE) -> list[str]:
-    """Angles written as decimals, such as 1.5708: exact arithmetic takes them for oblique ones, with formulas and base parameters of their own."""
+    """Warn of angles written as decimals near a multiple of pi/12, such as 1.5708 for pi/2.
+
+    Exact arithmetic treats such a decimal as an oblique angle, with formulas and base parameters of
+    its own.
+    """
     notes = []
     for f in robot.frames:
         for name, angle in (("gamma", f.gamma), ("alpha", f.alpha), ("theta", f.theta0)):
@@ -49,7 +58,7 @@ def nearly_round(robot: Robot, within: float = CLOSE) -> list[str]:
 
 
 def other_units(robot: Robot) -> list[str]:
-    """Sizes that no robot has in m and rad: gravity, lengths, zeros of the drives, limits."""
+    """Warn of values that no robot has in m and rad: gravity, lengths, drive offsets, limits."""
     notes = []
     g = math.hypot(*(e.value(robot.constants) for e in robot.gravity))
     if g > LONGEST:
@@ -80,7 +89,10 @@ def other_units(robot: Robot) -> list[str]:
 
 
 def equal_sides(robot: Robot) -> list[str]:
-    """Lengths of equal value and different names in a loop without linear relations: with one name it may be a parallelogram."""
+    """Warn of equal lengths with different names in a loop without linear relations.
+
+    With one name for both lengths, the loop may be a parallelogram.
+    """
     if not robot.loops:
         return []
     tied = set(close(robot).tied)
@@ -116,7 +128,7 @@ def equal_sides(robot: Robot) -> list[str]:
 
 
 def far_starts(robot: Robot) -> list[str]:
-    """Joints that no closed configuration has near the `start` of their loop."""
+    """Warn of joints that no closed configuration has near the `start` of their loop."""
     closed, longest = close(robot).start, robot.longest
     units = {j: 1.0 if robot.frame(j).sigma == REVOLUTE else longest for j in robot.start}
     far = [j for j, x in robot.start.items() if abs(closed[j] - x) > FAR * units[j]]

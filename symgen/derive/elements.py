@@ -1,12 +1,12 @@
-"""Torque columns of the elements on the joints: those of KINDS, and those of the user.
+"""Regressor columns of elements: friction, springs, actuator inertias, and torque laws of the user.
 
-along G, s = G q:   Gamma += c G' x,   x the law of the element over s, sd, sdd
-form B:             Gamma += c B x,    x = qdd | qd | q
-energy U:           Gamma_i += c dU/dq_i
+along G, s = G q:   Gamma += c G' x,   x the law of the element over s, sd, sdd form B:
+Gamma += c B x,    x = qdd | qd | q energy U:           Gamma_i += c dU/dq_i
 
-A law is a polynomial over calls. Cosines and sines of whole multiples of joint angles and signs of
-velocities are those of the robot, hence exact over F_p; every other call of a state is a node of
-its own, of which exact arithmetic knows nothing but what it is of.
+A law is a polynomial in states, constants and function calls. Cosines and sines of whole multiples
+of joint angles and signs of velocities are functions of the robot's geometry and motion, hence
+exact over F_p. Every other call that varies with the state is a node of its own, which exact
+arithmetic identifies only by its operands.
 """
 
 from __future__ import annotations
@@ -21,7 +21,10 @@ from symgen.description.robot import Element, Form, Row, parameter
 
 
 def element_column(motion: Motion, e: Element, j: int) -> dict[int, Scalar]:
-    """{i: D_ik} of the parameter of element `e` with key j, i over the moving joints it acts on."""
+    """Return the regressor column {i: D_ik} of parameter j of an element, for instance FV2.
+
+    The joints i are the moving joints that this parameter acts on.
+    """
     if j in e.form:
         return _form(motion, str(e.law(j)), e.form[j])
     row = e.along[j]
@@ -37,15 +40,15 @@ def element_column(motion: Motion, e: Element, j: int) -> dict[int, Scalar]:
 
 
 def law_value(motion: Motion, e: Element, j: int, law: Expression) -> Scalar:
-    """The value of an expression over the states that the law of key j of an element has."""
+    """Return the value of an expression in the states of an element, as a graph scalar."""
     return _Law(motion, e, j).of(law)
 
 
 class _Law:
-    """Values of the law of key j of an element over the scalars of a motion.
+    """Writes the torque law of one element parameter as nodes of the graph.
 
-    The velocity along several joints is named after the element, since other rows may have these
-    joints.
+    A velocity along several joints is named after the element, since rows of other elements may
+    have the same joints.
     """
 
     def __init__(self, motion: Motion, e: Element, j: int) -> None:
@@ -53,7 +56,7 @@ class _Law:
         self.name = f"{motion.named('QP')}{parameter(e.family, j)}"
 
     def of(self, e: Expression) -> Scalar:
-        """The value of an expression."""
+        """Return the value of an expression as a graph scalar."""
         total: Scalar = 0
         for m, c in e.ordered:
             varying = [(a, n) for a, n in m if varies(a)]
@@ -68,7 +71,7 @@ class _Law:
         return total
 
     def one_sided(self, law: Expression) -> Scalar:
-        """sd or sign(sd) in motion of the direction `when` alone."""
+        """Return sd or sign(sd) for motion in the direction `when`, and zero for the other one."""
         rate, key = self._atom("qd"), self.motion.geometry.closure.in_independent(self.row)
         if type(rate) is int or not key:
             return 0  # at rest, or the closure holds s still
@@ -106,7 +109,10 @@ class _Law:
         return algebra.function(a.function, *operands)
 
     def _turn(self, angle: Expression) -> tuple[Turn, Expression] | None:
-        """Write an angle as whole multiples of independent joints plus a constant; return both."""
+        """Write an angle as whole multiples of independent joint angles plus a constant.
+
+        Return the multiples and the constant, or None if the angle has another form.
+        """
         if not (part := linear_in(angle, "q", self.row)):
             return None
         row, rest = self.motion.geometry.closure.relation(*part)
@@ -117,7 +123,7 @@ class _Law:
 
 
 def is_opaque(e: Element, j: int) -> bool:
-    """Whether the law of key j of an element has a function that exact arithmetic does not know."""
+    """Whether the law of an element parameter has a function that F_p cannot represent."""
     pending = [e.law(j), e.potential(j)]
     for law in pending:
         for a in law.atoms:
@@ -134,8 +140,11 @@ def is_opaque(e: Element, j: int) -> bool:
 def linear_in(
     e: Expression, state: str, along: Row
 ) -> tuple[dict[int, Expression], Expression] | None:
-    """(row, rest) of e = row . x + rest, x the positions (q) or velocities (qd) of the joints and
-    `state` alone the sum of those `along` a row; None if e is something else.
+    """Split an expression e linear in joint positions or velocities x: e = row . x + rest.
+
+    Return the row {joint: coefficient} and the constant rest, or None if e is not linear. x are the
+    positions if `state` is q, the velocities if it is qd. The name q (or qd) without a joint number
+    means the sum over the row `along`.
     """
     row: dict[int, Expression] = {}
     rest = ZERO

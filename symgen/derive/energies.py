@@ -67,6 +67,8 @@ def origin_velocities(motion: Motion) -> dict[int, Vector]:
     """Return {j: v_j}, the velocity of the origin of frame j, in frame j.
 
         v_j = jRi (v_i + w_i x P_ij)  [+ qd_j e3   prismatic]
+
+    The base is at rest.
     """
     v: dict[int, Vector] = {0: ZERO3}
     for f in motion.robot.frames:

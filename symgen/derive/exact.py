@@ -1,16 +1,34 @@
-"""The prime field F_p, a domain of graph nodes in which random states and geometries are exact.
+"""Exact arithmetic in a prime field F_p, at random states of random geometries of a robot.
 
-p < 2**31, so products fit in int64. p = 3 (mod 4): 1 + t**2 is never 0 and every angle is a point ((1 - t**2)/(1 + t**2), 2t/(1 + t**2)) of the unit circle. The points form a group of order p + 1; p is chosen so that this order is a multiple of 2D, D the common denominator of the robot's fractions of pi: pi/3 or pi/4 are then exact roots of unity of F_p, not approximations. Every other fixed angle is a sum of multiples of units, random points (`derive.angles`).
+The class `Draw` is a domain of graph nodes. p < 2**31, so products fit in int64. p = 3 (mod 4), so
+1 + t**2 is never 0, and every t gives an angle, the point ((1 - t**2)/(1 + t**2), 2t/(1 + t**2)) of
+the unit circle. These points form a group of order p + 1. p is chosen so that this order is a
+multiple of 2D, with D the common denominator of the robot's fractions of pi. Then pi/3 or pi/4 are
+exact roots of unity of F_p, not approximations. Every other fixed angle is a sum of multiples of
+unit angles, which are random points (`derive.angles`).
 
-Square roots of rationals lie in the cyclotomic field of the fractions of pi and are taken from the same root of unity, so that sqrt(3)/2 is cos(pi/6) and never -cos(pi/6). For an odd prime l, by Gauss, with the Legendre symbol (k/l) (Ireland and Rosen, A Classical Introduction to Modern Number Theory, 6.4):
+Square roots of small primes are computed from the same root of unity, so that sqrt(3)/2 is
+cos(pi/6) and never -cos(pi/6). For an odd prime l, by Gauss, with the Legendre symbol (k/l)
+(Ireland and Rosen, A Classical Introduction to Modern Number Theory, 6.4):
 
-    sqrt(l) = sum_k (k/l) cos(2 pi k/l)  if l = 1 (mod 4) ,   sum_k (k/l) sin(2 pi k/l)  if l = 3 (mod 4) ,   sqrt(2) = 2 cos(pi/4)
+    sqrt(l) = sum_k (k/l) cos(2 pi k/l)    if l = 1 (mod 4)
+    sqrt(l) = sum_k (k/l) sin(2 pi k/l)    if l = 3 (mod 4)
+    sqrt(2) = 2 cos(pi/4)
 
-Every other square root is a random residue, independent of what is under it: what holds for any number holds for the root. pi as a number is a random residue: it is transcendental. A `Number` has its value, or a residue where `geometry` gives one.
+The square root of a larger number is a power of the number. The square root of an expression with
+symbols is a random residue, independent of the expression: a relation that holds for any number
+holds for the root. The number pi is a random residue, because pi is transcendental. A `Number` has
+its value, or the residue that `geometry` gives for it.
 
-Functions of laws that F_p does not have (exp, tanh, sin of half an angle, sign of a position) are x -> (x + k)**m with a k of the function and one large m: equal where what they are of is equal, and related in no other way. What else relates them shows in numbers (`regroup.regrouping`).
+F_p does not have all functions of torque laws: exp, tanh, sine of half an angle, sign of a
+position. Such a function becomes x -> (x + k)**m, with a constant k of the function and one large
+m. Its values are equal if its operands are equal; F_p sees no other relation between them. Any
+other relation is found in floating point (`regroup.regrouping`).
 
-Directions of motion: sign(sd) = 2b - 1 with b = 1 forward, 0 backward, one b for each class of proportional rows G; max(sd, 0) = b sd. A torque is a polynomial of degree one in each b, hence zero for b = 0, 1 if and only if it is the zero polynomial; b is drawn from F_p as every other variable.
+Directions of motion: sign(sd) = 2b - 1 with b = 1 forward, 0 backward, one b for each class of
+proportional rows G; max(sd, 0) = b sd. A torque is a polynomial of degree one in each b, hence zero
+for b = 0, 1 if and only if it is the zero polynomial. So b is drawn from F_p like every other
+variable.
 """
 
 from __future__ import annotations
@@ -47,7 +65,7 @@ KEY, OPAQUE_POWER = 40_503, 479_001_599  # of functions that F_p does not have; 
 
 
 class Fp:
-    """Elements of F_p, an int64 array of any shape."""
+    """An array of elements of the finite field F_p, stored as int64, with + - * modulo p."""
 
     __array_ufunc__ = None
     __slots__ = ("p", "x")
@@ -78,7 +96,7 @@ class Fp:
 
 
 def power(x: Array, n: int, p: int) -> Array:
-    """x**n mod p, elementwise."""
+    """Return x**n mod p, elementwise."""
     result = np.ones_like(x)
     while n:
         if n & 1:
@@ -92,11 +110,12 @@ Point = tuple[Array, Array]  # (cos, sin) over F_p
 
 
 class Draw:
-    """One random robot and `samples` random states over F_p: a domain of graph nodes.
+    """A random geometry of a robot and `samples` random states, with values in F_p.
 
-    `geometry` gives residues, shape (count, 1), for constants by name, for numbers and square roots
-    and for half-angle tangents of fixed angles by their unit: `count` robots in the same states.
-    What it leaves out is random, by seed and name, in whatever order it is asked for.
+    It is a domain for `interpret`. `geometry` gives residues, shape (count, 1), for constants by
+    name, for numbers and square roots, and for half-angle tangents of the unit angles; this makes
+    `count` robots in the same states. All other residues are random. They depend on the seed and
+    the name of the quantity, not on the order in which they are computed.
     """
 
     def __init__(
@@ -125,7 +144,10 @@ class Draw:
     # --- a domain ---
 
     def symbol(self, symbol: Symbol) -> Scalar:
-        """Residues of a symbol: of a state variable one per state; otherwise one, or one per geometry drawn."""
+        """Return the residues of an input, such as q1 or a length.
+
+        A state variable has one residue per state; a constant has one, or one per geometry.
+        """
         if symbol.kind == "gravity":
             return self.constant(-self.written.gravity[int(symbol.name)])
         if symbol.kind in ("constant", "pi"):
@@ -137,11 +159,11 @@ class Draw:
         return self._fp(self._state(symbol))
 
     def number(self, c: Fraction) -> Fp:
-        """The residue of a rational."""
+        """Return the residue of a rational number."""
         return self._fp(np.array([c.numerator * pow(c.denominator, -1, self.p) % self.p]))
 
     def function(self, node: Node, x: list[Fp]) -> Fp:
-        """A cosine or sine, a square root, an inverse, a direction, a function of a law."""
+        """Apply the function of a node, such as cos, sqrt, 1/x or sign, to the residues x."""
         if isinstance(node.value, Angle):
             return self._fp(self._angle(node.value)[node.op == SIN])
         match node.op:
@@ -163,16 +185,16 @@ class Draw:
     # --- constants ---
 
     def constant(self, e: Expression) -> Scalar:
-        """A constant expression."""
+        """Return the residues of a constant expression, such as a length."""
         (value,) = interpret([self._algebra.constant(e)], self)
         return value
 
     def residues(self, value: Scalar) -> Array:
-        """A scalar as it is drawn: one residue, or one for each geometry or state."""
+        """Return the residues of a scalar as an array: one, or one per geometry or state."""
         return value.x if isinstance(value, Fp) else np.array([value % self.p])
 
     def spread(self, value: Scalar) -> Array:
-        """A scalar at all geometries and states, of shape `shape`."""
+        """Return the residues of a scalar at all geometries and states, in the shape `shape`."""
         return np.broadcast_to(self.residues(value), self.shape)
 
     def _fp(self, x: Array) -> Fp:
@@ -183,13 +205,13 @@ class Draw:
         return (np.frombuffer(digest, dtype="<u8") % (self.p - 1) + 1).astype(np.int64)
 
     def _of_geometry(self, key: str | Call) -> Array:
-        """Residues of a constant, of pi or of a square root."""
+        """Return the residues of a constant, of pi or of a square root, given or random."""
         if key not in self._geometry:
             self._geometry[key] = self._random(str(key), 1)
         return self._geometry[key]
 
     def _state(self, key: object) -> Array:
-        """A residue for each state."""
+        """Return a random residue of a quantity for each state."""
         if key not in self._residues:
             self._residues[key] = self._random(key, self.samples)
         return self._residues[key]
@@ -205,7 +227,7 @@ class Draw:
         return (a[0] * b[0] - a[1] * b[1] % p) % p, (a[0] * b[1] + a[1] * b[0] % p) % p
 
     def _multiple(self, a: Point, n: int) -> Point:
-        """The point of the angle n a."""
+        """Return the point (cos, sin) of the angle n times the angle of point a."""
         if n < 0:
             a, n = (a[0], -a[1] % self.p), -n
         if n == 1:
@@ -219,13 +241,17 @@ class Draw:
         return result
 
     def _joint(self, j: int) -> Point:
-        """The point of q_j/parts at each state."""
+        """Return the points (cos, sin) of the joint angle q_j/parts at each state."""
         if j not in self._points:
             self._points[j] = self._point_at(self._random(("angle", j), self.samples))
         return self._points[j]
 
     def _unit(self, unit: Unit) -> Point:
-        """The point of a unit angle; of pi/D a root of unity of order 2D."""
+        """Return the point (cos, sin) of a unit angle.
+
+        For pi/D the point is a root of unity of order 2D; for any other unit angle it is random,
+        unless the geometry gives it.
+        """
         if unit not in self._points:
             if unit in self._geometry:
                 self._points[unit] = self._point_at(self._geometry[unit])
@@ -237,7 +263,7 @@ class Draw:
 
     @cached_property
     def half_turn(self) -> Point:
-        """The point of the angle pi/D: of order 2D, and its multiple pi/2 is (0, 1)."""
+        """Point (cos, sin) of the angle pi/D: a root of unity of order 2D, with pi/2 at (0, 1)."""
         order = 2 * self.units.D
         rng = np.random.default_rng([self.seed, 1])
         while True:
@@ -252,7 +278,7 @@ class Draw:
                 return root
 
     def _angle(self, angle: Angle) -> Point:
-        """(cos, sin) of a constant angle, or of one that joints turn."""
+        """Return the point (cos, sin) of a constant angle, or of an angle with joint positions."""
         turns, rest = quarter_turns(angle.offset)
         quarter = ((1, 0), (0, 1), (-1, 0), (0, -1))[turns % 4]
         point: Point = (np.array([quarter[0] % self.p]), np.array([quarter[1] % self.p]))
@@ -265,7 +291,11 @@ class Draw:
         return point
 
     def _sqrt(self, root: Expression) -> Array:
-        """The square root of a rational, see the head of this module; of anything else a residue."""
+        """Return the square root of a number, or a random residue for the root of any other
+        expression.
+
+        The head of this module has the formulas.
+        """
         (call,) = root.atoms
         assert isinstance(call, Call)
         c = call.argument.constant
@@ -276,7 +306,7 @@ class Draw:
         return power(self.number(c).x, (self.p + 1) // 4, self.p)
 
     def _sqrt_of_prime(self, l: int) -> Array:
-        """sqrt(l) as a sum of cosines or sines, see the head of this module."""
+        """Return sqrt(l) of a small prime l as a sum of cosines or sines."""
         D = self.units.D
         if l == 2:
             return 2 * self._multiple(self.half_turn, D // 4)[0] % self.p
@@ -290,7 +320,11 @@ class Draw:
     # --- laws ---
 
     def forward(self, node: Node, rate: Fp) -> Fp:
-        """b of the motion along the `rate` that a sign or positive part is of: 1 forward, 0 back."""
+        """Return the variable b of the velocity in a sign or positive part: sign = 2b - 1.
+
+        b is 1 for a forward motion and 0 for a backward motion. Proportional velocities share one
+        b.
+        """
         if not isinstance(node.value, Velocity):
             return self._opaque(SIGN, [rate])
         row = node.value.row
@@ -304,16 +338,21 @@ class Draw:
         return b if lead.value(self.robot.constants) > 0 else 1 - b
 
     def _opaque(self, op: str, x: list[Fp]) -> Fp:
-        """A function of a law, see the head of this module."""
+        """Return values in place of a function that F_p does not have, such as exp or tanh.
+
+        Equal operands give equal values. The head of this module has the formula.
+        """
         total = sum((v.x * KEY**k % self.p for k, v in enumerate(x)), sum(op.encode()) * KEY)
         return self._fp(power(total % self.p, OPAQUE_POWER, self.p))
 
 
 @lru_cache
 def primes_for(robot: Robot, count: int, seed: int | None = None) -> tuple[int, ...]:
-    """`count` primes p < 2**31 with p = -1 modulo 4 and 2D, over which the square roots of the robot's rationals exist: the largest, or below a random place.
+    """Return `count` primes p < 2**31 over which the fixed angles and square roots of a robot
+    exist.
 
-    Raises SymgenError if there are too few.
+    p = -1 modulo 4 and 2D. Without a seed they are the largest such primes; with a seed, the
+    largest below a random number. Raises SymgenError if there are too few.
     """
     primes = tuple(islice(candidates(robot, seed), count))
     if len(primes) == count:
@@ -325,7 +364,11 @@ def primes_for(robot: Robot, count: int, seed: int | None = None) -> tuple[int, 
 
 
 def candidates(robot: Robot, seed: int | None = None) -> Iterator[int]:
-    """Primes with p = -1 modulo 4 and 2D over which the large radicands are squares: downwards from the largest, or from a random place."""
+    """Yield, in descending order, the primes over which angles and square roots of a robot exist.
+
+    p = -1 modulo 4 and 2D, and the large numbers under square roots are squares in F_p. The order
+    starts below 2**31, or below a random number if a seed is given.
+    """
     step = lcm(4, 2 * units_of(numbered(robot)).D)
     top = 2**31 if seed is None else int(np.random.default_rng(seed).integers(2**30, 2**31))
     squares = [c for c in radicands(robot) if c >= LARGEST_RADICAND]

@@ -1,6 +1,9 @@
-"""Frames: orientation and origin of every frame in a root, and vectors between any two frames.
+"""Poses of all frames of a robot in a root frame, and vectors between any two frames.
 
-Row k of A_0j is the axis e_k of the root in components of frame j: it only rotates, so it is taken from the carrier in one step (see `derive.geometry`). So does any vector go from carrier to carrier, and between frames with parallel z axes by one rotation about them: the sums and differences of angles that a product of rotations has are there from the start.
+Row k of A_0j is the axis e_k of the root in components of frame j. It only rotates, so it is
+transformed from the carrier in one step (see `derive.geometry`). Any other vector is transformed
+from carrier to carrier too, and by one rotation about z between frames with parallel z axes. So the
+formulas have cosines of sums and differences of angles instead of products of cosines.
 """
 
 from __future__ import annotations
@@ -17,7 +20,10 @@ IDENTITY: Matrix = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 
 
 def frame_poses(geometry: Geometry) -> dict[int, tuple[Matrix, Vector]]:
-    """{j: (A_0j, P_0j)} in the root of `geometry`, its own included unless it is the base."""
+    """Return {j: (A_0j, P_0j)}: orientation and origin of every frame j in the root frame.
+
+    The root frame itself is included, unless it is the base.
+    """
     algebra, named = geometry.algebra, Names(len(geometry.robot.frames))
     root = geometry.root
     own = (root,) if root else ()
@@ -45,13 +51,13 @@ Group = tuple[
 
 
 class Frames:
-    """Positions and directions in the frames of `geometry`."""
+    """Positions, directions and poses of the frames of a robot relative to any other frame."""
 
     def __init__(self, geometry: Geometry) -> None:
         self.geometry, self.robot = geometry, geometry.robot
 
     def rotated(self, v: Vector, j: int, i: int) -> Vector:
-        """Components in frame i of a vector with components v in frame j."""
+        """Transform the components v of a vector from frame j to frame i."""
         down: list[int] = []
         carrier, at, to = self.geometry.carrier, j, i
         while not self._parallel(at, to):
@@ -67,7 +73,7 @@ class Frames:
         return v
 
     def position(self, j: int, i: int, seen_from: int) -> Vector:
-        """Vector from the origin of frame i to that of frame j, in components of frame `seen_from`."""
+        """Return the vector from the origin of frame i to that of frame j, in frame `seen_from`."""
         to, start = self.robot.path(j), self.robot.path(i)
         total = ZERO3
         for f in to:
@@ -82,12 +88,16 @@ class Frames:
         return total
 
     def pose(self, j: int, i: int) -> tuple[Matrix, Vector]:
-        """(A_ij, P_ij): orientation and origin of frame j in frame i."""
+        """Return the orientation A_ij and the origin P_ij of frame j in frame i."""
         x, y, z = (self.rotated(e, j, i) for e in ((1, 0, 0), (0, 1, 0), E3))
         return ((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])), self.position(j, i, i)
 
     def columns(self, j: int, i: int) -> dict[int, tuple[Vector, Vector]]:
-        """{k: (velocity of O_j, angular velocity)} per unit rate of each moving joint k before frame j, in frame i."""
+        """Return the Jacobian columns of frame j by moving joint, in components of frame i.
+
+        Column k is the pair (velocity of O_j, angular velocity of frame j) per unit rate of joint
+        k.
+        """
         result: dict[int, tuple[Vector, Vector]] = {}
         for k in self.robot.path(j):
             if k in self.robot.moving:
@@ -97,7 +107,7 @@ class Frames:
         return result
 
     def _depth(self, j: int) -> int:
-        """Carriers between frame j and the base."""
+        """Return the number of carriers (see `derive.geometry`) between frame j and the base."""
         depth = 0
         while j:
             j, depth = self.geometry.carrier[j].m, depth + 1
@@ -113,16 +123,20 @@ class Frames:
         return (m, f.alpha, f.gamma if f.alpha else Expression())
 
     def _about_z(self, j: int, i: int) -> Rotation:
-        """The rotation from frame i to frame j, both with the same z axis direction."""
+        """Return the rotation about z from frame i to frame j, whose z axes are parallel."""
         return Rotation(None, *self.geometry.algebra.cos_sin(*self._between(j, i)))
 
     def _between(self, j: int, i: int) -> tuple[Turn, Expression]:
-        """The angle of frame j less that of frame i."""
+        """Return the angle of frame j minus the angle of frame i: joint multiples, and a constant.
+        """
         (turn, offset), (other, other_offset) = self.geometry.turn[j], self.geometry.turn[i]
         return summed((*turn, *((k, -n) for k, n in other))), offset - other_offset
 
     def register_angles(self, algebra: GraphAlgebra) -> None:
-        """Make the angle of every frame against every other one about the same direction an angle of `algebra`."""
+        """Add the angles between all pairs of frames with parallel z axes to the graph `algebra`.
+
+        Each such angle, for instance q2 + q3, then has a cosine and a sine with a name.
+        """
         for f in self.robot.frames:
             for g in self.robot.frames:
                 if f.j < g.j and self._parallel(f.j, g.j):

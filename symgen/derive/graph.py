@@ -181,8 +181,7 @@ class Graph:
         return Scalar(self, self.nodes[index], sign)
 
     def seal(self) -> None:
-        """Fix the names of all present nodes, so that a later derivation cannot rename any of them.
-        """
+        """Fix the names of all present nodes, so that no later derivation renames any of them."""
         self._sealed = len(self.nodes)
 
     def symbol(self, symbol: Symbol, *, fixed: bool = False) -> Scalar:
@@ -265,8 +264,7 @@ class Graph:
         return value
 
     def hint(self, value: Scalar | int, name: str) -> Scalar | int:
-        """Suggest a name for a node, used if the node is needed more than once; return its value.
-        """
+        """Suggest a name for a node, used if the node is needed more than once; return the node."""
         if isinstance(value, Scalar) and self._may_be_named(value.node) and value.node.hint is None:
             value.node.hint = name
             value.node.name_sign = value.sign

@@ -67,6 +67,8 @@ def pose(frame: Frame, q: SX, constants: Mapping[str, SX]) -> SX:
     """Return the pose iTj of frame j in its antecedent frame i, a 4 x 4 matrix.
 
         iTj = Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r)
+
+    The joint position q is added to theta (revolute) or to r (prismatic).
     """
     gamma, b, alpha, d, theta, r = (
         _symbolic(e, {}, constants)
@@ -78,8 +80,7 @@ def pose(frame: Frame, q: SX, constants: Mapping[str, SX]) -> SX:
 
 
 def _screw(axis: int, angle: SX, shift: SX) -> SX:
-    """Return a rotation about x (axis 0) or z (axis 2) with a translation along that axis, 4 x 4.
-    """
+    """Return the 4 x 4 matrix of a rotation about x (axis 0) or z (axis 2) and a shift along it."""
     T = ca.SX.eye(4)
     u, v = (axis + 1) % 3, (axis + 2) % 3
     T[u, u], T[u, v], T[v, u], T[v, v] = ca.cos(angle), -ca.sin(angle), ca.sin(angle), ca.cos(angle)
@@ -168,8 +169,7 @@ class Lagrange:
         return _floats(self._functions[name], *arguments, self._values)
 
     def vary(self, rng: np.random.Generator, states: int) -> None:
-        """Draw a random value of each channel (a constant that varies with time) for every state.
-        """
+        """Draw a random value of each channel (a constant that varies with time) per state."""
         self._values = np.tile(self._values, (states, 1))
         for name in self.robot.channels:
             self._values[:, [*self.constants].index(name)] = rng.uniform(0.5, 2, states)

@@ -1,10 +1,14 @@
-"""The columns of the standard regressor, by name: Gamma_a = sum_k D_k chi_k in the actuated joints; those of the inertial parameters in axis form, without propagating a wrench.
+"""Columns D_k of the standard regressor, by parameter name: Gamma_a = sum_k D_k chi_k.
 
-Joint i feels the unit wrench (F, N) of a parameter of link j through its own axis seen from frame j,
+Gamma_a are the torques of the actuated joints. The columns of inertial parameters are computed from
+the joint axes, without propagating a wrench. A parameter of link j, set to 1, needs a wrench (F, N)
+on link j. Joint i feels this wrench through its own axis, expressed in frame j:
 
     D_ik = z_ij . N_k + v_ij . F_k
 
-z_ij the axis of joint i in frame j, v_ij the velocity of O_j per unit rate of joint i; both are carried outward: z <- jRi' z, v <- jRi' (v + z x P). A prismatic joint has z = 0 and v = its direction.
+z_ij is the axis of joint i in frame j, v_ij the velocity of O_j per unit rate of joint i. Both are
+propagated from the base to the tips: z <- jRi' z, v <- jRi' (v + z x P). A prismatic joint has
+z = 0, and v is its direction.
 """
 
 from __future__ import annotations
@@ -34,23 +38,26 @@ UNITS_OF_LINKS = {"M": "kg", "MX": "kg*m", "MY": "kg*m", "MZ": "kg*m"}
 
 @lru_cache(maxsize=16)
 def inertial_names(robot: Robot) -> dict[str, tuple[str, int]]:
-    """{name: (inertial parameter, link)}."""
+    """Return {name: (inertial parameter, link)}, for instance {ZZ1: (ZZ, 1)}."""
     return {parameter(p, j): (p, j) for j in robot.links for p in INERTIAL}
 
 
 def element_names(robot: Robot) -> dict[str, tuple[Element, int]]:
-    """{name: (element, key)}."""
+    """Return {parameter name: (element, number)}, for instance {FV2: (element FV, 2)}."""
     return {parameter(e.family, j): (e, j) for e in robot.elements for j in e.keys}
 
 
 def acting(e: Element, j: int) -> dict[Any, Expression]:
-    """Row {joint: G}, or form {(i, k): B}, i <= k, of an element's key."""
+    """Return the coefficients with which parameter j of an element acts on the joints.
+
+    They are its row {joint: G}, or its form {(i, k): B} with i <= k.
+    """
     form = {place: b for place, b in sorted(e.form.get(j, {}).items()) if place[0] <= place[1]}
     return form or dict(e.along[j])
 
 
 def unit(robot: Robot, name: str) -> str:
-    """Unit of a standard parameter, by family and by what its joint does."""
+    """Return the SI unit of a standard parameter; for friction it depends on the type of joint."""
     inertial = inertial_names(robot)
     if name in inertial:
         return UNITS_OF_LINKS.get(inertial[name][0], "kg*m**2")
@@ -59,7 +66,7 @@ def unit(robot: Robot, name: str) -> str:
 
 
 def columns(motion: Motion, names: Iterable[str]) -> dict[str, dict[int, Scalar]]:
-    """{name: {actuated joint: D}} of the standard parameters `names`."""
+    """Return the regressor columns {parameter: {actuated joint: D}} of the given parameters."""
     robot, closure, algebra = motion.robot, motion.geometry.closure, motion.algebra
     inertial, elements = inertial_names(robot), element_names(robot)
     axes = Axes(motion)
@@ -77,13 +84,17 @@ def columns(motion: Motion, names: Iterable[str]) -> dict[str, dict[int, Scalar]
 
 
 def unit_wrench(m: LinkMotion, parameter: str) -> tuple[Vector, Vector]:
-    """(F, N) of a link whose only inertial parameter is `parameter` = 1."""
+    """Return the force F and moment N that move a link with the only parameter `parameter` = 1."""
     K = dict.fromkeys(INERTIAL, 0) | {parameter: 1}
     return force(m, K), moment(m, K)
 
 
 class Axes:
-    """z_ij and v_ij of every joint i on the path to link j."""
+    """The axes of all joints before each link, in the frame of the link.
+
+    z_ij is the axis of joint i in frame j, v_ij the velocity of origin O_j per unit rate of joint
+    i.
+    """
 
     def __init__(self, motion: Motion) -> None:
         self.motion = motion
@@ -115,7 +126,10 @@ class Axes:
             self.z[j, j], self.v[j, j] = (E3, ZERO3) if frame.sigma == REVOLUTE else (ZERO3, E3)
 
     def column(self, parameter: str, j: int) -> dict[int, Scalar]:
-        """{i: D_ik} of an inertial parameter of link j, i over the moving joints that carry it."""
+        """Return the torques {i: D_ik} of an inertial parameter of link j that is set to 1.
+
+        The joints i are the moving joints between the base and link j.
+        """
         F, N = unit_wrench(self.motion.link[j], parameter)
         motion = self.motion
         entries: dict[int, Scalar] = {}

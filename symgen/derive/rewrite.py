@@ -1,12 +1,14 @@
-"""One model out of the derivation: its graph with inputs replaced, and no value written twice.
+"""Graphs of single models, copied from the derivation with some inputs replaced.
 
-Every model is the recursion with some inputs set: bias is Gamma at qdd = 0, a column of the inertia
-matrix Gamma of a unit acceleration at qd = 0 without gravity, base parameters replace
-the standard parameters they are called after and all others are 0. What becomes zero goes.
+Every model is the recursion with some inputs set. The bias is Gamma at qdd = 0. A column of the
+inertia matrix is Gamma of a unit acceleration at qd = 0 without gravity. Base parameters replace
+the standard parameters of the same name, and all other standard parameters are 0. Terms that become
+zero disappear.
 
-Hash-consing finds what is written alike; a few nodes are equal but written differently, and some
-differences of equal products vanish identically. Both show at random states of a random geometry
-over F_p, which never rounds: nodes with the same value are merged, up to sign.
+Hash-consing finds equal values that are written in the same way. Some nodes are equal but written
+differently, and some differences of equal products vanish identically. Both are found at random
+states of a random geometry over F_p, which never rounds: nodes with the same value up to sign are
+merged.
 """
 
 from __future__ import annotations
@@ -43,22 +45,25 @@ Inputs = Mapping[Symbol, Input]
 
 
 class ByNode(Draw):
-    """A draw in which every velocity has a direction of its own: sign(K qd) is not sign(qd), since K may have either sign."""
+    """Random values over F_p in which the sign of each velocity is independent of all others.
+
+    sign(K qd) is not treated as sign(qd), since K may be negative.
+    """
 
     def forward(self, node: Node, rate: Fp) -> Fp:
         return self._opaque(SIGN, [rate])
 
 
 class Rewrite:
-    """A graph of its own, `algebra`, to which values of the derivation `source` are copied.
+    """A new graph, `algebra`, to which values of a derivation are copied with replaced inputs.
 
     Parameters
     ----------
     source : GraphAlgebra
-        The algebra of the derivation.
+        The graph of the derivation.
     inputs : mapping
-        Symbol, constant expression, or value over the new algebra in the place of an input; others
-        stay as they are.
+        {input: its replacement}, a symbol, a constant expression, or a function that returns a value
+        in the new graph; other inputs stay as they are.
     """
 
     def __init__(self, source: GraphAlgebra, inputs: Inputs) -> None:
@@ -77,9 +82,10 @@ class Rewrite:
     def copied(
         self, outputs: Sequence[Scalar | int], inputs: Inputs | None = None, tag: str = ""
     ) -> list[Scalar | int]:
-        """`outputs` in the new graph, where `inputs` go before those of all cases.
+        """Copy `outputs` to the new graph, with further `inputs` replaced for this call only.
 
-        Names of steps that depend on them end in `tag`.
+        These replacements have priority over the general ones. Names of intermediate variables that
+        depend on them end in `tag`.
         """
         self._case = inputs or {}
         self._tag = tag
@@ -114,9 +120,10 @@ class Rewrite:
         return image
 
     def _name(self, node: Node, image: Scalar, *, merged: bool) -> None:
-        """Carry the name of a step over.
+        """Give the copy of a node the name of the node.
 
-        U = DV - WP is a product of WP = DV - product: its name would turn the recursion around.
+        A node merged with an earlier one gets no name of a RECURSIVE family. Otherwise U = DV - WP,
+        if it equals a product in WP = DV - product, would turn the recursion around.
         """
         signed = image if node.name_sign > 0 else -image
         tag = self._tag if node.index in self._replaced else ""
@@ -156,14 +163,14 @@ class Rewrite:
         return graph.call(node.op, operand, *more, of=of)
 
     def _sum(self, a: Scalar | int, b: Scalar | int) -> Scalar | int:
-        """a + b, without a term of a that b takes away: (x + y) + (z - x) = y + z."""
+        """Return a + b without terms that cancel: (x + y) + (z - x) = y + z."""
         for (x, y), (o, z) in product(_parts(a), _parts(b)):
             if o.node is x.node and o.sign != x.sign:
                 return self._sum(y, z)
         return a + b
 
     def _is_given(self, node: Node) -> bool:
-        """Whether the angle of a cosine or sine holds a joint position that is replaced."""
+        """Whether a joint position in the angle of a cosine or sine is replaced."""
         return node.value is not None and any(
             Symbol("q", f"q{j}") in self.inputs for j, _ in node.value.turn
         )
@@ -183,7 +190,8 @@ class Rewrite:
     # --- values over F_p ---
 
     def _merged(self, image: Scalar) -> Scalar | int:
-        """`image`, or an equal node that was there before."""
+        """Return the earlier number or node that has the same value, or `image` if there is none.
+        """
         node = image.node
         if node.index not in self._same:
             self._same[node.index] = self._first_of(node)
@@ -191,7 +199,7 @@ class Rewrite:
         return same if image.sign > 0 else -same
 
     def _first_of(self, node: Node) -> Scalar | int:
-        """0, 1 or -1 if that is the value of the node, else the first node of its value."""
+        """Return 0, 1 or -1 if the node has this value, else the first node of equal value."""
         p = self.draw.p
         (value,) = interpret([self.graph.scalar(node.index, 1)], self.draw, self._value)
         residues = self.draw.residues(value).tolist()
@@ -206,7 +214,7 @@ class Rewrite:
 
 
 def _parts(s: Scalar | int) -> Iterator[tuple[Scalar, Scalar | int]]:
-    """Each term of a value, the value itself first, and what is left without it."""
+    """Yield pairs (term, rest) whose sum is the value s; the first pair is s with rest 0."""
     if isinstance(s, Scalar):
         yield s, 0
         if s.node.op == ADD:

@@ -14,7 +14,7 @@ from symgen.description.expression import PI, Expression
 FULL_TURN = 2 * math.pi  # rad: a larger constant in an angle, pi aside, was meant in degrees
 
 _YAML = {  # what the scanner says: what to change
-    "'\\t'": "a tab stands here; indent with spaces",
+    "'\\t'": "there is a tab here; indent with spaces",
     "mapping values are not allowed here": (
         "a second `: ` on this line; put text that holds one between quotes"
     ),
@@ -34,9 +34,7 @@ _YAML = {  # what the scanner says: what to change
 
 
 def yaml_advice(problem: str) -> str:
-    """Return the hint for an error message `problem` of the YAML parser, such as "indent with
-    spaces".
-    """
+    """Return a hint for an error message `problem` of the YAML parser, for instance on a tab."""
     return next((f"; {advice}" for part, advice in _YAML.items() if part in problem), "")
 
 
@@ -61,8 +59,7 @@ def unit_advice(token: str) -> str:
 
 
 def degrees_advice(angle: Expression, constants: dict[str, float]) -> str:
-    """Return a hint if an angle larger than a full turn was probably written in degrees, not in
-    rad.
+    """Return a hint if an angle larger than a full turn was probably written in degrees.
 
     Multiples of pi in the angle are ignored. `angle` is given without the joint variable q_j.
     """

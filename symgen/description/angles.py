@@ -15,8 +15,7 @@ ALL_DIGITS = 1e-12  # rad: closer to a multiple of pi/12 is that multiple in eve
 
 
 class RobotFileWarning(UserWarning):
-    """Warning about a value in a URDF, MJCF or .par file that its author probably did not intend.
-    """
+    """Warning about a value in a URDF, MJCF or .par file that was probably not intended."""
 
 
 class InertiaWarning(RobotFileWarning):
@@ -24,7 +23,9 @@ class InertiaWarning(RobotFileWarning):
 
 
 class AngleWarning(RobotFileWarning):
-    """Warning that angles of a file were rounded to multiples of pi/12; `exact=True` prevents this.
+    """Warning that angles of a file were rounded to multiples of pi/12.
+
+    `exact=True` prevents the rounding.
     """
 
 
@@ -38,8 +39,7 @@ class Angles:
         Whether all angles stay as written in the file.
     near : list of tuple
         Each angle that differs from a multiple k pi/12 by at most SNAP and more than ALL_DIGITS:
-        its
-        name (joint, angle and line), its value in the file (rad), and k.
+        its name (joint, angle and line), its value in the file (rad), and k.
     """
 
     exact: bool
@@ -57,11 +57,10 @@ class Angles:
         return None if self.exact else k
 
     def report(self, file: str) -> tuple[str, tuple[str, ...]]:
-        """Describe how angles near multiples of pi/12 were read: a text for headers, and a tuple of
-        notes.
+        """Return a text and notes on how angles near multiples of pi/12 were read.
 
-        If angles were rounded, a note names the largest change, and an AngleWarning is issued. Both
-        results are empty if the file has no such angle.
+        The text is for file headers. If angles were rounded, a note names the largest change, and
+        an AngleWarning is issued. Both results are empty if the file has no such angle.
         """
         if not self.near:
             return "", ()

@@ -84,8 +84,7 @@ def substituted(e: Expression, values: Mapping[str, Expression]) -> Expression:
 
 
 def mapped(robot: Robot, length: Change, angle: Change = lambda e: e) -> Robot:
-    """Apply `length` to all lengths of `robot` and `angle` to all its angles, and return the new
-    robot.
+    """Return `robot` with `length` applied to its lengths and `angle` applied to its angles.
 
     `length` is also applied to gravity and to the coefficients of elements. A constraint on a
     prismatic joint counts as a length, a constraint on a revolute joint as an angle.
@@ -113,7 +112,9 @@ def mapped(robot: Robot, length: Change, angle: Change = lambda e: e) -> Robot:
 
 
 def _numbers(robot: Robot) -> dict[str, Expression]:
-    """Map each constant to its exact number; a constant in an angle may become a multiple of pi/12.
+    """Map the name of each constant to its value as an exact number.
+
+    A constant that occurs in an angle becomes a multiple of pi/12 if it is near such a multiple.
     """
     in_angles = {s for f in robot.frames for e in (f.gamma, f.alpha, f.theta0) for s in e.symbols}
     in_angles |= {

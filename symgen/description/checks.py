@@ -34,7 +34,9 @@ from symgen.errors import DescriptionError
 
 
 def check_robot(robot: Any) -> None:
-    """Check that the fields of `robot` describe a valid mechanism; raise DescriptionError if not.
+    """Check that the fields of `robot` describe a valid mechanism.
+
+    Raises DescriptionError if they do not.
     """
     _check_tree(robot.frames, robot.massless)
     check_names(robot)
@@ -150,8 +152,8 @@ def _check_geometry(robot: Any) -> None:
             if not variable and moves(e):
                 raise DescriptionError(
                     (
-                        f"frame {f.j}: {name} = {e}; a joint position stands in theta if sigma is "
-                        "0, in r if sigma is 1, nowhere else"
+                        f"frame {f.j}: {name} = {e}; write the joint position in theta if sigma is "
+                        "0, in r if sigma is 1, and nowhere else"
                     ),
                     path=where,
                 )
@@ -237,8 +239,7 @@ def _other_sigma(f: Frame) -> str:
 
 
 def _check_element(e: Element, robot: Any) -> None:
-    """Check one element on the joints: its kind, law, unit, direction of motion and coefficients.
-    """
+    """Check one element: its kind, law, unit, direction of motion and coefficients."""
     where: Path = ("elements", e.family)
     both = sorted(set(e.along) & set(e.form))
     laws = [law for law in (e.torque, e.energy) if law is not None]
@@ -372,8 +373,7 @@ def _check_drives(robot: Any) -> None:
 
 
 def _check_limits(robot: Any) -> None:
-    """Check that each limit has one entry per actuated joint, with lower bounds below upper bounds.
-    """
+    """Check the joint limits: one entry per actuated joint, lower bounds below upper bounds."""
     n = len(robot.joints)
     for name, row in robot.limits.items():
         if name not in ("q", "qd", "qdd", "tau") or len(row) != n:
@@ -393,9 +393,7 @@ def _check_limits(robot: Any) -> None:
 
 
 def _meant(name: str, robot: Any) -> str:
-    """Suggest the parameter that was probably meant by the unknown `name` under `values` or
-    `assume`.
-    """
+    """Suggest the parameter that was probably meant by an unknown name in a robot file."""
     if name.endswith("R") and name[:-1] in robot.parameters:
         return f"; base parameters (...R) are not given, standard ones are: {name[:-1]}"
     number = re.search(r"\d+\Z", name)

@@ -61,9 +61,7 @@ class LawScalar:
 
 
 def _scalars(table: Mapping[str, Any], declared: Any) -> dict[str, LawScalar]:
-    """Convert the scalars of a law in a file to LawScalar objects; a plain number is a fixed
-    scalar.
-    """
+    """Convert the scalars of a law to LawScalar objects; a plain number is a fixed scalar."""
     return {
         name: x if isinstance(x, LawScalar) else LawScalar((float(x), float(x)))
         for name, x in table.items()
@@ -71,8 +69,7 @@ def _scalars(table: Mapping[str, Any], declared: Any) -> dict[str, LawScalar]:
 
 
 def _law(text: str | None, declared: Any) -> Expression | None:
-    """Parse the text of a law written by the user; `check_law` later refuses unknown names in it.
-    """
+    """Parse the text of a law from a robot file; `check_law` later refuses unknown names."""
     try:
         return None if text is None else parse(text, None, LAWS)
     except ExpressionError as error:
@@ -161,8 +158,8 @@ class Element:
         return {parameter(name, j): x for name, x in values.items() for j in self.keys}
 
     def _of_key(self, law: Expression, j: int) -> Expression:
-        """Replace the scalars in `law` for key j: by symbols (vs by vs3), or by numbers if they are
-        fixed.
+        """Replace fitted scalars in `law` by symbols of key j (vs by vs3), fixed scalars by
+        numbers.
 
         The transmitted torque tau_model becomes channel.tau_model3.
         """
@@ -183,20 +180,15 @@ class Element:
         return sorted(name.removeprefix(CHANNEL) for name in names if name.startswith(CHANNEL))
 
     def law(self, j: int) -> Expression:
-        """Return the torque along s of key j for the parameter value 1; zero if the file gives an
-        energy.
-        """
+        """Return the torque along s of key j for the parameter value 1; zero for an energy law."""
         return self._of_key(self.torque or KINDS[self.kind].torque, j)
 
     def potential(self, j: int) -> Expression:
-        """Return the energy of key j for the parameter value 1; zero if the element has a torque
-        instead.
-        """
+        """Return the energy of key j for the parameter value 1; zero for a law that is a torque."""
         return self._of_key(self.energy or ZERO, j)
 
     def laws(self, j: int) -> tuple[Expression, dict[int, Expression]]:
-        """Return the torques of key j for the parameter value 1: along s, and at joints in its
-        energy.
+        """Return the torques of key j for the parameter value 1: along s, and at joints in U.
 
         With the torque x along s and the energy U, Gamma = G' x + dU/dq_i. The torque x includes
         the derivative of U with respect to s. The second result maps each joint i that U names to
@@ -208,9 +200,7 @@ class Element:
 
     @property
     def is_own(self) -> bool:
-        """Whether the law differs from inertia, viscous and Coulomb friction, constant offset and
-        spring.
-        """
+        """Whether the law is special: no inertia, viscous or Coulomb friction, offset or spring."""
         return (
             bool(self.torque or self.energy or self.scalars)
             or self.kind not in USUAL_KINDS.values()
@@ -218,8 +208,7 @@ class Element:
 
     @property
     def acts_as(self) -> str:
-        """Kind of the element in generated modules; for special laws only "column" or
-        "dissipative".
+        """Kind of the element in generated modules: "column" or "dissipative" for special laws.
 
         Generated modules do not know special laws, only whether such a law dissipates energy.
         """
@@ -302,8 +291,7 @@ def check_law(e: Element, robot: Any) -> None:
 
 
 def _positions(robot: Any, row: Any) -> tuple[float, float]:
-    """Choose two joint positions at which a law is tested, within the joint limits if they are
-    known.
+    """Choose two joint positions at which a law is tested, if possible within the joint limits.
 
     Without limits, or for several joints, the positions are -0.4 and 0.7.
     """
@@ -315,7 +303,7 @@ def _positions(robot: Any, row: Any) -> tuple[float, float]:
 
 
 def check_channels(robot: Any) -> None:
-    """Check that a channel (a constant that varies with time) occurs only in laws, as channel.NAME.
+    """Check that a channel, a constant that varies with time, is used only as channel.NAME in laws.
     """
     of_frames = [
         getattr(f, name)

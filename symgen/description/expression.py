@@ -70,8 +70,7 @@ class Call:
 
 @dataclass(frozen=True)
 class Number:
-    """A positive rational that formulas show as the robot file writes it: 0.4318**2, not
-    0.18645124.
+    """A positive rational that stays as the robot file writes it: 0.4318**2, not 0.18645124.
 
     See `derive.numbers`.
     """
@@ -163,9 +162,7 @@ class Expression:
         return result
 
     def inverse(self) -> Expression:
-        """Return 1/e: a single term is inverted factor by factor, a sum becomes the function
-        inv(e).
-        """
+        """Return 1/e: a product is inverted factor by factor, a sum becomes the function inv(e)."""
         if not self.terms:
             raise ZeroDivisionError
         if len(self.terms) == 1:
@@ -430,9 +427,10 @@ def _sqrt_of_rational(c: Fraction) -> Expression:
 def _sqrt(e: Expression) -> Expression:
     """Return the square root of an expression, simplified if possible.
 
-        sqrt(c m) = sqrt(c) sqrt(m)  for a rational c > 0
-        sqrt(a + b) = sqrt((a + s)/2) +- sqrt((a - s)/2)  if b**2 and s = sqrt(a**2 - b**2) are
-        rational
+    The rules for one term c m, and for a sum a + b in which b**2 and s are rational, are
+
+        sqrt(c m) = sqrt(c) sqrt(m),   c > 0 rational
+        sqrt(a + b) = sqrt((a + s)/2) +- sqrt((a - s)/2),   s = sqrt(a**2 - b**2)
 
     For instance, sqrt(3 + 2 sqrt(2)) = 1 + sqrt(2).
     """
@@ -571,8 +569,9 @@ def with_known_cosines(e: Expression) -> Expression:
 def simplified(e: Expression) -> Expression:
     """Simplify an expression by cos(a)**2 + sin(a)**2 = 1 wherever both terms occur in it.
 
-        cos(a)**2 m + sin(a)**2 m = m
-        m - cos(a)**2 m = sin(a)**2 m
+    The rules for any factor m are
+
+        cos(a)**2 m + sin(a)**2 m = m,   m - cos(a)**2 m = sin(a)**2 m
     """
     terms: dict[Monomial, Fraction] = {}
     monomials: list[Monomial] = []  # by their place
@@ -612,9 +611,7 @@ def simplified(e: Expression) -> Expression:
 
 
 def _sine_and_rest(m: Monomial) -> list[tuple[Monomial, Monomial]]:
-    """For each cos(a)**2 in the monomial m, return m with sin(a)**2 instead, and m without this
-    factor.
-    """
+    """For each cos(a)**2 in m, return m with sin(a)**2 instead, and m without this factor."""
     pairs = []
     for a, n in m:
         if isinstance(a, Call) and a.function == "cos" and n >= 2:
@@ -643,8 +640,7 @@ def ratio(x: float) -> Fraction:
 
 
 def twelfths(angle: float, within: float) -> int | None:
-    """Find the integer k for which k pi/12 lies within `within` rad of `angle`; None if there is
-    none.
+    """Find the integer k for which k pi/12 lies within `within` rad of `angle`, else None.
 
     Angles in drawings are often such multiples.
     """

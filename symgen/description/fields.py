@@ -93,8 +93,7 @@ class Given:
 
 
 class Written:
-    """Annotation of a field: its type `form` in a file, and the function `turn` that converts it.
-    """
+    """Annotation of a field: its type `form` in a file, and `turn`, which converts its value."""
 
     def __init__(
         self, form: Any, turn: Callable[[Any, Declared], Any] = lambda value, _: value
@@ -104,8 +103,7 @@ class Written:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> core_schema.CoreSchema:
-        """Build the schema by which pydantic validates the field as written in a file and converts
-        it.
+        """Build the pydantic schema that validates the field as written in a file and converts it.
 
         In Python, without a file, the final value of the field is given and is not converted.
         """
@@ -174,9 +172,7 @@ def _interval(value: Any) -> tuple[float, float]:
 
 
 def plain(value: Any) -> Any:
-    """Convert numbers of other packages, such as NumPy, to Python numbers, also in lists and
-    tables.
-    """
+    """Convert numbers of other packages (NumPy) to Python numbers, also in lists and tables."""
     if isinstance(value, Mapping):
         return {key: plain(x) for key, x in value.items()}
     if isinstance(value, list | tuple):

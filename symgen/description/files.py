@@ -28,8 +28,7 @@ UNREAD = {
 
 
 def packaged_robots() -> tuple[str, ...]:
-    """List the names of the robots in this package, which `load_robot` accepts in place of a path.
-    """
+    """List the names of the packaged robots, which `load_robot` accepts in place of a path."""
     folder = resources.files("symgen.description") / "robots"
     return tuple(
         sorted(
@@ -54,8 +53,7 @@ def load_robot(source: str | Path, *, keep_fixed: bool = False, exact: bool = Fa
     exact : bool
         For a URDF, MJCF or `.par` file: whether angles stay as written, which a calibrated robot
         needs. Otherwise, an angle within 1e-4 rad of a multiple of pi/12 becomes this multiple, and
-        an
-        AngleWarning names the largest change.
+        an AngleWarning names the largest change.
 
     Returns
     -------
@@ -79,8 +77,7 @@ def read_robot(
     lock: Mapping[str, float] | None = None,
     chain: tuple[str, str] | None = None,
 ) -> tuple[Robot, tuple[str, ...]]:
-    """Read a robot as `load_robot` does, and also return notes on data that were changed or left
-    out.
+    """Read a robot as `load_robot` does; return it and notes on changed or omitted data.
 
     Parameters
     ----------
@@ -92,14 +89,13 @@ def read_robot(
         For a URDF or MJCF: positions at which joints are held, by joint name.
     chain : tuple of str
         For a URDF or MJCF: names of a base link and a tip link. Only the joints between these links
-        move; the other joints are held at zero.
+        move; all others are held at zero.
 
     Raises
     ------
     DescriptionError
         As in `load_robot`; also if `lock` or `chain` is given for another format, or names a joint
-        or
-        link that the file does not have.
+        or link that the file does not have.
     """
     if not isinstance(source, str | Path):
         raise DescriptionError(
@@ -166,8 +162,7 @@ def _beside(path: Path) -> Callable[[str, int], bytes]:
 def write_robot(
     robot: Robot, file: str, *, comments: Sequence[str] = ()
 ) -> tuple[str, tuple[str, ...]]:
-    """Return the text of `robot` in the format given by the suffix of `file`, and notes on lost
-    data.
+    """Return the text of `robot` in the format given by the suffix of `file`, and notes.
 
     The notes list what the format cannot store. No file is written.
 

@@ -143,7 +143,7 @@ def _refuse(root: XmlElement) -> None:
     for e in root.iter():
         if e.tag in MULTIPLIED:
             raise DescriptionError(
-                f"<{e.tag}> is not read; write out what it stands for, as MuJoCo's saved XML does",
+                f"<{e.tag}> is not read; write out the elements it makes, as the XML that MuJoCo saves does",
                 line=e.line,
             )
         for key, value in e.attrib.items():

@@ -120,9 +120,7 @@ def check_names(robot: Any) -> None:
 
 
 def check_families(elements: Sequence[Element]) -> None:
-    """Check that each family of elements, such as FV, and each of its parameters has a name of its
-    own.
-    """
+    """Check that each family of elements, such as FV, and each parameter has its own name."""
     families = [e.family for e in elements]
     for e in elements:
         family, path = e.family, ("elements", e.family)
@@ -144,8 +142,7 @@ def check_families(elements: Sequence[Element]) -> None:
 
 
 def _of_others(name: str) -> str:
-    """Describe what `name` already means in generated code or in Python; empty if the name is free.
-    """
+    """Describe what `name` already means in generated code or Python; "" if it is free."""
     if STATES.match(name):
         return "a joint position, rate or torque (q, QP, QDP, GAM and a number)"
     if name in LAYOUT:
@@ -154,9 +151,7 @@ def _of_others(name: str) -> str:
 
 
 def _check_labels(labels: Mapping[int, str], frames: int) -> None:
-    """Check that each joint label belongs to an existing frame, and that the labels are all
-    different.
-    """
+    """Check that each joint label belongs to an existing frame and that labels are different."""
     used: dict[str, int] = {}
     for j, text in labels.items():
         message = ""
@@ -175,9 +170,7 @@ def _check_labels(labels: Mapping[int, str], frames: int) -> None:
 
 
 def is_label(text: str) -> bool:
-    """Whether `text` is allowed as a joint label: short, printable, without quotes or comment
-    marks.
-    """
+    """Whether `text` is allowed as a joint label: short, printable, without quotes."""
     return (
         0 < len(text) <= LONGEST_LABEL
         and text.isprintable()
@@ -208,15 +201,11 @@ class Namespace:
         return self._written.get(name, name)
 
     def has(self, name: str) -> bool:
-        """Whether `name` is already used in the generated file, or is a reserved word of its
-        language.
-        """
+        """Whether `name` is already used in the file, or is a reserved word of its language."""
         return name in self._taken or self._is_word(name)
 
     def own(self, name: str) -> str:
-        """Reserve a free name for an internal variable: `name`, with underscores added if it is
-        taken.
-        """
+        """Reserve a name for an internal variable: `name`, with underscores added if needed."""
         free = f"{name}_" if self._is_word(name) else name
         while free in self._taken:
             free += "_"
@@ -226,8 +215,7 @@ class Namespace:
         return free
 
     def inner(self) -> Namespace:
-        """Make the namespace of one function in the generated file, starting with all names used so
-        far.
+        """Make the namespace of one function in the file, starting with all names used so far.
 
         Names that the function reserves stay local. Its renamed variables are also listed for the
         file.

@@ -443,4 +443,4 @@ def _note_rest(par: _Par) -> None:
         if any(text not in ("0", "") for text, _ in par.lists.get(key, ())):
             par.notes.append(f"{key} is not read: the base rests and joints are rigid")
     if "Z" in par.lists and "".join(text for text, _ in par.lists["Z"]) != _IDENTITY:
-        par.notes.append("Z is not read: everything is told in frame 0")
+        par.notes.append("Z is not read: all vectors are in frame 0")

@@ -161,8 +161,8 @@ def assumed(table: Mapping[str, str], declared: Declared) -> frozenset[str]:
             names.add(key)
         else:
             raise DescriptionError(
-                f"{key}: {text}; only what is zero is taken into the regrouping; a known value "
-                "stands under values, a prior of method feasible",
+                f"{key}: {text}; only zero values change the regrouping; write a known value "
+                "under `values`, where method feasible uses it as a prior",
                 path=(key,),
             )
     return frozenset(names)

@@ -191,7 +191,7 @@ def _advice(path: Path, given: Any, message: str) -> str:
     if path[:1] == ("constants",) and isinstance(given, int):
         return "; a decimal comma? write 0.06, not 0,06"
     if path[:1] == ("constants",) and "undeclared symbol" in message:
-        return "; a constant is a number of its own: sums of constants stand where they are used"
+        return "; a constant is one number; write a sum of constants where it is used"
     return ""
 
 

@@ -102,8 +102,8 @@ def robot_of_tree(
     """
     if free := [joint for joint in tree.joints if joint.kind == FREE_TYPE]:
         raise DescriptionError(
-            f"free joint {free[0].name!r}: a robot stands on a base that rests; to hold this one "
-            f"where the file has it: symgen convert --lock {free[0].name}=0",
+            f"free joint {free[0].name!r}: the base of a robot must be fixed; to fix this one "
+            f"at its pose in the file: symgen convert --lock {free[0].name}=0",
             line=free[0].line,
         )
     table = placed(tree, keep_fixed=keep_fixed)

@@ -74,7 +74,7 @@ def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> XmlElement:
     """Parse XML and return its root element; DescriptionError names the line that is not plain XML."""
     if len(content) > MAX_BYTES:
         raise DescriptionError(
-            f"more than {MAX_BYTES} bytes; meshes belong into files of their own", line=1
+            f"more than {MAX_BYTES} bytes; put meshes into files of their own", line=1
         )
     parser = expat.ParserCreate()
     top = XmlElement("", {}, 0, 0)

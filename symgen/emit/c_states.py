@@ -37,8 +37,7 @@ class CStates:
         return cls(spec.robot.name, joints | tied, closed=True)
 
     def arguments(self, *states: str) -> list[str]:
-        """Return the names of the arguments that pass the given states: s, or one name per state.
-        """
+        """Return the argument names that pass the given states: s, or one name per state."""
         return ["s"] if self.closed else [*states]
 
     def parameters(self, *states: str) -> list[str]:

@@ -181,7 +181,9 @@ def _constant(e: Expression) -> str:
 
 
 def _comment(text: str) -> str:
-    """Make a text safe in a C comment: it cannot end the comment, start another or continue a line.
+    """Make a text safe inside a C comment, so that it cannot end the comment early.
+
+    The text can neither start another comment nor continue a line.
     """
     shown = "".join(c if c.isprintable() else " " for c in plain(text))
     return re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", r"\g<0> ", shown)

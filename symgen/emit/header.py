@@ -71,7 +71,7 @@ def header(spec: ModuleSpec, texts: Mapping[str, Text], formulas: bool) -> list[
     absorbing = one_sided_friction_that_absorbs(regrouping)
     if absorbing:
         lines += wrap_text(
-            f"In motion only: {' '.join(absorbing)} take in a constant force that no offset tells "
+            f"In motion only: {' '.join(absorbing)} contain a constant force, since no offset separates it "
             "from friction; at rest, in `gravity` and in `bias` at qd = 0, that force is missing.",
             "    ",
         )
@@ -103,8 +103,7 @@ def line_of(title: str, text: str) -> list[str]:
 
 
 def grouped(regrouping: Regrouping) -> dict[str, str]:
-    """Return the formulas of the base parameters that combine several standard parameters, by name.
-    """
+    """Return the formulas of the base parameters that combine several standard parameters."""
     return {b.name: str(b.formula) for b in regrouping.base if b.name != b.own}
 
 

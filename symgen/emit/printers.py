@@ -87,8 +87,7 @@ class Language:
         return re.sub(r"\bpi\b", self.pi, text)
 
     def entries(self, targets: Sequence[str], value: str, remark: str) -> list[str]:
-        """Write the lines that assign a value to all places of an entry, with a remark after a tab.
-        """
+        """Write the lines that assign a value to all places of an entry; a remark follows a tab."""
         targets = [" = ".join(targets)] if self.chained else targets
         return [f"{self.entry.format(target, value)}\t{remark}" for target in targets]
 
@@ -334,9 +333,7 @@ class Text:
         return f"{minus}{language.calls[node.op]}({operands})"
 
     def _sum(self, s: Scalar) -> str:
-        """Write a sum with positive terms first, so that it starts with a minus only if all are
-        negative.
-        """
+        """Write a sum, positive terms first, so that it seldom starts with a minus sign."""
         terms = map(self._operand, self._addends(s))
         first, *rest = sorted(terms, key=lambda t: t.startswith("-"))
         return first + "".join(

@@ -219,16 +219,14 @@ def _filled_at_once(
 
 
 def _passed_constants(robot: Robot, names: Sequence[str]) -> str:
-    """Write the constants as arguments: one tuple, and another one for functions of time, if any.
-    """
+    """Write the constants as arguments: a tuple, and a second one for functions of time."""
     timed = [c for c in names if c in robot.channels]
     rest = tuple_of([c for c in names if c not in timed])
     return f"{rest}, {tuple_of(timed)}" if timed else rest
 
 
 def _outputs(spec: ModuleSpec, models: Iterable[Model]) -> list[str]:
-    """Write the table of functions for CasADi: arguments of each function and names of its results.
-    """
+    """Write the table of functions for CasADi: arguments and result names of each function."""
     names, rows = spec.names(PYTHON.is_word), {"base_parameters": ("standard", "X")}
     own = {result: names.own(result) for result in dict.fromkeys(m.result for m in models)}
     for m in models:
@@ -346,8 +344,7 @@ def unpacked(names: Sequence[str], source: str) -> list[str]:
 
 
 def broken(lines: Iterable[str]) -> list[str]:
-    """Enclose the value of each assignment that is too long in brackets, so that it can be broken.
-    """
+    """Enclose in brackets the values of assignments that are too long for one line."""
     return [_bracketed(line) if len(line) > WIDTH - 4 else line for line in lines]
 
 

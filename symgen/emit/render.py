@@ -22,8 +22,9 @@ def _environment() -> Environment:
 
 
 def laid_out(template: str, context: Mapping[str, object]) -> str:
-    """Fill in `templates/<template>.jinja` with the values of `context`; break lines that are too
-    long.
+    """Fill in the template `templates/<template>.jinja` and break lines that are too long.
+
+    `context` holds the values for the template.
     """
     text = _environment().get_template(f"{template}.jinja").render(context)
     return "\n".join(_lines_that_fit(text.split("\n"), template.endswith((".c", ".h"))))

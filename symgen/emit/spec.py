@@ -46,8 +46,7 @@ class Function:
 
     @cached_property
     def nodes(self) -> list[Node]:
-        """Nodes of the expression graph that the entries depend on: inputs, constants, operations.
-        """
+        """Nodes of the expression graph that the entries depend on: inputs and operations."""
         return reachable(self.values.outputs)
 
     @cached_property
@@ -68,9 +67,7 @@ class Function:
         return tuple(state for state, kind in kinds.items() if self.reads(kind))
 
     def constants(self, free: Iterable[str]) -> tuple[str, ...]:
-        """Select from the names `free` the constants that the function depends on, in the given
-        order.
-        """
+        """Select from the names `free` the constants that the function depends on."""
         read = {symbol.name for symbol in self.inputs if symbol.kind in ("constant", "channel")}
         return tuple(name for name in free if name in read)
 
@@ -182,15 +179,12 @@ class ModuleSpec:
 
     @property
     def tied(self) -> tuple[int, ...]:
-        """Passive joints whose positions only the closure equations define, not an explicit
-        formula.
-        """
+        """Passive joints whose positions only the closure equations define, no explicit formula."""
         return self.derivation.closure.tied
 
     @cached_property
     def structure(self) -> tuple[tuple[bool, ...], ...]:
-        """Table structure[k][row]: whether base parameter k can act on the actuated joint of that
-        row.
+        """Table structure[k][row]: whether base parameter k can act on the actuated joint row.
 
         It can act if the entry of the regressor D is not identically zero.
         """
@@ -210,8 +204,7 @@ class ModuleSpec:
         return {"n": n, "m": m, "k": n + m, "b": len(self.regrouping), "p": p, "frames": frames}
 
     def names(self, is_word: Callable[[str], bool] = lambda name: False) -> Namespace:
-        """Make the table of used names for one source text, so that no two quantities get the same
-        name.
+        """Make the table of names of one source text, so that no two quantities share a name.
 
         `is_word` tests whether the language reserves a name.
         """
@@ -283,13 +276,11 @@ def spec_of(robot: Robot, options: tuple[str, ...] = ()) -> ModuleSpec:
 
 
 def is_inertial(robot: Robot) -> Callable[[str], bool]:
-    """Return a test whether a standard parameter is one of the ten inertial parameters of a link.
-    """
+    """Return a test whether a standard parameter is an inertial parameter of a link."""
     return inertial_names(robot).__contains__
 
 
 def is_inertial_or_actuator(robot: Robot) -> Callable[[str], bool]:
-    """Return a test whether a standard parameter is an inertial parameter or an actuator inertia.
-    """
+    """Return a test whether a standard parameter is inertial or the inertia of an actuator."""
     inertial, elements = inertial_names(robot), element_names(robot)
     return lambda own: own in inertial or elements[own][0].kind == "inertia"

@@ -84,7 +84,7 @@ def effects(spec: ModuleSpec) -> tuple[Effect, ...]:
             meaning, place, why = (
                 KINDS[e.kind].meaning,
                 f"joint {j}",
-                "it acts along a coordinate that does not move or carries no torque",
+                "it acts along a coordinate that does not move or has no torque",
             )
         said = "the robot file assumes that it is zero" if name in robot.assume else why
         result.append(

@@ -1,1 +1,1 @@
-"""Base parameters with exact formulas, and the formulas in every language they are printed in."""
+"""Base parameters of a robot and their exact regrouping formulas."""

@@ -1,22 +1,22 @@
-"""Points of a closed mechanism over F_p, a domain of graph nodes.
+"""Random closed states of a mechanism with loops, exact over the finite field F_p.
 
-The tied joints are algebraic functions of the actuated ones. Where the orientations of every loop
-agree by construction (sums of angles), the closure equations r = 0 are positions. Lengths and
-actuated joints are drawn at random, and each loop is closed by two tied joints: r is linear in
-(cos v, sin v) of a hinge v, which gives cos(v)**2 + sin(v)**2 = 1, a quadratic in the other joint
-u;
-its roots lie in F_p for every other draw. These are points of
+The tied joints are algebraic functions of the actuated ones. The method serves loops whose
+orientations agree by construction (sums of angles), so that the closure equations r = 0 are
+equations of positions. Lengths and actuated joints are drawn at random, and each loop is closed by
+two tied joints. r is linear in (cos v, sin v) of a hinge v, so that cos(v)**2 + sin(v)**2 = 1 gives
+a quadratic equation for the other joint u. Its roots lie in F_p for every other draw. These are
+points of
 
     V = {(lengths, configuration) : r = 0} ,
 
 each as likely as any other. V is linear in the lengths, a bundle of linear spaces over the torus of
 the angles, hence irreducible: an identity that holds at random points of V holds on all of V, for
-every geometry and in every assembly mode. Rates and accelerations of the tied joints follow from
-J qd = 0, J qdd + Jd qd = 0, by linear equations.
+every geometry and in every assembly mode. Rates and accelerations of the tied joints follow from J
+qd = 0, J qdd + Jd qd = 0, by linear equations.
 
-Where lengths are equal the roots may always lie in F_p and the closure splits into branches; the
-file's is told by a relation q_u = sum n_i q_i + k pi/2 that one branch has and the other has not
-(the parallelogram, and the antiparallelogram beside it).
+If lengths are equal, the roots may always lie in F_p, and the closure splits into branches, such as
+the parallelogram and the antiparallelogram. The branch of the robot file is found by a relation q_u
+= sum n_i q_i + k pi/2 that holds on one branch and not on the other.
 """
 
 from __future__ import annotations
@@ -46,11 +46,14 @@ ON_BRANCH = 1e-6  # rad
 
 
 class ClosedDraw(Draw):
-    """`samples` closed states at each of `count` random geometries.
+    """Random closed states over F_p: `samples` states at each of `count` random geometries.
 
-    `geometry` gives residues, shape (count, 1), of what varies; default: all lengths, or those that
-    are constants where `at_numbers` leaves the others at their values. `wide` times as many states
-    as usual are drawn. Raises ArithmeticError if no two joints close each loop.
+    `geometry` gives the residues of the quantities that vary, shape (count, 1). By default these
+    are all lengths; with `at_numbers`, lengths that are numbers in the robot file have their
+    values.
+
+    `wide` times as many states as usual are drawn, because not all of them close. ArithmeticError
+    is raised if no two joints close each loop.
     """
 
     def __init__(
@@ -100,7 +103,10 @@ class ClosedDraw(Draw):
         return self._array(value).reshape(self.shape)
 
     def _close(self) -> Array:
-        """Solve loop after loop for two tied joints; which samples could be closed, (samples,)."""
+        """Close loop after loop by two tied joints each.
+
+        Return which samples could be closed, shape (samples,).
+        """
         closed, left = np.ones(self.samples, dtype=bool), set(self.tied)
         pending = dict(enumerate(self.robot.loops))
         while pending:
@@ -121,9 +127,13 @@ class ClosedDraw(Draw):
         return closed
 
     def _dyad(self, rows: list[int], u: int, v: int, around: set[int]) -> Array:
-        """Solve two equations for joint u and hinge v; says which samples have a solution in F_p.
+        """Solve the two closure equations of a loop for joint u and hinge v, over F_p.
 
-        r = sum_ik R_ik y_i z_k with y = (1, cos u, sin u) or (1, u), z = (1, cos v, sin v).
+        Return which samples have a solution in F_p. The equations have the form
+
+            r = sum_ik R_ik y_i z_k ,
+
+        with y = (1, cos u, sin u) or (1, u), z = (1, cos v, sin v).
         """
         p = self.p
         slides = self.robot.frame(u).sigma == PRISMATIC
@@ -147,9 +157,9 @@ class ClosedDraw(Draw):
         R[:, 1:] -= R[:, :1]
 
         def place(x: Array) -> Array:
-            """Put joint u at the half-angle tangent or stroke x.
+            """Set joint u to the half-angle tangent x, or to the stroke x if u slides.
 
-            Returns y = (1, cos q_u, sin q_u) there, or (1, x, x**2) if u slides.
+            Return y = (1, cos q_u, sin q_u), or (1, x, x**2) if u slides.
             """
             if slides:
                 self._residues[q_u] = x
@@ -158,7 +168,11 @@ class ClosedDraw(Draw):
             return np.stack([whole, *self._points[u]])
 
         def tip(y: Array) -> tuple[Point, Array]:
-            """(cos v, sin v) that closes the loop, on the circle or not, and the determinant of its equations."""
+            """Compute the (cos v, sin v) that closes the loop, and the determinant of the
+            equations.
+
+            The point need not lie on the unit circle.
+            """
             r, *A = (R % p * y[: len(R), None, None] % p).sum(axis=0) % p
             c, s = self._solved(np.stack(A, axis=1), -r % p)
             return (c, s), (A[0][0] * A[1][1] - A[0][1] * A[1][0] % p) % p
@@ -195,7 +209,11 @@ class ClosedDraw(Draw):
         return np.asarray(square)
 
     def _branch(self, j: int, first: Point, second: Point, around: set[int]) -> Array:
-        """Whether hinge j is on the branch of the robot file at `first`, shape (samples,); for a closure whose solutions split into two branches."""
+        """Whether the solution `first` lies on the branch of the robot file, shape (samples,).
+
+        `first` and `second` are the two solutions for hinge j. The test is needed if the closure
+        splits into two branches.
+        """
         hinges = [
             i for i in self.robot.joints if i in around and self.robot.frame(i).sigma == REVOLUTE
         ]
@@ -224,11 +242,14 @@ class ClosedDraw(Draw):
                     )
                 turned = (-turned[1] % p, turned[0])
         raise ArithmeticError(
-            "the closure has several branches that no relation of angles tells apart"
+            "the closure has several branches that no relation of angles separates"
         )
 
     def _take(self, closed: Array) -> None:
-        """Keep the first samples of each geometry that close; `closed` is (geometries, samples)."""
+        """Select the first samples of each geometry that close, and drop the other samples.
+
+        `closed` marks the samples that close, shape (geometries, samples).
+        """
         count = self.shape[1]
         whole = self.samples
         if (closed.sum(axis=1) < count).any():
@@ -243,7 +264,7 @@ class ClosedDraw(Draw):
         self.samples = len(places)
 
     def _move(self) -> None:
-        """Compute rates and accelerations of the tied joints."""
+        """Compute rates and accelerations of the tied joints from the actuated joints."""
         joints = self.robot.joints
         n = len(joints)
         named = self.system.derivation.algebra.named
@@ -263,9 +284,9 @@ class ClosedDraw(Draw):
             self._residues[Symbol("qdd", f"QDP{u}")] = (along + bend) % self.p
 
     def _solved(self, A: Array, b: Array) -> Array:
-        """Solve A x = b sample by sample; A has shape (m, m, samples).
+        """Solve A x = b sample by sample over F_p; A has shape (m, m, samples).
 
-        A singular sample gives ArithmeticError.
+        A singular sample raises ArithmeticError.
         """
         M = np.moveaxis(np.concatenate([A, b[:, None]], axis=1) % self.p, -1, 0)
         x = solve_each(M, self.p, self.rng)
@@ -275,10 +296,10 @@ class ClosedDraw(Draw):
 
 
 def closed_draw(robot: Robot, seed: int, samples: int, **given: Any) -> ClosedDraw:
-    """Draw closed states.
+    """Draw random closed states over F_p; repeat the draw if it fails by chance.
 
-    A draw that is singular by chance, or that closes too rarely at one of many geometries, is
-    repeated with more samples.
+    A draw fails if it is singular, or if too few states close at one of the geometries. Each
+    repetition draws more samples.
     """
     for k in range(ATTEMPTS):
         try:
@@ -290,7 +311,7 @@ def closed_draw(robot: Robot, seed: int, samples: int, **given: Any) -> ClosedDr
 
 
 def lengths_of(robot: Robot) -> tuple[Length, ...]:
-    """Collect constants, numbers and roots in b, d and r of the frames, in their order."""
+    """Collect the constants, numbers and roots in the lengths b, d and r of the frames."""
     atoms: dict[Length, None] = {}
     for f in robot.frames:
         for e in (f.b, f.d, f.r0):

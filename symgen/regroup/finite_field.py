@@ -1,4 +1,4 @@
-"""Linear algebra over F_p: rank, reduced echelon form, small rationals from residues."""
+"""Linear algebra over the finite field F_p: echelon form, linear systems, small rationals."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from symgen.derive.exact import Array, power
 
 
 def rref(M: Array, p: int, *, reduced: bool = True) -> tuple[list[int], Array]:
-    """Pivot columns (leftmost first) and the reduced rows, shape (rank, columns), of M over F_p.
+    """Compute the reduced row echelon form of M over F_p.
 
-    The row with the fewest entries at the start is taken first and touches its own columns alone,
-    which is quick where the branches of a tree share few columns. Without `reduced` the rows of
-    earlier pivots stay as they are: the rank alone.
+    Return the pivot columns, leftmost first, and the rows with pivots, shape (rank, columns). Rows
+    with few nonzero entries are used first, and only the columns of these entries are changed; this
+    is fast if the branches of a tree share few columns. Without `reduced`, the rows of earlier
+    pivots are not changed, which is enough for the rank.
     """
     M = M[np.argsort(np.count_nonzero(M, axis=1), kind="stable")] % p
     left = np.ones(len(M), dtype=bool)
@@ -45,12 +46,11 @@ def rref(M: Array, p: int, *, reduced: bool = True) -> tuple[list[int], Array]:
 
 
 def solve_each(W: Array, p: int, rng: np.random.Generator) -> Array | None:
-    """Solve W[g, :, -1] = W[g, :, :-1] beta[g] for every g at once; shape (G, columns - 1).
+    """Solve W[g, :, -1] = W[g, :, :-1] beta[g] over F_p for every g at once.
 
-    None unless all are consistent.
-
-    Random combinations of the rows need no pivoting; three more than unknowns, which must come out
-    zero.
+    Return beta, shape (G, columns - 1), or None unless all systems are consistent. Random
+    combinations of the rows make pivoting unnecessary. There are three more combinations than
+    unknowns, to check consistency.
     """
     count, rows, columns = W.shape
     unknowns = columns - 1
@@ -71,8 +71,8 @@ def solve_each(W: Array, p: int, rng: np.random.Generator) -> Array | None:
 def small_rational(x: int, p: int, bound: int = 30) -> Fraction | None:
     """Find the fraction a/b with |a|, b <= bound that equals x mod p, by Wang's reconstruction.
 
-    Of random residues of 31 bits, one in two million is such a fraction up to 30, one in two
-    thousand up to 1000.
+    Return None if there is no such fraction. Of random residues of 31 bits, one in two million is
+    such a fraction up to 30, one in two thousand up to 1000.
     """
     r0, r1, t0, t1 = p, x % p, 0, 1
     while r1 > bound:

@@ -1,8 +1,8 @@
-"""Base columns and coefficients in floats, for the constants of the robot file.
+"""Base columns and coefficients in floating point, for the constants of the robot file.
 
-For coefficients that are not recognised over F_p, and for general loops of which F_p gives no
-points of one geometry: columns depend on those before them at random states, which Newton closes
-near the start of the loops.
+They are used for coefficients that are not recognised over F_p, and for general loops, of which F_p
+gives no closed states at one geometry. Dependent columns are found at random states, which Newton's
+method closes near the start configuration of the loops.
 """
 
 from __future__ import annotations
@@ -33,7 +33,10 @@ Relations = dict[str, dict[str, Expression]]  # {dependent: {base column: coeffi
 
 
 def float_relations(robot: Robot, names: Sequence[str]) -> tuple[tuple[str, ...], Relations]:
-    """Choose base columns among `names`, in order of preference, and express the others by them."""
+    """Choose base columns among `names`, in order of preference, and express the other columns.
+
+    Return the base columns and {dependent column: {base column: coefficient}}.
+    """
     pivots, K = float_base(float_regressor(robot, names))
     base = tuple(names[c] for c in pivots)
     return base, {
@@ -44,7 +47,7 @@ def float_relations(robot: Robot, names: Sequence[str]) -> tuple[tuple[str, ...]
 
 
 def numeric_coefficients(robot: Robot, name: str, support: Sequence[str]) -> list[Expression]:
-    """beta of D_name = sum_k beta_k D_support,k as numbers, by least squares."""
+    """Compute beta in D_name = sum_k beta_k D_support,k as numbers, by least squares."""
     W = float_regressor(robot, (*support, name))
     size = np.linalg.norm(W[:, :-1], axis=0)
     beta = np.linalg.lstsq(W[:, :-1] / size, W[:, -1], rcond=None)[0] / size
@@ -56,7 +59,10 @@ def _number(x: float) -> Expression:
 
 
 def float_regressor(robot: Robot, names: Sequence[str]) -> Array:
-    """Columns `names` at enough random states for their rank, (joints * states, columns)."""
+    """Compute the regressor columns `names` at enough random states to show their rank.
+
+    The result has shape (joints * states, columns).
+    """
     closure, rng = close(robot), np.random.default_rng(41)
     if not closure.tied:
         count = states_for(robot, names)
@@ -85,7 +91,10 @@ def float_regressor(robot: Robot, names: Sequence[str]) -> Array:
 
 
 def sampled_columns(floats: Floats, names: Sequence[str], count: int) -> Array:
-    """D of the parameters `names` at `count` states, shape (actuated joints, count, names)."""
+    """Compute the regressor columns `names` at given states, shape (actuated joints, count, names).
+
+    `count` is the number of states. A column that is not finite raises DescriptionError.
+    """
     robot = floats.robot
     D = derive(robot).columns
     entries = [D[name].get(j, 0) for j in robot.joints for name in names]
@@ -115,7 +124,11 @@ def sampled_columns(floats: Floats, names: Sequence[str], count: int) -> Array:
 def _columns_near_start(
     system: LoopSystem, names: Sequence[str], count: int, rng: np.random.Generator
 ) -> Array:
-    """Columns `names` at `count` random closed states near the start, (joints, states, columns)."""
+    """Compute the columns `names` at random closed states near the start of the loops.
+
+    `count` states are tried; states that do not close are dropped. The result has shape (joints,
+    states, columns).
+    """
     robot = system.robot
     closure = system.closure
     n = len(robot.joints)
@@ -153,14 +166,14 @@ def _columns_near_start(
 
 
 def _in_time(robot: Robot, rng: np.random.Generator, count: int) -> Any:
-    """Draw values of the channels of laws at `count` states."""
+    """Draw a random value at each state for the constants that are functions of time."""
     return {name: rng.uniform(0.5, 2, count) for name in robot.channels}
 
 
 def float_base(W: Array) -> tuple[list[int], Array]:
-    """Find the independent columns of W, leftmost first, and the coefficients of all columns in them.
+    """Find the independent columns of W, leftmost first, and express all columns by them.
 
-    The coefficients have shape (rank, columns).
+    Return the indices of the independent columns, and the coefficients, shape (rank, columns).
     """
     norms = np.linalg.norm(W, axis=0)
     norms[norms <= 1e-10 * norms.max(initial=0.0)] = np.inf

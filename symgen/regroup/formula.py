@@ -1,5 +1,7 @@
-"""Formulas: sums of parameters with coefficients in Q(geometry). They stay expressions until they
-are written: as text here, in Python by `emit.printers`, by the printers of SymPy in `symbols`.
+"""Regrouping formulas: sums of standard parameters with exact coefficients.
+
+The coefficients stay expressions until they are written: as text here, in Python by
+`emit.printers`, by the printers of SymPy in `symbols`.
 """
 
 from __future__ import annotations
@@ -29,7 +31,11 @@ class Formula:
         return self.text(str)
 
     def text(self, coefficient: Callable[[Expression], str]) -> str:
-        """The whole formula: parameters with coefficient 1 one by one, the others with the coefficient that they share, as `coefficient` writes it."""
+        """Write the formula as text; parameters with the same coefficient share it: D3*(MX4 + MY5).
+
+        `coefficient` writes a coefficient. Parameters with coefficient 1 or -1 are written one by
+        one.
+        """
         terms: list[Signed] = []
         for c, members in self.groups():
             if c in (ONE, -ONE):
@@ -46,9 +52,10 @@ class Formula:
         return _sum(terms)
 
     def groups(self) -> list[tuple[Expression, list[Signed]]]:
-        """Coefficients with the parameters that share one, as in eq. (27).
+        """Group the parameters by their coefficients, as in eq. (27).
 
-        Those with the opposite one are subtracted.
+        Return each coefficient with its parameters. Parameters with the opposite coefficient are in
+        the same group, marked as subtracted.
         """
         groups: dict[Expression, list[Signed]] = {}
         for name, c in self.combination.items():
@@ -57,7 +64,7 @@ class Formula:
         return list(groups.items())
 
     def mapping(self) -> dict[str, Any]:
-        """The formula in JSON: its text and its terms."""
+        """Return the formula for JSON: its text, and the coefficient of each parameter."""
         return {
             "formula": str(self),
             "terms": [

@@ -1,13 +1,13 @@
-"""Why a standard parameter is part of a base parameter, and what an edit of the robot file does to the base parameters.
+"""Why a standard parameter is part of a base parameter, and what an edit of the robot changes.
 
-The regressor columns of the standard parameters are combinations of those of the base,
-Gamma = sum_k D_k chi_k = sum_b D_b X_b, hence
+The regressor column of each standard parameter is a combination of the columns of the base
+parameters, Gamma = sum_k D_k chi_k = sum_b D_b X_b, hence
 
     D_k = sum_b K[b, k] D_b ,
 
-K[b, k] the coefficient of chi_k in the formula of X_b: YY2 is subtracted in XX2R because the
-columns of YY2 and XX2R are opposite. Which rule gave the relation follows from the step that moved
-the parameter: a general one (`rules`), or one of this robot alone.
+with K[b, k] the coefficient of chi_k in the formula of X_b. For instance, YY2 is subtracted in XX2R
+because the columns of YY2 and XX2R are opposite. The rule behind a relation follows from the step
+that moved the parameter: a general rule (`rules`), or a relation of this robot alone.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ class Absorption:
     name : str
         The standard parameter.
     base : tuple of str
-        Base parameters whose formulas contain it.
+        Base parameters whose formulas contain the standard parameter.
     columns : str
-        Its regressor column in terms of base columns, such as "the columns of YY2 and XX2R are
-        opposite".
+        Regressor column of the standard parameter in terms of base columns, such as "the columns of
+        YY2 and XX2R are opposite".
     rule : str
         The physical relation, in words.
     """
@@ -65,9 +65,10 @@ class BaseDifference:
     edits : tuple of str
         Keys of the robot file with their values before and after.
     appeared, gone : tuple of str
-        Base parameters of one of the robots only, by their own standard parameter.
+        Base parameters that only the edited robot has, and base parameters that only the robot
+        before the edit has. Each is named by its own standard parameter.
     changed : tuple of (str, str)
-        Formulas before and after of common base parameters, such as `XX2R = XX2 - YY2`.
+        Formulas before and after the edit of common base parameters, such as `XX2R = XX2 - YY2`.
     """
 
     edits: tuple[str, ...]
@@ -89,7 +90,10 @@ class BaseDifference:
 
 
 def absorptions(regrouping: Regrouping) -> tuple[Absorption, ...]:
-    """Reasons for all standard parameters that are part of another parameter's formula, in the order of eq. (4)."""
+    """Explain why each standard parameter is part of a base parameter named after another one.
+
+    The reasons are in the order of eq. (4).
+    """
     own, particular = set(regrouping.own), set(Transfer(regrouping.robot).remaining)
     into = {
         name: {b.name: b.combination[name] for b in regrouping.base if name in b.combination}
@@ -120,7 +124,7 @@ def _columns(name: str, image: Mapping[str, Any]) -> str:
 
 
 def _rule(robot: Robot, name: str) -> str:
-    """The general relation that moved a parameter of a link."""
+    """Describe the general rule that moved an inertial parameter of a link to another link."""
     family, j = inertial_names(robot)[name]
     frame = robot.frame(j)
     i = f"link {frame.ant}" if frame.ant else "the base"
@@ -134,7 +138,7 @@ def _rule(robot: Robot, name: str) -> str:
 def base_difference(before: Regrouping, after: Regrouping) -> BaseDifference:
     """Compare two robots: the edits between their files, and the effect on the base parameters.
 
-    `str` of it is one line: alpha of frame 2: 0 -> pi/2: MX1R appears; ...
+    `str` of the result is one line: alpha of frame 2: 0 -> pi/2: MX1R appears; ...
     """
     old, new = ({b.own: b for b in r.base} for r in (before, after))
     texts = [
@@ -163,7 +167,7 @@ def _edits(before: Robot, after: Robot) -> Iterator[str]:
 
 
 def _leaves(table: Any, path: Path = ()) -> dict[Path, str]:
-    """List every value of a nested mapping as text, by the keys that lead to it."""
+    """Flatten a nested mapping to {path of keys: value as text}."""
     if not isinstance(table, Mapping):
         return {path: flow(table)}
     parts = [_leaves(value, (*path, key)) for key, value in table.items()]

@@ -1,9 +1,9 @@
-"""Base parameters with their regrouping formulas, exact.
+"""Derive the base parameters of a robot with exact regrouping formulas.
 
-General rules over Q(geometry) remove most columns; rank and base choice come from the echelon form
-over F_p with the columns in
-Khalil's order of preference; the few particular relations left are solved exactly; a certificate
-checks the whole.
+General rules, exact for any geometry, first remove most columns of the regressor. Rank and base
+parameters then follow from the echelon form over the finite field F_p, with the columns in Khalil's
+order of preference. The few dependent columns that remain are expressed by relations of this robot
+alone, solved exactly. A certificate checks the result.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ LAST_CHOICE = ("MZ", "M", "YY")
 
 @dataclass(frozen=True)
 class BaseParameter:
-    """One base parameter: X = own + sum_k coefficient_k chi_k.
+    """One base parameter: the sum X = own + sum_k coefficient_k chi_k of standard parameters.
 
     Attributes
     ----------
     name : str
-        Name of its own standard parameter, with R if the sum has further terms.
+        Name of the standard parameter `own`, with R at the end if the sum has further terms.
     own : str
-        Its own standard parameter, which has the coefficient 1.
+        Standard parameter that gives the base parameter its name; its coefficient is 1.
     combination : mapping
         Coefficient of each standard parameter, `own` first.
     """
@@ -69,20 +69,21 @@ class BaseParameter:
 
 @dataclass(frozen=True)
 class Regrouping:
-    """The base parameters of a robot.
+    """The base parameters of a robot, with the moves that led to them.
 
     Attributes
     ----------
     robot : Robot
         The robot.
     base : tuple of BaseParameter
-        In the order of eq. (4).
+        Base parameters in the order of eq. (4).
     no_effect : tuple of str
         Standard parameters that enter no base parameter.
     steps : tuple of (from, into, coefficient)
-        The recursive form: each standard parameter that goes, and where.
+        The recursive form: each step removes the standard parameter `from` and adds coefficient *
+        `from` to the parameter `into`.
     method : str
-        How the coefficients were derived: EXACT, or NUMERIC and why.
+        How the coefficients were derived: EXACT, or NUMERIC and the reason.
     """
 
     robot: Robot
@@ -101,10 +102,10 @@ class Regrouping:
 
     @property
     def constants(self) -> Mapping[str, float]:
-        """Constants of the robot that may have other values.
+        """Constants of the robot that may have other values than in the robot file.
 
-        These are only channels if coefficients are numbers, because such numbers hold for the constants
-        of the file.
+        If coefficients are numbers, only channels may change (constants that are functions of
+        time), because the numbers hold for the constants of the file.
         """
         every, channels = self.robot.constants, self.robot.channels
         return every if self.method == EXACT else {c: every[c] for c in every if c in channels}
@@ -121,15 +122,15 @@ def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
     robot : Robot
         The robot.
     seed : int
-        Of the random draws over F_p; it never changes the result.
+        Seed of the random numbers over F_p; it never changes the result.
 
     Raises
     ------
     DescriptionError
         The loops cannot close.
     SymgenError
-        A general loop closes in too few states near its start; the derivation takes more processor
-        time than its limit.
+        A general loop closes in too few states near its start, or the derivation needs more
+        processor time than its limit.
     """
     with limited(f"the regrouping of {robot.name}"):
         regrouping = _regrouped(robot, seed)
@@ -138,7 +139,7 @@ def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
 
 
 def _warn(regrouping: Regrouping) -> None:
-    """Warn of each link whose inertia no body can have, and name the base parameters it enters."""
+    """Warn of each link whose inertia no rigid body can have, and name its base parameters."""
     for j, wrong in regrouping.robot.impossible:
         moments = {parameter(p, j) for p in INERTIAL[:6]}
         names = [b.name for b in regrouping.base if moments & b.combination.keys()]
@@ -152,7 +153,10 @@ def _warn(regrouping: Regrouping) -> None:
 
 @lru_cache(maxsize=16)
 def _regrouped(robot: Robot, seed: int) -> Regrouping:
-    """The regrouping, cached: formulas, certificate and module of a robot ask for it in turn."""
+    """Derive the base parameters of a robot, with a cache.
+
+    The cache saves time, because formulas, certificate and module of a robot need the same result.
+    """
     given, robot = robot, numbered(robot)
     transfer = Transfer(robot)
     names = preference(robot, transfer.remaining)
@@ -191,7 +195,10 @@ def _regrouped(robot: Robot, seed: int) -> Regrouping:
 
 
 def _reason(missing: Mapping[str, str]) -> str:
-    """Say why coefficients of the first column were not recognised, and how many more there are."""
+    """State why the coefficients of a column were not recognised.
+
+    The sentence names the first column and counts the other columns in `missing`.
+    """
     name, reason = next(iter(missing.items()))
     return (
         f"coefficients of {name}{f' and {len(missing) - 1} more' if len(missing) > 1 else ''} "
@@ -203,7 +210,7 @@ regrouping = regroup  # its public name, symgen.regrouping: symgen.regroup is th
 
 
 def preference(robot: Robot, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Order the columns: earlier ones rather become base parameters."""
+    """Sort the columns by preference: earlier columns are chosen first as base parameters."""
     inertial, elements = inertial_names(robot), element_names(robot)
 
     def rank(name: str) -> tuple[int, int, int]:
@@ -229,9 +236,9 @@ def _assemble(
     relations: Mapping[str, Mapping[str, Expression]],
     draw: Draw,
 ) -> Regrouping:
-    """Build the base parameters from the general rules and the particular relations.
+    """Build the base parameters from the general rules and the relations of this robot alone.
 
-    The latter are {dependent: {base column: coefficient}}.
+    `relations` holds {dependent column: {base column: coefficient}}.
     """
     combination: dict[str, Combination] = {name: transfer.combination[name] for name in base}
     steps = list(transfer.steps)
@@ -258,18 +265,23 @@ def _assemble(
 
 
 def _vanishes(c: Expression, draw: Draw) -> bool:
-    """Whether a coefficient is zero, also where this takes sin**2 + cos**2 = 1; angles are exact over F_p."""
+    """Whether a coefficient is zero, also if only sin**2 + cos**2 = 1 makes it zero.
+
+    Its residues over F_p decide, because angles are exact there.
+    """
     if all(isinstance(a, str) for a in c.atoms):
         return not c
     return not draw.residues(draw.constant(c)).any()
 
 
 def sign_conditions(regrouping: Regrouping) -> list[tuple[str, Expression, int]]:
-    """Find the formulas that add frictions of dependent directions.
+    """Find the base parameters whose formula holds only for one sign of a transmission ratio.
 
-    Each gives (base parameter, ratio of two rates, sign of this ratio in the robot file).
+    Such a formula adds the frictions of dependent joints. For qd2 = KR qd1, sign(qd2) = sign(KR)
+    sign(qd1), so that FS1 + KR FS2 holds only for the sign that KR has in the robot file.
 
-    sign(KR q1) is sign(KR) sign(q1): FS1 + KR FS2 holds for the sign that KR has in the file.
+    Return for each ratio: a base parameter, the ratio of the two joint rates, and its sign in the
+    robot file.
     """
     robot, closure = regrouping.robot, close(regrouping.robot)
     leads: dict[str, Expression] = {}

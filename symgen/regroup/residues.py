@@ -1,4 +1,4 @@
-"""Columns of the standard regressor over F_p, at random states and geometries of any robot."""
+"""Columns of the standard regressor over the finite field F_p, at random states and geometries."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ def draw_states(
     geometry: Mapping[Variable, Array] | None = None,
     count: int = 0,
 ) -> Draw:
-    """`samples` random states over F_p at one geometry, or at each of `count`.
+    """Draw `samples` random states over F_p, at one geometry or at each of `count` geometries.
 
-    Closed where joints are tied. Raises ArithmeticError if general loops have no points of one
-    geometry.
+    If closure equations tie joints, the states satisfy these equations. ArithmeticError is raised
+    for loops of which F_p gives no closed states at one geometry.
     """
     if close(robot).tied:
         return closed_draw(robot, seed, samples, p=p, count=max(count, 1), geometry=geometry)
@@ -36,7 +36,11 @@ def draw_states(
 
 
 def sample(draw: Draw, names: tuple[str, ...]) -> Array:
-    """The regressor columns `names` at the draw's states, shape (..., n_active * samples, len(names)), int64 residues."""
+    """Compute the regressor columns `names` over F_p at the states of a draw.
+
+    The result has shape (..., n_active * samples, len(names)), int64 residues; the axis ... counts
+    the geometries if the draw has several.
+    """
     robot = draw.robot
     D = derive(robot).columns
     entries = {
@@ -53,10 +57,10 @@ def sample(draw: Draw, names: tuple[str, ...]) -> Array:
 
 
 def states_for(robot: Robot, names: Sequence[str], spare: int = 4) -> int:
-    """Draw enough random states to show the rank of the columns `names`, and `spare` more.
+    """Return how many random states show the rank of the columns `names`, with some to spare.
 
-    The columns that act on the joints of a set S alone need |columns| <= states |S| rows: counted
-    for the set of every column, and for all joints.
+    The columns that act only on the joints of a set S need |columns| <= states |S|. This is
+    required for the set of every column, and for all joints. At least `spare` states are added.
     """
     acting = _acting(robot)
     acts = np.stack([acting[name] for name in names])
@@ -69,6 +73,6 @@ def states_for(robot: Robot, names: Sequence[str], spare: int = 4) -> int:
 
 @lru_cache(maxsize=8)
 def _acting(robot: Robot) -> dict[str, Array]:
-    """Test at random states on which joints each standard parameter acts."""
+    """Find by random states on which joints each standard parameter acts."""
     W = sample(Draw(robot, 5, 2), robot.parameters).reshape(len(robot.joints), 2, -1)
     return dict(zip(robot.parameters, (W != 0).any(axis=1).T, strict=True))

@@ -1,18 +1,18 @@
-"""General regrouping relations, exact over Q(geometry), from the tips to the base.
+"""General regrouping rules, exact for any geometry, applied from the tips to the base.
 
-Identities between regressor columns that hold for any motion of link i = ant(j) and any gravity
-[GK90, KB95], hence also in closed loops.
-Revolute j, with a = A_j e3 and p = P_ij (both constant):
+The rules are identities between regressor columns. They hold for any motion of link i = ant(j) and
+any gravity [GK90, KB95], hence also in closed loops. For a revolute joint j, with a = A_j e3 and p
+= P_ij (both constant):
 
     D_YY = -D_XX + D_J_i( A diag(1,1,0) A' )
     D_MZ = D_MS_i(a) + D_J_i( 2 (p.a) E - p a' - a p' )
     D_M  = D_M_i + D_MS_i(p) + D_J_i( (p.p) E - p p' )
 
-so YY_j, MZ_j, M_j go to link i. Prismatic j: the inertia tensor goes to link i, J_i += iRj J_j
-iRj'. Fixed j: all ten parameters go.
-What reaches the base has no effect.
+Therefore YY_j, MZ_j and M_j are moved to link i. For a prismatic joint j, the inertia tensor is
+moved to link i, J_i += iRj J_j iRj'. For a fixed joint j, all ten parameters are moved. A parameter
+that reaches the base has no effect.
 
-[GK90] M. Gautier, W. Khalil, IEEE T-RA 6(3), 1990.  [KB95] W. Khalil, F. Bennis, IJRR 14(2), 1995.
+[GK90] M. Gautier, W. Khalil, IEEE T-RA 6(3), 1990. [KB95] W. Khalil, F. Bennis, IJRR 14(2), 1995.
 """
 
 from __future__ import annotations
@@ -32,13 +32,11 @@ Step = tuple[
 
 
 class Transfer:
-    """Where the parameters of a link go.
+    """The moves of standard parameters from each link to the link before it, by the general rules.
 
-    `steps` holds the moves from each link to the one before; `combination` what each remaining
-    parameter then stands for.
-
-    After the tips have been processed, the torque is sum over the remaining names k of D_k
-    combination[k](chi).
+    `steps` holds the moves. `combination` holds, for each parameter that remains, the sum of
+    standard parameters that it stands for. The torque is then the sum over the remaining names k of
+    D_k combination[k](chi).
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -78,7 +76,11 @@ class Transfer:
                 self._move(parameter(name, frame.j), acting)
 
     def _reached(self, name: str, j: int) -> Combination:
-        """Columns of other links that make up the column of a parameter of frame j."""
+        """Express the regressor column of a parameter of frame j by columns of links.
+
+        A frame that is fixed to a link but is no link itself is replaced by that link. Parameters
+        of the base have no columns.
+        """
         if j == 0:
             return {}
         if j not in self.rigid:
@@ -90,7 +92,10 @@ class Transfer:
         return total
 
     def _move(self, source: str, image: Combination) -> None:
-        """Remove the column `source`, which equals sum_k image_k column k."""
+        """Remove the column `source`, which equals sum_k image_k column k of other columns.
+
+        The other columns then stand for the parameters of `source` too.
+        """
         amount = self.combination.pop(source)
         for target, c in image.items():
             self.steps.append((source, target, c))
@@ -103,7 +108,10 @@ class Transfer:
 
 
 def link_relations(f: Frame) -> dict[str, dict[tuple[str, int], Expression]]:
-    """{parameter of link j that goes: {(parameter, 1 if of link i else 0 of link j): coefficient}}."""
+    """Return the relations that move parameters of link j to the link i before it.
+
+    The result is {removed parameter of link j: {(parameter, 1 if of link i, else 0): coefficient}}.
+    """
     cg, sg, ca, sa = (call(trig, e) for e in (f.gamma, f.alpha) for trig in ("cos", "sin"))
     A = axis_rotation(cg, sg, ca, sa)
     p = displacement(A, f.b, f.d, f.r0)
@@ -132,7 +140,7 @@ def link_relations(f: Frame) -> dict[str, dict[tuple[str, int], Expression]]:
 
 
 def _steiner(p: Vector, u: Vector, symmetric: int) -> list[list[Expression]]:
-    """(p.u) E - p u', or 2 (p.u) E - p u' - u p' if `symmetric`."""
+    """Compute the matrix (p.u) E - p u', or 2 (p.u) E - p u' - u p' if `symmetric`."""
     trace = (p[0] * u[0] + p[1] * u[1] + p[2] * u[2]) * (1 + symmetric)
     return [
         [

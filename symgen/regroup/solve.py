@@ -1,16 +1,18 @@
-"""Coefficients of the particular relations in Q(geometry): D_dependent = sum_k beta_k D_base,k.
+"""Exact coefficients of relations that hold for one robot: D_dependent = sum_k beta_k D_base,k.
 
 Over F_p each beta is a residue, and a function of the geometry: lengths, gravity, (cos, sin) of
-fixed angles. Changing one of them at a time shows which ones matter. The rest is linear algebra:
-beta = P/Q with P, Q polynomials of rising degree in what matters,
+fixed angles. The program changes one of these variables at a time to find which of them matter. The
+rest is linear algebra: beta = P/Q with P, Q polynomials of rising degree in these variables,
 
     sum_m P_m m(g) - beta(g) sum_m Q_m m(g) = 0
 
-at more random geometries g than there are unknowns, a nullspace over F_p whose entries are then
-read as rationals, over as many primes as they need. What may vary is tried from much to little: the
-numbers of the file, square roots and all fixed angles as indeterminates; fractions of pi at their
-values; everything at its value, for a relation that holds for these numbers alone. Nothing is
-assumed of the result: the certificate checks it.
+at more random geometries g than there are unknowns. The solution is a nullspace over F_p, whose
+entries are converted to rational numbers, with as many primes as needed.
+
+The search starts with many variables and ends with few. First, numbers of the robot file, square
+roots and all fixed angles are variables; then fractions of pi have their values; at last the
+numbers have their values too, for a relation that holds for these numbers alone. Nothing is assumed
+about the result, because the certificate checks it.
 """
 
 from __future__ import annotations
@@ -69,9 +71,10 @@ Supports = Mapping[
 def coefficients(
     robot: Robot, supports: Supports
 ) -> tuple[dict[str, list[Expression]], dict[str, str]]:
-    """Find beta in D_dependent = sum_k beta_k D_support,k, exactly.
+    """Find the exact coefficients beta in D_dependent = sum_k beta_k D_support,k.
 
-    Where no P/Q of moderate degree fits, the reason is given.
+    Return the coefficients of each dependent column, and for columns without a fraction P/Q of
+    moderate degree the reason.
     """
     supports = {name: support for name, support in supports.items() if support}
     result: dict[str, list[Expression]] = {}
@@ -84,8 +87,10 @@ def coefficients(
 
 
 class Pool:
-    """Residues of the coefficients at a growing number of random geometries over the k-th prime;
-    `free` says what may vary.
+    """Residues of the coefficients at random geometries over one prime, the k-th.
+
+    Geometries are added when they are needed. `free` names what may vary besides the constants:
+    "numbers" of the robot file, "pi" (fractions of pi), or both.
     """
 
     def __init__(self, robot: Robot, supports: Supports, free: Sequence[str], k: int) -> None:
@@ -114,13 +119,14 @@ class Pool:
         self.values: dict[Expression, Array] = {}
 
     def random(self, count: int) -> dict[Variable, Array]:
-        """Draw `count` random geometries; residues of shape (count, 1)."""
+        """Draw `count` random geometries: residues of shape (count, 1) for each variable."""
         return {v: self.rng.integers(2, self.p, (count, 1)) for v in self.variables}
 
     def solved(self, geometry: Mapping[Variable, Array], count: int) -> dict[str, Array | None]:
-        """Residues of the coefficients of each dependent column, shape (count, support).
+        """Compute the residues of the coefficients of each dependent column.
 
-        None if the column does not depend on the support at every geometry.
+        The shape is (count, support); the value is None if the column does not depend on its
+        support at every geometry.
         """
         draw = draw_states(self.robot, 11, self.samples, p=self.p, geometry=geometry, count=count)
         W = sample(draw, self.names)
@@ -131,7 +137,7 @@ class Pool:
         }
 
     def grow(self, count: int) -> None:
-        """Draw until there are at least `count` geometries."""
+        """Add random geometries until there are at least `count`."""
         if count <= self.count:
             return
         more = max(count - self.count, self.count, FEWEST_GEOMETRIES)
@@ -145,7 +151,7 @@ class Pool:
         self.values.clear()
 
     def value(self, m: tuple[Expression, ...]) -> Array:
-        """Residues of a product at the geometries."""
+        """Compute the residues of a product of expressions at all geometries."""
         total = np.ones(self.count, dtype=np.int64)
         for e in m:
             if e not in self.values:
@@ -155,9 +161,10 @@ class Pool:
         return total
 
     def vector(self, name: str, k: int, P: Products, Q: Products) -> dict[int, int] | None:
-        """Find the first relation with a denominator: {place among [*Q, *P]: residue}; None without one.
+        """Find a linear relation between products for P and beta times products for Q, over F_p.
 
-        There can be several, since cos(a) and cos(3 a) are related.
+        Return {index in [*Q, *P]: residue} of the first relation with a denominator (a product of
+        Q), or None. There can be several relations, since cos(a) and cos(3 a) are related.
         """
         count = len(P) + len(Q) + 4
         self.grow(count)
@@ -181,7 +188,11 @@ class Pool:
 
 @dataclass(frozen=True)
 class Dependence:
-    """Variables of a coefficient: `free` ones, and others as factors with a power."""
+    """The variables on which a coefficient depends.
+
+    The coefficient depends on `free` in an unknown way; the variables in `powers` are mere factors
+    with the given power.
+    """
 
     free: tuple[Variable, ...]
     powers: Mapping[str | Number | Call, int]
@@ -191,7 +202,10 @@ class Dependence:
 
 
 class Recognition:
-    """Expressions from residues, where `free` may vary."""
+    """Search for the expressions of coefficients whose residues over F_p are known.
+
+    `free` names what counts as a variable besides the constants, see `Pool`.
+    """
 
     def __init__(
         self, robot: Robot, supports: Supports, free: Sequence[str], reasons: dict[str, str]
@@ -201,7 +215,7 @@ class Recognition:
         self.work = 0  # multiplications, roughly
 
     def coefficients(self) -> dict[str, list[Expression]]:
-        """{dependent: coefficients} of those that were recognised."""
+        """Return {dependent column: coefficients} for all columns that were recognised."""
         result: dict[str, list[Expression]] = {}
         for name, matters in self._what_matters().items():
             each = (self._recognise(name, k, depends) for k, depends in enumerate(matters))
@@ -259,7 +273,10 @@ class Recognition:
         return result
 
     def _power(self, reference: int, scaled: Sequence[int]) -> int:
-        """Power n by which a coefficient scales with a variable (tested at SCALES); 0 if it does not."""
+        """Find the power n with which a coefficient scales with a variable; 0 if there is none.
+
+        `scaled` holds the residues with the variable multiplied by each of SCALES.
+        """
         p = self.pools[0].p
         ratios = [int(x) * pow(int(reference), -1, p) % p for x in scaled] if reference else []
         return next((n for n in POWERS if ratios == [pow(c, n, p) for c in SCALES]), 0)
@@ -312,10 +329,10 @@ class Recognition:
     def _rationals(
         self, vector: dict[int, int], name: str, k: int, P: Products, Q: Products
     ) -> dict[int, Fraction] | None:
-        """Turn residues into rationals.
+        """Convert residues to rational numbers, or return None if they are not rational.
 
-        One prime suffices for very small ones; otherwise primes are combined by the Chinese
-        remainder theorem until one more agrees.
+        One prime is enough for small numerators and denominators. Otherwise primes are combined by
+        the Chinese remainder theorem until one more prime agrees.
         """
         small = {c: small_rational(x, self.pools[0].p) for c, x in vector.items()}
         if all(x is not None for x in small.values()):
@@ -340,8 +357,11 @@ class Recognition:
         return None
 
     def _choices(self, matters: Sequence[Variable]) -> list[tuple[Expression, ...]]:
-        """Fixed angles of the robot whose cos and sin may enter: none, one of them, two, all; they
-        hold every unit that matters.
+        """List the sets of fixed angles whose cosines and sines may occur in a coefficient.
+
+        A set has one angle, two angles, or all. It must contain every unit angle that matters; a
+        fixed angle is a sum of multiples of unit angles. Without such angles, the only set is
+        empty.
         """
         units, written = {v for v in matters if isinstance(v, tuple)}, numbered(self.robot)
         every = units_of(written)
@@ -358,8 +378,9 @@ class Recognition:
     def _monomials(
         self, matters: Sequence[Variable], angles: Sequence[Expression], degree: int
     ) -> Products:
-        """Products of at most `degree` constants, cosines and sines; sin to the first power only,
-        as sin**2 = 1 - cos**2.
+        """List the products of at most `degree` factors: constants, cosines and sines.
+
+        A sine occurs at most once in a product, because sin**2 = 1 - cos**2.
         """
         sines = [_atom(Call("sin", e)) for e in angles]
         atoms = (
@@ -377,7 +398,10 @@ class Recognition:
 
 
 def _fraction(entries: Mapping[int, Fraction], P: Products, Q: Products) -> Expression | None:
-    """P/Q from the coefficients of [*Q, *P]; cosines and roots that have simple values get them."""
+    """Make the expression P/Q from the coefficients of the products [*Q, *P]; None if Q is zero.
+
+    Cosines and roots that have simple values are replaced by these values.
+    """
     products = [*Q, *P]
     sides = [Expression(), Expression()]
     for c, value in entries.items():
@@ -393,7 +417,7 @@ def _fraction(entries: Mapping[int, Fraction], P: Products, Q: Products) -> Expr
 
 
 def _atom(a: str | Number | Call) -> Expression:
-    """The indeterminate as an expression; cos(pi/6) is not replaced by its value."""
+    """Make the expression of one variable; cos(pi/6) is not replaced by its value."""
     return Expression({((a, 1),): Fraction(1)})
 
 

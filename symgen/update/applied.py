@@ -124,7 +124,7 @@ class Applied:
         ]
         return Table(
             "changes",
-            ("where", "number", "from", "to", "change %", "sigma", "unit", "told by"),
+            ("where", "number", "from", "to", "change %", "sigma", "unit", "source"),
             rows,
             wide=(1, 6, 7),
         )
@@ -151,9 +151,9 @@ class Applied:
             )
         if self.strange:
             notes.append(
-                f"far from the file: {'; '.join(self.strange)}. The torques are those of the "
-                "estimate, the links need not be: weigh them, or give what you know of them as "
-                "values and bounds of method feasible"
+                f"far from the file: {'; '.join(self.strange)}. The torques are right, but "
+                "the values of single links need not be: weigh the links, or give known values "
+                "and bounds to method feasible"
             )
         if decided := [c for c in self.changes if c.told_by == "file"]:
             notes.append(

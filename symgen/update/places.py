@@ -222,7 +222,7 @@ class Places:
         for name, e in self.joints.items():
             if e.attrib.get("name", name) != name:
                 raise DescriptionError(
-                    f"joint {name!a:.60} stands elsewhere in the file than in MuJoCo's model; write "
+                    f"joint {name!a:.60} has another place in the file than in MuJoCo's model; write "
                     "the joints of a body before its child bodies",
                     line=e.line,
                 )

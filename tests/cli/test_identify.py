@@ -142,7 +142,7 @@ def test_rank_deficient_record_names_the_parameters(tmp_path):
     )
     assert (
         "No. The record does not determine" in result.stdout
-        and "cannot be told apart" in result.stdout
+        and "cannot be separated" in result.stdout
         and "FV2" in result.stdout
     )
 

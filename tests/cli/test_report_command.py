@@ -85,7 +85,7 @@ def test_record_that_determines_nothing(record, tmp_path):
     result = run("planar_2r", record, "-o", tmp_path / "out")
     assert (
         result.exit_code == 1
-        and "not told apart" in result.stdout
+        and "cannot be separated" in result.stdout
         and "does not determine" in result.stderr
     )
     assert "✕</span> No" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")

@@ -33,7 +33,7 @@ FOLDER = TemporaryDirectory()
 NOT_ASKED = "Not asked: a trial of another reading"
 
 MOTION = "of a motion"
-NO_SLIPS = "not judged beside force sensors"
+NO_SLIPS = "not judged for a robot with force sensors"
 REFUSED: Mapping[tuple[str, str], tuple[str, str]] = {
     ("force sensors", "advise"): (
         "the axes of a sensor have none",

@@ -125,12 +125,12 @@ def test_parameters_of_an_arm_whose_torque_is_its_law(tmp_path):
     ("record", "controller", "said"),
     [
         ({}, None, "controller: {kp: ..., kd: ...}"),
-        ({}, {"kp": 10, "law": {"kp": 10}}, "short for law"),
+        ({}, {"kp": 10, "law": {"kp": 10}}, "are short for law"),
         ({}, {"law": {"kp": 10, "ki": 3}}, "controller.law.ki: 3.0 is not taken here"),
         ({}, {"kp": [1, 2, 3]}, "3 values; expected one or 2"),
         ({}, {"kd": 1}, "expected a gain for every joint"),
         ({"qd_ref": ["q1"]}, {"kp": 10}, "1 reference velocities q1; expected 2"),
-        ({"qr": ["q1", "q2"]}, {"kp": 10}, "given beside q_ref"),
+        ({"qr": ["q1", "q2"]}, {"kp": 10}, "given together with q_ref"),
     ],
 )
 def test_what_is_no_law_is_refused(tmp_path, record, controller, said):
@@ -200,7 +200,7 @@ def test_kd_beside_a_reference_at_rest_is_told(tmp_path):
     result = identified(logged_early(tmp_path, kd="fit", moving=False, late=0.0))
     law = result.estimate.provenance["law"]
     assert np.isnan(law["kd"]).all() and np.isnan(law["delay"])
-    assert "kd and FV of joint 1, 2 cannot be told apart" in result.brief()
+    assert "kd and FV of joint 1, 2 cannot be separated" in result.brief()
     viscous = [result.estimate["FV1"], result.estimate["FV2"]]
     np.testing.assert_allclose(viscous, GAIN + TRUE[[3, 8]], rtol=0.02)
 

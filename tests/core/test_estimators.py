@@ -299,7 +299,7 @@ def test_rank_loss_names_the_parameters(settings):
     assert found.rank < 10
     assert {("FV2",), ("FS2",)} <= set(found.groups)
     assert np.isinf(found.cond)
-    assert "FV2, FS2" in found.message and "told apart" not in found.message.split("Likely")[1]
+    assert "FV2, FS2" in found.message and "separated" not in found.message.split("Likely")[1]
     determined = [name for name in found.names if not any(name in group for group in found.groups)]
     assert {"FV1", "FS1"} <= set(determined)
     assert np.all(np.isfinite([found.sigma[found.names.index(name)] for name in determined]))

@@ -352,7 +352,5 @@ def test_settings_are_values():
 
 
 def test_a_gear_ratio_belongs_into_the_robot_file() -> None:
-    with pytest.raises(
-        SettingsError, match=r"record\.ratio: gear ratios belong into the robot file"
-    ):
+    with pytest.raises(SettingsError, match=r"record\.ratio: write gear ratios in the robot file"):
         study_from_mapping({"record": {"files": ["a.csv"], "ratio": [100, 80]}})

@@ -185,7 +185,7 @@ WRONG = [
     ("M1: 2.0", "mass2: 2.0", 14, ["'mass2'", "expected names such as XX2", "M2", "FV2"]),
     ("M1: 2.0", "M2: 2.0}\nmassless: [2] #{", 14, ["'M2'", "frame 2 is massless"]),
     ("values:", "loops:\n  - {cut: 3, twin: 2}\nvalues:", 15, ["cut frame 3 does not exist"]),
-    ("  2: {ant", "\t2: {ant", 8, ["a tab stands here; indent with spaces"]),
+    ("  2: {ant", "\t2: {ant", 8, ["there is a tab here; indent with spaces"]),
     ("  2: {ant", "   2: {ant", 8, ["indented otherwise"]),
     ("theta: q2, r: 0}", "theta: q2 r: 0}", 8, ["missing , or }"]),
     ("title: Test arm", "title: Arm: test", 3, ["between quotes"]),

@@ -58,7 +58,7 @@ WRONG = [
     ('<link name="b"/>', '<link name="a"/>', 5, "given twice"),
     ('<link name="b"/>', '<link nome="b"/>', 5, "has no name"),
     ('<link name="b"/>', '<link name="b"/><link name="c"/>', 1, "links without parent"),
-    ('type="revolute"', 'type="floating"', 6, "free joint 's': a robot stands on a base"),
+    ('type="revolute"', 'type="floating"', 6, "free joint 's': the base of a robot must be fixed"),
     ('type="revolute"', 'type="ball"', 6, "expected revolute, continuous, prismatic or fixed"),
     ('xyz="0 0 2"', 'xyz="0 0 0"', 6, "no direction"),
     ('xyz="0 0 2"', 'xyz="0 2"', 6, "expected 3 numbers"),

@@ -153,7 +153,7 @@ def test_what_cannot_be_asked(arm, study, record):  # noqa: F811
         with pytest.raises(SettingsError, match=words):
             CestacSettings(**changed)
     with pytest.raises(
-        SettingsError, match="didim simulates the closed loop, and this study tells none"
+        SettingsError, match="didim simulates the closed loop, but this study describes none"
     ):
         cestac(arm[0], record, replace(method(study, "didim"), controller=None))
     with pytest.raises(SettingsError, match="place: loop simulates the closed loop"):

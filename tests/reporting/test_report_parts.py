@@ -182,7 +182,7 @@ def checked(estimate, unseen=5.0, *, every=None, **asked):
     (fit(error=0.01, joints=(0.01,)), 1.9, "good", None),
     (fit(sigma=(0.01, 0.3)), 5.0, "doubtful", "certain"),
     (fit(sigma=(0.2, 0.3)), 5.0, "no", "certain"),
-    (fit(correlation=-0.95), 5.0, "doubtful", "told apart"),
+    (fit(correlation=-0.95), 5.0, "doubtful", "separated"),
     (fit(cond_unit=300.0), 5.0, "doubtful", "determine"),
     (fit(status="not-converged", message="after 20 steps."), 5.0, "no", "determine"),
     (fit(status="rank-deficient", rank=1, groups=(("A1", "B1"),)), 5.0, "no", "determine"),

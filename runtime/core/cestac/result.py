@@ -63,7 +63,7 @@ from runtime.core.table import Table, csv_text, notebook
 Array = np.ndarray
 
 MARKED = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"), (PURPLE, "D"), (SKY, "v"), ("#8C6D00", "P"))
-VERDICTS = "Two verdicts stand below. The printed rule asks every parameter that decides, and %e(rho), to stay below 1 % (practically unbiased) and calls 5 % biased. The chapter's section 4.1.4 calls the residual the best single indicator, as it sees the whole model: the last verdict applies the same limits to the increase of its norm alone."
+VERDICTS = "There are two verdicts. The rule as printed: an estimate is practically unbiased if the errors of all deciding parameters and %e(rho) are below 1 %, and biased if one is above 5 %. Section 4.1.4 of the chapter calls the residual the best single indicator, since it depends on the whole model: the last verdict applies the same limits only to the increase of its norm."
 
 SCHEMA = "symgen-cestac/1"
 """Kind and version of the JSON layout; `symgen schema --of cestac` prints its JSON Schema."""

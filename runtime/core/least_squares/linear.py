@@ -242,8 +242,8 @@ def outcome(system: System, fit: Solution) -> tuple[Status, str]:
             parts.append(f"No effect on these rows: {', '.join(silent)}.")
         if mixed:
             parts.append(
-                f"Cannot be told apart: {'; '.join(mixed)}; the values given are those of least "
-                "norm and only their joint effect is meant."
+                f"Cannot be separated: {'; '.join(mixed)}; the values given are those of least "
+                "norm, and only their combined effect has a meaning."
             )
         parts.append(
             "Likely causes: a motion that does not excite them (a joint at rest, one "
