@@ -1,4 +1,4 @@
-"""Expectation propagation: estimation of a motion from the bounds that counts give at each sample.
+"""Estimation of a motion from encoder counts, which bound the position, by expectation propagation.
 
 The errors of counts and time stamps are those with the most evidence.
 
@@ -66,7 +66,7 @@ determined jerks; the least share of a window's density in that of the record.
 
 @dataclass(frozen=True)
 class Errors:
-    """Errors of an encoder besides rounding, as rms values.
+    """Errors of the counts and time stamps of an encoder besides rounding, as rms values.
 
     `count` is the error of a count in steps, `time` the error of a time stamp in sampling periods.
     """
@@ -81,7 +81,9 @@ class Errors:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """A motion estimated from the bounds of S counts, each replaced by a normal law, its site.
+    """The motion estimated from the counts of one encoder, with covariances and evidence.
+
+    At each of the S samples used, a normal law (the site) replaces the bounds.
 
     c : coefficients of the spline, shape (P,).
     density : density r of the jerk, shape (M,).
@@ -111,7 +113,7 @@ class Posterior:
 
 @dataclass(frozen=True, eq=False)
 class Boxes:
-    """Bounds of the positions of one encoder, given by its counts.
+    """Lower and upper bounds of the position of one encoder, given by its counts.
 
     y : counts, shape (m M,).
     measured : samples that have a count, ascending.
@@ -130,7 +132,7 @@ class Boxes:
 
     @np.errstate(divide="ignore", invalid="ignore")  # sites that do not settle
     def posterior(self, errors: Errors, c: Array, density: Array, t: Array, u: Array) -> Posterior:
-        """Estimate the motion by expectation propagation with the given errors.
+        """Estimate the motion by expectation propagation, for given errors of the counts.
 
         Starts from the coefficients c and the sites (t, u), their precision and precision times
         mean, and stops when the sites no longer change.
@@ -167,11 +169,11 @@ class Boxes:
         return Posterior(c, used, t, u, Z, factor, errors, likely, without)
 
     def again(self, errors: Errors, start: Posterior) -> Posterior:
-        """Estimate the motion with other errors, starting from the sites of `start`."""
+        """Estimate the motion for other errors of the counts, starting from the motion `start`."""
         return self.posterior(errors, start.c, start.density, start.tau, start.nu)
 
     def promised(self, errors: Errors, read: Posterior) -> float:
-        """Predict the rise of the evidence with other errors, to first order.
+        """Predict how much the evidence of the counts rises with other errors, to first order.
 
         To this order, settled sites need no change. Only some of the sites are used in the sum.
         """
@@ -182,7 +184,7 @@ class Boxes:
         return float(np.mean(mass - own) * len(self.sites))
 
     def agrees(self, read: Posterior) -> bool:
-        """Whether the sites have settled and the motion agrees with the interval of every count.
+        """Whether the estimation has converged and the motion agrees with every count.
 
         A distance of FAR standard deviations from an interval is allowed.
         """
@@ -193,7 +195,7 @@ class Boxes:
         return read.settled and bool(near.all())
 
     def suspects(self, read: Posterior) -> Array:
-        """Find the samples at which the counts may jump.
+        """Find the samples at which the counts may jump, for instance because counts were lost.
 
         They are the sample with the largest density of the jerk, and the middles of the SUSPECTS
         windows of time whose counts the other windows predict worst.
@@ -206,9 +208,10 @@ class Boxes:
         return np.append(worst, np.argmax(read.density) * self.basis.m)[::-1]
 
     def around(self, middle: int, read: Posterior) -> tuple[int, Boxes, Posterior]:
-        """Estimate the motion in the BESIDE samples on either side of the sample `middle` alone.
+        """Estimate the motion again from the samples near the sample `middle` alone.
 
-        Returns the first sample of this part, its bounds and its motion.
+        BESIDE samples on either side are used. Returns the first sample of this part, its bounds
+        and its motion.
         """
         m, end = self.basis.m, min(middle + BESIDE, self.basis.N)
         first = max(0, middle - BESIDE) // m
@@ -224,9 +227,10 @@ class Boxes:
         return begin, boxes, boxes.posterior(read.errors, c, density, *sites)
 
     def jump(self, near: int, read: Posterior) -> tuple[int, float, float]:
-        """Find the sample near `near` from which all counts are most likely off by one number.
+        """Find the sample near `near` from which on all counts most likely have a constant error.
 
-        Returns the sample, the number, and the rise of the posterior, in nats, if it is corrected.
+        Returns the sample, the error in counts, and the rise of the log posterior if it is
+        corrected.
 
         The slope of the log posterior by that number is g = sum (nu - tau x) over the later sites,
         its curvature sum tau - (B tau)' A^-1 (B tau).
@@ -254,10 +258,10 @@ class Boxes:
         return boxes, boxes.posterior(read.errors, read.c, read.density, read.tau, nu)
 
     def _tilted(self, m: Array, v: Array, e2: Array) -> tuple[Array, Array, Array]:
-        """Compute the tilted law of every site, which combines its bounds with the other sites.
+        """Update the site of every sample from its bounds and from the other samples.
 
-        Returns the logarithm of its mass, and the precision and precision times mean of the site
-        that reproduces its mean and variance.
+        The other samples give the position m and its variance v. Returns the logarithm of the mass
+        of the tilted law, and the precision and precision times mean of the new site.
         """
         s = np.sqrt(v + e2)
         a, b = (self.low - m) / s, (self.high - m) / s
@@ -272,7 +276,7 @@ class Boxes:
 def of_most_evidence(
     boxes: Boxes, sizes: Sequence[float], start: Posterior, moves: Sequence[tuple[int, int]] = MOVES
 ) -> Posterior:
-    """Find the errors of the counts and of the clock that have the most evidence, and their motion.
+    """Find the errors of counts and time stamps with the most evidence, and their motion.
 
     The search starts from `start` and changes the errors by one element of `sizes` or CLOCK_ERRORS
     at a time, in the directions `moves`, as long as the evidence clearly rises.
@@ -295,10 +299,10 @@ def of_most_evidence(
 
 
 def box_moments(a: Array, b: Array) -> tuple[Array, Array, Array]:
-    """Compute log Z of a unit normal law between bounds a < b, and its derivatives g and H.
+    """Compute the log probability that a unit normal variable is between a and b, and derivatives.
 
-    The law has mean m = 0 and unit variance: g = d log Z/dm, H = -d^2 log Z/dm^2, Z = Phi(b) -
-    Phi(a). One of the bounds is within a few standard deviations of zero.
+    Returns log Z, g = d log Z/dm and H = -d^2 log Z/dm^2, with Z = Phi(b) - Phi(a) and the mean m =
+    0. One of the bounds must be within a few standard deviations of zero.
     """
     middle, half = np.abs(a + b) / 2, (b - a) / 2  # the side that is nearer to the mean first
     low, high = middle - half, middle + half

@@ -43,7 +43,7 @@ class EncoderSteps(Part):
     title = "Steps of the encoders"
 
     def text(self) -> str:
-        """Write one sentence for each record that the counts would improve."""
+        """Write one sentence of advice for each record that `reader: counts` would improve."""
         readings = [r for r in self.result.prepared if r.study.signals.reader == "lowpass"]
         sentences = [
             sentence
@@ -128,7 +128,10 @@ def _range(steps: Array) -> str:
 def _attenuation(
     rate: float, signals: Signals, motion: Array, found: Lattice, drives: Drives | None
 ) -> Array:
-    """Compute the variance of the error of qdd divided by its mean square `motion`, shape (n,)."""
+    """Compute the share of the mean square of qdd that encoder steps cause, by joint, shape (n,).
+
+    `motion` is the mean square of qdd.
+    """
     n = len(motion)
     gain = bandwidth(replace(signals, median=1), rate).before[2, 2]
     error = gain * (encoder_root(drives, n) * found.step) ** 2 @ np.full(n, 1 / 12)

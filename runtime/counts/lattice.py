@@ -80,7 +80,7 @@ def lattice(
     *,
     name: str = "record",
 ) -> Lattice:
-    """Find the lattice of positions, shape (N, n), measured at the encoder side.
+    """Find the step and phase of encoder positions, shape (N, n): position = count step + phase.
 
     step : step in rad or m, for all encoders or for each; default: from the record.
 
@@ -150,7 +150,7 @@ def lattice(
 
 
 def smallest_step(x: Array) -> float:
-    """Estimate the step of the lattice from distinct positions x, shape (N,).
+    """Estimate the step of an encoder from the distances between its positions x, shape (N,).
 
     0 if the positions never change.
     """
@@ -167,7 +167,7 @@ def smallest_step(x: Array) -> float:
 
 
 def to_and_fro(counts: Array) -> Array:
-    """Find the places where counts cross one encoder line three times in a row, shape (m, 2).
+    """Find the moments at which counts cross one encoder line three times in a row, shape (m, 2).
 
     Returns the sample before the first change and the sample behind the last. The counts have shape
     (N,), none missing. A smooth motion crosses a line once, or twice if it turns back between two
@@ -194,10 +194,10 @@ def unwrapped_counts(
     *,
     name: str = "record",
 ) -> tuple[Lattice, Array, tuple[str, ...]]:
-    """Convert positions to counts, and undo the wraps of counters of WRAPS bits.
+    """Convert positions to counts that continue when a counter of WRAPS (16 or 32) bits overflows.
 
     Returns the lattice of the positions (see `lattice`), the counts, shape (N, n), and a sentence
-    for each encoder that wrapped. Raises InputError if counts jump otherwise.
+    for each encoder that overflows. Raises InputError if counts jump otherwise.
     """
     lattice_of_all = lattice(position, step, name=name)
     counts = lattice_of_all.counts(position)

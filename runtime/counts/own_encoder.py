@@ -35,7 +35,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class OwnEncoder:
-    """The encoder of one record.
+    """The encoder of one record: its steps, and the motion estimated from its counts if needed.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class OwnEncoder:
 
 
 def own_encoder(record: Record, study: Study, drives: Drives | None) -> OwnEncoder | None:
-    """Find the encoder of a record, for a study with `rounding: phase`.
+    """Find the encoder of a record, for a study of coarser encoders (`rounding: phase`).
 
     None for other kinds of rounding, which take every position as exact.
 

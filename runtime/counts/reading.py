@@ -121,10 +121,10 @@ class Reading:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One stretch of the record, starting at sample `begin`.
+    """One stretch of a long record, with the motion of the encoders that move in it.
 
-    Only its samples [first, stop) are used in the result. `moving` lists the encoders whose counts
-    change in the stretch.
+    The stretch starts at sample `begin`; only its samples [first, stop) are used in the result.
+    `moving` lists the encoders whose counts change.
     """
 
     smoothed: tuple[Smoothed, ...]
@@ -298,7 +298,7 @@ def _positions_of_counts(
 
 
 class Gaps:
-    """Counts of the samples that have no encoder count, by encoder."""
+    """Statistics of the missing samples of each encoder: their number and the longest gap."""
 
     def __init__(self, n: int) -> None:
         self.samples, self.unknown, self.run, self.longest = np.zeros((4, n), dtype=int)
@@ -313,9 +313,9 @@ class Gaps:
         return np.where(np.isnan(self.last), first, self.last)
 
     def take(self, counts: Array, unknown: Array) -> None:
-        """Process the next counts of the record: count missing samples and unknown states.
+        """Update the statistics of missing samples with the next counts of the record.
 
-        Both arrays have shape (B, n).
+        Both arrays have shape (B, n); `unknown` marks the samples with unknown state.
         """
         missing = np.isnan(counts)
         self.samples += missing.sum(axis=0)
@@ -350,7 +350,7 @@ class Gaps:
 
 
 def stretches(N: int) -> list[tuple[int, int, int, int]]:
-    """Split a record of N samples into stretches (begin, first, stop, end).
+    """Split a record of N samples into overlapping stretches (begin, first, stop, end).
 
     The samples [begin, end) are processed in order to find the motion in [first, stop).
     """

@@ -73,7 +73,7 @@ SPACING = 0.3
 
 
 class SearchStart(NamedTuple):
-    """Start of the search for a motion that is already known, with another phase of its encoder.
+    """Starting values to estimate a motion again, for the same motion with another encoder phase.
 
     errors : errors of the counts.
     m : samples from knot to knot of the spline.
@@ -87,7 +87,7 @@ class SearchStart(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """Posterior motion of one encoder, in steps of the encoder relative to `origin`.
+    """The motion estimated from the counts of one encoder, in steps relative to `origin`.
 
     said : sentence about the errors of the counts, or empty.
     """
@@ -157,10 +157,9 @@ def smoothed(
 
 @dataclass(frozen=True, eq=False)
 class Counts:
-    """Counts y of one encoder, shape (N,).
+    """The counts y of one encoder, shape (N,), with the samples that have a count.
 
-    `measured` lists the samples that have a count; `rest` is the small precision given to the other
-    samples.
+    `measured` lists these samples; `rest` is the small precision given to the other samples.
     """
 
     y: Array
@@ -171,11 +170,11 @@ class Counts:
     def read(
         self, sizes: Sequence[float], start: SearchStart | None = None
     ) -> tuple[Boxes, Posterior]:
-        """Find the motion that agrees with all counts, and the most likely errors of the counts.
+        """Estimate the motion from the counts, and check that it agrees with every count.
 
-        The errors of a long record are searched in its liveliest part, and those in `start` are
-        known already. If the motion does not agree with every count, larger errors are tried.
-        Raises InputError if no motion agrees with the counts.
+        The most likely errors of the counts are estimated too: for a long record in its liveliest
+        part, for a motion known from `start` not again. If the motion does not agree with every
+        count, larger errors are tried. Raises InputError if no motion agrees with the counts.
         """
         start = start if start and start.errors.count in sizes else None
         if start or len(self.y) > 4 * LIVELIEST:
@@ -209,7 +208,7 @@ class Counts:
         return Counts(self.y[part], inside, self.rest[part], self.Ts)
 
     def searched(self, sizes: Sequence[float]) -> tuple[Boxes, Posterior]:
-        """Find the motion and the errors of the counts that have the most evidence.
+        """Estimate the motion together with the errors of the counts that have the most evidence.
 
         The smallest errors are used unless larger ones have UNEVEN nats more evidence. If the
         errors of the counts are large, errors of the clock are tried too.
@@ -272,7 +271,7 @@ class Counts:
         return np.asarray(known[np.unique(np.concatenate([ends.ravel(), between.astype(int)]))])
 
     def from_changes(self, errors: Errors) -> tuple[Array, Array]:
-        """Estimate the first sites from the changes of the count.
+        """Estimate positions from the changes of the count alone, as a first estimate.
 
         Returns, for every sample, the precision and its product with the mean. The two samples
         around a change have the most precision; other samples have little, missing samples `rest`.
@@ -323,7 +322,7 @@ class Counts:
         return [(int(known[at[i] + 1]), round(off[i])) for i in leap]
 
     def jump(self, boxes: Boxes, read: Posterior) -> tuple[int, int] | None:
-        """Find a jump of the counts, such as lost counts, that a motion cannot explain.
+        """Find a jump of the counts that a smooth motion does not explain, such as lost counts.
 
         Returns the sample and the number of counts, or None. Without the jump the record around it
         must be more likely by LIKELIER nats. Nothing is searched if the errors of the counts are
@@ -372,9 +371,10 @@ def _error_notes(errors: Errors, least: float, sites: int) -> list[str]:
 def _spline_through_sites(
     basis: Basis, tau: Array, nu: Array, density: float
 ) -> tuple[Array, Array]:
-    """Fit a spline through Gaussian sites, and estimate the density of its jerk, shape (M,).
+    """Fit a spline to positions with Gaussian errors, and estimate the density of its jerk.
 
-    The density starts from `density` and is updated at most FIRST times.
+    Returns the coefficients and the density, shape (M,), which starts from `density` and is updated
+    at most FIRST times.
     """
     tau, nu, ones = basis.filled(tau), basis.filled(nu), np.ones(basis.M)
     samples, unit, c = basis.of_samples(tau), basis.of_prior(ones), np.zeros(basis.P)
@@ -391,9 +391,10 @@ def _spline_through_sites(
 
 
 def _through(basis: Basis, tau: Array, nu: Array, density: Array, c: Array) -> tuple[Array, Factor]:
-    """Fit a spline through Gaussian sites, shape (m M,) each, starting from a spline c near it.
+    """Fit a spline to positions with Gaussian errors, starting from the coefficients c.
 
-    Returns its coefficients and the Cholesky factor of their precision.
+    tau and nu, shape (m M,), are the precisions and the precisions times means. Returns the
+    coefficients and the Cholesky factor of their precision.
     """
     factor = Factor.of(basis.precision(tau, density))
     for _ in range(2):

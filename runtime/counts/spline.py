@@ -82,15 +82,15 @@ class Basis:
         return CONDITION / (self.h**5 * self.m)
 
     def at_samples(self, c: Array, order: int = 0) -> Array:
-        """Compute the spline of coefficients c, shape (P,), at all samples, shape (m M,).
+        """Compute the spline or a derivative at all samples, shape (m M,), from its coefficients c.
 
-        `order` is the order of its derivative, 0 for the position.
+        `order` is the order of the derivative, 0 for the position.
         """
         windows = np.lib.stride_tricks.sliding_window_view(c, 4)
         return np.asarray((windows @ self.values[order].T).ravel())
 
     def rows(self, samples: Array) -> csr_array:
-        """Return the values b_k of the basis at some samples, shape (S, P), sparse."""
+        """Return the basis functions b_k at some samples, a sparse matrix of shape (S, P)."""
         interval, u = np.divmod(samples, self.m)
         columns = (interval[:, None] + np.arange(4)).ravel()
         ends = np.arange(0, len(columns) + 1, 4)
@@ -111,14 +111,19 @@ class Basis:
         return third_differences(c) / self.h**3
 
     def jerk_variances(self, Z: Array) -> Array:
-        """Variances of the jerk in every interval of the spline."""
+        """Compute the variance of the jerk in every interval of the spline, shape (M,).
+
+        Z : covariances of its coefficients, shape (4, P).
+        """
         total = np.zeros(self.M)
         for i, j in PAIRS:
             total += (1 if i == j else 2) * JERK[i] * JERK[j] * Z[j - i, i : i + self.M]
         return np.asarray(total / self.h**6)
 
     def precision(self, tau: Array, density: Array) -> Array:
-        """Compute the precision A of the coefficients, by its diagonals, shape (4, P).
+        """Compute the precision matrix A (inverse covariance) of the spline coefficients.
+
+        Returns its diagonals, shape (4, P).
 
         tau : precisions of the samples, shape (m M,).
         density : density r of the jerk, shape (M,).
@@ -126,7 +131,7 @@ class Basis:
         return np.asarray(self.of_samples(tau) + self.of_prior(density))
 
     def of_samples(self, tau: Array) -> Array:
-        """Compute the part of A that comes from the samples, sum_k tau_k b_k b_k'."""
+        """Compute the part of the precision matrix A from the samples, sum_k tau_k b_k b_k'."""
         samples = self.products.T @ tau.reshape(-1, self.m).T
         A = np.zeros((4, self.P))
         for (i, j), of_pair in zip(PAIRS, samples, strict=True):
@@ -134,7 +139,7 @@ class Basis:
         return A
 
     def of_prior(self, density: Array) -> Array:
-        """Compute the part of A that comes from the prior, sum_i (h/r_i) d_i d_i'."""
+        """Compute the part of the precision matrix A from the prior, sum_i (h/r_i) d_i d_i'."""
         prior = 1 / (self.h**5 * density)
         A = np.zeros((4, self.P))
         for i, j in PAIRS:
@@ -142,7 +147,7 @@ class Basis:
         return A
 
     def gradient(self, pull: Array, density: Array, c: Array) -> Array:
-        """Compute the gradient of the log posterior at c, shape (P,).
+        """Compute the gradient of the log posterior by the coefficients, at c, shape (P,).
 
         pull : nu - tau x(c) at all samples, shape (m M,).
         """
@@ -161,16 +166,16 @@ def third_differences(c: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Factor:
-    """Cholesky factor L of the precision A, by its diagonals, shape (4, P)."""
+    """Cholesky factor L of the precision matrix A, by its diagonals, shape (4, P)."""
 
     L: Array
 
     @classmethod
     def of(cls, A: Array) -> Factor:
-        """Compute the Cholesky factor of A, given by its diagonals, shape (4, P).
+        """Compute the Cholesky factor of the precision matrix A.
 
-        If rounding errors made A indefinite, its diagonal is increased by the smallest share that
-        helps.
+        A is given by its diagonals, shape (4, P). If rounding errors made A indefinite, its
+        diagonal is increased by the smallest share that helps.
         """
         for share in (0.0, 1e-13, 1e-11, 1e-9):
             L, info = dpbtrf(np.vstack([A[:1] * (1 + share), A[1:]]), lower=1)
@@ -180,7 +185,7 @@ class Factor:
 
     @property
     def log_determinant(self) -> float:
-        """Logarithm of the determinant of A."""
+        """Logarithm of the determinant of the precision matrix A."""
         return float(2 * np.log(self.L[0]).sum())
 
     def solve(self, g: Array) -> Array:
@@ -193,7 +198,7 @@ class Factor:
         return np.asarray(dtbtrs(self.L, z, uplo="L", trans="T")[0].ravel())
 
     def inverse(self) -> Array:
-        """Compute the elements of Z = A^-1 near its diagonal, shape (4, P).
+        """Compute the elements of the covariance matrix Z = A^-1 near its diagonal, shape (4, P).
 
         They are Z_(i, i + lag) for lags 0 to 3.
         """
@@ -230,9 +235,9 @@ class Factor:
 
 
 def next_density(basis: Basis, samples: Array, unit: Array, g: Array, r: float) -> float:
-    """Update the density r of the jerk by MacKay's rule, once.
+    """Compute the next estimate of the density r of the jerk of a spline by MacKay's rule.
 
-    The new density is the sum of squared jerks over the number of jerks that the samples determine.
+    It is the sum of squared jerks over the number of jerks that the samples determine.
 
     samples, unit : parts of A that come from the samples, and from a prior of density one.
     g : gradient at c = 0.

@@ -1,8 +1,9 @@
 """Variable projection: least squares in parameters X and in scalars a that enter W nonlinearly.
 
-A scalar is a constant inside a friction law, for instance the Stribeck velocity. The table FIT of
-the emitted module lists the scalars. The torque is linear in X but not in the scalars a, Y = W(a) X
-+ rho. With P the projector orthogonal to the columns of W, X is eliminated,
+A scalar is a constant in the law of a column that the robot file adds to W, for instance the
+velocity of a Stribeck law. The table FIT of the emitted module lists the scalars. The torque is
+linear in X but not in the scalars a, Y = W(a) X + rho. With P the projector orthogonal to the
+columns of W, X is eliminated,
 
     a = argmin ||P(a) Y||^2,    X = W(a)^+ Y
 
@@ -32,9 +33,10 @@ SLOPE_STEP = 1e-4  # of log(a), or of the bounds: differences of columns
 
 
 class LawProblem:
-    """The observation matrix W(u) and the torques Y of all records, as functions of the scalars.
+    """The observation matrix W and torques Y of all records, with W a function of scalars.
 
-    The coordinate of a scalar a is u = log(a) if its lower bound is positive, else u = a.
+    The scalars are constants in the laws of columns. The coordinate of a scalar a is u = log(a) if
+    its lower bound is positive, else u = a.
     """
 
     def __init__(
@@ -62,11 +64,11 @@ class LawProblem:
         return np.where(self.log, np.log(np.where(self.log, a, 1.0)), a)
 
     def values(self, u: Array) -> Array:
-        """Convert the coordinates u to the scalars a."""
+        """Convert the coordinates u of the search to the scalars a of the laws."""
         return np.where(self.log, np.exp(np.where(self.log, u, 0.0)), u)
 
     def bound(self, u: Array) -> Any:
-        """Return the model whose scalars have the values at u."""
+        """Return the model with the scalars of its laws set to the values at u."""
         return BoundModel(self.model, dict(zip(self.scalars, self.values(u).tolist(), strict=True)))
 
     def _varying(self) -> list[list[int]]:
@@ -106,7 +108,7 @@ class LawProblem:
         return self._columns[key]
 
     def slope(self, k: int, u: Array, X: Array) -> Array:
-        """Compute (dW/du_k) X by a central difference."""
+        """Compute the derivative (dW/du_k) X by a central difference."""
         h = SLOPE_STEP if self.log[k] else SLOPE_STEP * (self.upper[k] - self.lower[k])
         ahead, behind = u.copy(), u.copy()
         ahead[k], behind[k] = u[k] + h, u[k] - h
@@ -117,7 +119,10 @@ class LawProblem:
 
 
 class Projection:
-    """The least-squares problem with X eliminated, on some rows, each divided by its scale."""
+    """The least-squares problem in the scalars alone, with X eliminated, on some rows of W.
+
+    Each row is divided by its scale.
+    """
 
     def __init__(self, problem: LawProblem, rows: Array, scale: Array) -> None:
         self.problem, self.rows = problem, rows
@@ -156,7 +161,10 @@ class Projection:
         return np.asarray(B @ (B.T @ S) - S)
 
     def polished(self, u: Array) -> tuple[Array, float]:
-        """Find the local minimum near u. Returns its coordinates and its sum of squares."""
+        """Find the local minimum of the sum of squares near u.
+
+        Returns the coordinates of the minimum and the sum of squares there.
+        """
         p = self.problem
         margin = 1e-6 * (p.upper - p.lower)
         fit = least_squares(
@@ -174,10 +182,10 @@ class Projection:
     def fitted(
         self, groups: Sequence[Sequence[int]]
     ) -> tuple[Array, float, dict[int, list[Array]]]:
-        """Find the best minimum over the grids of all laws; a group holds the scalars of one law.
+        """Find the best minimum of the sum of squares, starting from grids of the scalars.
 
-        Returns the coordinates u of the minimum, its sum of squares, and the other local minima of
-        each law, by the number of the law.
+        `groups` lists the scalars of each law. Returns the coordinates u of the minimum, its sum of
+        squares, and the other local minima of each law, by the number of the law.
         """
         p = self.problem
         u, seeds = p.start.copy(), {}

@@ -1,4 +1,4 @@
-"""Scalars of friction laws, for instance a Stribeck velocity, fitted to a record.
+"""Scalars in the laws of columns, for instance the velocity of a Stribeck law, fitted to a record.
 
 The fit is the one of `runtime.laws.projection`; other local minima are reported. Standard
 deviations are computed for X and the scalars together, from the linear problem with the columns [W,
@@ -41,7 +41,7 @@ LOOSE = 0.5  # deviation of log(a), or share of the bounds, above which a is not
 
 @dataclass(frozen=True)
 class FittedScalar:
-    """One fitted scalar of a friction law.
+    """One fitted scalar in the law of a column, for instance the velocity of a Stribeck law.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class FittedScalar:
 
 @dataclass(frozen=True)
 class LawTest:
-    """Test of a friction law: whether its column and scalars improve the prediction of torques.
+    """Test of the law of a column: whether the law improves the prediction of torques.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class LawTest:
 
 @dataclass(frozen=True)
 class FittedLaws(Part):
-    """The scalars of the friction laws of a model, fitted to records, with tests of the laws."""
+    """The scalars in the laws of columns, fitted to records, with tests of the laws."""
 
     scalars: tuple[FittedScalar, ...]
     tests: tuple[LawTest, ...]
@@ -164,7 +164,7 @@ class FittedLaws(Part):
 
 
 def fitted_scalars(problem: Problem) -> Problem:
-    """Fit the scalars of the friction laws to the records, and set their values in the model.
+    """Fit the scalars in the laws of columns to the records, and set their values in the model.
 
     A step of the identification. Without scalars (`fit:` of the robot file) or records, the problem
     is returned unchanged.
@@ -189,7 +189,7 @@ def fitted_scalars(problem: Problem) -> Problem:
 
 
 def scalars_of_laws(result: Identification) -> FittedLaws | None:
-    """Return the fitted scalars of the friction laws; None if the model has no scalars."""
+    """Return the fitted scalars in the laws of columns; None if none were fitted."""
     note = result.problem.noted(KIND)
     return None if note is None else note.result
 
@@ -201,7 +201,7 @@ def fit_laws(
     *,
     weights: bool = False,
 ) -> FittedLaws:
-    """Fit the scalars of the friction laws of a model to records.
+    """Fit the scalars in the laws of the columns of a model to records.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ def fit_laws(
 
 
 def fitted_laws(problem: LawProblem, weights: bool = False) -> FittedLaws:
-    """Fit the scalars of the friction laws to prepared rows W, Y; see `fit_laws`."""
+    """Fit the scalars in the laws of columns to prepared rows W, Y; see `fit_laws`."""
     every, scale = np.ones(len(problem.Y), dtype=bool), np.ones(len(problem.Y))
     groups: dict[str, list[int]] = {}
     for k, name in enumerate(problem.scalars):
@@ -253,9 +253,9 @@ def fitted_laws(problem: LawProblem, weights: bool = False) -> FittedLaws:
 
 
 def _joint_deviations(problem: LawProblem, u: Array, scale: Array) -> tuple[Array, Array, Array]:
-    """Compute W and X for the scalars at u, and standard deviations of X and u together.
+    """Compute W, X, and the standard deviations of X and of the scalars together.
 
-    The standard deviations take blocks of time as independent.
+    The scalars have the values at u. Blocks of time are taken as independent.
     """
     A = problem.W.copy()
     for c in problem.moving:
@@ -273,7 +273,7 @@ def _joint_deviations(problem: LawProblem, u: Array, scale: Array) -> tuple[Arra
 def _half(
     problem: LawProblem, rows: Array, scale: Array, members: Sequence[Sequence[int]], u: Array
 ) -> Array:
-    """Fit the scalars to some rows alone, starting from u."""
+    """Fit the scalars of the laws to some rows alone, starting from u."""
     return Projection(problem, rows, scale).polished(u)[0]
 
 
@@ -286,7 +286,7 @@ def _squares(A: Array, Y: Array, scale: Array) -> float:
 def _unseen(
     problem: LawProblem, halves: Sequence[tuple[Array, Array]], without: Sequence[int], scale: Array
 ) -> float:
-    """Compute the prediction error, in %, of the rows of each half from a fit to the other half.
+    """Compute the prediction error, in %, of each half of the rows from a fit to the other half.
 
     `without` lists the columns of W that are left out.
     """

@@ -1,6 +1,6 @@
-"""Friction laws that depend on the torque which the rest of the model transmits at their joint.
+"""Laws of columns that depend on the torque which the rest of the model transmits at their joint.
 
-Such a model is bilinear in the parameters,
+An example is load-dependent friction. Such a model is bilinear in the parameters,
 
     Y = D_r X_r + D_l(tau_m) X_l + rho,        tau_m = D_r X_r
 
@@ -32,7 +32,7 @@ SAME_TORQUE = 1e-6  # of the rms of tau_m, between two passes
 
 
 def transmitted_torque(problem: Problem) -> Problem:
-    """Add to the records the torque that each joint transmits, if friction laws depend on it.
+    """Add the torque that each joint transmits to the records, if columns depend on this torque.
 
     A step of the identification. Without such laws the problem is returned unchanged.
 

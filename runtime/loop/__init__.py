@@ -1,1 +1,1 @@
-"""What moves the arm: references, control laws, and the simulated closed loop."""
+"""References, control laws, and the simulated closed loop that moves the arm."""

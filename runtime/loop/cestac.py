@@ -1,20 +1,23 @@
-"""The closed loop of a resolution study: for methods that simulate it (iv, didim), and for encoders that stand inside it.
+"""The simulated closed loop of a study of encoder resolution (CESTAC).
+
+The loop serves methods that simulate it (iv, didim), and encoders inside the loop:
 
     place: record
             the positions of the record are rounded; the loop is simulated without steps, as the
             method does on any record
     place: loop
-            every run is a record simulated anew, the encoder of the loop with steps of Delta and a
-            random phase for each encoder:
+            every run is a record simulated anew; the encoder in the loop has steps of Delta, and a
+            random phase phi for each encoder:
 
-        arm, controller and record answer
+        arm, controller and record use
                 y = R^-1 (phi + Delta floor((R (q - offset) - phi)/Delta + 1/2)) + offset
 
-Rounding recorded positions alone tells nothing of a controller that answers encoder steps, and next
-to nothing of didim, which reads one position. In the loop every run has a seed of its own for
-phase, torque noise and disturbance, the same for every Delta and method; so have the runs that they
-are compared with, whose encoder is that of the study (an exact one, if it gives none), so that %e
-is what the steps alone do. `around` of estimate.options then serves every method.
+Rounding recorded positions does not show how a controller responds to encoder steps. For didim it
+shows almost nothing, because didim uses only the first position. With place: loop every run has a
+seed of its own for phase, torque noise and disturbance, the same for every Delta and method. The
+runs are compared with runs of the same seeds whose encoder is that of the study (an exact encoder,
+if the study gives none), so that %e shows the effect of the steps alone. With place: loop, the
+option `around` of estimate.options applies to every method.
 """
 
 from __future__ import annotations
@@ -55,31 +58,32 @@ class Loop:
     Attributes
     ----------
     problem : Problem
-        With the median of settings.cestac in its signals; of place loop, its records are those that the reference may come from.
+        Problem with the median of settings.cestac in its signals. With place: loop, its records
+        serve only as source of the reference.
     simulator : Simulator
-        Without steps of its own making: its law has the encoder of the settings.
+        Simulator whose control law has the encoder of the settings, not the steps of the study.
     """
 
     problem: Problem
     simulator: Simulator
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """State for other processes; each makes the simulator anew."""
+        """Return the data to pickle: the problem alone; every process makes its own simulator."""
         return _loop, (self.problem,)
 
     @property
     def model(self) -> GeneratedModel:
-        """The model of the problem."""
+        """Model of the problem."""
         return self.problem.model
 
     @property
     def study(self) -> Any:
-        """The settings of the problem."""
+        """Settings of the problem."""
         return self.problem.settings
 
     @property
     def options(self) -> Mapping[str, Any]:
-        """Those of estimate.options that concern the loop."""
+        """Options of estimate.options that concern the loop: `around` and `reference`."""
         return {
             key: self.study.estimate.options[key]
             for key in ALIKE
@@ -88,7 +92,7 @@ class Loop:
 
     @cached_property
     def reference(self) -> Reference:
-        """Reference of the controller, for place loop."""
+        """Reference of the controller, for place: loop."""
         return reference_of(self.simulator.controller, self.model, records=self.problem.records)
 
     @cached_property
@@ -98,9 +102,9 @@ class Loop:
 
     @cached_property
     def closed(self) -> ClosedLoop:
-        """The closed loop of the measured records.
+        """Closed loop of the measured records.
 
-        For place loop, it is made with the encoder of the study.
+        For place: loop, it is the closed loop of a record simulated with the encoder of the study.
         """
         if self.study.cestac.place == "record":
             return closed_loop(self.problem, self.problem.prepared, self.simulator, **self.options)
@@ -108,12 +112,12 @@ class Loop:
 
     @property
     def parts(self) -> tuple[LoopPart, ...]:
-        """The records that the closed loop simulates, one part each."""
+        """Parts of the closed loop, one per record that it simulates."""
         return tuple(self.closed.parts)
 
     @property
     def estimate(self) -> EstimateSettings:
-        """Settings of the estimate, as a method that simulates no loop takes them."""
+        """Settings of the estimate, without loop options if its method simulates no loop."""
         settings: EstimateSettings = self.study.estimate
         if self.problem.method.observe is not None:
             return settings
@@ -122,12 +126,12 @@ class Loop:
 
     @property
     def described(self) -> Mapping[str, Any]:
-        """The controller, for JSON."""
+        """Settings of the controller, as a mapping for JSON."""
         return {"controller": to_mapping(self.simulator.controller)}
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Remarks for the user of a study."""
+        """Remarks for the user of a study, such as an assumption on the reference."""
         method = self.study.estimate.method
         notes = [self.closed.assumption] if self.closed.assumption else []
         if self.study.cestac.place == "loop":
@@ -145,11 +149,14 @@ class Loop:
         return tuple(notes)
 
     def measured(self) -> Observation:
-        """Rows of the records as measured."""
+        """Build the rows Y = W X + rho of the records as measured."""
         return self.closed.measured()
 
     def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
-        """Rows from perturbed positions of every record, shape (N, n), with the loop attached."""
+        """Attach the loop, with perturbed positions of every record, to rows from these positions.
+
+        positions : shape (N, n) per record.
+        """
         parts = [
             replace(part, prepared=replace(part.prepared, record=part.record.moved(np.asarray(q))))
             for part, q in zip(self.closed.parts, positions, strict=True)
@@ -162,11 +169,15 @@ class Loop:
         )
 
     def rows(self, level: Level, draw: tuple[int, ...]) -> Observation:
-        """Rows of a record simulated with encoders of step level.delta."""
+        """Simulate a record with encoders of step level.delta, and build its rows Y = W X + rho."""
         return self.simulated(level, draw).measured()
 
     def simulated(self, level: Level, draw: tuple[int, ...]) -> ClosedLoop:
-        """The loop of a record simulated with encoders of step level.delta, or of the study's without one."""
+        """Simulate a record with encoders of step level.delta, and return its closed loop.
+
+        If level.delta is 0, the encoder is that of the study. draw : numbers of the run; the last
+        sets its seed.
+        """
         random = stream(self.study.cestac.seed, draw[-1])
         law, n = self.simulator.law, len(self.model.JOINTS)
         phase = level.delta * random.random(n)
@@ -180,9 +191,10 @@ class Loop:
         return self._of(simulator, int(random.integers(2**31)), level.delta)
 
     def _of(self, simulator: Any, seed: int, delta: float) -> ClosedLoop:
-        """A record made by `simulator`, under the loop without its steps.
+        """Simulate one record with `simulator`, and make its closed loop.
 
-        The reader of counts is told them, and needs some.
+        The closed loop itself is simulated with the encoder of the settings. A reader of encoder
+        counts gets the step; without any step, the positions are low-pass filtered instead.
         """
         record = simulator.run(
             self.truth, self.reference, seed=seed, name=f"SIMULATED {self.model.NAME}"
@@ -201,7 +213,7 @@ class Loop:
 
 
 def _loop(problem: Problem) -> Loop:
-    """The loop with a simulator of the section `controller`."""
+    """Make the loop of a problem, with a simulator from the section `controller`."""
     from runtime.loop.simulation import Simulator
 
     settings: Any = problem.settings
@@ -209,7 +221,10 @@ def _loop(problem: Problem) -> Loop:
 
 
 def loop_of(problem: Problem, simulator: Simulator | None = None) -> Loop | None:
-    """The loop of a problem that simulates one; else None. simulator : default: that of the section `controller`."""
+    """Make the loop of a problem, or None if neither its study nor its method simulates a loop.
+
+    simulator : default: made from the section `controller`.
+    """
     study: Any = problem.settings
     if study.cestac.place != "loop" and problem.method.observe is None:
         return None

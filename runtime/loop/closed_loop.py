@@ -1,4 +1,4 @@
-"""The closed loop in which a record was made, run again with other parameters: what IV and DIDIM compare the record with.
+"""Simulate the closed loop of a record again, with other parameters, for methods IV and DIDIM.
 
     loop = closed_loop(problem, problem.prepared, simulator)
     observation = loop.measured()             Y = W X + rho, to which the loop stays attached
@@ -11,17 +11,17 @@
                                               Z = F_p[W(q_s, qd_s, qdd_s)], exact states through the
                                               decimation alone       DIDIM
 
-g_j^k = J_j(X^k)/J_j(X_ref), J_j the mean of A_jj over the reference, multiplies all that stands
-between position error and torque: the bandwidth of the simulated loop stays that of the real one
-while X^k is far from the truth. Rows are chosen by the velocity of the reference, never by that of
-the measured positions: a choice that depends on noise biases every method. Slow rows of joint j
-(`rows.low_speed`) are those where a dry friction that acts on it, coupled ones of a wrist included,
-slips slower: at rest its torque is anything between -FS and FS, not W X, and the decimation smears
-that into the rows `around`. Instants with the torque at its limit are left out.
+g_j^k = J_j(X^k)/J_j(X_ref), J_j the mean of A_jj over the reference, multiplies everything between
+position error and torque: the bandwidth of the simulated loop stays that of the real loop while X^k
+is far from the truth. Rows are chosen by the velocity of the reference, never by that of the
+measured positions: a choice that depends on noise biases every method. Slow rows of joint j
+(`rows.low_speed`) are rows where a dry friction that acts on the joint slips slowly (coupled
+friction of a wrist included): at rest its torque is anything between -FS and FS, not W X, and the
+decimation spreads that into the rows `around`. Instants with the torque at its limit are left out.
 
-Where the reference is not known (`reference: measured`), the measured motion through the filters
-stands for it: then the instruments carry the noise of the same run, and DIDIM is output error about
-itself. The Estimate says so.
+If the reference is not known (`reference: measured`), the measured motion through the filters
+replaces it: then the instruments contain the noise of the same run, and DIDIM is output error about
+the measured motion itself. The Estimate states this.
 """
 
 from __future__ import annotations
@@ -69,10 +69,10 @@ class LoopOptions(Settings):
     Attributes
     ----------
     reference : str
-        known (that of the settings, or the columns qr1 ... of each record), or measured where the
-        reference has to be inferred.
+        known (from the settings, or from the columns qr1 ... of each record), or measured: the
+        measured motion replaces a reference that is not known.
     around : float, s
-        Rows so near to slow ones (`rows.low_speed`) are left out with them.
+        Rows within this time of slow rows (`rows.low_speed`) are also left out.
     """
 
     reference: Literal["known", "measured"] = "known"
@@ -81,21 +81,21 @@ class LoopOptions(Settings):
 
 @dataclass(frozen=True, eq=False)
 class LoopPart:
-    """One record of a closed loop.
+    """One record of a closed loop, with its reference and the choice of its rows.
 
     Attributes
     ----------
     prepared : Prepared
-        The record as the study reads it.
+        The record with its filtered states.
     reference : Reference
-        What the controller followed, at its rate; T ticks.
+        Reference that the controller followed, at its rate; T ticks.
     selection : Selection
         Rows used.
     torque : ndarray, shape (n, K), N m or N
         Y before rows are left out.
     feedforward, disturbance : ndarray, shape (T, n), N m or N, or None
-        Recorded feed-forward torque, and the known torque with the opposite sign: what acts on the
-        arm beside drives and model.
+        Recorded feed-forward torque; and the known torque with the opposite sign, which acts on the
+        arm in addition to the torque of the drives.
     """
 
     prepared: Prepared
@@ -107,12 +107,12 @@ class LoopPart:
 
     @property
     def record(self) -> Record:
-        """The record itself."""
+        """The record of this part."""
         return self.prepared.record
 
     @property
     def given(self) -> dict[str, Any]:
-        """Arguments of a simulation of this record, besides parameters and reference."""
+        """Arguments for a simulation of this record, except the parameters and the reference."""
         return {
             "start": self.record.q[0],
             "disturbance": self.disturbance,
@@ -120,7 +120,7 @@ class LoopPart:
         }
 
     def decimated(self, x: Array) -> Array:
-        """Signals of the record, shape (N, n, ...), decimated like Y: (n, ..., K)."""
+        """Decimate signals of the record, shape (N, n, ...), like Y; the result has shape (n, ..., K)."""
         window = np.moveaxis(x[: len(self.record)][self.selection.samples], 0, -1)
         return decimated(
             np.ascontiguousarray(window), self.selection.factor, self.selection.signals.decimate
@@ -129,10 +129,10 @@ class LoopPart:
 
 @dataclass(frozen=True, eq=False)
 class ClosedLoop:
-    """The records with their loop.
+    """The closed loop of one or more records, ready to be simulated with other parameters.
 
-    `assumption`: what was assumed about the reference; empty if it is known. `law`: how well the
-    control law explains the records.
+    `assumption`: text on the assumed reference; empty if the reference is known. `law`: how well
+    the control law explains the records, by joint.
     """
 
     model: GeneratedModel
@@ -143,19 +143,26 @@ class ClosedLoop:
     law: tuple[LawFit, ...] = ()
 
     def run(self, X: Array, g: Array | float = 1.0) -> list[Simulation]:
-        """One simulation per record with all base parameters X (b,), from the measured position at its start, at rest."""
+        """Simulate every record with all base parameters X, shape (b,), without noise and steps.
+
+        Each simulation starts at rest, at the first measured position. g : factor on everything
+        between position error and torque.
+        """
         return [
             self.simulator.run(X, part.reference, g=g, ideal=True, **part.given)
             for part in self.parts
         ]
 
     def torques(self, runs: Sequence[Simulation]) -> list[Array]:
-        """Torque of the drives in each run, (N, n), without the known torque of its record, like `Record.torque`."""
+        """Compute the drive torque of each run, shape (N, n), minus the known torque of its record.
+
+        The result is comparable with `Record.torque`.
+        """
         pairs = zip(runs, (part.record.tau_known for part in self.parts), strict=True)
         return [run.tau if known is None else run.tau[: len(known)] - known for run, known in pairs]
 
     def measured(self) -> Observation:
-        """Y = W X + rho of the measured positions on the rows of the loop, which it carries along."""
+        """Build the rows Y = W X + rho of the measured positions, with the loop attached."""
         states = [p.prepared.states for p in self.parts]
         observation = self._observed([replace(s, errors=None) for s in states])
         observation = replace(
@@ -177,7 +184,11 @@ class ClosedLoop:
     def simulated(
         self, runs: Sequence[Simulation], observation: Observation, *, exact: bool
     ) -> Observation:
-        """The rows and columns of `observation` with Z of the simulated motion in place of W: of its positions through the filters of the record, or of its exact states."""
+        """Replace W of `observation` by Z, the same rows and columns computed from the simulated motion.
+
+        exact : use the exact simulated states; else the simulated positions pass through the filters of the
+        record.
+        """
         assert observation.closed_loop is not None
         states = [
             States(run.q, run.qd, run.qdd)[: len(part.record)]
@@ -191,7 +202,10 @@ class ClosedLoop:
         return replace(observation, W=np.asfortranarray(Z[observation.closed_loop.rows]))
 
     def outputs(self, signals: Sequence[Array], observation: Observation) -> Array:
-        """Signals of every record, shape (N, n) or (N, n, c), decimated like Y, on the rows of `observation`: shape (r,) or (r, c)."""
+        """Decimate signals of every record like Y, and select the rows of `observation`.
+
+        The signals have shape (N, n) or (N, n, c) per record, the result shape (r,) or (r, c).
+        """
         assert observation.closed_loop is not None
         by_joint: list[Array] = []
         kept = [part.decimated(x) for x, part in zip(signals, self.parts, strict=True)]
@@ -203,7 +217,7 @@ class ClosedLoop:
         return np.asarray(np.concatenate(by_joint)[observation.closed_loop.rows])
 
     def inertia(self, X: Array) -> Array:
-        """Mean of A_jj over the references, for each joint: J_j, shape (n,)."""
+        """Compute the mean inertia J_j of each joint, shape (n,): the mean of A_jj over the references."""
         functions: Any = self.model
         q = np.concatenate(
             [part.reference.q[:: max(1, len(part.reference) // 500)] for part in self.parts]
@@ -221,9 +235,10 @@ class ClosedLoop:
 
 
 def observed_loop(problem: Problem, simulator: Simulator | None = None) -> Observation:
-    """Rows of the records of a problem with the loop that made them attached, for a method that simulates it.
+    """Build the rows of the records of a problem, with the closed loop attached.
 
-    simulator : default: that of the section `controller` of the settings.
+    Methods that simulate the loop need this. simulator : default: made from the section
+    `controller` of the settings; without this section no loop is attached.
     """
     settings: Any = problem.settings
     if any(is_axis(joint) for joint in problem.model.JOINTS):
@@ -249,10 +264,11 @@ def closed_loop(
     keep: Sequence[Array] = (),
     **options: Any,
 ) -> ClosedLoop:
-    """The loop of some readings of records, and of the problem whose settings read them.
+    """Make the closed loop of records for simulation: their references, their rows, the law check.
 
+    measured : the records with filtered states.
     keep : bool, shape (N,) or (N, n) per record: samples that may be used.
-    options : those of LoopOptions.
+    options : the options of LoopOptions.
     """
     asked = structure(LoopOptions, options, ("estimate", "options"))
     controller, model, study = simulator.controller, problem.model, problem.settings
@@ -298,7 +314,10 @@ def closed_loop(
 
 
 def _at_ticks(x: Array, every: int, ticks: int) -> Array:
-    """Interpolate samples (N, n) linearly at the ticks of the controller, (T, n); the last is held."""
+    """Interpolate samples, shape (N, n), linearly at the ticks of the controller: shape (T, n).
+
+    The last sample is held.
+    """
     places = np.arange(ticks) / every
     return np.column_stack([np.interp(places, np.arange(len(x)), column) for column in x.T])
 
@@ -310,7 +329,7 @@ def _reference(
     controller: Controller,
     reference: str,
 ) -> Reference:
-    """Reference of the controller in record k, at its rate."""
+    """Find the reference that the controller followed in record k, at the controller rate."""
     record = records[k].record
     if reference == "measured":
         states, every = records[k].states, controller.record_every
@@ -342,9 +361,10 @@ def _reference(
 
 
 def slips(qd: Array, G: Array) -> Array:
-    """Smallest speed of what rubs on each joint, shape (N, n); its own speed counts too.
+    """Compute the smallest speed of all dry friction that acts on each joint, shape (N, n).
 
-    qd : (N, n). G : (elements, n), slips G qd of dry friction.
+    The speed of the joint itself counts too. qd : shape (N, n). G : shape (elements, n); G qd are
+    the slips of dry friction.
     """
     speed: Array = np.abs(qd)
     for element in G:
@@ -354,7 +374,10 @@ def slips(qd: Array, G: Array) -> Array:
 
 
 def _usable(simulator: Simulator, record: Record, keep: Array | None) -> Array | None:
-    """`keep`, and the samples whose torque is not at its limit and whose positions are there or missing for a moment only."""
+    """Select the samples whose torque is below its limit and whose position is not in a long gap.
+
+    keep : samples that may be used; None: all.
+    """
     bound = np.broadcast_to(np.asarray(simulator.law.saturation, dtype=float), (record.n,))
     if not np.isfinite(bound).any() and record.missing is None:
         return keep
@@ -367,7 +390,10 @@ def _usable(simulator: Simulator, record: Record, keep: Array | None) -> Array |
 
 
 def loop_of(observation: Observation, method: str) -> ClosedLoop:
-    """The loop of an observation; raises SettingsError if `method` was asked for and there is none."""
+    """Return the closed loop that is attached to an observation.
+
+    SettingsError if there is none; the message names `method`, which needs the loop.
+    """
     if observation.closed_loop is None:
         raise SettingsError(
             f"{method} simulates the closed loop of the record, but this study describes none; add a "

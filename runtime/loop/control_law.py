@@ -1,12 +1,15 @@
-"""The laws of a controller as one: u = P e + Vr qd_r - Vm qd_m + K I + feed-forward,  dI/dt = Ie e
-+ Ir qd_r - Im qd_m,  torque = g sat(u).
+"""Control laws pid and cascade, written as one law with different gains.
+
+    u = P e + Vr qd_r - Vm qd_m + K I + feed-forward,
+    dI/dt = Ie e + Ir qd_r - Im qd_m,
+    torque = g sat(u).
 
     pid      P = kp       Vr = Vm = kd                K = ki   Ie = 1    Ir = Im = 0
     cascade  P = kv kp    Vr = kv cv    Vm = kv       K = ki   Ie = kp   Ir = cv   Im = 1
 
-all of P, Vr, Vm, K times the gain of the drive. g scales everything between position error and
-torque, the saturation too: with g_j = J_j(X)/J_j(reference) a simulation with other parameters
-keeps the bandwidth of the real loop.
+P, Vr, Vm and K are multiplied by the gain of the drive. g multiplies everything between position
+error and torque, the saturation too: with g_j = J_j(X)/J_j(reference), a simulation with other
+parameters keeps the bandwidth of the real loop.
 """
 
 from __future__ import annotations
@@ -43,22 +46,22 @@ VECTORS = (
 
 @dataclass(frozen=True, eq=False)
 class ControlLaw:
-    """The numbers of a closed loop of n joints, SI, joint side.
+    """The gains and limits of a closed loop of n joints, as arrays in SI units on the joint side.
 
     Attributes
     ----------
     P, Vr, Vm, K, Ie, Ir, Im : ndarray, shape (n,)
-        Gains of the head of this module.
+        Gains of the equations at the head of this module.
     antiwindup, saturation : ndarray, shape (n,)
         Largest |I|, and largest |u| before g.
     torque_step : ndarray, shape (n,), N m or N
         Step of the converter.
     encoder_step, encoder_noise : ndarray, shape (n,), rad or m
-        Step and deviation of the noise, on the side of R.
+        Step of R (q - offset), and standard deviation of its noise.
     ca : ndarray, shape (n,)
         Gain of qdd_r.
     flags : ndarray, shape (4,)
-        T, ticks from the position to its torque (0 or 1), weights of (y_k - y_(k-1))/T and
+        T; ticks from the position to its torque (0 or 1); weights of (y_k - y_(k-1))/T and
         (y_k - y_(k-2))/T in qd_m.
     R, offset : ndarray, shape (n, n) and (n,)
         The encoder shows R (q - offset).
@@ -87,9 +90,9 @@ class ControlLaw:
         return len(self.P)
 
     def matrix(self, g: Array, *, ideal: bool) -> Array:
-        """The numbers of the law for one tick, (n, columns).
+        """Arrange the numbers of the law for one tick as a matrix, shape (n, columns), a row per joint.
 
-        ideal : encoder and converter have no steps.
+        g : factor on the torque, shape (n,). ideal : encoder and converter have no steps.
         """
         vectors = {name: getattr(self, name) for name in VECTORS if name != "g"} | {"g": g}
         if ideal:
@@ -99,7 +102,7 @@ class ControlLaw:
         )
 
     def shown(self, q: Array) -> Array:
-        """Positions that the encoders show for joint positions q (n,)."""
+        """Compute the positions that the encoders show at the joint positions q, shape (n,)."""
         step = np.where(self.encoder_step > 0, self.encoder_step, 1.0)
         qm = self.R @ (q - self.offset)
         return np.asarray(
@@ -111,7 +114,10 @@ class ControlLaw:
 
 
 def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
-    """Turn the settings into numbers for the joints of a model; SettingsError if they do not fit."""
+    """Convert the settings of a controller into a control law for the joints of a model.
+
+    SettingsError if the settings do not fit the model.
+    """
     n, law = len(model.JOINTS), controller.law
 
     def each(path: str, value: PerJoint[float] | None, absent: float = 0.0) -> Array:
@@ -157,9 +163,10 @@ def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
 
 
 def parameters_of(model: GeneratedModel, controller: Controller | None = None) -> Array:
-    """Base parameters (b,) of the standard ones of the robot file, with `values` of the settings in their place.
+    """Compute the base parameters, shape (b,), from the standard parameters of the robot file.
 
-    0 for those without effect.
+    `values` of the controller settings replace values of the file. A standard parameter without
+    effect is 0 if it has no value.
     """
     changed = {} if controller is None else controller.values
     emitted, where = cast(Any, model), ("controller", "values")
@@ -181,9 +188,10 @@ def parameters_of(model: GeneratedModel, controller: Controller | None = None) -
 
 
 def discrete_poles(law: ControlLaw, A: Array, B: Array, g: Array) -> Array:
-    """Poles of the sampled loop about a point at rest: inertia A (n, n), viscous friction B (n, n), torque held between ticks.
+    """Compute the poles of the sampled loop, linearised about a point at rest.
 
-    State: q, qd, y1, y2, I, u. An integral that acts on nothing is left out.
+    A : inertia matrix (n, n). B : viscous friction (n, n). The torque is constant between ticks. State:
+    q, qd, y1, y2, I, u. States without effect, such as an integral with gain 0, are left out.
     """
     n = law.joints
     T, delay, last, average = law.flags
@@ -205,7 +213,7 @@ def discrete_poles(law: ControlLaw, A: Array, B: Array, g: Array) -> Array:
 
 
 def continuous_pole(law: ControlLaw, A: Array, B: Array, g: Array) -> float:
-    """Modulus of the fastest pole of the loop with continuous control, 1/s."""
+    """Compute the modulus of the fastest pole of the loop with continuous control, 1/s."""
     n = law.joints
     one, zero = np.eye(n), np.zeros((n, n))
     inverse = np.linalg.inv(A)

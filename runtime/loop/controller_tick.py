@@ -1,15 +1,15 @@
-"""One controller tick of a closed loop as one CasADi function, compiled to C if there is a compiler.
+"""One controller tick of a closed loop as a CasADi function, compiled to C if there is a compiler.
 
-    y     = what the encoder shows of q                   qd_m = its difference
+    y     = position that the encoder shows for q         qd_m = its difference
     u     = P e + Vr qd_r - Vm qd_m + K I + feed-forward,  e = q_r - y
             (both laws of the study file, runtime.loop.control_law)
-    tau   = g sat(u), u of this tick or of the one before, in steps of the converter, held until the
-          next tick
+    tau   = g sat(u), u of this tick or of the tick before, in steps of the converter, held until
+            the next tick
     q, qd = Runge-Kutta of order 4 in equal substeps (or CVODES), cut where a slip stops
     (`runtime.loop.dry_friction`)
 
-State of a tick: q, qd, the last two positions shown, I, and u. What changes from run to run is an
-input, so that one compilation serves them all.
+State of a tick: q, qd, the last two positions shown, I, and u. Everything that changes from run to
+run is an input, so that one compilation serves all runs.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ CVODES = {"abstol": 1e-10, "reltol": 1e-9}
 
 @dataclass(frozen=True, eq=False)
 class LoopInputs:
-    """The inputs of a run as arrays.
+    """Input arrays of one simulated run.
 
     Attributes
     ----------
@@ -64,11 +64,11 @@ class LoopInputs:
     g : ndarray, shape (n,)
         Factor on everything between position error and torque.
     law : ndarray, shape (n, columns)
-        Of `ControlLaw.matrix`.
+        Result of `ControlLaw.matrix`.
     substeps : int
         Integration steps per tick.
     torque_noise : ndarray, shape (N, n), N m or N
-        Of the recorded torque.
+        Noise of the recorded torque.
     """
 
     x: Array
@@ -82,7 +82,7 @@ class LoopInputs:
 
 
 def blocks(rows: Array, size: int) -> Iterator[tuple[Array, int]]:
-    """Split the inputs into blocks of `size` rows; each block says how many of them count.
+    """Yield the rows in blocks of `size` rows, each with the number of its valid rows.
 
     The last block is filled up with copies of its last row.
     """
@@ -98,11 +98,14 @@ def tick_function(
     substeps: int,
     integrator: str,
 ) -> Any:
-    """(x, signals, X, law, flags) -> x at the next tick, and y, tau, qdd of this one.
+    """Make the CasADi function of one controller tick of the closed loop.
 
-    x : q, qd, y1, y2, I, u.   signals : q_r, qd_r, feed-forward, encoder noise, disturbance.
-            law : (n, columns) of `VECTORS`, then the encoder's
-    R, R^-1 and offset.   flags : T, delay, weights of the two differences.
+    (x, signals, X, law, flags) -> x at the next tick, and y, tau, qdd of this tick.
+
+    x : q, qd, y1, y2, I, u.
+    signals : q_r, qd_r, feed-forward, encoder noise, disturbance.
+    law : (n, columns) of `VECTORS`, then R, R^-1 and offset of the encoder.
+    flags : T, delay, weights of the two differences.
     """
     n, b = len(model.JOINTS), len(model.BASE_PARAMETERS)
     x, signals, X = ca.MX.sym("x", 6 * n), ca.MX.sym("signals", 5 * n), ca.MX.sym("X", b)
@@ -132,7 +135,10 @@ def tick_function(
 
 
 def control_function(n: int) -> Any:
-    """(q, y1 y2, I, u of the tick before, q_r qd_r ff, noise, law, flags) -> y, tau, I, u."""
+    """Make the CasADi function of the control law at one tick.
+
+    (q, y1 y2, I, u of the tick before, q_r qd_r ff, noise, law, flags) -> y, tau, I, u.
+    """
     q, past, I, before, wanted, noise = (
         ca.SX.sym(name, k * n)
         for name, k in (("q", 1), ("past", 2), ("I", 1), ("u", 1), ("wanted", 3), ("noise", 1))
@@ -165,17 +171,19 @@ def _clip(x: MX, bound: MX) -> MX:
 
 
 def _steps(x: MX, step: MX) -> MX:
-    """Round x to the grid of `step`; a step of 0 leaves x as it is."""
+    """Round x to a multiple of `step`; a step of 0 leaves x unchanged."""
     return ca.if_else(step > 0, step * ca.floor(x / step + 0.5), x)
 
 
 def plant_function(
     model: GeneratedModel, friction: DryFriction, constants: dict[str, float], integrator: str
 ) -> Any:
-    """(q, qd, tau, Xs, plus, minus, h) -> q, qd after h, and qdd at its start.
+    """Make the CasADi function of the arm with dry friction, for one integration step h.
 
-    Where every slip keeps its direction, one step of the flow; otherwise rounds, each until the
-    next slip stops.
+    (q, qd, tau, Xs, plus, minus, h) -> q, qd after h, and qdd at its start.
+
+    If every slip keeps its direction, h is one step; otherwise h is divided into rounds, each until
+    the next slip stops.
     """
     n, m = friction.G.shape[1], len(friction.G)
     inputs = plant_inputs(model, friction)
@@ -199,26 +207,32 @@ def plant_function(
 
 
 def sliding_friction(friction: DryFriction, qd: MX, plus: MX, minus: MX) -> tuple[MX, MX]:
-    """Friction forces f and directions if every element slides."""
+    """Compute friction forces f and directions of slip if every friction element slides."""
     direction = ca.sign(ca.DM(friction.G) @ qd)
     return kinetic(direction, plus, minus), direction
 
 
 def keeps_sliding(friction: DryFriction, direction: MX, qd: MX, end: MX) -> MX:
-    """Whether every slip has the same direction at qd and at `end`."""
+    """Whether every slip has the same direction at the velocity qd and at the velocity `end`."""
     G = ca.DM(friction.G)
     return ca.mmin(ca.vertcat(ca.fabs(G @ qd), direction * (G @ end))) > LIMIT.SLIP_REST
 
 
 def flow_function(model: GeneratedModel, constants: dict[str, float], integrator: str) -> Any:
-    """(q, qd, tau, Xs, h) -> q, qd after h at constant torque, and qdd at the start."""
+    """Make the CasADi function of the arm without dry friction, for a step h at constant torque.
+
+    (q, qd, tau, Xs, h) -> q, qd after h, and qdd at the start.
+    """
     return (_cvodes if integrator == "cvodes" else _runge_kutta)(model, constants)
 
 
 def _rounds(
     model: GeneratedModel, friction: DryFriction, constants: dict[str, float], flow: Any
 ) -> Any:
-    """The plant where slips stop or rest: each round lasts until the next slip stops."""
+    """Make the function of the arm for slips that stop or rest.
+
+    A step h is divided into rounds; each round lasts until the next slip stops.
+    """
     inputs = plant_inputs(model, friction)
     cut, whole = (round_function(model, friction, constants, flow, whole=k) for k in (0, 1))
 
@@ -248,7 +262,11 @@ def round_function(
     *,
     whole: int,
 ) -> Any:
-    """The plant until the next slip stops, or the whole of h: q, qd, what is left of h, qdd, f, direction, Y, slips that stopped."""
+    """Make the function of one round: the arm moves until the next slip stops, or for the whole of h.
+
+    whole : 1 for the whole of h. Results: q, qd, the remaining part of h, qdd, f, direction, Y, and
+    which slips stopped.
+    """
     inputs = plant_inputs(model, friction)
     q, qd, tau, X, plus, minus, h = inputs
     f, direction, qdd, Y = friction_function(model, friction, constants)(q, qd, tau, X, plus, minus)
@@ -269,7 +287,10 @@ def round_function(
 
 
 def plant_inputs(model: GeneratedModel, friction: DryFriction | None = None) -> list[MX]:
-    """q, qd, tau, Xs, plus, minus, h; without dry friction, plus and minus are empty."""
+    """Make the symbols q, qd, tau, Xs, plus, minus, h, the inputs of the functions of the arm.
+
+    Without dry friction, plus and minus are empty.
+    """
     n, m = len(model.JOINTS), 0 if friction is None else len(friction.G)
     names = ("q", "qd", "tau", "X", "plus", "minus", "h")
     sizes = (n, n, n, len(model.BASE_PARAMETERS), m, m, 1)
@@ -279,9 +300,9 @@ def plant_inputs(model: GeneratedModel, friction: DryFriction | None = None) -> 
 def runge_kutta(
     rates: Callable[..., Sequence[MX]], state: Sequence[MX], h: MX
 ) -> tuple[list[MX], Sequence[MX]]:
-    """The state after h by Runge-Kutta of order 4, and its derivative at the start.
+    """Integrate a state over the time h by one Runge-Kutta step of order 4.
 
-    rates(*state) gives the derivative.
+    Returns the state after h, and its derivative at the start. rates(*state) gives the derivative.
     """
 
     def moved(share: MX, slope: Sequence[MX]) -> list[MX]:
@@ -296,7 +317,10 @@ def runge_kutta(
 
 
 def _runge_kutta(model: GeneratedModel, constants: dict[str, float]) -> Any:
-    """(q, qd, tau, Xs, h) -> q, qd after h at constant torque, and qdd at the start; order 4."""
+    """Make the function of the arm for a step h, by Runge-Kutta of order 4.
+
+    (q, qd, tau, Xs, h) -> q, qd after h at constant torque, and qdd at the start.
+    """
     q, qd, tau, X, _, _, h = plant_inputs(model)
 
     def rates(q: MX, qd: MX) -> tuple[MX, MX]:
@@ -307,7 +331,10 @@ def _runge_kutta(model: GeneratedModel, constants: dict[str, float]) -> Any:
 
 
 def _cvodes(model: GeneratedModel, constants: dict[str, float]) -> Any:
-    """The same by CVODES, variable order and step."""
+    """Make the function of the arm for a step h, by CVODES with variable order and step.
+
+    Inputs and results are those of `_runge_kutta`.
+    """
     q, qd, tau, X, _, _, h = plant_inputs(model)
     n = len(model.JOINTS)
     x = ca.MX.sym("x", 2 * n)
@@ -321,9 +348,9 @@ def _cvodes(model: GeneratedModel, constants: dict[str, float]) -> Any:
 
 
 def compiled(function: Any, cache: Path | None = None) -> Any:
-    """The function in C, from the cache of compiled files.
+    """Compile a CasADi function to C, or load it from the cache of compiled files.
 
-    The function itself, with a FallbackWarning, where that cannot be had.
+    If this fails, the result is the function itself, with a FallbackWarning.
     """
     generator = ca.CodeGenerator(f"{function.name()}.c")
     generator.add(function)

@@ -1,4 +1,4 @@
-"""Families of trajectories that rest at both ends: finite Fourier series, sinusoids of free frequency, point to point, triangular.
+"""Families of joint motions that rest at both ends: Fourier, sinusoids, point to point, triangular.
 
     Fourier        q = q0 + sum_l a_l/(w l) sin(w l t) - b_l/(w l) cos(w l t),   w = 2 pi/period
             (Swevers et al. 1997)
@@ -10,9 +10,9 @@
     Triangular     constant velocities between points, turning without rest
             (chapter, section 4.2.1)
 
-A family turns the coefficients p of one joint into its motion. The same text evaluates arrays
-(numpy) and expressions (casadi): `math` is the module whose sin and cos apply. All but Sinusoids
-are linear in p. Position, velocity and acceleration are continuous. SI, rad.
+A family turns the coefficients p of one joint into its motion. The same code evaluates arrays
+(numpy) and expressions (casadi): `math` is the module whose sin and cos are used. All families but
+Sinusoids are linear in p. Position, velocity and acceleration are continuous. SI units, rad.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ Corners = Annotated[Whole, Field(ge=2, le=LIMIT.PART_SIZE)]
 
 
 class Family:
-    """A form of motion; subclasses are settings, `family` their name in files."""
+    """A family of motions of one form; subclasses are settings, `family` is their name in files."""
 
     family: str
 
     @property
     def duration(self) -> float:
-        """Length, s."""
+        """Duration of the motion, s."""
         raise NotImplementedError
 
     @property
@@ -50,21 +50,29 @@ class Family:
         raise NotImplementedError
 
     def joint(self, t: Array, p: Any, math: Any) -> States:
-        """q, qd, qdd of one joint at the times t, shape (N,), from its coefficients p, shape (P,)."""
+        """Compute q, qd, qdd of one joint at the times t, shape (N,), from its coefficients p, shape (P,)."""
         raise NotImplementedError
 
     def guess(self, rng: np.random.Generator, lower: float, upper: float, speed: float) -> Array:
-        """Random coefficients, shape (P,), of a motion about the middle of [lower, upper], no faster than about `speed`."""
+        """Draw random coefficients, shape (P,), of a motion about the middle of [lower, upper].
+
+        The motion is not faster than about `speed`.
+        """
         raise NotImplementedError
 
     def bounds(self) -> tuple[Array, Array]:
-        """Smallest and largest p, shape (P,) each; infinite if only the motion is limited."""
+        """Return the smallest and the largest coefficients p that are allowed, shape (P,) each.
+
+        They are infinite for coefficients that only the limits of the motion restrict.
+        """
         return np.full(len(self.names), -np.inf), np.full(len(self.names), np.inf)
 
 
 class Fourier(Family, Settings):
-    """Finite Fourier series. At rest at its ends where sum a_l = 0 and sum l b_l = 0, a condition
-    on p that the search imposes.
+    """Finite Fourier series.
+
+    The motion is at rest at its ends if sum a_l = 0 and sum l b_l = 0; the search imposes these
+    conditions on the coefficients.
 
     Attributes
     ----------
@@ -113,7 +121,7 @@ class Fourier(Family, Settings):
 
 
 class Sinusoids(Family, Settings):
-    """Sinusoids of free frequency.
+    """Sum of sinusoids of free frequency, which rise at the start and fall at the end.
 
     Attributes
     ----------
@@ -126,7 +134,7 @@ class Sinusoids(Family, Settings):
     highest : float, Hz
         Largest frequency.
     ramp : float, s
-        Time in which the sinusoids rise, and in which they fall.
+        Time in which the sinusoids rise at the start, and in which they fall at the end.
     """
 
     family: Literal["sinusoids"] = field(default="sinusoids", kw_only=True)
@@ -186,18 +194,21 @@ class Sinusoids(Family, Settings):
 
 
 class Polyline(Family):
-    """Positions p0, p1 ... with constant velocities between them and rounded corners; `ramps` has the times of the velocities."""
+    """Motion with constant velocities between positions p0, p1 ... and rounded corners.
+
+    `ramps` has the start and end times of each constant velocity, as if the corners were sharp.
+    """
 
     points: int
     blend: float
 
     @property
     def ramps(self) -> list[tuple[float, float]]:
-        """Begin and end of the way to each next position, s; corners not rounded."""
+        """Start and end time of the motion to each next position, s, before the corners are rounded."""
         raise NotImplementedError
 
     def stride(self, speed: float) -> float:
-        """Largest distance between neighbours of a guess, rad or m."""
+        """Return the largest distance between neighbouring positions of a random guess, rad or m."""
         raise NotImplementedError
 
     @property
@@ -223,7 +234,7 @@ class Polyline(Family):
 
 
 class PointToPoint(Polyline, Settings):
-    """Positions p0, p1 ..., at rest in each of them.
+    """Motion through the positions p0, p1 ..., at rest in each position.
 
     Attributes
     ----------
@@ -234,7 +245,7 @@ class PointToPoint(Polyline, Settings):
     travel : float, s
         Time from one position to the next.
     blend : float, s
-        Part of `travel` in which speed is gained, and in which it is lost.
+        Part of `travel` in which the joint accelerates, and in which it decelerates.
     """
 
     family: Literal["point-to-point"] = field(default="point-to-point", kw_only=True)
@@ -265,7 +276,7 @@ class PointToPoint(Polyline, Settings):
 
 
 class Triangular(Polyline, Settings):
-    """Positions p0, p1 ..., turning without rest.
+    """Motion through the positions p0, p1 ..., turning at each position without rest.
 
     Attributes
     ----------
@@ -276,9 +287,9 @@ class Triangular(Polyline, Settings):
     travel : float, s
         Time from one position to the next.
     blend : float, s
-        Time of a corner.
+        Time of a rounded corner.
     speed : float, rad/s or m/s
-        Largest velocity of a guess.
+        Largest velocity between positions in the search.
     """
 
     family: Literal["triangular"] = field(default="triangular", kw_only=True)
@@ -317,16 +328,19 @@ def _linear(basis: Sequence[Array], p: Any, math: Any) -> States:
 
 
 def _step(t: Array, width: float, sign: float = 1.0) -> tuple[Array, Array, Array]:
-    """A smooth step from 0 to 1 within [0, width], 10 x^3 - 15 x^4 + 6 x^5, and its derivatives by time, of time running as `sign`."""
+    """Compute a smooth step from 0 to 1 within [0, width], with its two derivatives by time.
+
+    The step is 10 x^3 - 15 x^4 + 6 x^5 with x = t/width. sign : -1 if t runs against the time.
+    """
     x = np.clip(t / width, 0.0, 1.0)
     speed, bend = 30 * x**2 * (1 - x) ** 2 / width, 60 * x * (1 - x) * (1 - 2 * x) / width**2
     return x**3 * (10 - 15 * x + 6 * x**2), sign * speed, bend
 
 
 def _corner(u: Array, blend: float) -> Array:
-    """A ramp max(u, 0) whose corner is rounded within |u| < blend/2, with its two derivatives, shape (3, N).
+    """Compute a ramp max(u, 0) whose corner is rounded within |u| < blend/2, with two derivatives.
 
-    The speed rises as 3 x^2 - 2 x^3.
+    The result has shape (3, N). In the corner the speed rises as 3 x^2 - 2 x^3, x from 0 to 1.
     """
     x = np.clip(u / blend + 0.5, 0.0, 1.0)
     beyond = np.maximum(u - blend / 2, 0.0)
@@ -336,5 +350,5 @@ def _corner(u: Array, blend: float) -> Array:
 
 
 def _between(rng: np.random.Generator, lower: float, upper: float) -> float:
-    """A position in the middle half of the range."""
+    """Draw a random position in the middle half of the range."""
     return float(rng.uniform(0.75 * lower + 0.25 * upper, 0.25 * lower + 0.75 * upper))

@@ -1,15 +1,15 @@
-"""What IV and DIDIM share: parameters and simulation in turn, gains that follow the inertia, steps that stay physical.
+"""Fixed-point iteration of IV and DIDIM: estimate and simulate in turn until X no longer changes.
 
-    X^(k+1) = estimate from the record and the simulation with X^k and gains g(X^k), until it no longer
-    changes; then again with g = 1
+    X^(k+1) = estimate from the record and the simulation with X^k and gains g(X^k), until it no
+    longer changes; then again with g = 1
 
-g refers to X_ref, which is not the truth: the last passes need g = 1. A parameter vector whose loop
-cannot be simulated (inertia not positive definite, unstable) is refused: the step towards it is
-halved, at most five times. Stop: max
-|dX_i|/sigma_i < 0.1 and the norm of the residual
-changes by less than 1e-3 of itself, or the change is rounding. A loose loop makes passes of DIDIM
-overshoot: from the third pass on the steps are those of Anderson (1965), f_k = X_next - X^k, gamma
-= argmin |f_k - dF gamma| over the last differences, X^(k+1) = X^k + f_k - (dX + dF) gamma.
+The gains g refer to X_ref, which is not the truth, so that the last passes need g = 1. A parameter
+vector whose loop cannot be simulated (inertia not positive definite, unstable) is refused: the step
+towards it is halved, at most five times. The iteration stops if max |dX_i|/sigma_i < 0.1 and the
+norm of the residual changes by less than 1e-3 of itself, or if the change is rounding. If the loop
+is loose, passes of DIDIM overshoot: from the third pass on, the steps are those of Anderson (1965),
+f_k = X_next - X^k, gamma = argmin |f_k - dF gamma| over the last differences,
+X^(k+1) = X^k + f_k - (dX + dF) gamma.
 """
 
 from __future__ import annotations
@@ -44,15 +44,15 @@ class FixedPointOptions(LoopOptions):
     ----------
     start : str or mapping of float
         X^0: ols, values of the robot file, unit (motor inertia, else inertia or mass of the own
-        link, 1 for every joint; rest 0), or parameters by name, the others 0.
+        link, 1 for every joint; all others 0), or parameters by name, the others 0.
     gains : str
         X_ref of g: ols, values, start, or one (no rescaling).
     passes : int
         Largest number of passes with rescaled gains, and with g = 1.
     change : float
-        Largest change of a parameter over its deviation at which the passes end.
+        Largest change of a parameter over its standard deviation at which the passes end.
     residual : float
-        Relative change of the residual at which the passes end.
+        Relative change of the residual norm at which the passes end.
     """
 
     start: Literal["ols", "values", "unit"] | Mapping[str, Real] = "ols"
@@ -64,10 +64,9 @@ class FixedPointOptions(LoopOptions):
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One estimate of a pass.
+    """Result of one pass: the parameters, their covariance, and the norm of the residual.
 
-    X of the columns (c,), their covariance, the norm of its residual, and what else the method
-    keeps.
+    X has shape (c,). `result` holds other data that the method needs later.
     """
 
     X: Array
@@ -78,7 +77,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Fixed:
-    """End of an iteration: last step, all steps, whether it converged, ratio of the last two changes."""
+    """End of an iteration: last step, list of passes, convergence, and ratio of the last two changes."""
 
     step: Step
     trail: tuple[dict[str, Any], ...]
@@ -88,16 +87,16 @@ class Fixed:
 
 
 def full(names: Sequence[str], X: Array, every: Sequence[str]) -> Array:
-    """Fill all base parameters (b,) from those of the columns `names`; the others are zero."""
+    """Extend the parameters X of the columns `names` to all base parameters; the others are zero."""
     by_name = dict(zip(names, X, strict=True))
     return np.array([by_name.get(name, 0.0) for name in every])
 
 
 def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]) -> Array:
-    """Choose the X that the iteration starts from.
+    """Choose the parameters X that the iteration starts from.
 
-    `which` asks for ordinary least squares, for the values of the robot file, for unit inertias, or
-    gives the values by name.
+    `which` : ols (ordinary least squares), values (of the robot file), unit (unit inertias), or values
+    by name.
     """
     names = start.observation.names
     if not isinstance(which, str):
@@ -115,8 +114,8 @@ def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]
             base = parameters_of(model)
         except InputError as e:
             raise SettingsError(
-                f"values, but {e.message.partition(';')[0]}; give them in the robot file (0 where "
-                "one is zero), or use start: ols and gains: one",
+                f"start: values needs all of them, but {e.message.partition(';')[0]}; give these in the "
+                "robot file (0 for each that is zero), or use start: ols and gains: one",
                 path=("estimate", "options"),
             ) from e
     else:
@@ -137,7 +136,7 @@ def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]
 def iterate(
     loop: ClosedLoop, start: Beginning, update: Callable[[Sequence[Simulation], Array], Step]
 ) -> Fixed:
-    """Find the fixed point of X -> update(simulation with X, X), for the X of the rows' columns."""
+    """Find the fixed point of X -> update(simulation with X, X), X the parameters of the columns."""
     options: FixedPointOptions = start.options
     names, every = start.observation.names, loop.model.BASE_PARAMETERS
     X = initial(loop, start, options.start)
@@ -192,10 +191,10 @@ def iterate(
 
 
 def _physical_start(loop: ClosedLoop, start: Beginning) -> str:
-    """Say which start to set where the parameters are not those of a physical robot.
+    """Write which start to set if the parameters are not those of a physical robot.
 
-    These are the values of the robot file if they have an inertia about every joint, else those of
-    method feasible.
+    The advice is the values of the robot file if they give a positive inertia about every joint,
+    else the parameters of method feasible.
     """
     try:
         X = full(
@@ -220,9 +219,10 @@ def _simulated(
     J: Array | None,
     remedy: str,
 ) -> tuple[Array, Array, Sequence[Simulation], str]:
-    """Find an X that can be simulated, on the way from the last one that could.
+    """Simulate the loop with X; if this fails, halve the step from the last X that could be simulated.
 
-    g, the runs, and why none could be made. remedy : what the error of the first one says.
+    Returns X, the gains g, the runs, and the reason if no simulation was possible. remedy : advice
+    in the error if the first simulation fails.
     """
     reason = ""
     for _ in range(LIMIT.HALVINGS + 1):
@@ -251,9 +251,9 @@ def _simulated(
 
 
 def _accelerated(last: Sequence[Mapping[str, Any]], size: Array) -> Array:
-    """Extrapolate the next X from the last passes, each from X to `next`.
+    """Extrapolate the next X from the last passes (Anderson acceleration).
 
-    Distances in units of `size`, shape (c,).
+    Each pass moved from X to `next`. Distances are in units of `size`, shape (c,).
     """
     points = np.array([own["X"] for own in last])
     steps = np.array([own["next"] - own["X"] for own in last])
@@ -265,7 +265,7 @@ def _accelerated(last: Sequence[Mapping[str, Any]], size: Array) -> Array:
 
 
 def _contraction(trail: Sequence[Mapping[str, Any]]) -> float:
-    """Ratio of the last two changes; nan before there are two."""
+    """Compute the ratio of the last two changes of X; nan if there are fewer than two."""
     changes = [
         float(np.linalg.norm((own["next"] - own["X"]) / np.maximum(np.abs(own["next"]), 1e-12)))
         for own in trail[-2:]
@@ -274,7 +274,11 @@ def _contraction(trail: Sequence[Mapping[str, Any]]) -> float:
 
 
 def outcome_of(loop: ClosedLoop, fixed: Fixed, method: str) -> tuple[Status, str, dict[str, Any]]:
-    """Status, message, and what `details` holds of the passes: parameters after each, norm of the residual, gains, change in sigmas."""
+    """Return the status, the message and the details of an iteration.
+
+    The details give the parameters after each pass, the norm of the residual, the gains, and the
+    largest change in standard deviations.
+    """
     parts = [part for part in (fixed.message, loop.assumption) if part]
     if not fixed.converged:
         parts.insert(

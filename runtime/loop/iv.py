@@ -1,19 +1,18 @@
-"""IDIM-IV: instrumental variables from the simulated closed loop.
+"""Method IDIM-IV: instrumental variables from the simulated closed loop.
 
     X^(k+1) = (Z'VW)^-1 Z'VY,   Z^k = F_p[W(q_s, qd_s, qdd_s)] with the filters of the record on
                                 q_s,   V = diag(1/s_j^2), s_j of Y - W X^k
     C = A Z'VZ A', A = (Z'VW)^-1
 
-W is that of the measured positions, whose noise makes least squares biased; Z is free of it, so Z'V
-rho has mean zero. Bias that W and Z share,
-such as what the filters do to sign(qd), stays. The system is solved with the columns of W and Z
-scaled alike.
+W is computed from the measured positions, whose noise makes least squares biased. Z is free of this
+noise, so that Z'V rho has mean zero. A bias that W and Z share, such as the effect of the filters
+on sign(qd), remains. The system is solved with the columns of W and Z scaled alike.
 
 `details` : trail; smallest correlation between the spaces of Z and W (1: the instruments explain
-W); condition of Z'VW with unit columns; the
-Hausman test on d = X_IV - X_WLS, whose covariance C_d is taken from blocks of residuals as for
-sigma_corrected: largest |d_i|/sigma_di with its name,
-and, if there are blocks enough, d'C_d^-1 d, about chi2(b) where least squares is unbiased.
+W); condition of Z'VW with unit columns; the Hausman test on d = X_IV - X_WLS. The covariance C_d of
+d comes from blocks of residuals, as for sigma_corrected. The test gives the largest |d_i|/sigma_di
+with its name and, if there are blocks enough, d'C_d^-1 d, about chi2(b) if least squares is
+unbiased.
 
 References: Janot, Vandanjon and Gautier (2014); Hausman (1978).
 """
@@ -41,7 +40,7 @@ from runtime.loop.result import Simulation
 
 
 def fit(start: Beginning) -> Fitted:
-    """Fit by method iv on the rows of the measured positions.
+    """Fit the parameters by method iv on the rows of the measured positions.
 
     SettingsError if no loop is attached to the observation.
     """
@@ -95,7 +94,12 @@ def fit(start: Beginning) -> Fitted:
 
 
 def hausman(names: Sequence[str], d: Array, U: Array) -> dict[str, Any]:
-    """Test of d, shape (b,), against its covariance U'U, U of shape (K, b) from K blocks."""
+    """Test whether the difference d of two estimates is larger than its covariance U'U allows.
+
+    d has shape (b,); U has shape (K, b), one row per block of samples. Returns the largest
+    |d_i|/sigma_i with its parameter and, if there are enough blocks, the chi-square statistic with its
+    probability.
+    """
     sigma = np.linalg.norm(U, axis=0)
     z = np.abs(d) / np.where(sigma > 0, sigma, np.inf)
     worst = int(np.argmax(z))
@@ -107,7 +111,7 @@ def hausman(names: Sequence[str], d: Array, U: Array) -> dict[str, Any]:
 
 
 def _solve(W: Array, Z: Array, Y: Array) -> tuple[Array, Array, Array]:
-    """X, C and A = (Z'VW)^-1 of weighted rows."""
+    """Solve the weighted system for X; return X, its covariance C, and A = (Z'VW)^-1."""
     size = np.linalg.norm(W, axis=0)
     W, Z = W / size, Z / size
     try:
@@ -124,12 +128,10 @@ def _solve(W: Array, Z: Array, Y: Array) -> tuple[Array, Array, Array]:
 
 
 def _quality(W: Array, Z: Array) -> dict[str, float]:
-    """Condition of Z'VW with unit columns, and two correlations.
+    """Compute how well the instruments Z explain W, both with weighted rows.
 
-    These are the smallest one of the two column spaces, and the smallest of a column with its own
-    instrument.
-
-    Rows are weighted.
+    Returns the condition number of Z'VW with unit columns, the smallest correlation between the two
+    column spaces, and the smallest correlation between a column of W and its own instrument.
     """
     unit_W = W / np.linalg.norm(W, axis=0)
     unit_Z = Z / np.maximum(np.linalg.norm(Z, axis=0), 1e-300)
@@ -142,9 +144,10 @@ def _quality(W: Array, Z: Array) -> dict[str, float]:
 
 
 def _by_block(observation: Observation, Z: Array, residual: Array, A: Array) -> Array:
-    """Change of X = A Z'Y by each block left out (`runtime.core.least_squares.block_covariance`), shape (K, b), times sqrt((K - 1)/K).
+    """Compute the change of X = A Z'Y if a block of rows is left out, for each block: shape (K, b).
 
-    nan for one block.
+    The changes are multiplied by sqrt((K - 1)/K) (`runtime.core.least_squares.block_covariance`);
+    they are nan if there is only one block.
 
     Z, residual : weighted rows of the instruments, shape (r, b), and Y - W X, shape (r,).
     """

@@ -1,5 +1,4 @@
-"""Does the stated control law explain the torques of the record? Asked before anything is
-simulated.
+"""Check whether the stated control law explains the torques of the record, before any simulation.
 
     u = P e + Vr qd_r - Vm qd_m + K I + feed-forward
             from the recorded reference and positions, e = q_r - q, at the rate of the record
@@ -8,10 +7,10 @@ simulated.
     factor    of tau_law nearest to tau: 1 if gains and units are those of the record
     delay     of tau against tau_law with the largest share, s
 
-A law that explains little is not that of the record, whatever the simulation with it gives: gains
-in other units, on the motor side, a delay, another reference.
+If a law explains little, it is not the law of the record, whatever the simulation with it gives:
+gains may be in other units or on the motor side, there may be a delay or another reference.
 
-Between slow records and fast controllers the differences qd_m are those of the record.
+If the record is slower than the controller, the differences qd_m are those of the record.
 """
 
 from __future__ import annotations
@@ -33,17 +32,17 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class LawFit:
-    """Comparison of the law with the record, for one joint.
+    """Comparison of the control law with the record, for one joint.
 
     Attributes
     ----------
     joint : str
     share : float, %
-        Of the torque that the law explains; below 0: nothing.
+        Share of the torque that the law explains; below 0: nothing.
     factor : float
-        Of the torque of the law, nearest to that of the record.
+        Factor on the torque of the law with which it is nearest to the recorded torque.
     delay : float, s
-        At which the share is largest.
+        Delay at which the share is largest.
     best : float, %
         The share with that factor and delay.
     """
@@ -58,9 +57,9 @@ class LawFit:
 def law_fits(
     law: Any, parts: Sequence[Any], controller: Controller, joints: Sequence[str]
 ) -> tuple[LawFit, ...]:
-    """Compare the law with the records, joint by joint.
+    """Compare the torque of the control law with the records, joint by joint.
 
-    parts : of `ClosedLoop`, references at the rate of the controller.
+    parts : parts of a `ClosedLoop`, with references at the rate of the controller.
     """
     torques = [law_torque(law, part.record, part.reference, controller) for part in parts]
     rate, fits = parts[0].record.rate, []
@@ -82,10 +81,10 @@ def law_fits(
 
 
 def law_torque(law: Any, record: Record, reference: Reference, controller: Controller) -> Array:
-    """tau_law at the samples of a record, shape (N, n), N m or N.
+    """Compute the torque tau_law of the control law at the samples of a record, N m or N.
 
-    The integrator starts where the loop settled before t = 0: at the value that the torques of the
-    first LIMIT.LAW_STEADY seconds ask for; at 0 if the loop did not settle.
+    The result has shape (N, n). If the loop settled before t = 0, the integrator starts at the
+    value that explains the torques of the first LIMIT.LAW_STEADY seconds; else it starts at 0.
     """
     N, T = len(record), 1 / record.rate
     q_r, qd_r, qdd_r = (
@@ -109,7 +108,10 @@ def law_torque(law: Any, record: Record, reference: Reference, controller: Contr
 
 
 def _integral(steps: Array, first: float, bound: float) -> Array:
-    """I before each step, shape (N,): I_0 = first, I_(k+1) = clip(I_k + step_k), as in `runtime.loop.controller_tick`."""
+    """Compute the integral I of the control law before each step, shape (N,), limited to +-bound.
+
+    I_0 = first, I_(k+1) = clip(I_k + step_k), as in `runtime.loop.controller_tick`.
+    """
 
     def following(I: float, step: float) -> float:
         return min(max(I + step, -bound), bound)
@@ -119,7 +121,7 @@ def _integral(steps: Array, first: float, bound: float) -> Array:
 
 
 def law_text(fits: Sequence[LawFit]) -> str:
-    """Share of the torque that the law explains, joint by joint, in words, with the cause if it is small."""
+    """Write which share of the torque the law explains, by joint, and likely causes of a small share."""
     shares = ", ".join(f"{max(one.share, 0.0):.0f} % of joint {one.joint}" for one in fits)
     poor = [one for one in fits if one.share < LIMIT.LAW_POOR]
     if not poor:
@@ -138,7 +140,11 @@ def law_text(fits: Sequence[LawFit]) -> str:
 
 
 def _share(y: Array, x: Array) -> tuple[float, float, float]:
-    """Share of y that x explains, %; the best factor of x; the share with this factor."""
+    """Compute how well x explains y.
+
+    Returns the share of y that x explains, %; the best factor of x; and the share with this factor,
+    %.
+    """
     norm, size = float(np.linalg.norm(y)), float(x @ x)
     if not norm:
         return 100.0, 1.0, 100.0

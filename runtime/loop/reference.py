@@ -1,4 +1,6 @@
-"""References of a controller: q_r, qd_r, qdd_r at its rate, from samples, a motion by coefficients, a record, or random points.
+"""References of a controller: positions q_r, velocities qd_r and accelerations qdd_r at its rate.
+
+They come from samples, from a motion given by coefficients, from a record, or from random points.
 
 reference = Reference.sampled(q_r, rate=1000)
         # derivatives by central differences
@@ -33,7 +35,7 @@ UNITS = {"q": "", "qd": "/s", "qdd": "/s^2"}
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """Positions, velocities and accelerations at the instants k/rate.
+    """Reference positions, velocities and accelerations of all joints at the times k/rate.
 
     Attributes
     ----------
@@ -58,7 +60,7 @@ class Reference:
 
     @classmethod
     def sampled(cls, q: Array, rate: float) -> Reference:
-        """Make a reference of positions alone, shape (N, n).
+        """Make a reference from positions alone, shape (N, n).
 
         Velocities and accelerations are central differences.
         """
@@ -67,9 +69,9 @@ class Reference:
         return cls(rate, q, qd, derivative(qd, rate))
 
     def at_rate(self, every: int) -> Reference:
-        """Sample the same motion `every` times as fast: N samples become (N - 1) every + 1.
+        """Resample the reference at `every` times its rate: N samples become (N - 1) every + 1.
 
-        q is interpolated by cubic splines, whose derivatives are qd and qdd.
+        Cubic splines interpolate q; their derivatives are qd and qdd.
         """
         if every == 1:
             return self
@@ -79,7 +81,7 @@ class Reference:
 
     @property
     def t(self) -> Array:
-        """Instants, s, shape (N,)."""
+        """Times of the samples, s, shape (N,)."""
         return np.arange(len(self.q)) / self.rate
 
     def __len__(self) -> int:
@@ -93,23 +95,26 @@ def reference_of(
     records: Sequence[Record] = (),
     folder: str | Path | None = None,
 ) -> Reference:
-    """The reference that the settings describe, within the limits of the robot unless they are to be ignored.
+    """Make the reference that the settings of a controller describe.
+
+    The reference must be within the limits of the robot, unless the settings say to ignore them.
 
     Parameters
     ----------
     controller : Controller
     model : GeneratedModel
     records : sequence of Record
-        Those of the study, for the setting `record`.
+        Records of the study, for the setting `record`.
     folder : str or Path, optional
-        Where the file name starts; default: the current folder.
+        Folder of relative file names; default: the current folder.
 
     Raises
     ------
     SettingsError
-        No reference, or one that does not fit the robot or the controller.
+        There is no reference, or it does not fit the robot or the controller.
     InputError
-        A file that does not hold it, or a value outside the limits, with joint and instant.
+        A file does not hold the reference, or a value is outside the limits; the message gives
+        joint and time.
     """
     settings, rate, n = controller.reference, controller.rate, len(model.JOINTS)
     if settings.file is not None:
@@ -152,7 +157,10 @@ def _check_length(duration: float, rate: float, key: str) -> None:
 
 
 def read_reference(path: Path, rate: float, n: int) -> Reference:
-    """Columns q1 ... qn and, where the file has them, qd1 ..., qdd1 ... of a file at `rate`, Hz."""
+    """Read a reference at `rate`, Hz, from the columns q1 ... qn of a file.
+
+    The columns qd1 ... and qdd1 ... are used if the file has them; else central differences.
+    """
     table = read_table(path)
     names = {x: [f"{x}{j}" for j in range(1, n + 1)] for x in UNITS}
     if missing := [name for name in names["q"] if name not in table.names]:
@@ -178,10 +186,10 @@ def read_reference(path: Path, rate: float, n: int) -> Reference:
 
 
 def of_record(record: Record, controller: Controller) -> Reference:
-    """The recorded reference at the rate of the controller, by cubic splines where the record is slower.
+    """Make the reference of a controller from the reference columns of a record.
 
-    SettingsError if the record holds none, or its rate is not that of every `record_every`-th
-    tick.
+    If the record is slower than the controller, cubic splines interpolate. SettingsError if the
+    record holds no reference, or if its rate is not that of every `record_every`-th tick.
     """
     where, every = ("controller", "reference", "record"), controller.record_every
     if record.q_r is None:
@@ -196,7 +204,7 @@ def of_record(record: Record, controller: Controller) -> Reference:
 def require_rate(record: Record, controller: Controller) -> None:
     """Raise SettingsError unless the record holds every `record_every`-th tick of the controller.
 
-    The error names the setting that would make it so.
+    The error names the setting to change.
     """
     rate, every = controller.rate, controller.record_every
     if abs(record.rate * every / rate - 1) <= LIMIT.RATE_TOLERANCE:
@@ -221,7 +229,10 @@ def require_rate(record: Record, controller: Controller) -> None:
 
 
 def check_limits(reference: Reference, limits: Mapping[str, Any], joints: Sequence[str]) -> None:
-    """Raise InputError with joint, value, limit and instant at the first reference value outside LIMITS of a model."""
+    """Raise InputError if a reference leaves the limits of a model.
+
+    The message gives joint, value, limit and time of the first value outside.
+    """
     for quantity, unit in UNITS.items():
         if quantity not in limits:
             continue
@@ -241,11 +252,10 @@ def check_limits(reference: Reference, limits: Mapping[str, Any], joints: Sequen
 
 
 def point_to_point(model: GeneratedModel, settings: Points, rate: float) -> Reference:
-    """Move all joints together between random points in the middle of their range.
+    """Make a reference that moves all joints together between random points of their range.
 
-    The motion is as fast as the limits of speed and acceleration allow.
-
-    It ends with the last piece that the duration has room for.
+    The points are in the middle of the range. Each move is as fast as the limits of speed and
+    acceleration allow. The reference ends with the last move that fits into the duration.
     """
     if missing := [key for key in ("q", "qd", "qdd") if key not in model.LIMITS]:
         raise SettingsError(
@@ -285,7 +295,7 @@ def point_to_point(model: GeneratedModel, settings: Points, rate: float) -> Refe
 
 
 def _unit_piece(x: Array) -> tuple[Array, Array, Array]:
-    """Position from 0 to 1, velocity and acceleration of one piece at x = t/T from 0 to 1."""
+    """Compute the position (0 to 1), velocity and acceleration of one move at x = t/T from 0 to 1."""
     top = 1 / (1 - RAMP)
     up, down = np.clip(x / RAMP, 0, 1), np.clip((1 - x) / RAMP, 0, 1)
     v = top * np.minimum(up**2 * (3 - 2 * up), down**2 * (3 - 2 * down))

@@ -1,4 +1,4 @@
-"""What a closed-loop simulation gives: exact states, what a record of it would hold, sensitivities to the parameters."""
+"""Result of a closed-loop simulation: exact states, and the signals that a record would hold."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ TORQUE = {"rad": "N m", "m": "N"}  # unit of the torque by that of the position
 
 
 class SimulationError(InputError):
-    """A run that cannot be made: inertia not positive definite, loop unstable, or motion lost.
+    """A simulation fails: inertia not positive definite, loop unstable, or motion lost.
 
-    `time` : s of the reference at which this shows.
+    `time` : time of the reference at which this appears, s.
     """
 
     def __init__(self, message: str, *, time: float) -> None:
@@ -40,11 +40,11 @@ class Simulation(Result):
     q, qd, qdd, tau : ndarray
         Exact states, and the torque on the arm without the disturbance.
     q_measured, tau_measured : ndarray
-        What a record would hold.
+        Positions and torques that a record would hold.
     q_r : ndarray
-        Reference.
+        Reference positions.
     rate : float, Hz
-        Of the recorded ticks.
+        Rate of the recorded ticks.
     saturated : ndarray, shape (n,)
         Share of ticks with the torque at its limit.
     substeps : int
@@ -77,7 +77,7 @@ class Simulation(Result):
     name: str = "simulation"
 
     def record(self) -> Record:
-        """The simulated record, with its reference."""
+        """Make a record of the simulated measurements, with its reference."""
         return Record(
             self.t,
             self.q_measured,
@@ -89,24 +89,24 @@ class Simulation(Result):
         )
 
     def to_csv(self) -> str:
-        """Write the measured columns t, q1 ..., tau1 ..., qr1 ..., as `identify` reads them.
+        """Write the simulated measurements as CSV text, which `identify` reads.
 
-        They are of the joint side, SI.
+        The columns are t, q1 ..., tau1 ..., qr1 ..., on the joint side, in SI units.
         """
         return csv_text(self.t, q=self.q_measured, tau=self.tau_measured, qr=self.q_r)
 
     @property
     def units(self) -> tuple[tuple[str, str], ...]:
-        """Units of position and torque, by joint."""
+        """Units of position and torque of each joint, for instance ("rad", "N m")."""
         return tuple((unit, TORQUE[unit]) for unit in joint_units(self.model))
 
     @property
     def at_rest(self) -> Array:
-        """Share of the recorded ticks at which each joint rests, shape (n,)."""
+        """Share of the recorded ticks at which each joint is at rest, shape (n,)."""
         return np.asarray((np.abs(self.qd) <= LIMIT.SLIP_REST).mean(axis=0))
 
     def summary(self) -> dict[str, Any]:
-        """Figures of merit as JSON values: simulation.json."""
+        """Return the figures of merit as JSON values, for the file simulation.json."""
         error = self.q - self.q_r
         return {
             "robot": self.model.NAME,
@@ -131,7 +131,7 @@ class Simulation(Result):
         }
 
     def table(self) -> Table:
-        """Tracking error and torque of each joint."""
+        """Make a table of the tracking error and the torque of each joint."""
         error, effort = self.q - self.q_r, np.abs(self.tau).max(axis=0)
         columns = (
             joint_labels(self.model),
@@ -164,13 +164,16 @@ class Simulation(Result):
         )
 
     def to_table(self) -> str:
-        """Tracking error and torque of each joint, as text."""
+        """Write the tracking error and the torque of each joint as text."""
         table = self.table()
         return f"{table.caption}\n{table.to_text()}"
 
 
 def csv_text(t: Array, **signals: Array) -> str:
-    """CSV with the columns t, then NAME1, NAME2 ... of each signal, shape (N, n), ten digits."""
+    """Write signals as CSV text: the column t, then NAME1, NAME2 ... for each signal, shape (N, n).
+
+    Numbers have ten digits.
+    """
     names = ["t", *(f"{name}{j + 1}" for name, x in signals.items() for j in range(x.shape[1]))]
     rows = np.column_stack([t, *signals.values()])
     return "\n".join([",".join(names), *(",".join(f"{x:.10g}" for x in row) for row in rows), ""])

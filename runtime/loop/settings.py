@@ -1,10 +1,12 @@
-"""The `controller` section of a study file: the closed loop that moves the arm, its reference, encoders and drives.
+"""The `controller` section of a study file: the closed loop that moves the arm.
+
+The section describes the control law, the reference, the encoders and the drives:
 
     controller:
       law: {kind: pid, kp: [450, ...], kd: [2.5, ...], ki: 0, gain: [35.24, ...]} rate: 5000
       reference: {points: {duration: 10, seed: 1}} encoder: {step: 2*pi/65536, side: motor}
 
-SI, rad, joint side. One number applies to all joints.
+SI units, rad, joint side. One number applies to all joints.
 """
 
 from __future__ import annotations
@@ -39,9 +41,9 @@ def _a_motion(mapping: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 class Law(Settings):
-    """Control law of every joint on its own.
+    """Control law of each joint.
 
-    E = q_r - q_m, u in the unit of the drive, torque = gain u.
+    e = q_r - q_m, u in the unit of the drive, torque = gain u.
 
     pid      u = kp e + kd (qd_r - qd_m) + ki I,                       I = integral of e
     cascade  u = kv (kp e + cv qd_r - qd_m) + ki I + ca qdd_r,
@@ -67,10 +69,10 @@ class Law(Settings):
     gain : float or tuple of float, N m or N
         Torque for one unit of u.
     delay : float or str, s
-        From the logged signals to the torque, of a law that replaces a measured torque; fit:
+        Delay from the logged signals to the torque, for a law that replaces a measured torque; fit:
         found with the parameters. For a simulated loop: controller.delay.
     antiwindup : float or tuple of float or None
-        Largest |I|; null: none.
+        Largest |I|; null: unlimited.
     """
 
     kind: Literal["pid", "cascade"] = "pid"
@@ -91,9 +93,10 @@ class Law(Settings):
             require(none, f"{value}; a {self.kind} law has no such gain", key)
 
     def gains(self, n: int) -> dict[str, np.ndarray]:
-        """P, Vr, Vm, K of u = P e + Vr qd_r - Vm qd_m + K I for n joints, each of shape (n,), N m or N by unit of e, its rate and I.
+        """Return the gains P, Vr, Vm, K of u = P e + Vr qd_r - Vm qd_m + K I, shape (n,) each.
 
-        kd: fit counts as 0.
+        They contain the gain of the drive: N m or N per unit of e, of its rate, and of I. kd: fit
+        counts as 0.
         """
 
         def each(key: str) -> np.ndarray:
@@ -113,13 +116,14 @@ class Law(Settings):
 
 
 class Encoder(Settings):
-    """Measured position: white noise is added, then the sum is rounded to steps. Rad or m of its
-    side.
+    """Model of an encoder: white noise is added to the position, then the sum is rounded to steps.
+
+    Units are rad or m on the side of the encoder.
 
     Attributes
     ----------
     step : float or tuple of float or None, rad or m
-        Size of the steps; null: none.
+        Size of the steps; null: no steps.
     noise : float or tuple of float, rad or m
         Standard deviation of the noise.
     side : str
@@ -132,12 +136,12 @@ class Encoder(Settings):
 
 
 class Torque(Settings):
-    """Path from the command to the arm and to the record, N m or N of the joint.
+    """Path of the torque from the command to the arm and to the record, N m or N at the joint.
 
     Attributes
     ----------
     saturation : float or tuple of float or str or None, N m or N
-        Largest torque; limits: that of the robot file, if it has one; null: none.
+        Largest torque; limits: the limit of the robot file, if it has one; null: unlimited.
     step : float or tuple of float or None, N m or N
         Step of the converter, after the saturation.
     noise : float or tuple of float, N m or N
@@ -155,14 +159,19 @@ class Torque(Settings):
     bandwidth: Positive = 50.0
 
     def largest(self, limits: Mapping[str, Any]) -> PerJoint[float] | None:
-        """The saturation, N m or N, from the settings or the LIMITS of a model; None without one."""
+        """Return the largest torque, N m or N, from the settings or the LIMITS of a model.
+
+        None if the torque is unlimited.
+        """
         if self.saturation != "limits":
             return self.saturation
         return tuple(limits["tau"]) if "tau" in limits else None
 
 
 class Points(Settings):
-    """Motion between random points in the middle of the range, as fast as the limits of the robot file allow.
+    """Settings of a motion between random points in the middle of the range of each joint.
+
+    The motion is as fast as the limits of the robot file allow.
 
     Attributes
     ----------
@@ -183,7 +192,7 @@ class ReferenceSettings(Settings):
     ----------
     file : str or None
         CSV with columns q1 ..., qd1 ..., qdd1 ... (and t), at the controller rate, rad or m;
-        missing derivatives are differences.
+        missing derivatives are computed by differences.
     record : int or None
         Index, from 0, of a record that holds its reference, columns qr1 ...
     motion : mapping or None
@@ -211,14 +220,14 @@ class ReferenceSettings(Settings):
 
 
 class Controller(Settings):
-    """A closed loop: law, encoder, torque and reference.
+    """Settings of a closed loop: control law, encoder, torque and reference.
 
     Attributes
     ----------
     law : Law
-        Control law. Where records name q_ref and no tau, its torque replaces theirs.
+        Control law. If records name q_ref and no tau, its torque replaces the missing torque.
     kp, kd : float or tuple of float or str or None
-        Short for law: {kp: ..., kd: ...}.
+        Short form of law: {kp: ..., kd: ...}.
     rate : float, Hz
         Rate of the controller; torque is held between its ticks.
     delay : int
@@ -226,18 +235,18 @@ class Controller(Settings):
     velocity : str
         qd_m as the difference of two positions, or averaged, (q_k - q_(k-2))/2T.
     feedforward : str
-        values adds the torque of the reference with the parameters of the robot file; record adds
-        the recorded one, `record.columns.tau_ff`.
+        none; values adds the torque of the reference with the parameters of the robot file; record
+        adds the recorded feed-forward torque, `record.columns.tau_ff`.
     encoder : Encoder
         Measurement of the positions.
     torque : Torque
-        Way of the torque to the arm and to the record.
+        Path of the torque to the arm and to the record.
     reference : ReferenceSettings
-        Motion that is followed.
+        Motion that the controller follows.
     record_every : int
-        Ticks for one recorded sample.
+        Number of ticks per recorded sample.
     settle : float, s
-        Time at rest on the first reference point before the motion, where the law has an integral.
+        Time at rest on the first reference point before the motion, if the law has an integral.
     integrator : str
         rk4 in substeps of at most `pole_step` over the fastest closed-loop pole, or cvodes.
     pole_step : float

@@ -1,13 +1,13 @@
-"""Does the simulation follow the record? What IV and DIDIM assume, joint by joint.
+"""Check, joint by joint, whether the simulation follows the record, as IV and DIDIM assume.
 
     position    100 rms(q_s - q)/std(q)
             of the simulation with the parameters found, g = 1
     tracking    100 rms(q_s - q)/rms(q_r - q)
-            100 %: no better than to take the reference for the motion; where the reference is known
+            100 %: the reference predicts the motion as well; only if the reference is known
     torque      100 ||tau_s - tau||/||tau||           decimated, on the rows of the observation
 
-A simulated motion that is not the measured one makes Z, or the output error, that of another
-experiment: whatever the residual says then, it is not about this robot. Limits are conventions.
+If the simulated motion is not the measured motion, Z, or the output error, belongs to another
+experiment: then a small residual does not concern this robot. The limits are conventions.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class JointMotion:
-    """Simulated minus measured, one joint.
+    """Difference between the simulated and the measured motion of one joint.
 
     Attributes
     ----------
@@ -43,9 +43,10 @@ class JointMotion:
     rms : float, rad or m
         Root mean square of q_s - q.
     position : float, %
-        The same, of the deviation of q from its mean.
+        This rms relative to the standard deviation of q.
     tracking : float, %
-        The same, of the deviation of q from the reference; nan if the reference is not known.
+        This rms relative to the rms of the tracking error q_r - q; nan if the reference is not
+        known.
     torque : float, %
         100 ||tau_s - tau||/||tau||.
     """
@@ -58,7 +59,7 @@ class JointMotion:
 
     @property
     def apart(self) -> str:
-        """Say how the simulation differs from the record; "" if it follows."""
+        """Text that says how the simulation differs from the record; "" if it follows the record."""
         if not self.position <= LIMIT.MOTION_APART:
             return f"position of joint {self.joint} off by {self.position:.0f} % of its motion"
         if self.tracking > LIMIT.MOTION_TRACKING and self.position > LIMIT.MOTION_SMALL:
@@ -75,9 +76,9 @@ class JointMotion:
 def simulated_motion(
     loop: ClosedLoop, observation: Observation, X: Array
 ) -> tuple[JointMotion, ...]:
-    """Simulate with all base parameters X, shape (b,), and compare each joint with the records.
+    """Simulate the records with all base parameters X, shape (b,), and compare each joint.
 
-    InputError if it cannot be made.
+    InputError if the simulation is not possible.
     """
     runs = loop.run(X)
     gaps = [
@@ -115,7 +116,10 @@ def simulated_motion(
 def judge_motion(
     loop: ClosedLoop, observation: Observation, X: Array
 ) -> tuple[Status, str, Mapping[str, Any]]:
-    """Status, message, and `motion` for the details of an Estimate with all base parameters X."""
+    """Judge whether the simulation with parameters X follows the records.
+
+    Returns the status, the message and the details for an Estimate. X holds all base parameters.
+    """
     law = law_text(loop.law) if loop.law else ""
     details: dict[str, Any] = {"law": [vars(one) for one in loop.law]} if loop.law else {}
     try:
@@ -140,7 +144,10 @@ def judge_motion(
 
 
 def beside_record(fit: Callable[[Beginning], Fitted], start: Beginning) -> Fitted:
-    """Run `fit`, a method that simulates the loop, and compare its last simulation with the record."""
+    """Run a method that simulates the loop, and check that its last simulation follows the record.
+
+    fit : function of the method.
+    """
     fitted = fit(start)
     loop = loop_of(start.observation, start.settings.method)
     X = full(start.system.names, fitted.solution.X, loop.model.BASE_PARAMETERS)

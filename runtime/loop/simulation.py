@@ -1,14 +1,14 @@
-"""Closed-loop simulation on the emitted CasADi model.
+"""Closed-loop simulation of a robot, on its generated CasADi model.
 
     run = simulate(model, study)                            # one run, by the section `controller`
     simulator = Simulator(model, controller)                # many: compiled once
     run = simulator.run(X, reference, g=g, ideal=True)      # exact states, no noise, no steps
 
-Torque is held between the ticks of the controller; between them Runge-Kutta of order 4 (or CVODES),
-with dry friction that holds at rest and only takes energy. Substeps are at most `pole_step` over
-the fastest pole of the loop. Before a run the inertia matrix must be positive definite and the
-sampled loop stable along the reference: what is not raises SimulationError, which says where, and
-what to try.
+The torque is held between the ticks of the controller. The motion between ticks is integrated by
+Runge-Kutta of order 4 (or CVODES), with dry friction that holds at rest and only takes energy.
+Substeps are at most `pole_step` over the fastest pole of the loop. Before a run, the inertia matrix
+must be positive definite and the sampled loop stable along the reference; else SimulationError
+names the place and what to try.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Simulator:
     constants : mapping, optional
         Geometry and gravity that replace those of the robot file.
     in_c : bool
-        Compile if there is a compiler.
+        Whether to compile to C if there is a compiler.
     """
 
     def __init__(
@@ -88,7 +88,7 @@ class Simulator:
         seed: int | None = None,
         name: str = "simulation",
     ) -> Simulation:
-        """Simulate the arm along the reference.
+        """Simulate the closed loop along the reference.
 
         Parameters
         ----------
@@ -98,24 +98,24 @@ class Simulator:
         g : ndarray, shape (n,), or float
             Factor on everything between position error and torque.
         start : ndarray, shape (n,), optional, rad or m
-            Joint positions at t = 0, at rest; default: those of the settings, else the first of the
-            reference.
+            Joint positions at t = 0, at rest; default: from the settings, else the first position
+            of the reference.
         ideal : bool
-            No noise, no steps of encoder and converter.
+            Whether to leave out noise, and the steps of encoder and converter.
         disturbance : ndarray, shape (N, n), optional, N m or N
             Torques on the arm that are not recorded.
         feedforward : ndarray, shape (N, n), optional, N m or N
             Torques added to the command, in place of those of the settings.
         seed : int, optional
-            Of the noise; default: that of the settings.
+            Seed of the noise; default: the seed of the settings.
         name : str
-            Of the record.
+            Name of the record.
 
         Raises
         ------
         SimulationError
-            An inertia that is not positive definite, a loop that is not stable, or a motion that is
-            lost.
+            An inertia that is not positive definite, a loop that is not stable, or a motion that
+            leaves its reference.
         """
         seed = self.controller.seed if seed is None else seed
         inputs = self._inputs(
@@ -134,7 +134,10 @@ class Simulator:
         feedforward: Array | None,
         seed: int | None,
     ) -> LoopInputs:
-        """Draw the inputs of a run. seed : None for an ideal run."""
+        """Prepare the inputs of a run: signals with noise, first state, gains, number of substeps.
+
+        seed : None for an ideal run.
+        """
         n, b, N = len(self.model.JOINTS), len(self.model.BASE_PARAMETERS), len(reference)
         X, g = np.asarray(X, dtype=float), np.broadcast_to(np.asarray(g, dtype=float), (n,)).copy()
         if X.shape != (b,) or not np.isfinite(X).all():
@@ -198,10 +201,10 @@ class Simulator:
         )
 
     def substeps(self, X: Array, reference: Reference, g: Array) -> int:
-        """Number of integration steps per tick.
+        """Compute the number of integration steps per tick from the fastest pole of the loop.
 
-        SimulationError if the inertia is not positive definite or the sampled loop is unstable on
-        the reference.
+        SimulationError if, on the reference, the inertia is not positive definite or the sampled
+        loop is unstable.
         """
         fastest = 0.0
         for k in np.unique(np.linspace(0, len(reference) - 1, LIMIT.LOOP_POINTS).astype(int)):
@@ -240,7 +243,7 @@ class Simulator:
         return steps
 
     def _ticks(self, substeps: int) -> Any:
-        """The CasADi function of BLOCK ticks; made once."""
+        """Return the CasADi function that simulates BLOCK ticks; it is made once for each `substeps`."""
         if substeps not in self._compiled:
             tick = tick_function(
                 self.model, self.friction, self.constants, substeps, self.controller.integrator
@@ -249,9 +252,10 @@ class Simulator:
         return self._compiled[substeps]
 
     def _iterated(self, inputs: LoopInputs) -> tuple[Array, Array]:
-        """Run BLOCK ticks at a time.
+        """Simulate all ticks of a run, BLOCK ticks in one call.
 
-        Returns states after each tick (S + N, 6n), and outputs y, tau, qdd (S + N, 3n).
+        Returns the states after each tick, shape (S + N, 6n), and the outputs y, tau, qdd, shape
+        (S + N, 3n).
         """
         function = self._ticks(inputs.substeps)
         x = inputs.x
@@ -265,7 +269,7 @@ class Simulator:
         return np.vstack(states), np.vstack(out)
 
     def _start(self, reference: Reference, start: Array | None, *, ideal: bool) -> Array:
-        """State of the loop, (6n,), at rest."""
+        """Return the first state of the loop, at rest, shape (6n,)."""
         n = len(self.model.JOINTS)
         given = self.controller.start if start is None else start
         q = np.asarray(reference.q[0] if given is None else given, dtype=float)
@@ -275,7 +279,10 @@ class Simulator:
         return np.concatenate([q, np.zeros(n), y, y, np.zeros(2 * n)])
 
     def _noise(self, rng: np.random.Generator, N: int) -> tuple[Array, Array, Array]:
-        """Encoder noise, torque on the arm, noise of the recorded torque: (N, n) each."""
+        """Draw the encoder noise, the disturbance on the arm, and the noise of the recorded torque.
+
+        Each has shape (N, n).
+        """
         n, torque, rate = len(self.model.JOINTS), self.controller.torque, self.controller.rate
         encoder, pushed, recorded = rng.standard_normal((3, N, n))
         size = np.broadcast_to(np.asarray(torque.disturbance, dtype=float), (n,))
@@ -305,8 +312,8 @@ def simulate(
 ) -> Simulation:
     """Simulate the closed loop of a controller along its reference.
 
-    records : those that the reference may come from.   folder : where a file of it starts.
-    ideal, name : as of `runtime.simulate`.
+    records : records that may hold the reference. folder : folder of relative names of reference files.
+    ideal, name : as for `runtime.simulate`.
     """
     X = parameters_of(model, controller)
     index = controller.reference.record
@@ -318,7 +325,10 @@ def simulate(
 
 
 def _rest_functions(model: GeneratedModel, constants: Mapping[str, float]) -> Any:
-    """(q, Xs) -> A and the viscous friction B = dGamma/dqd at rest."""
+    """Make the CasADi function of the inertia matrix A and the viscous friction B at rest.
+
+    (q, Xs) -> A, B = dGamma/dqd.
+    """
     n = len(model.JOINTS)
     q, qd, X = ca.SX.sym("q", n), ca.SX.sym("qd", n), ca.SX.sym("X", len(model.BASE_PARAMETERS))
     A = model.casadi("inertia_matrix")(q=q, X=X, **constants)["A"]
@@ -344,7 +354,10 @@ def _check_shapes(reference: Reference, rate: float, n: int, N: int, *given: Arr
 
 
 def _check_motion(q: Array, reference: Reference) -> None:
-    """SimulationError at the first tick where the motion is not finite or far from all reference."""
+    """Raise SimulationError if the motion is not finite or far away from the whole reference.
+
+    The error gives the first such tick.
+    """
     far = np.abs(reference.q).max() + LIMIT.MOTION_LOST * (1 + np.ptp(reference.q, axis=0))
     lost = ~(np.abs(q) < far)
     if lost.any():

@@ -6,8 +6,9 @@ c_plus,
     A qdd = tau - h - G' f,        f = c_plus where s > 0,  -c_minus where s < 0,
             between them where s = 0,
 
-h without dry friction. At rest the force is the one that keeps ds/dt = 0 while it lies between its
-bounds, else the bound itself: a linear complementarity problem, solved by block pivots.
+with h of the model without dry friction. At rest, the friction force keeps ds/dt = 0 if such a
+force lies between the bounds; else it is the bound itself. This is a linear complementarity
+problem, solved by block pivots.
 
 A step ends where a slip changes its sign, and the slip is zero from there on: friction never pushes
 along the motion, so that it takes energy only.
@@ -29,7 +30,11 @@ SX = Any  # casadi.SX
 def friction_function(
     model: GeneratedModel, friction: DryFriction, constants: dict[str, float]
 ) -> Any:
-    """(q, qd, tau, Xs, c_plus, c_minus) -> f, direction of every element (-1, 0 stuck, 1), qdd, and Y = A^-1 G'.
+    """Make the CasADi function of the dry friction forces f in a state of the arm.
+
+    (q, qd, tau, Xs, c_plus, c_minus) -> f, direction of every element (-1, 0 stuck, 1), qdd, and
+    Y = A^-1 G'.
+
     Xs : X without dry friction.
     """
     n, m = len(model.JOINTS), len(friction.G)
@@ -61,12 +66,15 @@ def friction_function(
 
 
 def kinetic(direction: SX, plus: SX, minus: SX) -> SX:
-    """Friction forces (m,) of elements that slide in a direction; 0 where the direction is 0."""
+    """Compute the friction forces, shape (m,), of elements that slide; 0 where the direction is 0."""
     return (direction > 0) * plus - (direction < 0) * minus
 
 
 def _at_rest(D: SX, free: SX, moving: SX, plus: SX, minus: SX) -> tuple[SX, SX]:
-    """Forces (m,) of the elements at rest and the direction in which each starts, 0 if none: ds/dt = free - D f."""
+    """Compute the forces of friction elements at rest, and the direction in which each starts to slip.
+
+    Both have shape (m,); the direction is 0 if the element stays at rest. ds/dt = free - D f.
+    """
     m = D.shape[0]
     resting = moving == 0
     mode = ca.SX.zeros(m)
@@ -84,9 +92,9 @@ def _at_rest(D: SX, free: SX, moving: SX, plus: SX, minus: SX) -> tuple[SX, SX]:
 
 
 def _masked(D: SX, rows: SX) -> SX:
-    """Keep D on rows and columns marked 1; elsewhere the identity.
+    """Keep the rows and columns of D that are marked 1; replace all others by the identity.
 
-    A little more on the diagonal, since rows of G may depend on each other.
+    The diagonal becomes slightly larger, since rows of G may depend on each other.
     """
     return (
         ca.diag(rows) @ D @ ca.diag(rows)
@@ -96,10 +104,11 @@ def _masked(D: SX, rows: SX) -> SX:
 
 
 def rest_function(friction: DryFriction, columns: int = 1) -> Any:
-    """(qd, Y, at_rest) -> qd with the slips marked 1 at zero: the nearest velocity in the metric of A, so that kinetic energy only falls.
+    """Make the CasADi function that sets the marked slips of a velocity to zero.
 
-    Of a displacement in place of qd: elements that rest over the step do not creep. qd : (n,
-    columns).
+    (qd, Y, at_rest) -> the nearest velocity with these slips zero. The metric is A, so that kinetic
+    energy only falls. If a displacement replaces qd, elements that rest over the step do not creep.
+    qd : (n, columns).
     """
     m, n = friction.G.shape
     qd, Y, rows = ca.SX.sym("qd", n, columns), ca.SX.sym("Y", n, m), ca.SX.sym("rows", m)
@@ -111,11 +120,11 @@ def rest_function(friction: DryFriction, columns: int = 1) -> Any:
 
 
 def event_function(friction: DryFriction) -> Any:
-    """The part of a step until the first slip changes its sign.
+    """Make the CasADi function that cuts a step where the first slip changes its sign.
 
-    (q, qd, qdd, q1, qd1, h, direction, whole) -> q, qd at the end of the part, what is left of h,
-    slips that are zero at that end. The slip is taken as quadratic over the
-    step; `whole` = 1 keeps the whole step whatever changes its sign.
+    (q, qd, qdd, q1, qd1, h, direction, whole) -> q, qd at the cut, the remaining part of h, and
+    which slips are zero at the cut. The slip is taken as quadratic over the step. `whole` = 1 keeps
+    the whole step, whatever changes its sign.
     """
     m, n = friction.G.shape
     q, qd, qdd, q1, qd1 = (ca.SX.sym(name, n) for name in ("q", "qd", "qdd", "q1", "qd1"))
@@ -146,9 +155,9 @@ def event_function(friction: DryFriction) -> Any:
 
 
 def _root(c: SX, b: SX, end: SX) -> SX:
-    """Find where c + b x + a x**2 first falls through zero in [0, 1].
+    """Find x in [0, 1] where c + b x + a x**2 first falls through zero.
 
-    It is c >= 0 at 0 and `end` < 0 at 1.
+    The polynomial is c >= 0 at x = 0 and `end` < 0 at x = 1.
     """
     a = end - b - c
     root = ca.sqrt(ca.fmax(b**2 - 4 * a * c, 0))
@@ -158,7 +167,10 @@ def _root(c: SX, b: SX, end: SX) -> SX:
 
 
 def solve(A: SX, B: SX) -> SX:
-    """A^-1 B with A = L diag(d) L', L unit lower triangular; A symmetric positive definite."""
+    """Compute A^-1 B from the factors A = L diag(d) L'; A is symmetric positive definite.
+
+    L is unit lower triangular.
+    """
     n = A.shape[0]
     L, d = ca.SX.eye(n), [A[j, j] for j in range(n)]
     rows = [B[j, :] for j in range(n)]

@@ -1,5 +1,6 @@
-"""Trajectories: chains of families with their coefficients, each part beginning where the part before it ends.
-SI, rad.
+"""Trajectories of the joints: chains of parts, each a family of motions with its coefficients.
+
+Each part begins where the part before it ends. SI units, rad.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ BLOCK = 2**22  # times at once, by coefficients: a family holds a row of them fo
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One part of a motion: a family with the coefficients of every joint, shape (P, n)."""
+    """One part of a motion: a family with the coefficients p of every joint, shape (P, n)."""
 
     family: Family
     p: Array
@@ -38,7 +39,7 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A chain of parts."""
+    """A motion of all joints: a chain of parts that follow each other in time."""
 
     parts: tuple[Part, ...]
 
@@ -55,11 +56,11 @@ class Motion:
 
     @property
     def duration(self) -> float:
-        """Length, s."""
+        """Duration of the motion, s."""
         return sum(part.family.duration for part in self.parts)
 
     def states(self, t: Array) -> tuple[Array, Array, Array]:
-        """q, qd, qdd, shape (N, n), at the times t, shape (N,), within [0, duration]."""
+        """Compute q, qd, qdd, shape (N, n), at the times t, shape (N,), within [0, duration]."""
         t = np.asarray(t, dtype=float)
         q, qd, qdd = (np.empty((len(t), self.n)) for _ in range(3))
         start = 0.0
@@ -83,21 +84,21 @@ class Motion:
         return q, qd, qdd
 
     def sampled(self, rate: float) -> tuple[Array, Array, Array, Array]:
-        """t, q, qd, qdd at the controller rate, Hz."""
+        """Sample the motion at `rate`, Hz: return t, shape (N,), and q, qd, qdd, shape (N, n)."""
         t = np.arange(round(self.duration * rate) + 1) / rate
         return t, *self.states(t)
 
     def to_mapping(self) -> dict[str, Any]:
-        """The parts with their coefficients, by joint, for a file."""
+        """Return the parts with their coefficients, by joint, as a mapping for a file."""
         return {
             "parts": [{**to_mapping(part.family), "p": part.p.T.tolist()} for part in self.parts]
         }
 
 
 def motion_from_mapping(mapping: Mapping[str, Any]) -> Motion:
-    """The motion that `Motion.to_mapping` wrote.
+    """Make a motion from a mapping that `Motion.to_mapping` wrote.
 
-    Raises SettingsError with the path of the offending key.
+    Raises SettingsError with the path of the wrong key.
     """
     parts = mapping.get("parts")
     if not isinstance(parts, list | tuple):

@@ -216,10 +216,10 @@ def nearest_standard(
     start: Array,
     limits: RobotLimits | None = None,
 ) -> Array:
-    """Find the standard parameters chi with K chi = X that are nearest to the values of the robot file.
+    """Find the physical standard parameters chi with K chi = X, nearest to those of the robot file.
 
-    chi fulfils the conditions of a physical robot, like `start`, which is the result if the solver
-    finds nothing better.
+    start : a chi that fulfils the conditions of a physical robot. It is the result if the solver finds
+    nothing better.
     """
     scale, unit = scales(physical), units(physical)
     space, rows = solutions(physical.rows(names), X, unit), limit_rows(physical, limits)
@@ -344,8 +344,8 @@ def known_inertia(physical: PhysicalModel) -> tuple[int, ...]:
 def unsolved(status: str, rows: LinearBounds, attempt: Callable[[LinearBounds], Optimum]) -> str:
     """Write why no solution was found: the likely cause, and what to try.
 
-    attempt : function that solves the same problem with other limits. Each limit is left out in turn,
-    to find out which limit prevents a solution.
+    attempt : function that solves the same problem with other limits. Each limit is left out in
+    turn, to find out which limit prevents a solution.
     """
     helps = [name for name in dict.fromkeys(rows.names) if attempt(rows.without(name)).solved]
     if helps:

@@ -1,6 +1,6 @@
 """Method feasible: least squares over the parameters that a physical robot can have.
 
-    min ||R (z - K chi)||^2 + weight D(chi)      subject to
+    min ||R (z - K chi)||^2/||Y||^2 + weight D(chi)      subject to
             P_j(chi) >= margin S_j, forms >= margin 1, Ia, FV, FS >= margin, limits
     X = K chi                                    R z = Q'Y, W = Q R
 
@@ -17,10 +17,10 @@ options (also all options of `runtime.physical.feasibility.RobotLimits`):
     prior      none | euclidean: distance D of the inertial parameters from the values of the robot
                file; "auto": euclidean if the file has values of links, else none
     weight     weight of D, a number; "held-out": the weight with which four fifths of the record in
-               time predict the left-out fifth best; "auto": the
-               largest, to half a decade, that raises the residual norm by at most 1 %
-    reach      size of the robot, m, which bounds masses and their centres
-               "auto": from its frames if these show the size; null: no such bounds
+               time predict the left-out fifth best; "auto": the largest, to half a decade, that
+               raises the residual norm by at most 1 %
+    reach      size of the robot, m, which bounds masses and their centres; "auto": from its frames
+               if these show the size; null: no such bounds
     explain    whether to name every condition that least squares breaks; true
     linear     options of the least squares that starts the method: rank_tolerance, block
 

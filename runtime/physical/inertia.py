@@ -193,9 +193,10 @@ def _links(
 def _forms(
     elements: Mapping[str, Any], standard: Sequence[str], least: float
 ) -> Iterator[Condition]:
-    """Yield the conditions on inertia or viscous friction that couples joints, one per group of joints.
+    """Yield the conditions on inertia and viscous friction of coupled joints.
 
-    The sum of the matrices c_k B_k over the elements of the group must be positive semidefinite.
+    There is one condition per kind and per group of coupled joints: the sum of the matrices c_k B_k
+    over the elements of the group is positive semidefinite.
     """
     for kind in FORMED:
         own = {

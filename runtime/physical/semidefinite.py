@@ -1,4 +1,4 @@
-"""Semidefinite programs over the standard parameters, as cone programs for Clarabel.
+"""Semidefinite programs over the standard parameters, as cone programs for the solver Clarabel.
 
     closest     min ||R chi - z||^2 + weight D(chi)    subject to
             P >= least S of every condition, rows, chi in a Space
@@ -8,12 +8,12 @@
             P >= 0 of every condition, rows chi >= 0, for many A and g
 
 S = diag(size) of the condition: the cones hold S^-1/2 P S^-1/2, whose entries are near one.
-Clarabel solves  min 1/2 x'Qx + c'x,  A x + s = b,  s in a product of cones. The unknowns x are w of
-chi = origin + basis w, with sizes near one as interior point methods want, then what the criterion
-adds: residuals y with y = R chi - z as an equation, so that R is not squared (the euclidean
-distance, of unknowns in units of their size, is). A symmetric matrix enters by the columns of its
-upper triangle, entries off the diagonal times sqrt(2). K chi = X is a Space, not an equation, and
-holds to rounding. Clarabel is deterministic: same problem, same bits.
+Clarabel solves  min 1/2 x'Qx + c'x,  A x + s = b,  s in a product of cones. The unknowns x are
+first w of chi = origin + basis w, with sizes near one, as interior point methods need. Then follow
+unknowns that the criterion adds: residuals y with y = R chi - z as an equation, so that R is not
+squared (the euclidean distance, of unknowns in units of their size, is). A symmetric matrix enters
+by the columns of its upper triangle, with entries off the diagonal times sqrt(2). K chi = X is a
+Space, not an equation, and holds to rounding. Clarabel is deterministic: same problem, same bits.
 
 Reference: Goulart and Chen (2024) for Clarabel; Boyd and Vandenberghe, Convex Optimization (2004),
 for the cones.
@@ -53,7 +53,7 @@ SOLVED = ("optimal", "optimal_inaccurate")
 
 
 def _clarabel() -> Any:
-    """The solver, loaded when a program is solved."""
+    """Import the solver Clarabel, not before a program is solved."""
     import clarabel
 
     return clarabel
@@ -61,7 +61,7 @@ def _clarabel() -> Any:
 
 @dataclass(frozen=True, eq=False)
 class LinearBounds:
-    """lower <= A chi <= upper, one name per row; infinite if there is no bound."""
+    """Linear inequalities lower <= A chi <= upper, one name per row; infinite if there is no bound."""
 
     names: tuple[str, ...]
     A: Array
@@ -69,7 +69,7 @@ class LinearBounds:
     upper: Array
 
     def without(self, name: str) -> LinearBounds:
-        """The rows of other names."""
+        """Return the inequalities without the rows called `name`."""
         kept = [k for k, own in enumerate(self.names) if own != name]
         return LinearBounds(
             tuple(self.names[k] for k in kept), self.A[kept], self.lower[kept], self.upper[kept]
@@ -78,28 +78,29 @@ class LinearBounds:
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """chi = origin + basis w: origin (p,), basis (p, m)."""
+    """The set of all chi = origin + basis w; origin has shape (p,), basis (p, m)."""
 
     origin: Array
     basis: Array
 
 
 def everything(scale: Array) -> Space:
-    """Every chi, in units of `scale`, (p,)."""
+    """Make the space of all chi, with w in units of `scale`, shape (p,)."""
     return Space(np.zeros(len(scale)), np.diag(scale))
 
 
 def solutions(K: Array, X: Array, scale: Array) -> Space:
-    """Every chi with K chi = X, K of full row rank."""
+    """Make the space of all chi with K chi = X; K has full row rank."""
     return Space(
         scale * np.linalg.lstsq(K * scale, X, rcond=None)[0], scale[:, None] * null_space(K * scale)
     )
 
 
 def within(space: Space, rows: LinearBounds) -> tuple[Space, LinearBounds]:
-    """Restrict `space` by those rows that are equations; returns it and the other rows.
+    """Restrict `space` to the chi that fulfil the equations among the rows (lower = upper).
 
-    If the equations contradict the space, its nearest points are taken.
+    Returns the restricted space and the other rows. If the equations contradict the space, the
+    points of the space that come nearest to the equations are used.
     """
     equal = rows.lower == rows.upper
     others = LinearBounds(
@@ -119,16 +120,16 @@ def within(space: Space, rows: LinearBounds) -> tuple[Space, LinearBounds]:
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Pull of the inertial parameters towards chi0.
+    """Pull of the inertial parameters towards the values chi0.
 
     Attributes
     ----------
     chi0 : ndarray, shape (p,), SI
-        Where they are pulled to.
+        Values towards which the parameters are pulled.
     scale : ndarray, shape (p,), SI
-        Units of the euclidean distance.
+        Units of the euclidean distance D.
     numbers : tuple of int
-        Numbers of the inertial parameters among the p.
+        Indices of the inertial parameters in chi.
     weight : float
         Weight of D.
     """
@@ -141,7 +142,7 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
-    """Result of a program.
+    """Result of a semidefinite program.
 
     Attributes
     ----------
@@ -150,10 +151,10 @@ class Optimum:
     chi : ndarray, shape (p,), SI
         Standard parameters; nan without solution.
     margin : float
-        t of a problem of `margin`; nan of others.
+        t of a problem of `margin`; nan for other problems.
     duals : mapping of str to float
-        Trace of the multiplier of each condition, their sum 1 in a problem of `margin`: what stands
-        in the way.
+        Trace of the multiplier of each condition; the largest belongs to the condition that
+        prevents a larger margin. In a problem of `margin` their sum is 1.
     """
 
     status: str
@@ -163,13 +164,15 @@ class Optimum:
 
     @property
     def solved(self) -> bool:
-        """Whether there is a chi."""
+        """Whether the program has a solution chi."""
         return self.status in SOLVED
 
 
 class Program:
-    """A cone program in w of chi = origin + basis w, and in what the criterion adds: P >= least S
-    of every condition, or P >= t S of an unknown t, and the rows; then constraint by constraint.
+    """A cone program in w of chi = origin + basis w, built constraint by constraint.
+
+    It starts with the constraint P >= least S of every condition, or P >= t S with an unknown t,
+    and with the linear rows. The criterion may add further unknowns.
 
     Parameters
     ----------
@@ -210,7 +213,7 @@ class Program:
             self.at_least_zero(sign * A[given], sign * (b - bound)[given])
 
     def more(self, count: int) -> Array:
-        """Add `count` unknowns and return their numbers."""
+        """Add `count` unknowns to the program and return their indices."""
         first = len(self.linear)
         self.linear, self.diagonal = (
             np.append(x, np.zeros(count)) for x in (self.linear, self.diagonal)
@@ -218,7 +221,7 @@ class Program:
         return np.arange(first, first + count)
 
     def of_chi(self, M: Array) -> tuple[Array, Array]:
-        """Write M chi as A x + b, M of shape (k, p); returns A and b."""
+        """Write M chi as A x + b, with x the unknowns and M of shape (k, p); return A and b."""
         A = np.zeros((len(M), len(self.linear)))
         A[:, : self.m] = M @ self.space.basis
         return A, M @ self.space.origin
@@ -229,7 +232,7 @@ class Program:
             self.constraints.append((_clarabel().NonnegativeConeT(len(b)), A, b))
 
     def add_squares(self, M: Array, z: Array, weight: float) -> None:
-        """Add weight ||M chi - z||^2 to the criterion; the residuals are further unknowns."""
+        """Add weight ||M chi - z||^2 to the criterion; the residuals become further unknowns."""
         own = self.more(len(z))
         A, b = self.of_chi(M)
         A[np.arange(len(z)), own] = -1.0
@@ -237,7 +240,7 @@ class Program:
         self.constraints.append((_clarabel().ZeroConeT(len(z)), A, b - z))
 
     def solve(self) -> Optimum:
-        """Solve by the tightest of TOLERANCES that Clarabel reaches."""
+        """Solve the program with the tightest of TOLERANCES that Clarabel reaches."""
         cones, A, b = zip(*self.constraints, strict=True)
         count, status = len(self.linear), ""
         Q = np.diag(self.diagonal)
@@ -283,11 +286,12 @@ def closest(
     least: float,
     pull: Prior | None = None,
 ) -> Optimum:
-    """Find the chi of `space` that minimises ||R chi - z|| under `conditions`; shapes (m, p), (m,).
+    """Find the chi of `space` that minimises ||R chi - z|| under `conditions` and `rows`.
 
-    The caller scales R and z so that ||z|| is about 1.
+    R has shape (m, p), z shape (m,); the caller scales both so that ||z|| is about 1.
 
-    least : lower bound, above zero, of the smallest eigenvalue of every condition, relative to its size.
+    least : lower bound, above zero, of the smallest eigenvalue of every condition, relative to its
+    size. pull : adds weight D(chi) to ||R chi - z||^2.
     """
     program = Program(space, rows, conditions, least)
     program.add_squares(R, z, 1.0)
@@ -301,9 +305,9 @@ def closest(
 
 
 def margin(conditions: Sequence[Condition], rows: LinearBounds, space: Space) -> Optimum:
-    """Find the largest t for which every P - t S is positive semidefinite.
+    """Find the largest t for which P - t S of every condition is positive semidefinite.
 
-    Negative where no physical robot is in `space`.
+    t is negative if there is no physical robot in `space`.
     """
     program = Program(space, rows, conditions, None)
     program.linear[-1] = -1.0
@@ -315,15 +319,15 @@ def margin(conditions: Sequence[Condition], rows: LinearBounds, space: Space) ->
 
 
 class Quadratic:
-    """The minimum of 1/2 chi'A chi - g'chi with P >= 0 of every condition and rows chi >= 0.
+    """Solver for the minimum of 1/2 chi'A chi - g'chi over physical robots, for many A and g.
 
-    The cones are set up once, for many A and g.
+    The constraints are P >= 0 of every condition, and rows chi >= 0. The cones are set up once.
 
     Parameters
     ----------
     conditions : sequence of Condition
     rows : ndarray, shape (k, p)
-        Of sizes near one if chi has its size.
+        Rows of sizes near one if chi has its size.
     scale : ndarray, shape (p,), SI
         Sizes of the parameters.
     """
@@ -342,7 +346,7 @@ class Quadratic:
         self.solver: Any = None
 
     def minimum(self, A: Array, g: Array) -> Array:
-        """chi, shape (p,); zeros if Clarabel finds none."""
+        """Find the chi, shape (p,), that minimises 1/2 chi'A chi - g'chi; zeros if Clarabel finds none."""
         squares = (A * self.scale * self.scale[:, None])[self.upper]
         linear = -g * self.scale
         if self.solver is None:
@@ -357,8 +361,10 @@ class Quadratic:
         return self.scale * np.where(np.isfinite(x), x, 0.0)
 
     def _solver(self, squares: Array, linear: Array, *, scaled: bool) -> Any:
-        """Clarabel, which may take nothing out of a program whose criterion changes. Unknowns that
-        are near one need no scaling of its own: half of the time.
+        """Make a Clarabel solver whose criterion can be changed later.
+
+        So Clarabel must not remove anything from the program. scaled : the unknowns are near one,
+        and Clarabel does not scale them again, which saves half of the time.
         """
         settings = _clarabel().DefaultSettings()
         settings.verbose = False
@@ -374,12 +380,12 @@ class Quadratic:
 
 
 def _solved(*data: Any) -> Any:
-    """The solution of one program."""
+    """Solve one program with a new Clarabel solver."""
     return _clarabel().DefaultSolver(*data).solve()
 
 
 def _solution(solve: Callable[[], Any]) -> Any:
-    """Run Clarabel; None if it stops with an error of its own."""
+    """Run Clarabel; return None if it stops with an error of its own."""
     try:
         return solve()
     except BaseException as e:  # a panic of Rust is no Exception
@@ -389,19 +395,25 @@ def _solution(solve: Callable[[], Any]) -> Any:
 
 
 def _cone(n: int) -> Any:
-    """The cone of a condition of n rows."""
+    """Make the Clarabel cone of a condition whose matrix has n rows."""
     return _clarabel().PSDTriangleConeT(n) if n > 1 else _clarabel().NonnegativeConeT(1)
 
 
 def triangle(B: Array) -> Array:
-    """Columns of the upper triangles of symmetric matrices, shape (k, n, n), entries off the diagonal times sqrt(2): shape (n (n + 1)/2, k)."""
+    """Write symmetric matrices, shape (k, n, n), as columns: their upper triangles.
+
+    Entries off the diagonal are multiplied by sqrt(2). The result has shape (n (n + 1)/2, k).
+    """
     j, i = np.tril_indices(B.shape[1])
     return np.asarray((B[:, i, j] * np.where(i == j, 1.0, np.sqrt(2.0))).T)
 
 
 @lru_cache(maxsize=8)
 def _triangles(conditions: tuple[Condition, ...], p: int) -> tuple[Array, Array]:
-    """Triangles of the conditions on p standard parameters in units of their sizes, one below the other, shape (rows, p), and those of the identity, (rows,)."""
+    """Write the scaled matrices of all conditions as triangles, one below the other, over all chi.
+
+    Returns the triangles, shape (rows, p), and the triangles of identity matrices, shape (rows,).
+    """
     ones = [triangle(np.eye(c.B.shape[1])[None])[:, 0] for c in conditions]
     return np.vstack(
         [on_standard(triangle(c.scaled), c.numbers, p) for c in conditions] or [np.zeros((0, p))]
@@ -409,13 +421,16 @@ def _triangles(conditions: tuple[Condition, ...], p: int) -> tuple[Array, Array]
 
 
 def trace(z: Array) -> float:
-    """Trace of a symmetric matrix from its triangle."""
+    """Compute the trace of a symmetric matrix that is given as its upper triangle."""
     ends = np.cumsum(np.arange(1, len(z) + 1)) - 1  # places of the diagonal
     return float(z[ends[ends < len(z)]].sum())
 
 
 def on_standard(M: Array, numbers: Sequence[int], p: int) -> Array:
-    """Columns of M, shape (k, len(numbers)), as those of all p standard parameters, shape (k, p)."""
+    """Extend the columns of M, shape (k, len(numbers)), to all p standard parameters: shape (k, p).
+
+    The other columns are zero.
+    """
     spread = np.zeros((len(M), p))
     spread[:, list(numbers)] = M
     return spread

@@ -121,9 +121,7 @@ def _meant(
 
 
 def _numbered(quantity: str, table: Table, joints: Sequence[str]) -> tuple[str, ...]:
-    """Find the columns q1, q2 ... (or tau1, tau2 ...) and return them in the order of their
-    numbers.
-    """
+    """Find the columns q1, q2 ... (or tau1, tau2 ...), in the order of their numbers."""
     matches = [re.fullmatch(rf"{quantity}([0-9]{{1,4}})", name) for name in table.names]
     numbered = sorted((int(match[1]), match[0]) for match in matches if match)
     if not numbered:
@@ -331,7 +329,9 @@ def _units(units: str | tuple[str, ...], n: int, key: str) -> tuple[str, ...]:
 
 
 def _position_units(settings: RecordSettings, n: int) -> tuple[Array, Array]:
-    """Return the factors from the units of positions to rad or m, shape (n,), and which are angles.
+    """Return the factors from the units of positions to rad or m, and which units are angles.
+
+    Both have shape (n,).
     """
     units = [position_unit(unit) for unit in _units(settings.units.q, n, "units.q")]
     counts = np.ones(n)

@@ -13,10 +13,9 @@ from runtime.reading.settings import RecordSettings
 
 
 def draft(settings: RecordSettings, path: Path, joints: Sequence[str]) -> str:
-    """Write a draft of a study file for one record; `# ?` marks the settings that the user must
-    complete.
+    """Write a draft of a study file for one record; `# ?` marks the settings that are still open.
 
-    Candidates for a column are listed behind the mark. The draft is "" if the file cannot be read.
+    Candidates for a column follow the mark. The draft is "" if the file cannot be read.
 
     path : of the first file. joints : names of the joints in the robot file.
     """

@@ -30,8 +30,7 @@ def is_file(path: Path) -> bool:
 
 
 def require_size(unpacked: int, size: int, file: str) -> None:
-    """Raise InputError if a file of `size` bytes unpacks to more bytes than a measured record has.
-    """
+    """Raise InputError if a file of `size` bytes unpacks to too many bytes for a record."""
     if unpacked > max(ALWAYS, RATIO * size):
         raise InputError(
             f"unpacks to {unpacked / 2**20:.0f} MiB or more from {size / 2**20:.3g} MiB; a record may be {ALWAYS // 2**20} MiB or {RATIO} times the size of its file: store it without compression if it is genuine",

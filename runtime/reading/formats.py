@@ -1,5 +1,4 @@
-"""The file formats of measurements, in one list, and the function that reads a file of any format.
-"""
+"""The file formats of measurements, and the function that reads a file of any format."""
 
 from __future__ import annotations
 

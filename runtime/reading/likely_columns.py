@@ -147,8 +147,9 @@ def known_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str,
 
 
 def candidates(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str, list[str]]:
-    """List columns that may be t, q or tau, the likeliest first; a family is listed by its first
-    name.
+    """List the columns that may be t, q or tau, the likeliest first.
+
+    A family of columns is listed by its first name.
     """
     families = sorted(families_of(names, joints), key=lambda family: family.order)
     return {

@@ -1,6 +1,9 @@
-"""MATLAB files: versions 4 to 7 by scipy, 7.3 (an HDF5 file) by h5py (pip install symgen[tables]).
+"""Reading of MATLAB files: versions 4 to 7 by scipy, 7.3 (an HDF5 file) by h5py.
 
-Numeric and logical arrays are read, also those in structures, as rec.pos. Cells, arrays of structures, texts and sparse matrices are listed with their class: a column of one is refused by name. Arrays of version 7.3 are stored by columns, so that h5py shows them transposed; they are turned back.
+h5py is optional (pip install symgen[tables]). Numeric and logical arrays are read, also inside
+structures, as rec.pos. Cells, arrays of structures, texts and sparse matrices are listed with their
+class; a study that names one of them as a column gets an error. Arrays of version 7.3 are stored by
+columns, so that h5py returns them transposed; they are transposed back.
 """
 
 from __future__ import annotations
@@ -36,7 +39,7 @@ Member = np.ndarray | Mapping[str, Any] | str
 
 
 def read_mat(path: Path, options: Options) -> Table:
-    """Table of a .mat file."""
+    """Read a .mat file as a Table."""
     with opened(path) as file:
         head = file.read(PLACES[-1] + len(HDF5))
     arrays: dict[str, np.ndarray] = {}
@@ -58,7 +61,10 @@ def read_mat(path: Path, options: Options) -> Table:
 
 
 def _by_scipy(path: Path, others: dict[str, str]) -> dict[str, Any]:
-    """The members of a file of versions 4 to 7; those of classes that are no numbers are put among the `others`, unread."""
+    """Read the members of a file of versions 4 to 7.
+
+    A member whose class is not numeric is not read; its class is added to `others`.
+    """
     from scipy.io import loadmat, whosmat
 
     with warnings.catch_warnings():
@@ -87,7 +93,11 @@ def _flatten(
     others: dict[str, str],
     depth: int = 0,
 ) -> None:
-    """Put arrays of numbers, also those in structures, among the `arrays`; what cannot be read among the `others`."""
+    """Collect all arrays of numbers in `arrays`, also those inside structures, as rec.pos.
+
+    Members that cannot be read are described in `others`. read : function that returns the value of
+    a member.
+    """
     for key, member in members.items():
         name = f"{path}{key}"
         x = read(member)
@@ -102,7 +112,10 @@ def _flatten(
 
 
 def _of_scipy(x: Any) -> Member:
-    """Value of a member of a file of versions 4 to 7."""
+    """Return the value of a member of a file of versions 4 to 7: an array, a structure, or words.
+
+    Words describe a member that is neither.
+    """
     if isinstance(x, np.ndarray) and is_numeric(x):
         return x
     if isinstance(x, np.ndarray) and x.dtype.names:
@@ -117,10 +130,10 @@ def _members(group: Any) -> dict[str, tuple[Any, str]]:
 
 
 def _of_hdf5(member: tuple[Any, str]) -> Member:
-    """Value of a member of a file of version 7.3, as MATLAB shows it.
+    """Return the value of a member of a file of version 7.3: an array, a structure, or words.
 
-    Links to other files are not followed. A mark shows an empty array, whose dimensions are stored
-    in its place.
+    Words describe a member that is neither. Links to other files are not followed. An empty array
+    has the attribute MATLAB_empty, because the file holds its dimensions in place of numbers.
     """
     import h5py
 

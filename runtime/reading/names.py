@@ -1,4 +1,4 @@
-"""What records and their files are called."""
+"""Names of records and of their files in results."""
 
 from __future__ import annotations
 
@@ -13,16 +13,19 @@ from runtime.reading.settings import RecordSettings
 
 @dataclass(frozen=True)
 class Label:
-    """Name of a record, and of each of its files in the provenance of results."""
+    """Name of a record, and the names of its files in the provenance of results."""
 
     name: str
     files: tuple[str, ...]
 
 
 def labels(settings: Sequence[RecordSettings]) -> list[Label]:
-    """One label by record, no name twice.
+    """Give each record a unique name, and names to its files.
 
-    A record is called as its settings say, else as its dataset or its first file without ending; of equal ones each is called by the folder too (day1/run, day2/run), by more folders where need be, and in the end by its number. A file is called by its name, by its path where another has the same.
+    A record has the name in its settings, else that of its dataset, else that of its first file
+    without ending. Equal names are preceded by the folder (day1/run, day2/run), by more folders if
+    needed, and finally followed by a number. A file has its own name, or its path if another file
+    has the same name.
     """
     paths = [Path(s.dataset or "") / (s.files[0] if s.files else "") for s in settings]
     parts = [[*path.parts[:-1], stem(path.name)] for path in paths]
@@ -46,7 +49,7 @@ def labels(settings: Sequence[RecordSettings]) -> list[Label]:
 
 
 def stem(file: str) -> str:
-    """The name of a measured file without its ending: log.1 of log.1.csv.gz."""
+    """Return the name of a measured file without its ending: log.1 of log.1.csv.gz."""
     name = file[:-3] if file.lower().endswith(".gz") else file
     ending = next((ending for ending in endings() if name.lower().endswith(ending)), "")
     return name[: len(name) - len(ending)] or file

@@ -1,4 +1,5 @@
-"""NumPy files: archives of arrays (.npz) and single arrays (.npy); pickled objects are refused."""
+"""Reading of NumPy files without pickled objects: archives of arrays (.npz), single arrays (.npy).
+"""
 
 from __future__ import annotations
 
@@ -17,13 +18,13 @@ SINGLE = "a file of one plain array"
 
 
 def read_npz(path: Path, options: Options) -> Table:
-    """Table of a .npz file."""
+    """Read a .npz file as a Table of its numeric arrays."""
     arrays = archive_of(path)
     return Table(file=path.name, columns={key: x for key, x in arrays.items() if is_numeric(x)})
 
 
 def read_npy(path: Path, options: Options) -> Table:
-    """Table of a .npy file: its columns are called 1, 2 ..."""
+    """Read a .npy file as a Table whose columns are called 1, 2 ..."""
     with damage_named(SINGLE, path.name):
         x = np.load(unpacked(path), allow_pickle=False)
         if not isinstance(x, np.ndarray):
@@ -40,7 +41,10 @@ def read_npy(path: Path, options: Options) -> Table:
 
 
 def archive_of(path: Path) -> dict[str, Array]:
-    """Arrays by name of a .npz file; InputError for pickled objects, damage, and more than such a file holds."""
+    """Read the arrays of a .npz file, by name.
+
+    Raise InputError for pickled objects, damage, and an archive that is too large.
+    """
     file = path.name
     stream = unpacked(path)
     with damage_named(ARCHIVE, file):
@@ -63,7 +67,7 @@ def archive_of(path: Path) -> dict[str, Array]:
 
 
 def _plain(arrays: Any, name: str) -> Array:
-    """One array of an archive; ValueError, with its name, for pickled objects and damage."""
+    """Return one array of an archive; raise ValueError for pickled objects and damage."""
     try:
         return np.asarray(arrays[name])
     except ValueError as e:

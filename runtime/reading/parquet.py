@@ -1,4 +1,4 @@
-"""Parquet files, by polars (pip install symgen[tables])."""
+"""Reading of Parquet files, by polars (pip install symgen[tables])."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TITLE = "a Parquet file"
 
 
 def read_parquet(path: Path, options: Options) -> Table:
-    """Table of a Parquet file; missing values become nan."""
+    """Read a Parquet file as a Table; missing values become nan."""
     import polars
 
     refused: dict[str, InputError] = {}

@@ -1,8 +1,10 @@
-"""From the files of a measurement to a Record: columns, scale, units, then the drives, then the clock.
+"""Conversion of the files of a measurement to Records in SI units, at the joints.
 
     records = read_records(settings, model, folder="measurements")
 
-Units and side are explicit in the settings, never guessed. A file whose columns are called t, q1 ... qn, tau1 ... taun needs no column names. Bad input raises InputError, which names file, column and line or sample.
+The steps are: columns, scale, units, drives, and then the clock. Units and side are explicit in the
+settings, never guessed. A file whose columns are called t, q1 ... qn, tau1 ... taun needs no column
+names. Bad input raises InputError, which names file, column and line or sample.
 """
 
 from __future__ import annotations
@@ -41,7 +43,7 @@ def read_records(
     folder: str | Path | None = None,
     missing: bool = False,
 ) -> list[Record]:
-    """Read several records of one robot; no two have the same name.
+    """Read the records of one robot from their files; no two records have the same name.
 
     A record that `resample` splits at gaps becomes one record for each piece.
 
@@ -50,9 +52,9 @@ def read_records(
     model : module, optional
         Emitted model of the robot, for its drives and its number of joints.
     folder : str or Path, optional
-        Where relative file names start; default: the current folder.
+        Folder of relative file names; default: the current folder.
     missing : bool
-        Whether positions may be missing, as `signals.reader: counts` admits.
+        Whether positions may be missing, as for `signals.reader: counts`.
     """
     settings = each_record(tuple(settings))
     return [
@@ -69,7 +71,10 @@ def _pieces(
     folder: Path,
     missing: bool,
 ) -> list[Record]:
-    """The record of these settings, or those into which `resample` splits it at gaps and where time goes back."""
+    """Read the record of these settings; return it alone, or the pieces into which it is split.
+
+    `resample` splits a record at gaps and where time goes back.
+    """
     tables = [
         read_table(path, settings.topic, settings.decimal)
         for path in record_files(settings, folder)
@@ -134,14 +139,14 @@ def _pieces(
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """Columns of one quantity, shape (N, k), as the file holds them."""
+    """Columns of one measured quantity, such as all positions, shape (N, k), as in the file."""
 
     table: Table
     names: tuple[str, ...]
     values: Array
 
     def finite(self, values: Array, hint: str = "", largest: float | None = None) -> Array:
-        """The values, which must be finite and, in SI, of a size that exists."""
+        """Return the values if all are finite and at most `largest`; else raise InputError."""
         limits = {} if largest is None else {"largest": largest}
         return require_finite(
             values, self.names, self.table.file, self.table.row, hint=hint, **limits
@@ -151,7 +156,7 @@ class Signal:
 def _signals(
     columns: Columns, first: Table, last: Table, other: Table, missing: bool
 ) -> dict[str, Signal]:
-    """The columns that are asked for, by quantity."""
+    """Read the requested columns and return them by quantity, for instance "q" or "tau"."""
     places = {
         "t": (first, () if columns.t is None else (columns.t,)),
         "q": (first, columns.q),
@@ -181,7 +186,7 @@ def _signals(
 def _require_shapes(
     columns: Columns, signals: Mapping[str, Signal], first: Table, last: Table
 ) -> None:
-    """Raise InputError if the columns are not of one record of n joints."""
+    """Raise InputError unless all signals have the same N samples and columns for n joints."""
     N, n = signals["q"].values.shape
     rows, width = signals.get("tau", signals["q"]).values.shape
     width += columns.tau.count(NONE) if "tau" in signals else 0
@@ -223,7 +228,7 @@ def _joint_side(
 ) -> dict[str, Array]:
     """Convert the signals to joint side and SI.
 
-    Also returns `missing`, True for each missing position, if there are any.
+    The result also has the entry `missing`, True for each missing position, if there are any.
     """
     samples: dict[str, Array] = {}
     for key, signal in signals.items():
@@ -256,12 +261,12 @@ def _joint_side(
 
 
 def _columns_of_joints(names: Sequence[str]) -> tuple[str, ...]:
-    """The columns of those joints that have one."""
+    """Return the names of the columns without NONE, which stands for a joint without a column."""
     return tuple(name for name in names if name != NONE)
 
 
 def _spread(values: Array, names: Sequence[str], absent: float) -> Array:
-    """Spread the columns over all joints, shape (N, n); joints without one get `absent`."""
+    """Arrange the columns for all joints, shape (N, n); a joint without a column gets `absent`."""
     present = [name != NONE for name in names]
     if all(present):
         return values
@@ -273,9 +278,10 @@ def _spread(values: Array, names: Sequence[str], absent: float) -> Array:
 def _uniform(
     settings: RecordSettings, columns: Columns, table: Table, samples: Mapping[str, Array]
 ) -> tuple[list[Stretch], float, str]:
-    """The samples at a uniform rate, Hz, and what their time stamps are like: as they are, or resampled where the settings ask for it.
+    """Return the samples at a uniform rate, this rate in Hz, and a sentence on the time stamps.
 
-    table : of the positions and of the time.
+    The samples are unchanged, or resampled if the settings request it. table : file of the
+    positions and of the time.
     """
     t = samples.get("t")
     signals = tuple(values for key, values in samples.items() if key != "t")
@@ -310,9 +316,10 @@ def _uniform(
 
 
 def _places(settings: RecordSettings, tables: Sequence[Table]) -> tuple[Table, Table, Table]:
-    """The files that hold the positions, the torques and the known torques.
+    """Find which file holds the positions, which the torques, and which the known torques.
 
-    Of two files the second holds the torques, except for known torques that it has and the first has not, beside torques of the first.
+    The second of two files holds the torques, unless it alone has the known torques and the first
+    file has the torques.
     """
     first = tables[0]
     last = tables[-1]
@@ -327,7 +334,7 @@ def _places(settings: RecordSettings, tables: Sequence[Table]) -> tuple[Table, T
 
 
 def record_files(settings: RecordSettings, folder: Path) -> list[Path]:
-    """Paths of the files of a record; those of a dataset are looked up, and downloaded where need be."""
+    """Return the paths of the files of a record; files of a dataset are downloaded if needed."""
     if not settings.files:
         raise InputError("the record names no file; set record.files")
     if settings.dataset is None:
@@ -336,7 +343,10 @@ def record_files(settings: RecordSettings, folder: Path) -> list[Path]:
 
 
 def _names_of(model: Any) -> tuple[str, ...]:
-    """Names of the joints of an emitted model, in the order of JOINTS; none if the robot file does not name every joint."""
+    """Return the names of the joints of an emitted model, in the order of JOINTS.
+
+    The result is empty if the robot file does not name every joint.
+    """
     names = getattr(model, "LABELS", {})
     if not isinstance(names, Mapping) or not all(
         isinstance(name, str) and name.isprintable() for name in names.values()

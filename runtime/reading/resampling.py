@@ -1,20 +1,18 @@
-"""Samples at the instants of an irregular clock, brought to a uniform one.
-
-Never across a gap or a step back of time.
+"""Resampling of signals with irregular time stamps at a uniform rate.
 
     t_k = t_first + k / rate,   k = 0 ... floor((t_last - t_first) rate)
                                 for every stretch without gap or step back
 
-between two samples by a straight line or by a cubic spline through all samples of the stretch. For
-a signal of highest pulsation w and steps up to h the error is at most (w h)^2/8 or 5 (w h)^4/384 of
-its amplitude (de Boor, A Practical Guide to Splines, 2001, II.(12) and V.(18)), the ends of the
-spline aside. Nothing is filtered: a rate below that of the record would fold what lies above half
-of it, and is refused.
+There is no interpolation across a gap or a step back of time. Between two samples, the signal is a
+straight line, or a cubic spline through all samples of the stretch. For a signal of highest
+pulsation w and steps up to h, the error is at most (w h)^2/8 or 5 (w h)^4/384 of its amplitude (de
+Boor, A Practical Guide to Splines, 2001, II.(12) and V.(18)), except near the ends of the spline.
+Nothing is filtered: a rate below that of the record would cause aliasing, and is refused.
 
-Where the samples are uniform and their stamps are not (a controller samples, another computer
-stamps), interpolation at the stamps would add the jitter times the
-velocity to the positions. "count" takes the samples of a stretch as they are, t_k = t_first + k /
-rate, and requires as many as its stamps last.
+If the samples are uniform but their stamps are not (a controller samples, another computer adds the
+stamps), interpolation at the stamps would add an error to the positions, the jitter times the
+velocity. The method "count" uses the samples of a stretch as they are, t_k = t_first + k / rate,
+and checks their number against the duration of the stamps.
 """
 
 from __future__ import annotations
@@ -43,7 +41,7 @@ LAST = 1e-6  # periods; a last instant so little beyond the last sample is that 
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Uniform samples: t, shape (K,), s; signals, each of shape (K, n)."""
+    """Uniform samples without a gap: t, shape (K,), s, and signals, each of shape (K, n)."""
 
     t: Array
     signals: tuple[Array, ...]
@@ -57,7 +55,7 @@ def resample(
     method: Literal["cubic", "linear"] = "cubic",
     longest: float = GAP,
 ) -> tuple[Array, Array]:
-    """Interpolate signals with irregular time stamps at a uniform rate, by a cubic spline or straight lines.
+    """Interpolate signals with irregular time stamps at a uniform rate, by a spline or lines.
 
         t_k = t[0] + k / rate,   k = 0 ... floor((t[-1] - t[0]) rate)
 
@@ -68,9 +66,9 @@ def resample(
     x : array_like, shape (N,) or (N, n)
         Samples.
     rate : float, Hz, optional
-        Default: that of the regular steps.
+        Default: the mean rate of the regular steps.
     method : str
-        cubic or linear.
+        cubic (a cubic spline) or linear (straight lines).
     longest : float, periods
         Steps up to this length are bridged; the period is the median step.
 
@@ -121,18 +119,20 @@ def resampled(
     *,
     file: str,
 ) -> tuple[list[Stretch], float, str]:
-    """Resample the signals; returns stretches at a uniform rate, this rate in Hz, and a sentence.
+    """Resample the signals; return stretches at a uniform rate, this rate in Hz, and a sentence.
 
     Parameters
     ----------
     t : ndarray, shape (N,), s
-        Stamps.
+        Time stamps.
     signals : sequence of ndarray, shape (N, n)
         Signals, and masks of bool.
     stamps : TimeStamps
-        What the stamps are like.
+        Regularity of the time stamps.
+    settings : Resample
+        Method, rate, and treatment of gaps.
     rate : float or None, Hz
-        Of the record, where it is stated.
+        Stated sampling rate of the record, if any.
     """
     if settings.gaps == "refuse" and (stamps.gaps or stamps.resets):
         raise InputError(
@@ -180,9 +180,9 @@ def resampled(
 
 
 def _counted(t: Array, signals: Sequence[Array], rate: float, file: str) -> Stretch:
-    """Leave the signals unchanged, at t[0] + k/rate.
+    """Give the samples the uniform times t[0] + k/rate, and leave the signals unchanged.
 
-    Raises InputError if the time stamps last longer or shorter than this number of samples.
+    Raise InputError if the time stamps last longer or shorter than this number of samples.
     """
     N = len(t)
     last = float(t[-1] - t[0])
@@ -195,7 +195,7 @@ def _counted(t: Array, signals: Sequence[Array], rate: float, file: str) -> Stre
 
 
 def _uniform(t: Array, signals: Sequence[Array], rate: float, method: str) -> Stretch:
-    """Interpolate the signals at t[0] + k/rate."""
+    """Interpolate the signals at the uniform times t[0] + k/rate."""
     K = int(np.floor((t[-1] - t[0]) * rate + LAST)) + 1
     grid = t[0] + np.arange(K) / rate
     at = np.minimum(grid, t[-1])
@@ -203,7 +203,10 @@ def _uniform(t: Array, signals: Sequence[Array], rate: float, method: str) -> St
 
 
 def _interpolated(t: Array, x: Array, at: Array, method: str) -> Array:
-    """x, shape (N, n), at other instants; of a mask, whether a sample next to them is in it."""
+    """Interpolate x, shape (N, n), at other instants.
+
+    For a mask, the result is True if a neighbouring sample is marked.
+    """
     if method == "cubic" and x.dtype != np.bool_:
         from scipy.interpolate import CubicSpline  # 60 ms, where it is used
 

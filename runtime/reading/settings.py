@@ -1,5 +1,6 @@
-"""Settings of measured records: where they lie, what their columns mean, what is done about their time stamps.
-Part of a Study.
+"""Settings of measured records: their files, their columns, and treatment of their time stamps.
+
+They are a part of a Study.
 """
 
 from __future__ import annotations
@@ -66,9 +67,9 @@ class Columns(Settings):
     """Names of the columns of a record file, one per joint.
 
     A name may be the number of the column (from 1) in a file without header, or an (N, n) array of
-    a .npz or .mat file, which has n columns. `names` means the labels of the joints
-    in the robot file: a column is called as the joint, or q_ and the joint, joint.position,
-    tau_joint, joint/effort ...; of q it is also that of tau, where tau is left out.
+    a .npz or .mat file, which has n columns. `names` means the labels of the joints in the robot
+    file: a column has the name of the joint, or q_ and the joint, joint.position, tau_joint,
+    joint/effort ...; `names` for q also applies to tau, if tau is left out.
 
     Attributes
     ----------
@@ -79,13 +80,12 @@ class Columns(Settings):
     tau : tuple of str
         Torques. 0 in place of a name: this joint has no motor, its torque is zero.
     q_ref : tuple of str
-        Reference positions, where the file of the positions holds them; unit and side are those of
-        q.
+        Reference positions, if the file of the positions holds them; unit and side are those of q.
     qr : tuple of str
         Earlier name of q_ref.
     qd : tuple of str
         Velocities that were recorded with the positions, in the same file; unit and side of q,
-        per s. They give the velocity of the rows where they say more than differences of q do.
+        per s. They replace differences of q in the rows where they are more accurate.
     qd_ref : tuple of str
         Reference velocities, in the same file, units as qd; for the law of a controller.
     q_link : tuple of str
@@ -93,18 +93,18 @@ class Columns(Settings):
         of a name: none on this joint.
     tau_ff : tuple of str
         Feed-forward torques that the controller added, in the file of the torques; unit and side
-        are those of tau. For methods that simulate it, and for the torque of a law.
+        are those of tau. For methods that simulate the controller, and for the torque of a law.
     tau_known : tuple of str
         Torques of the drives that do not come from the model (a counterbalance, a cable), computed
         elsewhere; N m or N, joint side. They are subtracted from tau. 0 in place of a name: none on
         this joint.
     channels : mapping of str to str
-        Column of each channel.NAME of the laws of the robot file, in the file of the positions, as
-        it is: {temperature: T_motor}.
+        Column of each channel.NAME in the laws of the robot file, without conversion, in the file of
+        the positions: {temperature: T_motor}.
     wrench : mapping of int to six str
         Three forces and three moments of a sensor in the axes of a frame, about its origin, by the
         number of the frame, in the file of the positions, N and N m: {0: [fx, fy, fz, mx, my, mz]}
-        below the robot, {7: [...]} ahead of link 7. Beside tau, or in its place.
+        below the robot, {7: [...]} ahead of link 7. In addition to tau, or in place of tau.
     """
 
     t: Text | None = None
@@ -122,7 +122,7 @@ class Columns(Settings):
 
     @property
     def further(self) -> dict[str, tuple[str, ...]]:
-        """Columns that are no joint's, by channel."""
+        """Columns that do not belong to joints, by name of the channel or wrench."""
         own = {name: (column,) for name, column in self.channels.items()}
         return own | {f"{WRENCH}{frame}": names for frame, names in self.wrench.items()}
 
@@ -140,19 +140,19 @@ class Columns(Settings):
 
 
 class Units(Settings):
-    """Units of the columns: one, or one per joint, by any name that `runtime.reading.units` knows.
+    """Units of the columns: one, or one per joint, by any name of `runtime.reading.units`.
 
-    Counts need the counts per revolution; units of current and voltage are turned into torque by
-    the torque constant.
+    Counts need the counts per revolution; the torque constant converts currents and voltages to
+    torque.
 
     Attributes
     ----------
     t : str
-        Of the time: s, ms, us, ns.
+        Unit of the time: s, ms, us, ns.
     q : str or tuple of str
-        Of the positions: rad, deg, rev, counts, m, mm.
+        Unit of the positions: rad, deg, rev, counts, m, mm.
     tau : str or tuple of str
-        Of the torques: N*m, mN*m, N, A, mA, V.
+        Unit of the torques: N*m, mN*m, N, A, mA, V.
     """
 
     t: TimeUnit = "s"
@@ -161,17 +161,19 @@ class Units(Settings):
 
 
 class Scale(Settings):
-    """Factors on the columns before their unit applies: a number, one per joint, or the name of a scalar in the file.
+    """Factors on the columns before the conversion of units.
+
+    A factor is a number, one number per joint, or the name of a scalar in the file.
 
     Attributes
     ----------
     q : float or tuple of float or str
-        On the positions.
+        Factor on the positions.
     tau : float or tuple of float or str
-        On the torques; gtau where the file holds force = gtau*vir.
+        Factor on the torques; gtau if the file holds force = gtau*vir.
     wrench : float
-        On wrenches, which are those by which the sensor moves the links ahead of it: -1 if it
-        reports what they do to it.
+        Factor on wrenches. A wrench acts from the sensor on the links ahead of it; set -1 if the
+        sensor reports the opposite wrench, of the links on the sensor.
     """
 
     q: Factor = 1.0
@@ -180,18 +182,18 @@ class Scale(Settings):
 
 
 class Resample(Settings):
-    """Time stamps that are not uniform, made so; nothing is resampled unless this section is given.
+    """Conversion of time stamps that are not uniform; without this section nothing is resampled.
 
     Attributes
     ----------
     rate : float or None, Hz
-        Sampling rate made; default: record.rate, else the mean rate of the record.
+        New sampling rate; default: record.rate, else the mean rate of the record.
     method : str
-        cubic or linear interpolate between the stamps; count takes the samples as they are, for a
+        cubic or linear interpolate between the stamps; count uses the samples as they are, for a
         logger whose stamps jitter while the controller samples uniformly.
     gaps : str
         refuse a record with gaps or with time that goes back, or split it at these places into
-        records of their own.
+        separate records.
     longest : float, sampling periods
         Steps up to this length are bridged, longer ones are gaps.
     shortest : float, s
@@ -206,22 +208,22 @@ class Resample(Settings):
 
 
 class RecordSettings(Settings):
-    """One measured record, or several alike: where they lie and what their columns mean.
+    """One measured record, or several alike: their files, and the meaning of their columns.
 
     Attributes
     ----------
     files : tuple of str
-        One file with all columns, or two: positions (and time), then torques; then, where it is
-        apart, the file of the known torques. Relative to the study file, or files of `dataset`.
+        One file with all columns, or two: positions (and time), then torques; a third file may hold
+        the known torques. Relative to the study file, or files of `dataset`.
     columns : Columns
         Names of the columns.
     side : str
         motor (qm = R (q - offset), tau = R' u, by the drives of the robot), joint, or link: joint
         torques of sensors behind the gears, in which the drive has no part: inertia, viscous and
-        dry friction of drives (Ia, FV, FS) are left out of the columns, and a base parameter that
-        holds Ia holds none.
+        dry friction of drives (Ia, FV, FS) are left out of the columns, and of the base parameters
+        that contain Ia.
     torque_side : str or None
-        The same for tau alone: motor for joint angles recorded with motor currents. Default: side.
+        The side of tau alone: motor for joint angles recorded with motor currents. Default: side.
     rate : float or None, Hz
         Sampling rate; may be left out if a time column gives it.
     units : Units
@@ -236,27 +238,29 @@ class RecordSettings(Settings):
     coupling : str
         Use the off-diagonal part of R for both, for position or torque alone, or for none.
     jitter : float, sampling periods
-        Largest deviation of the time column from a uniform grid.
+        Largest difference of the time column from a uniform grid.
     dataset : str or None
         Public dataset that holds the files.
     name : str or None
         Name of the record in results; default: that of its first file.
     simulated : bool
-        Nothing was measured, and results say so.
+        Whether the record was simulated, not measured; results then say so.
     topic : str or None
         Topic of a bag that holds several of sensor_msgs/JointState.
     decimal : str
         Decimal sign of a text file, "." or "," (columns then separated by semicolons, tabs or
         blanks).
     unwrap : bool
-        Angles that start anew at a full turn of the side on which they were recorded (180 to -180
-        degrees) are continued from the first sample on; its turn has to suit the zero of the joint.
+        Whether angles that jump back after a full turn of the side on which they were recorded (180
+        to -180 degrees) are made continuous, from the first sample on. The turn of the first sample
+        has to suit the zero of the joint.
     resample : Resample or None
-        How a time column that is not uniform is made so; null: it is refused.
+        Conversion of a time column that is not uniform; null: such a column is refused.
     controller : Controller or None
-        Whose law is the torque, where q_ref is named and tau is not; default: that of the study.
+        Controller whose law gives the torque, if q_ref is named and tau is not; default: that of the
+        study.
     also : tuple of tuple of str
-        Files of further records with the same settings, each a record of its own: [b.csv, c.csv],
+        Files of further records with the same settings, each a separate record: [b.csv, c.csv],
         or pairs of files.
     """
 
@@ -315,7 +319,7 @@ class RecordSettings(Settings):
 
     @property
     def by_law(self) -> bool:
-        """Whether the torque is that of a controller's law."""
+        """Whether the torque is computed by the law of a controller: q_ref is named, tau is not."""
         return bool(self.columns.q_ref) and not self.columns.tau
 
     @property
@@ -327,7 +331,10 @@ class RecordSettings(Settings):
 def with_law(
     records: Sequence[RecordSettings], controller: Controller | None
 ) -> tuple[RecordSettings, ...]:
-    """The records, that controller where a law is the torque and none is named."""
+    """Set `controller` in each record whose torque is computed by the law of a controller.
+
+    A record that names its own controller is not changed.
+    """
     return tuple(
         replace(record, controller=record.controller or controller) if record.by_law else record
         for record in records
@@ -335,7 +342,10 @@ def with_law(
 
 
 def each_record(settings: Sequence[RecordSettings]) -> tuple[RecordSettings, ...]:
-    """One RecordSettings per record: the files of `also` in entries of their own, without name."""
+    """Return one RecordSettings per record: the files in `also` become separate records.
+
+    These further records have no name.
+    """
     return tuple(
         single
         for record in settings

@@ -18,14 +18,14 @@ WIDEST = 10_000  # columns of a file; a wider one is no table of samples
 
 @dataclass(frozen=True)
 class Options:
-    """Settings of a record about its files.
+    """Settings of a record that concern its files.
 
     Attributes
     ----------
     topic : str or None
-        Of a bag; None: the only one that holds sensor_msgs/JointState.
+        Topic of a bag; None: the only one with sensor_msgs/JointState.
     decimal : str
-        "." or ",", within the numbers of a text file.
+        Decimal sign of a text file, "." or ",".
     """
 
     topic: str | None = None
@@ -41,23 +41,24 @@ class Table:
     file : str
         Name of the file in messages.
     columns : mapping of str to ndarray
-        Numbers by name: a vector of N samples, or a matrix (N, k) or (k, N) that has k columns. Samples run along the longer side: a record has more samples than joints.
+        Numbers by name: a vector of N samples, or a matrix (N, k) or (k, N) that has k columns. Samples
+        are along the longer side: a record has more samples than joints.
     refused : mapping of str to InputError
-        What else the file holds under a name.
+        Error for each name in the file whose values are not numbers.
     empty : mapping of str to str
         Row of the first empty field of a column, which is nan.
     row : callable
-        How the file counts sample i, from 0: "line 12", "sample 12".
+        Function that names sample i, from 0, by its place in the file: "line 12", "sample 12".
     joints : tuple of str or None
-        Joints that the messages of a bag name; None for other files.
+        Joints in the messages of a bag; None for other files.
     topic : str
-        Of a bag.
+        Topic of a bag.
     note : str
-        What a reader of these columns should know, a sentence.
+        Sentence that a user of these columns should read.
     has_header : bool
         Whether the names are the first line of a text.
     what : str
-        What the file is, in messages.
+        Kind of the file, in messages.
     digest : str
         SHA-256 of the uncompressed bytes.
     """
@@ -76,13 +77,14 @@ class Table:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the columns, or of matrices with several columns."""
+        """Names of the columns; a matrix with several columns has one name."""
         return tuple(self.columns)
 
     def chosen(self, names: Sequence[str]) -> Table:
-        """The table of the samples that hold these columns; for most files, all samples.
+        """Return the table without the rows in which all these columns are empty.
 
-        Rows whose columns are all empty but the time come from another source, and are left out.
+        The time may be filled in such rows, which come from another source. For most files, the
+        table is returned unchanged.
         """
         gaps = [name for name in dict.fromkeys(names) if name in self.empty]
         if not gaps or len({*names}) - len(gaps) > 1:
@@ -103,14 +105,17 @@ class Table:
         )
 
     def read(self, names: Sequence[str], *, empty: bool = False, hint: str = "") -> Array:
-        """These columns side by side, shape (N, k); InputError for names that the file has not, and for what is no number.
+        """Return the columns of these names side by side, shape (N, k).
+
+        Raise InputError for a name that the file does not have, and for values that are not
+        numbers.
 
         Parameters
         ----------
         empty : bool
             Whether fields may be empty; they are nan.
         hint : str
-            What to do about an empty field.
+            Remedy for an empty field, in the message.
         """
         for name in names:
             if name in self.refused:
@@ -137,7 +142,7 @@ class Table:
         return columns[0] if len(columns) == 1 else np.hstack(columns)
 
     def scalar(self, name: str) -> float:
-        """The single number called `name`."""
+        """Return the single number called `name`; raise InputError if there is none."""
         if name in self.refused:
             raise self.refused[name]
         if name not in self.columns:
@@ -153,7 +158,7 @@ class Table:
         return float(x.reshape(()))
 
     def _by_samples(self, name: str) -> Array:
-        """The array of that name, shape (N, k), if it is one of samples."""
+        """Return the array of that name as columns of samples, shape (N, k); else InputError."""
         x = self.columns[name]
         problem = ""
         if x.ndim > 2:
@@ -170,13 +175,16 @@ class Table:
 
 
 def is_numeric(x: Array) -> bool:
-    """Whether these are real numbers; booleans are."""
+    """Whether an array holds real numbers or booleans."""
     return x.dtype.kind in "biuf"
 
 
 @contextmanager
 def damage_named(title: str, file: str) -> Iterator[None]:
-    """Turn any error of a library on damaged bytes into one InputError with `title`."""
+    """Turn errors of a library about damaged bytes into one InputError, within the block.
+
+    title : what the file should be, for the message.
+    """
     try:
         yield
     except (InputError, ImportError, KeyboardInterrupt, SystemExit):

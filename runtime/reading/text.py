@@ -1,6 +1,10 @@
-"""Text files: comma, semicolon, tab or blanks between numbers, one header line or none, `#` before comments; decimals with a point, or with a comma where that is said.
+"""Reading of text files with columns of numbers.
 
-NumPy parses a file whose fields are all numbers. Where it cannot, the lines are read field by field: a column of other things is refused by name when it is asked for, with the first line where that is so.
+Columns are separated by commas, semicolons, tabs or blanks. There is one header line or none, and
+`#` starts a comment. Decimals have a point, or a comma if the settings say so.
+
+NumPy parses a file whose fields are all numbers. Other files are read field by field: a column with
+other texts raises an error only if it is used, with the first line of such a text.
 """
 
 from __future__ import annotations
@@ -27,7 +31,7 @@ Lines = Iterator[tuple[int, str]]  # number of a line, from 1, and what stands t
 
 
 def read_text(path: Path, options: Options) -> Table:
-    """Table of a text file; without a header line the columns are called 1, 2, 3 ..."""
+    """Read a text file as a Table; without a header line the columns are called 1, 2, 3 ..."""
     file = path.name
     decimal = options.decimal
     _, first = next(_lines(path), (0, ""))
@@ -65,7 +69,7 @@ def read_text(path: Path, options: Options) -> Table:
 
 
 def _lines(path: Path) -> Lines:
-    """The lines that are neither empty nor comments."""
+    """Yield the lines that are neither empty nor comments, each with its number."""
     number = 0
     try:
         with opened(path) as stream, TextIOWrapper(stream, encoding="utf-8-sig") as text:
@@ -79,7 +83,7 @@ def _lines(path: Path) -> Lines:
 
 
 def _not_utf8(path: Path) -> InputError:
-    """The error for a file that is not UTF-8: its first such byte, and the line of it."""
+    """Make the error for a file that is not UTF-8: its first wrong byte, and the line of it."""
     with opened(path) as stream:
         for number, line in enumerate(stream, 1):
             try:
@@ -92,13 +96,16 @@ def _not_utf8(path: Path) -> InputError:
 
 
 def _row(path: Path, has_header: bool, i: int) -> str:
-    """The line of sample i, counted from 0."""
+    """Name the line of sample i, counted from 0, for messages: "line 12"."""
     number, _ = next(islice(_lines(path), i + has_header, None))
     return f"line {number}"
 
 
 def _parsed(path: Path, has_header: bool, delimiter: str | None, decimal: str) -> Array | None:
-    """All numbers, shape (N, k); None if something is no number, or a line has more or fewer."""
+    """Parse all numbers of a file, shape (N, k), by NumPy.
+
+    Return None if a field is not a number, or if lines have different numbers of fields.
+    """
     lines = (line for _, line in islice(_lines(path), has_header, None))
     if decimal != ".":
         lines = (_with_point(line, decimal) for line in lines)
@@ -116,7 +123,10 @@ def _parsed(path: Path, has_header: bool, delimiter: str | None, decimal: str) -
 
 
 def _with_point(line: str, decimal: str) -> str:
-    """The line with decimal points; ValueError if it has some already: 1.234 may be a thousand."""
+    """Replace decimal commas in a line by points.
+
+    Raise ValueError if the line has points already, since 1.234 may mean a thousand.
+    """
     if "." in line:
         raise ValueError("a decimal point in a file with decimal commas")
     return line.replace(decimal, ".")
@@ -131,7 +141,7 @@ def _by_fields(
     refused: dict[str, InputError],
     empty: dict[str, str],
 ) -> Array:
-    """Numbers of the lines, shape (N, k), with nan if a field is no number.
+    """Read the numbers of the lines field by field, shape (N, k), with nan for other texts.
 
     Columns with other texts are added to `refused`, columns with empty fields to `empty`.
     """
@@ -161,7 +171,7 @@ def _by_fields(
 
 
 def _width(line: str, delimiter: str | None) -> int:
-    """Number of fields of a line."""
+    """Count the fields of a line."""
     return len(line.split()) if delimiter is None else line.count(delimiter) + 1
 
 
@@ -170,7 +180,7 @@ def _fields(line: str, delimiter: str | None) -> list[str]:
 
 
 def _number(text: str, decimal: str) -> float | None:
-    """The number in a field; None if there is none."""
+    """Return the number in a field; None if the text is not a number."""
     if "_" in text or not text.isascii() or (decimal != "." and "." in text):
         return None
     try:
@@ -188,7 +198,10 @@ def _width_hint(delimiter: str | None, wider: bool) -> str:
 def _no_number(
     file: str, name: str, row: str, field: str, decimal: str, *, first: bool
 ) -> InputError:
-    """The error for a field that is no number; first : whether it is of the first sample."""
+    """Make the error for a field that is not a number.
+
+    first : whether the field belongs to the first sample.
+    """
     what = f"{field!r}; expected a number"
     hint = ""
     remedy = None

@@ -1,13 +1,13 @@
-"""Units of measured columns, turned into SI when a record enters: the only place where pint is used.
-Inside, everything is SI.
+"""Conversion of the units of measured columns to SI; all other modules use SI only.
 
     position_unit("deg")     ("angle", 0.017453292519943295)
     torque_unit("mA")        ("current", 0.001): the torque constant of the drive does the rest
     speed("30 rpm")          3.141592653589793
 
-The units of most records are in a table; pint is loaded for others, which it knows by their
-dimension. A grammar checks a unit before pint reads it: names, products, quotients and small
-powers, no numbers and no calls. Factors are computed as fractions and rounded once.
+The units of most records are in a table. Other units are converted by pint, which is loaded only
+then, and which finds the kind of a unit by its dimension. A grammar checks a unit before pint
+parses it: names, products, quotients and small powers, no numbers and no calls. Factors are
+computed as fractions and rounded once.
 """
 
 from __future__ import annotations
@@ -85,25 +85,29 @@ QUANTITY = re.compile(r"\s*([-+]?[0-9.]{1,30}(?:[eE][-+]?[0-9]{1,3})?)\s*([^\W\d
 
 
 def position_unit(text: str) -> Unit:
-    """Kind of a unit of positions, "angle", "length" or "counts", and its factor to rad or m.
+    """Return the kind of a unit of positions and its factor to rad or m.
 
-    Counts are still to be divided by those per revolution.
+    The kind is "angle", "length" or "counts". The factor of counts must still be divided by the
+    counts per revolution.
     """
     return _unit(text, POSITIONS)
 
 
 def torque_unit(text: str) -> Unit:
-    """Kind of a unit of torques, "torque", "force", "current" or "voltage", and its factor to N m, N, A or V."""
+    """Return the kind of a unit of torques and its factor to N m, N, A or V.
+
+    The kind is "torque", "force", "current" or "voltage".
+    """
     return _unit(text, TORQUES)
 
 
 def time_unit(text: str) -> float:
-    """Factor of a unit of time to s."""
+    """Return the factor of a unit of time to s."""
     return _unit(text, TIMES)[1]
 
 
 def speed(value: Any) -> Any:
-    """A speed such as "30 rpm", or a list of speeds, in rad/s or m/s.
+    """Convert a speed such as "30 rpm", or a list of speeds, to rad/s or m/s.
 
     A value without unit is returned as it is.
     """
@@ -149,9 +153,9 @@ def _unit(text: str, kinds: tuple[str, ...]) -> Unit:
 
 @cache
 def _of_pint(text: str) -> Unit:
-    """Kind and factor of a unit that is not in the table.
+    """Find the kind and the factor of a unit that is not in the table, by pint.
 
-    ("", nan) where pint does not know the unit, or its kind is none of SI.
+    Return ("", nan) if pint does not have the unit, or if its kind is none of those in SI.
     """
     nothing = ("", float("nan"))
     if len(text) > LONGEST or not GRAMMAR.fullmatch(text):

@@ -57,7 +57,7 @@ def convert(
         Path | None,
         typer.Option(
             help=(
-                "Standard parameters for OUT from the estimate.json of an identification with physical parameters, as `symgen identify -o` writes it."
+                "Result of `symgen identify` with physical parameters (estimate.json) to write into OUT."
             )
         ),
     ] = None,

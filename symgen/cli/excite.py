@@ -16,8 +16,8 @@ def excite(
     record: Annotated[
         str | None,
         typer.Argument(
-            help="Dataset, study file or measured file. Its estimate gives parameters and torque "
-            "deviations; its motion is compared with the new one."
+            help="Dataset, study file or measured file. Its estimate gives the parameters and the noise of the "
+            "torques; its motion is compared with the new one."
         ),
     ] = None,
     output: Annotated[
@@ -30,17 +30,20 @@ def excite(
         int | None,
         typer.Option(
             min=1,
-            help="Choose this number of poses at rest, which identify gravity, instead of a motion.",
+            help="Choose this number of static poses, which identify the gravity parameters, instead of a motion.",
         ),
     ] = None,
     criterion: Annotated[
         str | None,
         typer.Option(
-            help="What to optimise: record, cond (condition number), logdet or sigma. Default: record, if one is given."
+            help="What the motion optimises: cond (condition number of W), logdet (determinant of W'W), sigma (largest "
+            "standard deviation), or record (as sigma, relative to that of RECORD). Default: record if one is given, else cond."
         ),
     ] = None,
     columns: options.Columns = None,
-    starts: Annotated[int | None, typer.Option(min=1, help="Random starts.")] = None,
+    starts: Annotated[
+        int | None, typer.Option(min=1, help="Number of random starts of the search.")
+    ] = None,
     rate: Annotated[float | None, typer.Option(help="Controller rate, Hz.")] = None,
     seed: options.Seed = None,
     workers: options.Workers = 0,

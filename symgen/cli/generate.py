@@ -47,7 +47,7 @@ def generate(
         typer.Option(
             "--with",
             help=(
-                "Functions on request: coriolis, slotine_li, momentum, energy, "
+                "Further functions to emit: coriolis, slotine_li, momentum, energy, "
                 "base_wrench_regressor, or several as coriolis,energy."
             ),
         ),

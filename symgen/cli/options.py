@@ -26,30 +26,30 @@ RobotOrModule = Annotated[
 Records = Annotated[
     list[str],
     typer.Argument(
-        help="Dataset, study file (.yaml) or measured file (t,q1..,tau1..; SI, joint side). "
-        "Further measured files like the first: records of their own."
+        help="Dataset, study file (.yaml) or measured file (columns t, q1 .., tau1 ..; SI, joint side). "
+        "Several measured files are several records, fitted together."
     ),
 ]
 AtValues = Annotated[
     bool,
     typer.Option(
         "--at-values",
-        help="Replace every constant by its number. The base parameters and formulas then hold for these values only.",
+        help="Use the numbers of the constants instead of symbols. The base parameters and formulas then hold for these numbers only.",
     ),
 ]
 Exact = Annotated[
     bool,
     typer.Option(
         "--exact",
-        help="Take the angles of a URDF, MJCF or .par file as they are written. Otherwise an angle within "
-        "1e-4 rad of a multiple of pi/12 is taken as that multiple.",
+        help="Use the angles of a URDF, MJCF or .par file exactly as written. Without it, an angle within "
+        "1e-4 rad of a multiple of pi/12 is replaced by that multiple.",
     ),
 ]
 Trust = Annotated[
     bool,
     typer.Option(
         "--trust",
-        help="Run a generated module (.py) that was not emitted on this machine. It is code: use only what you trust.",
+        help="Run a generated module (.py) that was not made on this machine. It is code: use it only if you trust its author.",
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
@@ -71,7 +71,10 @@ Scheduler = Annotated[
         help="Address of a Dask scheduler whose workers do the work, such as tcp://10.0.0.1:8786."
     ),
 ]
-Side = Annotated[Text, typer.Option(help="joint or motor: where positions are rounded.")]
+Side = Annotated[
+    Text,
+    typer.Option(help="Side on which positions are rounded, as an encoder does: joint or motor."),
+]
 Rounding = Annotated[
     Text,
     typer.Option(
@@ -82,40 +85,42 @@ Rounding = Annotated[
 Uneven = Annotated[
     float | None,
     typer.Option(
-        help="How unevenly the encoder's lines are spaced, as a standard deviation in steps, such as 0.1; "
-        "with --rounding phase."
+        help="Standard deviation of the spacing of the encoder lines, in steps, such as 0.1; "
+        "only with --rounding phase."
     ),
 ]
 Method = Annotated[
     Text,
-    typer.Option(help="Estimator in place of the study's: ols, wls, irls, iv, didim, feasible."),
+    typer.Option(
+        help="Estimator to use instead of that of the study: ols, wls, irls, iv, didim, feasible."
+    ),
 ]
 Reader = Annotated[
     Text,
     typer.Option(
-        help="How positions become velocities: lowpass filters them as they are; counts reads them as "
+        help="How velocities are computed: lowpass filters the positions; counts estimates the motion from "
         "encoder counts (with --rounding phase)."
     ),
 ]
 Place = Annotated[
     Text,
     typer.Option(
-        help="record: recorded positions are rounded; loop: the encoder of the study's closed "
-        "loop, in every run."
+        help="What is rounded: the recorded positions (record), or the encoder signal in a simulation of "
+        "the closed loop of the study (loop)."
     ),
 ]
 Advise = Annotated[
     bool,
     typer.Option(
         "--advise",
-        help="Predict the coarsest steps that keep the change below 1 % and 5 %, and confirm them "
-        "by --runs runs each.",
+        help="Predict the coarsest encoder steps that change the parameters by less than 1 % and 5 %, "
+        "and confirm each with --runs runs.",
     ),
 ]
 Lock = Annotated[
     list[str] | None,
     typer.Option(
-        help="URDF or MJCF only: lock a joint at a position, e.g. elbow=pi/2 (rad or m); may be repeated."
+        help="URDF or MJCF only: lock a joint at a position, e.g. elbow=pi/2 (rad or m); repeat for several."
     ),
 ]
 Chain = Annotated[

@@ -19,7 +19,7 @@ def report(
     encoder: Annotated[
         str | None,
         typer.Option(
-            help="Step of the encoders in use, rad or m, such as 2*pi/65536. It is judged as one of the checks."
+            help="Step of the encoders in use, rad or m, such as 2*pi/65536. The report then also checks whether this step is fine enough."
         ),
     ] = None,
     side: options.Side = None,

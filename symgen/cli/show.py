@@ -31,13 +31,15 @@ def show(
     ] = None,
     frame: Annotated[
         int | None,
-        typer.Option(help="Frame of the components of a pose, Jacobian or twist. Default: 0."),
+        typer.Option(help="Frame in which a pose, Jacobian or twist is expressed. Default: 0."),
     ] = None,
     of: Annotated[
-        int | None, typer.Option(help="Frame of the model. Default: the last frame.")
+        int | None,
+        typer.Option(help="Frame whose pose, Jacobian or twist is shown. Default: the last frame."),
     ] = None,
     rows: Annotated[
-        str | None, typer.Option(help="For a determinant: rows of the Jacobian, e.g. 1,2.")
+        str | None,
+        typer.Option(help="Rows of the Jacobian of which the determinant is taken, e.g. 1,2."),
     ] = None,
     form: Annotated[
         str | None,

@@ -1,8 +1,12 @@
-"""Closed loops: their residual as nodes of a graph, Newton's method for it, and the configurations of a mechanism in floats, with rates of passive joints and mobility.
+"""Closed loops of a mechanism: residuals, Newton's method, closed configurations and mobility.
 
-A loop closes where its cut frame and its twin coincide, rT_cut = rT_twin, r its root: the last frame on the paths of both. `coincidence` says so by twelve differences; `residuals` by six, of which the three of the orientation vanish half a turn away too: an equation for each freedom that a loop takes.
+A loop closes where its cut frame and its twin coincide, rT_cut = rT_twin. Frame r is the root of
+the loop: the last frame on the paths of both. `coincidence` has twelve differences between the two
+frames. `residuals` has six, one for each freedom that a loop removes; the three of the orientation
+are also zero at half a turn.
 
-The free joints are those that no relation of the file gives, q = N q_free + c for all that move.
+The free joints are the moving joints that no relation of the file gives. All moving joints are
+q = N q_free + c.
 """
 
 from __future__ import annotations
@@ -32,7 +36,10 @@ ALL = slice(None)
 
 
 def loop_ends(robot: Robot, algebra: GraphAlgebra, closure: Closure) -> list[tuple[Pose, Pose]]:
-    """Orientation and origin of the cut frame and of its twin in the root of their loop, which no joint before it turns, loop by loop."""
+    """Return, for each loop, the poses of its cut frame and of its twin, in the root of the loop.
+
+    Each pose is an orientation and an origin. Joints before the root do not change these poses.
+    """
     roots = [robot.root(loop) for loop in robot.loops]
     pose = {root: frame_poses(Geometry(robot, algebra, closure, root)) for root in {*roots}}
     loops = zip(robot.loops, roots, strict=True)
@@ -40,7 +47,10 @@ def loop_ends(robot: Robot, algebra: GraphAlgebra, closure: Closure) -> list[tup
 
 
 def coincidence(ends: list[tuple[Pose, Pose]]) -> list[Scalar]:
-    """P_cut - P_twin and A_cut - A_twin, twelve entries a loop; zero if the frames coincide."""
+    """Return P_cut - P_twin and A_cut - A_twin, twelve differences for each loop.
+
+    All are zero if the cut frame and its twin coincide.
+    """
     return [
         sub(x, y)
         for (A, P), (B, Q) in ends
@@ -50,10 +60,10 @@ def coincidence(ends: list[tuple[Pose, Pose]]) -> list[Scalar]:
 
 
 def residuals(robot: Robot, algebra: GraphAlgebra, closure: Closure) -> list[Scalar]:
-    """P_cut - P_twin and the axial vector of A_cut' A_twin, six entries a loop.
+    """Return P_cut - P_twin and the axial vector of A_cut' A_twin, six entries for each loop.
 
-    Where the cut joint is no independent one, its angle is a sum of others and the orientations
-    agree: zero without being looked at.
+    If the cut joint is not independent, its angle is a sum of other angles, and the orientations
+    agree in all configurations: the last three entries are then 0.
     """
     rows: list[Scalar] = []
     ends = loop_ends(robot, algebra, closure)
@@ -71,7 +81,10 @@ def residuals(robot: Robot, algebra: GraphAlgebra, closure: Closure) -> list[Sca
 def differences(
     residual: Callable[[Array], Array], q: Array, columns: slice | list[int] = ALL
 ) -> tuple[Array, Array]:
-    """r (..., m) at q (..., n), and its derivatives by `columns` of q, (..., m, columns)."""
+    """Return the residual r at q (..., n), and its derivatives by central differences.
+
+    r has shape (..., m). The derivatives by the `columns` of q have shape (..., m, columns).
+    """
     units = DIFFERENCE * np.eye(q.shape[-1])[columns]
     n = len(units)
     r = residual(q[..., None, :] + np.concatenate([np.zeros((1, q.shape[-1])), units, -units]))
@@ -80,7 +93,11 @@ def differences(
 
 
 def inertia_of(torque: Callable[[Array], Array], q: Array) -> Array:
-    """A (..., n, n) of torques that are A qdd + b in qdd (..., n); q gives their shape."""
+    """Return the matrix A, shape (..., n, n), of a torque function A qdd + b.
+
+    Column i is torque(e_i) - torque(0) for the unit acceleration e_i; q only gives the shape of
+    qdd.
+    """
     rest = torque(0 * q)
     return np.stack([torque(0 * q + e) - rest for e in np.eye(q.shape[-1])], axis=-1)
 
@@ -94,10 +111,11 @@ def newton(
     tolerance: float,
     rcond: float = 1e-9,
 ) -> Array:
-    """Where r(q) = 0, from q (..., n), by steps of least squares of at most STEP in `columns`.
+    """Solve r(q) = 0 from a start q (..., n), by Newton's method with least squares.
 
-    A state ends early below the tolerance, or where STALLED steps make no progress, whatever states
-    stand beside it. The caller looks at the residual where it ends.
+    Only the `columns` of q change, by at most STEP in each iteration. A state stops below the
+    tolerance, or after STALLED iterations without progress, independently of the other states. The
+    caller must check the residual at the end.
     """
     q, best, stalled = q.copy(), np.full(q.shape[:-1], np.inf), np.zeros(q.shape[:-1])
     going = np.ones(q.shape[:-1], dtype=bool)
@@ -126,7 +144,10 @@ INDEPENDENT_MOTIONS = 1e-7
 
 
 def declared_relations(robot: Robot) -> dict[int, tuple[dict[int, Expression], Expression]]:
-    """{j: (row, constant)} of the constraints of the file, in the joints that have none."""
+    """Return the constraints of a robot file as relations {j: (row, constant)}.
+
+    Each constrained joint is q_j = row q + constant, in the joints without a constraint.
+    """
     free = [i for i in robot.moving if i not in robot.constraints]
     relations = {}
     for j, e in robot.constraints.items():
@@ -149,12 +170,15 @@ def declared_relations(robot: Robot) -> dict[int, tuple[dict[int, Expression], E
 
 @lru_cache(maxsize=16)
 def open_loops(robot: Robot) -> list[Scalar]:
-    """Differences of the cut and twin frames of every loop, all joints free."""
+    """Return the differences between cut and twin frames of every loop, all joints independent."""
     return coincidence(loop_ends(robot, GraphAlgebra(robot), open_tree(robot)))
 
 
 class Assembly:
-    """Configurations q (..., free joints), in the order of `free`.
+    """A mechanism with loops in floating point: finds configurations that close its loops.
+
+    A configuration q has shape (..., free joints), in the order of `free`: the moving joints
+    without a relation.
 
     Parameters
     ----------
@@ -163,7 +187,7 @@ class Assembly:
     relations : mapping
         {joint: (row, constant)} in the free joints.
     constants : mapping
-        In place of those of the robot file.
+        Values that replace constants of the robot file.
     """
 
     def __init__(
@@ -184,11 +208,15 @@ class Assembly:
 
     @property
     def unknown(self) -> tuple[int, ...]:
-        """Free joints without an actuator."""
+        """Numbers of the free joints without an actuator."""
         return tuple(self.free[k] for k in self.passive)
 
     def guess(self, start: Mapping[int, float], rng: np.random.Generator | None) -> Array:
-        """A place to look from: joints of `start` there, the others drawn, or at one and the same place."""
+        """Return a configuration from which to search for a closed one.
+
+        Joints named in `start` have that position. All others have a random position, or a fixed
+        one if there is no random generator.
+        """
         drawn = (
             rng.uniform(-np.pi, np.pi, len(self.free))
             if rng
@@ -197,11 +225,14 @@ class Assembly:
         return np.array([start.get(j, x) for j, x in zip(self.free, drawn, strict=True)])
 
     def configuration(self, q: Array) -> dict[int, float]:
-        """All moving joints of one configuration."""
+        """Return the positions {joint: q_j} of all moving joints in one configuration."""
         return dict(zip(self.robot.moving, (self.N @ q + self.c).tolist(), strict=True))
 
     def residual(self, q: Array) -> Array:
-        """(..., loops, 12): differences of cut and twin frames, positions per longest link."""
+        """Return the differences between cut and twin frames, shape (..., loops, 12).
+
+        Positions are divided by the longest length.
+        """
         joints = dict(
             zip(self.robot.moving, np.moveaxis(q @ self.N.T + self.c, -1, 0), strict=True)
         )
@@ -212,39 +243,44 @@ class Assembly:
         return np.asarray(np.moveaxis(r, (0, 1), (-2, -1)) * self.scale)
 
     def rows(self, q: Array) -> Array:
-        """The residual of all loops, (..., equations)."""
+        """Return the residual of all loops in one vector, shape (..., equations)."""
         return self.residual(q).reshape(*q.shape[:-1], 12 * len(self.robot.loops))
 
     def gap(self, q: Array) -> float:
-        """Largest entry of the residual."""
+        """Return the largest absolute entry of the residual at configuration q."""
         return float(np.abs(self.rows(q)).max(initial=0.0))
 
     def widest(self, q: Array) -> tuple[Loop, float]:
-        """The loop that is open widest, and its largest entry of the residual."""
+        """Return the loop with the largest residual, and this largest entry."""
         gaps = np.abs(self.residual(q)).max(axis=-1)
         return self.robot.loops[int(gaps.argmax())], float(gaps.max())
 
     def closest(self) -> Array:
-        """The configuration nearest to a closed one over several descents in all joints."""
+        """Return the configuration in which the loops are nearest to closing.
+
+        It is the best result of several descents, in all free joints, from random configurations.
+        """
         rng = np.random.default_rng(4)
         starts = rng.uniform(-np.pi, np.pi, (DESCENTS, len(self.free)))
         ends = [newton(self.rows, q, steps=STEPS, tolerance=0.0, rcond=1e-6) for q in starts]
         return min(ends, key=self.gap)
 
     def solve(self, q: Array) -> Array | None:
-        """Newton for the passive joints from `q`; None if the loops do not close."""
+        """Close the loops with the passive joints, from configuration q; None if this fails."""
         closed = newton(self.rows, q, self.passive, steps=STEPS, tolerance=TOLERANCE)
         return closed if self.gap(closed) < 10 * TOLERANCE else None
 
     def rates(self, q: Array) -> Array:
-        """G (passive, active): rates of the passive joints per rate of the active ones."""
+        """Return G, shape (passive, active): rates of passive joints per rate of active joints."""
         J = differences(self.rows, q)[1]
         return np.asarray(
             -np.linalg.lstsq(J[:, self.passive], J[:, self.active], rcond=INDEPENDENT_MOTIONS)[0]
         )
 
     def mobility(self, q: Array) -> tuple[int, int]:
-        """(freedoms of the mechanism, freedoms left with the actuators held)."""
+        """Return the degrees of freedom of the mechanism, and those left with all actuators
+        blocked.
+        """
         J = differences(self.rows, q)[1]
         return len(self.free) - _rank(J), len(self.passive) - _rank(J[:, self.passive])
 

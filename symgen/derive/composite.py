@@ -1,8 +1,9 @@
-"""The inertia matrix by composite links: a link with all that it carries, rigid (Walker and Orin 1982).
+"""Inertia matrix by composite links: a link and all links mounted on it, as one rigid body.
 
-From the tips to the base, the parameters of a composite link about the origin of its frame take in those of the links on it:
+The method is that of Walker and Orin (1982). From the tips to the base, the parameters of each
+composite link, about the origin of its frame, are added to those of its antecedent:
 
-    JP_i <- JP_i + iRj JP_j jRi + 2 (P . AS) E - P AS' - AS P' + MP_j ((P . P) E - P P')
+    JP_i  <- JP_i + iRj JP_j jRi + 2 (P . AS) E - P AS' - AS P' + MP_j ((P . P) E - P P')
     MSP_i <- MSP_i + AS + MP_j P ,   MP_i <- MP_i + MP_j ,   AS = iRj MSP_j ,   P = P_ij
 
 Column k of A is the wrench by which composite link k resists a unit acceleration of joint k,
@@ -10,9 +11,11 @@ Column k of A is the wrench by which composite link k resists a unit acceleratio
     E = (-MSP_2, MSP_1, 0) ,   NE = (JP_13, JP_23, JP_33)      revolute
     E = (0, 0, MP) ,           NE = (MSP_2, -MSP_1, 0)         prismatic
 
-carried inward to every joint before it. With base parameters YY = MZ = M = 0 of most links, and the terms in MP vanish.
+propagated to every joint before joint k. With base parameters, YY = MZ = M = 0 for most links, and
+the terms in MP vanish.
 
-M. W. Walker, D. E. Orin, J. Dyn. Sys. Meas. Control 104, 1982; Khalil and Dombre, Modeling, Identification and Control of Robots, 2002, ch. 9.
+M. W. Walker, D. E. Orin, J. Dyn. Sys. Meas. Control 104, 1982; Khalil and Dombre, Modeling,
+Identification and Control of Robots, 2002, ch. 9.
 """
 
 from __future__ import annotations
@@ -32,6 +35,8 @@ Place = tuple[int, int]
 
 class CompositeLinks:
     """Inertia tensor JP, first moments MSP and mass MP of every composite link, in its frame.
+
+    A composite link is a link with all links mounted on it, as one rigid body.
 
     Parameters
     ----------
@@ -65,7 +70,7 @@ class CompositeLinks:
                 self._take(f.j, f.ant)
 
     def _name(self, j: int) -> None:
-        """Call the parameters of a composite link by their names."""
+        """Name the parameters of composite link j in the graph, such as JP332 of link 2."""
         for (k, m), x in zip(PLACES, self.JP[j], strict=True):
             self.algebra.name(x, self.named("JP", k, m, j))
         for k, x in enumerate(self.MSP[j], start=1):
@@ -73,7 +78,7 @@ class CompositeLinks:
         self.algebra.name(self.MP[j], self.named("MP", j))
 
     def _take(self, j: int, i: int) -> None:
-        """Add composite link j to the frame i that carries it."""
+        """Add the parameters of composite link j to those of its antecedent i."""
         R = self.geometry.rotation[j]
         P = self.geometry.P[j]
         AS = R.up(self.MSP[j])
@@ -90,7 +95,10 @@ class CompositeLinks:
         self.MP[i] = add(self.MP[i], self.MP[j])
 
     def matrix(self) -> dict[Place, Scalar]:
-        """{(i, k): A_ik} of all moving joints of the open tree, elements included."""
+        """Return the inertia matrix {(i, k): A_ik} of all moving joints of the open tree.
+
+        Inertias on the joints (elements) are included.
+        """
         moving = self.robot.moving
         A: dict[Place, Scalar] = {(i, k): 0 for i in moving for k in moving}
         for k in moving:
@@ -108,7 +116,10 @@ class CompositeLinks:
         return A
 
     def _column(self, k: int) -> dict[int, Scalar]:
-        """{i: A_ik} of the links, joint i on the path to joint k."""
+        """Return column k of the inertia matrix, {i: A_ik}, links only.
+
+        The joints i are those between the base and joint k.
+        """
         x, y, _ = self.MSP[k]
         E: Vector = (sub(0, y), x, 0)
         NE: Vector = (self.JP[k][2], self.JP[k][4], self.JP[k][5])
@@ -131,7 +142,7 @@ class CompositeLinks:
 
 
 def turned(R: Rotation, J: Tensor) -> Tensor:
-    """iRj J jRi: about z by cos**2 and cos sin, then by the fixed part."""
+    """Rotate an inertia tensor J from frame j to frame i: return iRj J jRi."""
     XX, XY, XZ, YY, YZ, ZZ = J
     cc, cs = mul(R.c, R.c), mul(R.c, R.s)
     x = sub(mul(cc, sub(XX, YY)), mul(add(cs, cs), XY))
@@ -145,7 +156,10 @@ def turned(R: Rotation, J: Tensor) -> Tensor:
 
 
 def parallel(P: Vector, AS: Vector, moved: Vector) -> Tensor:
-    """(P . AS + P . moved) E - P moved' - AS P', moved = AS + MP P: the terms of the parallel axes."""
+    """Return the parallel-axis terms of an inertia tensor that is shifted by the vector P.
+
+    They are (P . AS + P . moved) E - P moved' - AS P', with moved = AS + MP P.
+    """
     trace = add(dot(P, AS), dot(P, moved))
     outer = {(k, m): add(mul(P[k - 1], moved[m - 1]), mul(AS[k - 1], P[m - 1])) for k, m in PLACES}
     return tuple(sub(trace if k == m else 0, x) for (k, m), x in outer.items())

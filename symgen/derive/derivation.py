@@ -124,8 +124,7 @@ def derived(robot: Robot, closing: Callable[[Robot], Closure]) -> Derivation:
 def projected_twice(
     closure: Closure, algebra: GraphAlgebra, A: Mapping[tuple[int, int], Scalar]
 ) -> dict[tuple[int, int], Scalar]:
-    """Return {(i, k): (G' A G)_ik} of the actuated joints, from the matrix A of all moving joints.
-    """
+    """Return {(i, k): (G' A G)_ik} of the actuated joints, from A of all moving joints."""
     robot = closure.robot
     AG = {j: closure.project(algebra, {k: A[j, k] for k in robot.moving}) for j in robot.moving}
     columns = {

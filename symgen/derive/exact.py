@@ -291,8 +291,7 @@ class Draw:
         return point
 
     def _sqrt(self, root: Expression) -> Array:
-        """Return the square root of a number, or a random residue for the root of any other
-        expression.
+        """Return the square root of a number, or a random residue for any other square root.
 
         The head of this module has the formulas.
         """
@@ -348,11 +347,10 @@ class Draw:
 
 @lru_cache
 def primes_for(robot: Robot, count: int, seed: int | None = None) -> tuple[int, ...]:
-    """Return `count` primes p < 2**31 over which the fixed angles and square roots of a robot
-    exist.
+    """Return `count` primes over which the fixed angles and square roots of a robot exist.
 
-    p = -1 modulo 4 and 2D. Without a seed they are the largest such primes; with a seed, the
-    largest below a random number. Raises SymgenError if there are too few.
+    p < 2**31, and p = -1 modulo 4 and 2D. Without a seed they are the largest such primes; with a
+    seed, the largest below a random number. Raises SymgenError if there are too few.
     """
     primes = tuple(islice(candidates(robot, seed), count))
     if len(primes) == count:

@@ -127,7 +127,7 @@ class Frames:
         return Rotation(None, *self.geometry.algebra.cos_sin(*self._between(j, i)))
 
     def _between(self, j: int, i: int) -> tuple[Turn, Expression]:
-        """Return the angle of frame j minus the angle of frame i: joint multiples, and a constant.
+        """Return the angle from frame i to frame j about their common z axis: joint part, constant.
         """
         (turn, offset), (other, other_offset) = self.geometry.turn[j], self.geometry.turn[i]
         return summed((*turn, *((k, -n) for k, n in other))), offset - other_offset

@@ -1,10 +1,13 @@
-"""The closure equations of general loops: as many as there are tied joints, with Jacobian and curvature.
+"""Closure equations of general loops, one for each tied joint, with Jacobian and curvature.
 
-`equations` are the rows of `assembly.residuals` that determine the tied joints best at the start configuration. Then
+A tied joint is a passive joint that only these equations relate to the actuated joints. The
+equations are the entries of `assembly.residuals` that determine the tied joints best at the start
+configuration. Then
 
     r(q) = 0 ,    J qd = 0 ,    J qdd + Jd qd = 0 .
 
-J and Jd qd are the first and second time derivatives of the nodes of r: along the unit rate of each joint, and along qd.
+J and Jd qd are the first and second time derivatives of the nodes of r: J along the unit rate of
+each joint, Jd qd along qd.
 """
 
 from __future__ import annotations
@@ -30,16 +33,17 @@ TURN_STEPS, TURN_CLOSED = 72, 1e-4  # of a full turn of the crank, and residual 
 
 @dataclass(frozen=True)
 class LoopSystem:
-    """The closure equations of a robot with tied joints.
+    """The closure equations of a robot with tied joints, and the values of these equations.
 
+    A tied joint is a passive joint that only the closure equations relate to the actuated joints.
     Arrays q hold the independent joints in the last axis: n actuated, then m tied.
 
     Attributes
     ----------
     derivation : Derivation
-        Of the mechanism; the equations are nodes of its graph.
+        Derivation of the mechanism; the equations are nodes of its graph.
     equations : tuple of int
-        Rows of `residuals` that are used, as many as there are tied joints.
+        Indices of the `residuals` that are used, as many as there are tied joints.
     """
 
     derivation: Derivation
@@ -56,44 +60,44 @@ class LoopSystem:
 
     @property
     def start(self) -> Array:
-        """The independent joints at the start configuration."""
+        """Positions of the independent joints in the start configuration, rad or m."""
         return np.array([self.closure.start[j] for j in self.closure.independent])
 
     @property
     def tied(self) -> slice:
-        """Places of the tied joints among the independent ones."""
+        """Slice of the tied joints in an array of the independent joints."""
         return slice(len(self.robot.joints), len(self.closure.independent))
 
     @cached_property
     def rows(self) -> list[Scalar]:
-        """All rows of `residuals`."""
+        """All entries of `residuals`, six for each loop, as graph scalars."""
         geometry = self.derivation.geometry
         return residuals(geometry.robot, geometry.algebra, geometry.closure)
 
     @cached_property
     def residual(self) -> list[Scalar]:
-        """r(q)."""
+        """The closure residuals r(q), one for each tied joint, as graph scalars."""
         return [self.rows[k] for k in self.equations]
 
     @cached_property
     def jacobian(self) -> list[list[Scalar]]:
-        """[equation][independent joint]."""
+        """Jacobian dr/dq as graph scalars: a row per equation, a column per independent joint."""
         columns = [rates(self.rows, {Symbol("q", f"q{i}"): 1}) for i in self.closure.independent]
         return [[column[k] for column in columns] for k in self.equations]
 
     @cached_property
     def curvature(self) -> list[Scalar]:
-        """Jd qd."""
+        """Second time derivative Jd qd of the residuals at constant qd, as graph scalars."""
         qd = self.derivation.algebra.qd
         along = {Symbol("q", f"q{i}"): qd(i) for i in self.closure.independent}
         return rates(rates(self.residual, along), along)
 
     @cached_property
     def alignment(self) -> list[Scalar]:
-        """Trace of A_cut' A_twin: 3 where a loop closes, -1 half a turn from there, where the axial vector is zero too.
+        """Trace of A_cut' A_twin of each loop: 3 if it closes, -1 if it is half a turn away.
 
-        Of the loops alone whose cut joint is tied: where it is a sum of angles, the orientations
-        agree by construction.
+        The axial vector of A_cut' A_twin is zero in both cases. A loop whose cut joint is not tied
+        is left out: there the angle is a sum of other angles, and the orientations always agree.
         """
         geometry = self.derivation.geometry
         ends = loop_ends(geometry.robot, geometry.algebra, geometry.closure)
@@ -104,7 +108,7 @@ class LoopSystem:
         ]
 
     def floats(self, outputs: Sequence[Scalar], q: Array, qd: Array | None = None) -> Array:
-        """Values at states q (..., independent) of nodes, (..., outputs)."""
+        """Evaluate nodes at states q (..., independent joints) and qd; shape (..., outputs)."""
         states = {"q": q} | ({} if qd is None else {"qd": qd})
         by_joint = {
             kind: dict(zip(self.closure.independent, np.moveaxis(x, -1, 0), strict=True))
@@ -114,35 +118,47 @@ class LoopSystem:
         return np.stack([np.broadcast_to(x, q.shape[:-1]) for x in values], axis=-1)
 
     def residual_floats(self, q: Array) -> Array:
-        """r (..., m)."""
+        """Evaluate the residual r at q, shape (..., m)."""
         return self.floats(self.residual, q)
 
     def jacobian_floats(self, q: Array) -> Array:
-        """J (..., m, n + m)."""
+        """Evaluate the Jacobian J at q, shape (..., m, n + m)."""
         J = self.floats([x for row in self.jacobian for x in row], q)
         return J.reshape(*q.shape[:-1], len(self.equations), -1)
 
     def closed(self, q: Array, *, steps: int, tolerance: float) -> Array:
-        """q with tied joints near those given that close the loops, if Newton finds them."""
+        """Return q with the tied joints changed so that the loops close, by Newton's method.
+
+        The tied joints start from their positions in q. The loops may stay open if the method
+        fails.
+        """
         return newton(self.residual_floats, q, self.tied, steps=steps, tolerance=tolerance)
 
     def mode(self) -> float:
-        """Sign of det J_u at the start: it stays as long as the mechanism passes no dead point, hence in one assembly mode."""
+        """Return the sign of det J_u at the start configuration, J_u the Jacobian of the tied
+        joints.
+
+        It stays the same until the mechanism passes a dead point, hence within one assembly mode.
+        """
         return float(np.sign(np.linalg.det(self.jacobian_floats(self.start)[:, self.tied])))
 
     @property
     def units(self) -> tuple[float, ...]:
-        """Size of a motion of each independent joint: 1 rad, or the longest length for slides."""
+        """Unit of motion of each independent joint: 1 rad, or the longest length if prismatic."""
         frames = map(self.robot.frame, self.closure.independent)
         return tuple(1.0 if f.sigma == REVOLUTE else self.robot.longest for f in frames)
 
     @property
     def tolerance(self) -> float:
-        """Largest residual, m or rad, at which emitted code calls the loops closed."""
+        """Largest residual, m or rad, at which generated code accepts the loops as closed."""
         return 1e-13 if self.robot.longest > IN_METRES else 1e-16
 
     def pace(self) -> float:
-        """A step of the actuated joints in which no tied one moves far, as fast as at the start (PACE); in rad, and in the longest length for slides."""
+        """Return a step of the actuated joints that moves no tied joint far.
+
+        It is computed from the rates at the start configuration (PACE); in rad, or as a fraction of
+        the longest length if prismatic.
+        """
         J = self.jacobian_floats(self.start)
         n = self.tied.start
         units = np.array(self.units)
@@ -150,9 +166,9 @@ class LoopSystem:
         return float(min(PACE[0], PACE[1] / np.abs(G).max()))
 
     def turn(self) -> tuple[int, ...] | None:
-        """Whole turns of the tied joints per turn of the actuated one.
+        """Return the whole turns of each tied joint during one turn of the actuated joint.
 
-        None if it cannot turn fully or is not the only one.
+        None if the actuated joint cannot turn fully, is prismatic, or is not the only one.
         """
         if [self.robot.frame(j).sigma for j in self.robot.joints] != [REVOLUTE]:
             return None
@@ -173,7 +189,10 @@ class LoopSystem:
 
 @lru_cache(maxsize=64)
 def loop_system(robot: Robot) -> LoopSystem:
-    """Choose the equations: pivoted elimination of their Jacobian in the tied joints at the start configuration."""
+    """Choose the closure equations that determine the tied joints best at the start configuration.
+
+    The method is a pivoted elimination of the Jacobian of the tied joints: one equation per joint.
+    """
     d = derive(robot)
     closure = d.closure
     rows = LoopSystem(d, tuple(range(6 * len(robot.loops))))

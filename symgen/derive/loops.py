@@ -1,11 +1,12 @@
-"""Relations of the passive joints: declared ones checked, linear ones derived, and the mobility of the mechanism.
+"""Relations of the passive joints: declared relations are checked, linear ones derived and proved.
 
 Loop: frame `cut` (one branch) and frame `twin` (sigma 2, other branch) coincide, 0T_cut = 0T_twin.
-At a closed configuration the passive rates are G = -J_u^+ J_a; where G keeps the same whole numbers
-along a motion, the relation q_u = G q_a + c is linear, and c is looked for among the fixed angles
-or lengths of the loops (`_offset`). The relation is then *proved*: the two frames must coincide
-identically over F_p, with random lengths, so equal lengths must be equal symbols. The second branch
-of a parallelogram (anti-parallelogram) is not linear and never taken for one.
+At a closed configuration the passive rates are G = -J_u^+ J_a. If G has the same whole numbers
+along a motion, the relation q_u = G q_a + c is linear, and its constant c is searched among the
+fixed angles or lengths of the loops (`_offset`). The relation is then *proved*: the two frames must
+coincide identically over F_p, with random lengths, so equal lengths must be equal symbols. The
+second branch of a parallelogram (anti-parallelogram) is not linear, and is never accepted as
+linear. The mobility of the mechanism is checked too.
 """
 
 from __future__ import annotations
@@ -51,14 +52,19 @@ Sample = tuple[Mapping[str, float], Mapping[int, float]]  # constants, closed co
 
 @lru_cache(maxsize=64)
 def close(robot: Robot) -> Closure:
-    """The closure of `robot`: declared relations checked, linear ones derived. Raises
-    DescriptionError if the loops cannot close.
+    """Return the closure of a robot: its passive joints as functions of independent joints.
+
+    Declared relations are checked, linear relations are derived. Raises DescriptionError if the
+    loops cannot close.
     """
     return find_relations(robot) if robot.passive else open_tree(robot)
 
 
 def find_relations(robot: Robot) -> Closure:
-    """The closure of a robot with passive joints: linear if a closed configuration shows it."""
+    """Find the closure of a robot with passive joints from its closed configurations.
+
+    The closure is linear if one of the configurations shows linear relations, else general.
+    """
     assembly = Assembly(robot, declared_relations(robot))
     in_loops = {j for loop in robot.loops for k in (loop.cut, loop.twin) for j in robot.path(k)}
     for j in assembly.unknown:
@@ -82,7 +88,12 @@ def find_relations(robot: Robot) -> Closure:
 
 
 def _configurations(assembly: Assembly) -> Iterator[Array]:
-    """Closed configurations: the one nearest to the `start` of the loops and no other if there is one, else from random places, or from the closest approach."""
+    """Yield configurations that close the loops.
+
+    If the robot has a `start` and a closed configuration near it is found, only this configuration
+    is given. Otherwise the search begins at random configurations and, if none of them closes, at
+    the one in which the loops are nearest to closing.
+    """
     robot, rng, closed = assembly.robot, np.random.default_rng(3), False
     wanted = {j: x for j, x in robot.start.items() if j in assembly.free}
     if wanted and (near := _nearest(assembly, wanted)) is not None:
@@ -101,9 +112,11 @@ def _configurations(assembly: Assembly) -> Iterator[Array]:
 
 
 def _nearest(assembly: Assembly, wanted: Mapping[int, float]) -> Array | None:
-    """The closed configuration nearest to the joints that `start` names, hinges up to whole turns: those that it does not name are free, from several places, and passive ones that it names from beside it.
+    """Return the closed configuration nearest to the joint positions of `start`; None if none
+    closes.
 
-    None if none closes.
+    Joints that are not in `start` begin at several positions. Passive joints in `start` begin near
+    it. Whole turns of a hinge do not count as a distance.
     """
     rng, free = np.random.default_rng(5), assembly.free
     others, passive = [k for k, j in enumerate(free) if j not in wanted], assembly.passive
@@ -128,7 +141,11 @@ def _nearest(assembly: Assembly, wanted: Mapping[int, float]) -> Array | None:
 
 
 def _general(assembly: Assembly, q: Array) -> Closure:
-    """The configuration q as a general closure: declared relations, the sums of angles that planar loops fix, the rest tied."""
+    """Return the closure of general loops, with configuration q as its start.
+
+    It has the declared relations and the sums of angles that planar loops fix. All other passive
+    joints are tied: only the closure equations give them.
+    """
     relations: dict[int, Relation] = {}
     configuration = assembly.configuration(q)
     samples = _samples(assembly, q) or [(assembly.constants, configuration)]
@@ -148,10 +165,11 @@ def _general(assembly: Assembly, q: Array) -> Closure:
 def _angle_sum(
     assembly: Assembly, loop: Loop, configuration: Mapping[int, float]
 ) -> dict[int, Expression] | None:
-    """Whole n with q_cut = sum n_j q_j + c in a planar loop: all its hinges turn about one direction, forwards or backwards, slides and twists between them or not.
+    """Return {j: n_j} with q_cut = sum n_j q_j + c if the loop is planar, else None.
 
-    The directions are looked at in two configurations of the open tree; `regroup.closed_draw`
-    proves the sum over F_p.
+    In a planar loop all hinges have parallel axes, in equal or opposite directions, with or without
+    prismatic joints between them. The axes are compared in two configurations of the open tree;
+    `regroup.closed_draw` proves the sum over F_p.
     """
     robot = assembly.robot
     if robot.frame(loop.cut).sigma != REVOLUTE:
@@ -174,7 +192,11 @@ def _angle_sum(
 
 
 def _linear(assembly: Assembly, q: Array) -> Closure | None:
-    """The configuration q as a linear closure, if it is one: whole constant rates, offsets that are sums of angles or lengths, proof over F_p."""
+    """Return the closure with linear relations of all passive joints, or None if there is none.
+
+    The rates of the passive joints must be constant whole numbers near configuration q, the
+    constants must be sums of fixed angles or lengths, and the relations must be proved over F_p.
+    """
     N = np.round(assembly.rates(q))
     moved = q.copy()
     moved[assembly.active] += 0.37 + 0.1 * np.array(assembly.active)
@@ -197,7 +219,10 @@ def _linear(assembly: Assembly, q: Array) -> Closure | None:
 def _closure(
     assembly: Assembly, relations: Mapping[int, Relation], start: Mapping[int, float]
 ) -> Closure:
-    """The relations of passive joints that have one, those of the file, and all others tied."""
+    """Return the closure from the found relations and the declared ones.
+
+    Passive joints without a relation are tied: only the closure equations give them.
+    """
     robot = assembly.robot
     tied = tuple(j for j in assembly.unknown if j not in relations)
     free = (*robot.joints, *tied)
@@ -217,8 +242,10 @@ def _closure(
 
 
 def _samples(assembly: Assembly, q: Array) -> list[Sample]:
-    """Constants with the configuration there: those of the file with q, and others near them, at which equal values of different symbols differ.
-    Empty if the loops do not close there.
+    """Return pairs (constants, closed configuration): those of the file, and changed constants.
+
+    At the changed constants, equal values of different symbols differ. The list is empty if the
+    loops do not close there, and has only the pair of the file if an expression has no value there.
     """
     rng, robot = np.random.default_rng(7), assembly.robot
     angles = {s for f in robot.frames for e in (f.gamma, f.alpha, f.theta0) for s in e.symbols}
@@ -238,10 +265,10 @@ def _samples(assembly: Assembly, q: Array) -> list[Sample]:
 def _offset(
     assembly: Assembly, samples: list[Sample], j: int, row: Mapping[int, Expression]
 ) -> Expression | None:
-    """c of q_j = sum n_i q_i + c as an expression, or None.
+    """Find the constant c of q_j = sum n_i q_i + c as an expression, or None.
 
-    Constants of theta (or r) beside q_j and q_i enter as they do there. The rest is a sum of other
-    angles of the loops and quarter turns, or of lengths.
+    Constants that the frames add to q_j and q_i in theta or r enter c with their factors. The rest
+    of c is a sum of other fixed angles of the loops and quarter turns, or of lengths.
     """
     robot, whole = assembly.robot, {j: -ONE} | dict(row)
     hinge = robot.frame(j).sigma == REVOLUTE
@@ -269,15 +296,17 @@ def _offset(
 
 
 def _beside(robot: Robot, row: Mapping[int, Expression]) -> Expression:
-    """sum n_i c_i, with c_i the constant added to q_i in theta or r."""
+    """Return sum n_i c_i, where c_i is the constant that frame i adds to q_i in theta or r."""
     frames = {i: robot.frame(i) for i in row}
     terms = ((f.theta0 if f.sigma == REVOLUTE else f.r0) * row[i] for i, f in frames.items())
     return sum(terms, ZERO)
 
 
 def _fixed(assembly: Assembly, hinge: bool) -> list[Expression]:
-    """Fixed angles without quarter turns, or lengths, of the frames around the loops and of the declared relations: distinct, and up to sign.
-    What stands beside q_j is none.
+    """Return the fixed angles, or lengths, of which the constant of a relation may be a sum.
+
+    They are from the frames of the loops and from the declared relations: without quarter turns,
+    each once up to sign. Constants added to a joint position are left out.
     """
     robot, own = assembly.robot, REVOLUTE if hinge else PRISMATIC
     around = {k for l in robot.loops for k in {*robot.path(l.cut)} ^ {*robot.path(l.twin)}}
@@ -297,7 +326,10 @@ def _fixed(assembly: Assembly, hinge: bool) -> list[Expression]:
 
 
 def _coincide(closure: Closure) -> bool:
-    """Whether cut and twin frames are equal over F_p for random lengths and positions: the proof of the relations."""
+    """Whether cut and twin frames coincide over F_p for random lengths and joint positions.
+
+    This is the proof of the relations in `closure`.
+    """
     draw, algebra = Draw(closure.robot, 17, 3), GraphAlgebra(closure.robot)
     rows = interpret(coincidence(loop_ends(closure.robot, algebra, closure)), draw)
     return not any(draw.residues(x).any() for x in rows)
@@ -323,7 +355,7 @@ def _wrong_mobility(robot: Robot, freedoms: int, left: int) -> DescriptionError:
 
 
 def _cannot_close(assembly: Assembly) -> DescriptionError:
-    """Why no configuration closes: the declared relations, the actuators, or the frames."""
+    """Return the error that says why no configuration closes: relations, actuators or frames."""
     robot = assembly.robot
     in_loops = {j for loop in robot.loops for k in (loop.cut, loop.twin) for j in robot.path(k)}
     declared = {j: e for j, e in robot.constraints.items() if j in in_loops}
@@ -352,7 +384,10 @@ def _cannot_close(assembly: Assembly) -> DescriptionError:
 def _contradiction(
     assembly: Assembly, declared: Mapping[int, Expression], closure: Closure
 ) -> DescriptionError:
-    """Both sides of every declared relation that is not the closure's, and how far the loop is open with the declared ones."""
+    """Return the error for declared relations that contradict the closure of the loops.
+
+    It gives both forms of each such relation, and how far the loop is open with the declared ones.
+    """
     sides = []
     for j, e in declared.items():
         if j in closure.tied:
@@ -372,7 +407,7 @@ def _contradiction(
 
 
 def _same(closure: Closure, j: int, row: Mapping[int, Expression], c: Expression) -> bool:
-    """Whether row and constant are those of joint j, up to whole turns of a hinge."""
+    """Whether q_j = row q + c is the relation of joint j in the closure, up to whole turns."""
     apart = (c - closure.offset[j]).value(closure.robot.constants)
     if closure.robot.frame(j).sigma == REVOLUTE:
         apart -= 2 * np.pi * round(apart / (2 * np.pi))

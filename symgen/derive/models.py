@@ -1,6 +1,7 @@
-"""The models of a robot: the one table that targets, symbols, certificate and pages iterate over.
+"""Table of all models of a robot, such as inverse dynamics and the inertia matrix.
 
-A new model is one entry here.
+Code generators, symbols, the certificate and the pages iterate over this table. A new model is one
+entry here.
 """
 
 from __future__ import annotations
@@ -34,7 +35,10 @@ HOMOGENEOUS = (0, 0, 0, 1)  # last row of a pose
 
 
 def _still(d: Derivation, *kinds: str, tied: bool = True) -> dict[Symbol, Input]:
-    """Zero rates: of `kinds` qd or qdd; of a tied joint too, unless it accelerates by itself."""
+    """Return replacements that set the joint velocities (qd) or accelerations (qdd) to zero.
+
+    If `tied` is true, those of the tied passive joints are zero too.
+    """
     independent = d.closure.independent if tied else d.robot.joints
     letter = {"qd": "QP", "qdd": "QDP"}
     return {Symbol(kind, f"{letter[kind]}{i}"): ZERO for kind in kinds for i in independent}
@@ -43,7 +47,7 @@ def _still(d: Derivation, *kinds: str, tied: bool = True) -> dict[Symbol, Input]
 def _without(
     d: Derivation, kept: Callable[[Element], bool], links: bool = True
 ) -> dict[Symbol, Input]:
-    """Zero parameters: of elements that are not `kept`, and of links if they are not."""
+    """Return replacements that set parameters to zero: of elements not `kept`, perhaps of links."""
     elements = element_names(d.robot)
     return {
         Symbol("parameter", name): ZERO
@@ -87,7 +91,10 @@ def _inertia_matrix(d: Derivation, r: Request) -> Iterator[Case]:
 
 
 def _unit_accelerations(d: Derivation, r: Request) -> Iterator[Case]:
-    """Column i of A: Gamma from rest, without gravity, for qdd_i = 1; tied joints accelerate by G."""
+    """Yield the columns of A: column i is Gamma from rest, without gravity, for qdd_i = 1.
+
+    A tied passive joint then has the acceleration G = dq_u/dq_i.
+    """
     named, common = Names(len(d.robot.frames)), _still(d, "qd", "qdd") | _weightless(d)
     common |= _without(d, lambda e: e.kind == "inertia")
     for column, i in enumerate(d.robot.joints):
@@ -131,7 +138,7 @@ def _by_column(d: Derivation, r: Request, columns: Columns) -> list[Entry]:
 
 
 def _momentum_regressor(d: Derivation, r: Request) -> Iterator[Case]:
-    """Columns of Gamma from rest, without gravity, for qdd = qd."""
+    """Yield the regressor of p = A qd: Gamma from rest, without gravity, for qdd = qd."""
     elements = element_names(d.robot)
     moved = {
         own: {} if own in elements and elements[own][0].kind != "inertia" else d.columns[own]

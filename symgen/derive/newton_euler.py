@@ -1,17 +1,15 @@
-"""Newton-Euler, once: the motion of the links outward and the wrenches inward.
+"""Newton-Euler recursions: link motions from base to tips, then wrenches from tips to base.
 
 Link j, frame j, i = ant(j), a_j the acceleration of O_j minus gravity, U = skew(wd) + skew(w)**2:
 
     w_j  = iRj' w_i  + qd_j e3
-            wd_j = iRj' wd_i + qdd_j e3 + (iRj' w_i) x (qd_j e3)      revolute
-    a_j  = iRj' (a_i + U_i P_ij)  [+ 2 w_j x (qd_j e3) + qdd_j e3   prismatic],
-            a_0 = -gravity
+    wd_j = iRj' wd_i + qdd_j e3 + (iRj' w_i) x (qd_j e3)      revolute
+    a_j  = iRj' (a_i + U_i P_ij)  [+ 2 w_j x (qd_j e3) + qdd_j e3   prismatic],   a_0 = -gravity
     F_j  = M_j a_j + U_j MS_j ,     N_j = J_j wd_j + w_j x (J_j w_j) + MS_j x a_j
-    f_j  = F_j + sum_k jRk f_k ,    n_j = N_j + sum_k (jRk n_k + P_jk x jRk f_k) ,
-            k over the frames carried by j
+    f_j  = F_j + sum_k jRk f_k ,    n_j = N_j + sum_k (jRk n_k + P_jk x jRk f_k)
 
-N_j is written in product form (see `moment`): with base parameters YY = MZ = M = 0, which is where
-the saving is.
+with k over the frames mounted on frame j. N_j is written in product form (see `moment`): with base
+parameters, YY = MZ = M = 0 for most links, and many products disappear.
 
 W. Khalil, J.-F. Kleinfinger, ICRA 1986; Khalil and Dombre, Modeling, Identification and Control of
 Robots, 2002, ch. 9.
@@ -50,14 +48,14 @@ TWO = Expression.number(2)
 
 @dataclass(frozen=True)
 class LinkMotion:
-    """Motion of one link, in its frame.
+    """Velocities and accelerations of one link, in its frame.
 
     Attributes
     ----------
     w, wd : Vector
         Angular velocity (rad/s) and acceleration (rad/s**2).
     DV : Matrix
-        w_k w_l.
+        Products w_k w_l.
     DW : Vector
         (w2**2 - w3**2, w3**2 - w1**2, w1**2 - w2**2).
     U : Matrix
@@ -78,14 +76,14 @@ REST = LinkMotion(ZERO3, ZERO3, ZERO33, ZERO3, ZERO33, ZERO3)
 
 
 class Motion:
-    """Outward recursion: q, qd, qdd of the actuated joints and gravity move the whole tree.
+    """Velocities and accelerations of all links, by the outward Newton-Euler recursion.
 
     Parameters
     ----------
     geometry : Geometry
         Rotations and positions of the frames.
     tag : tuple of int
-        Last indices of the names of the steps.
+        Last indices in the names of the intermediate variables.
     qd, qdd : mapping, optional
         Rates and accelerations of the independent joints. Default: the inputs QP and QDP.
     """
@@ -108,24 +106,25 @@ class Motion:
             self.link[f.j] = self._link(f.j)
 
     def _base(self) -> LinkMotion:
-        """The base, which is at rest and accelerates against gravity."""
+        """Return the motion of the base: at rest, but accelerated by minus gravity."""
         x, y, z = (self.algebra.gravity(axis) for axis in range(3))
         return REST if is_zero((x, y, z)) else replace(REST, a=(x, y, z))
 
     def q(self, j: int) -> Scalar:
-        """Position of any moving joint."""
+        """Return the position of any moving joint j."""
         return self.geometry.position(j)
 
     def qd(self, j: int) -> Scalar:
-        """Velocity of any moving joint."""
+        """Return the velocity of any moving joint j."""
         return linear(self.algebra, self.geometry.closure.row[j], self._qd)
 
     def qdd(self, j: int) -> Scalar:
-        """Acceleration of any moving joint."""
+        """Return the acceleration of any moving joint j."""
         return linear(self.algebra, self.geometry.closure.row[j], self._qdd)
 
     def vector(self, family: str, value: Vector, *indices: int) -> Vector:
-        """The same vector, its components named family + component + indices."""
+        """Name the components of a vector, such as W12, W22, W32 for link 2, and return the vector.
+        """
         x, y, z = (
             self.algebra.name(v, self.named(family, k, *indices, *self.tag))
             for k, v in enumerate(value, start=1)
@@ -133,7 +132,10 @@ class Motion:
         return x, y, z
 
     def hinted(self, family: str, value: Vector, *indices: int) -> Vector:
-        """The same vector, its components to be named so if they are used more than once."""
+        """Suggest names for the components of a vector, and return the vector.
+
+        A name is used if its component is needed more than once.
+        """
         x, y, z = (
             self.algebra.hint(v, self.named(family, k, *indices, *self.tag))
             for k, v in enumerate(value, start=1)
@@ -213,12 +215,12 @@ class Motion:
 
 
 def force(m: LinkMotion, K: Mapping[str, Scalar]) -> Vector:
-    """F = M a + U MS."""
+    """Return the force F = M a + U MS that moves a link."""
     return vadd(scale(K["M"], m.a), apply(m.U, (K["MX"], K["MY"], K["MZ"])))
 
 
 def moment(m: LinkMotion, K: Mapping[str, Scalar]) -> Vector:
-    """N = J wd + w x (J w) + MS x a, in product form.
+    """Return the moment N = J wd + w x (J w) + MS x a that moves a link, in product form.
 
     N1 = XX wd1 + (ZZ - YY) w2 w3 + YZ (w2**2 - w3**2) + XZ U21 - XY U31 + (MS x a)1, and
     cyclically.
@@ -234,9 +236,10 @@ def moment(m: LinkMotion, K: Mapping[str, Scalar]) -> Vector:
 
 
 def joint_torques(motion: Motion, K: Mapping[str, Scalar]) -> dict[int, Scalar]:
-    """Inward recursion: the part of Gamma_j that moves the links, for every moving joint of the tree.
+    """Return the torques {j: Gamma_j} that move the links, by the inward recursion.
 
-    K maps a standard parameter's name to its scalar; a parameter that is not in K counts as 0.
+    Every moving joint of the tree has an entry; friction and other elements are not included. K
+    maps a standard parameter's name to its scalar; a parameter that is not in K counts as 0.
     """
     robot, geometry, vector = motion.robot, motion.geometry, motion.vector
     f: dict[int, Vector] = dict.fromkeys(range(len(robot.frames) + 1), ZERO3)

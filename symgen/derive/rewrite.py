@@ -62,8 +62,8 @@ class Rewrite:
     source : GraphAlgebra
         The graph of the derivation.
     inputs : mapping
-        {input: its replacement}, a symbol, a constant expression, or a function that returns a value
-        in the new graph; other inputs stay as they are.
+        {input: its replacement}: a symbol, a constant expression, or a function that returns a
+        value in the new graph. Other inputs stay as they are.
     """
 
     def __init__(self, source: GraphAlgebra, inputs: Inputs) -> None:
@@ -190,8 +190,7 @@ class Rewrite:
     # --- values over F_p ---
 
     def _merged(self, image: Scalar) -> Scalar | int:
-        """Return the earlier number or node that has the same value, or `image` if there is none.
-        """
+        """Return the earlier number or node that has the same value, or else `image` itself."""
         node = image.node
         if node.index not in self._same:
             self._same[node.index] = self._first_of(node)

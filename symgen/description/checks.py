@@ -250,7 +250,11 @@ def _check_element(e: Element, robot: Any) -> None:
             "give one of `torque` and `energy`, or a `kind` that has a law",
             "",
         ),
-        (laws and not own, f"{e.kind} has its law; leave out torque and energy", "kind"),
+        (
+            laws and not own,
+            f"kind {e.kind} already defines the law; leave out torque and energy",
+            "kind",
+        ),
         (own and not e.unit, "give the `unit` of its parameter, such as N*m", ""),
         (
             not re.fullmatch(r"[\w*/^().°%+-]{0,40}", e.unit),
@@ -264,7 +268,7 @@ def _check_element(e: Element, robot: Any) -> None:
             f"when {e.when!r}; viscous and coulomb elements take positive or negative",
             "when",
         ),
-        (not e.along and not e.form, "acts along nothing; give `along` or `form`", ""),
+        (not e.along and not e.form, "it acts on no joint; give `along` or `form`", ""),
         (
             e.form and e.kind in KINDS and not KINDS[e.kind].form,
             f"a {e.kind} element has no quadratic form; use `along`",
@@ -272,7 +276,7 @@ def _check_element(e: Element, robot: Any) -> None:
         ),
         (
             e.form and e.when,
-            "`when` needs a direction of motion, hence `along`, not `form`",
+            "`when` needs a direction of motion; use `along` instead of `form`",
             "when",
         ),
         (both, f"keys {both} in both along and form", "form"),

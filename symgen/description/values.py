@@ -78,7 +78,7 @@ def with_estimate(robot: Robot, standard: object, file: str) -> Robot:
     """
     if not isinstance(standard, dict):
         raise DescriptionError(
-            f"{file}: holds base parameters alone; a program needs standard ones: set estimate: "
+            f"{file}: has only base parameters, but standard parameters are needed; set estimate: "
             f"{{method: feasible}} in the study and identify again"
         )
     for name, x in standard.items():

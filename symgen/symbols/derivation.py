@@ -73,7 +73,7 @@ class Source:
 
     @cached_property
     def derivation(self) -> Derivation:
-        """The derivation of the robot.
+        """Derivation of the robot, from which all its symbolic models are computed.
 
         Passive joints that stay symbols are treated as independent joints.
         """
@@ -82,9 +82,9 @@ class Source:
         return derived(self.robot, open_tree)
 
     def request(self, of: int = 0, frame: int = 0) -> Request:
-        """Make the request for a model of frame `of` in components of frame `frame`.
+        """Make the request for a model: its parameters, its given values and its frames.
 
-        It holds the parameters and the given values.
+        The model is of frame `of` in components of frame `frame`.
         """
         inputs: dict[Symbol, Input] = {}
         for kind, letter in (("q", "q"), ("qd", "QP"), ("qdd", "QDP")):

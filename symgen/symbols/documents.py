@@ -87,7 +87,7 @@ EXPANDED = 2000  # terms that are multiplied out to see
 
 
 def printed(model: SymbolicModel, form: str, language: str) -> str:
-    """Print a model in a form (closed or recursive) and a format (text, latex, sympy, json, ...).
+    """Write a model in a form (closed or recursive) and a format (text, latex, sympy, json, ...).
 
     Raises SymgenError if the form or the format is unknown, or if the model does not have this form
     or has too many terms in it.
@@ -298,10 +298,9 @@ def latex_lines(model: SymbolicModel, form: str) -> dict[str, list[str]]:
 def recursion(
     model: SymbolicModel,
 ) -> tuple[dict[str, list[tuple[str, Tree]]], dict[tuple[int, ...], Tree]]:
-    """Return the recursion of a model as SymPy expressions.
+    """Return the recursion of a model as equations of SymPy expressions, and its entries.
 
-    The first value holds the equations (name, expression) by heading, the second the entries of the
-    model by their indices.
+    The equations (name, expression) are listed by heading, the entries by their indices.
     """
     listing = model.listing
     objects = Objects(partial(expressions.product, factors=()))
@@ -374,14 +373,14 @@ def broken(line: str) -> list[str]:
 
 
 def width(text: str) -> int:
-    """Count the characters of a LaTeX text as they are printed, about."""
+    """Estimate the printed width of a LaTeX text, in characters."""
     return len(
         re.sub(r"\\(mathbf|operatorname|dot|ddot|left|right|frac|quad|,)|[{}^_&\\]", "", text)
     )
 
 
 def escaped(text: str) -> str:
-    """Escape plain text for LaTeX.
+    """Replace the special characters of plain text, so that LaTeX prints the text unchanged.
 
     A letter that many fonts lack is written by the command \\other, which PREAMBLE defines.
     """
@@ -389,7 +388,10 @@ def escaped(text: str) -> str:
 
 
 def _written(c: str) -> str:
-    """Write a character: common ones unchanged, any other by \\other with its Unicode number."""
+    """Write one character in LaTeX.
+
+    A common character is unchanged; any other is written by \\other with its Unicode number.
+    """
     common = (c < "\u0180" and c not in "ĦħĸĿŀŉŦŧſ") or c in "–—‘’“”„…•€"
     return c if common else rf"\other{{{ord(c):04X}}}{{{c}}}"
 
@@ -456,8 +458,7 @@ def sympy_lines(model: SymbolicModel, form: str) -> str:
 def json_text(model: SymbolicModel, form: str) -> str:
     """Write a model as JSON text.
 
-    It holds the labels of rows and columns, the entries or the equations as text, the meaning of C
-    and S, the notes and the frame table.
+    It has labels, entries or equations, the meaning of C and S, notes, and the frame table.
     """
     robot = model.source.robot
     values: dict[str, Any] = {
@@ -520,7 +521,7 @@ def shown_models(regrouping: Regrouping) -> tuple[list[ShownModel], list[str]]:
 
 
 def _shown(model: SymbolicModel) -> ShownModel | None:
-    """Prepare one model for the page; None if the robot has neither form of the model."""
+    """Prepare one model for the page; None if it has no closed form and no recursion."""
     title = model.model.name.replace("_", " ")
     try:
         closed = model.closed

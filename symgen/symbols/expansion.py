@@ -41,7 +41,7 @@ class TooManyTermsError(SymgenError):
 
 
 class Expansion:
-    """Values of one computation graph, expanded as polynomials in the parameters.
+    """Values of a computation graph, expanded as polynomials in the parameters.
 
     Parameters
     ----------
@@ -117,10 +117,10 @@ class Expansion:
         return names
 
     def _generators(self, node: Node) -> Iterable[tuple[Tree, int]]:
-        """Yield the generators of the ring K that a node adds, each with its rank.
+        """Yield the symbols and functions that a graph node adds to coefficients, with their rank.
 
-        The rank is the place of the generator in a printed product: constants first, then positions
-        of prismatic joints, cosines and sines, rates.
+        The rank is its place in a printed product: constants first, then positions of prismatic
+        joints, cosines and sines, rates.
         """
         name = str(node.value)
         match node.op:

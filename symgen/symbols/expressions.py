@@ -105,12 +105,12 @@ def power(a: str | Number | Call, n: int) -> Tree:
 
 
 def function(op: str, operands: list[Tree]) -> Tree:
-    """Apply the function named `op` in robot files to expressions."""
+    """Apply a function to expressions; `op` is the name of the function in robot files."""
     return getattr(sympy, FUNCTIONS[op].sympy)(*operands, evaluate=False)
 
 
 def formula(f: Formula) -> Tree:
-    """Write a regrouping formula as a SymPy expression.
+    """Write the regrouping formula of a base parameter as a SymPy expression.
 
     Parameters with the same coefficient share it in brackets, as in eq. (27).
     """
@@ -133,7 +133,7 @@ def formula(f: Formula) -> Tree:
 
 
 def angle(letter: str, e: Expression) -> Tree:
-    """Write the cosine (letter C) or the sine (letter S) of an angle."""
+    """Write the cosine (letter C) or the sine (letter S) of the angle e."""
     return (sympy.cos if letter == "C" else sympy.sin)(expression(e), evaluate=False)
 
 
@@ -157,9 +157,9 @@ def evaluated(x: Tree, values: Mapping[str, Any]) -> Any:
 
 
 def in_decimals(regrouping: Regrouping) -> Regrouping:
-    """Return the regrouping with numerical coefficients as decimals of DIGITS digits, for display.
+    """Convert the numerical coefficients of the regrouping formulas to decimals, for display.
 
-    Coefficients that contain symbols are not changed.
+    The decimals have DIGITS digits. Coefficients that contain symbols are not changed.
     """
 
     def rounded(c: Expression) -> Expression:

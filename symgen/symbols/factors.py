@@ -59,7 +59,7 @@ class Factors:
         return [self._product(number, factors)]
 
     def _product(self, c: Fraction, factors: Sequence[Tree]) -> Tree:
-        """Write the product of the number c and the factors; c may be a decimal."""
+        """Multiply the number c by the factors; with `decimals`, c is written as a decimal."""
         if self.decimals and c.denominator > 1:
             factors, c = [expressions.product(abs(c), ()), *factors], Fraction(1 if c > 0 else -1)
         return expressions.product(c, factors)
@@ -130,11 +130,11 @@ class Factors:
         return map(self.ring.zero.new, parts.values())
 
     def _order(self, m: Powers) -> tuple[Any, ...]:
-        """Return the sorting key of a monomial in print: highest degree first, then by name."""
+        """Return the key that sorts monomials for print: highest degree first, then by name."""
         return -sum(m), [(self._labels[k], -n) for k, n in enumerate(m) if n]
 
     def _powers(self, m: Powers) -> list[Tree]:
-        """List the factors of a monomial, powers of the printed generators."""
+        """List the printed factors of a monomial, for instance D3**2 and C2."""
         return [
             x if n == 1 else sympy.Pow(x.as_base_exp()[0], n * x.as_base_exp()[1], evaluate=False)
             for x, n in zip(self.shown, m, strict=True)
@@ -143,7 +143,7 @@ class Factors:
 
 
 def _content(c: Coefficient) -> Fraction:
-    """Return the number that is factored out of every term of a coefficient.
+    """Return the number that is factored out of all terms of a coefficient.
 
     It is the greatest number that divides all terms. Different decimals have no common factor: 0.5
     x + 0.8636 y is easier to read than 0.0004 (1250 x + 2159 y).

@@ -80,9 +80,9 @@ class Identities:
         return c.new(terms)
 
     def _sums(self) -> Iterable[tuple[Coefficient, Coefficient, int, Coefficient]]:
-        """Yield the identities `first + sign * second = value`.
+        """Yield the identities of cosines and sines as (first, second, sign, value).
 
-        Each is given as (first, second, sign, value).
+        Each of them reads first + sign * second = value.
         """
         one = self.ring(1)
         for C, S in self.pairs.values():
@@ -95,9 +95,9 @@ class Identities:
                 yield Sa * Cb, Ca * Sb, way, whole[1]
 
     def _whole(self, a: Angle, b: Angle, way: int) -> tuple[Coefficient, Coefficient] | None:
-        """Return the cosine and sine of the angle a + way b, with way 1 or -1.
+        """Return the cosine and sine of the angle a + way b, if the model has this angle.
 
-        None if this sum is not an angle of the model.
+        `way` is 1 or -1. None if the sum is no angle of the model.
         """
         turn = summed((*a.turn, *((j, way * n) for j, n in b.turn)))
         if not turn:
@@ -118,14 +118,14 @@ def number(c: Fraction) -> Fraction | int:
 
 
 def _ends(monomial: tuple[int, ...]) -> tuple[int, int]:
-    """Return the indices of the first and the last generator in a monomial."""
+    """Return the indices of the first and the last variable in a monomial."""
     inside = [k for k, n in enumerate(monomial) if n]
     return inside[0], inside[-1]
 
 
 def forward(angle: Angle) -> tuple[Angle, int]:
-    """Return the angle with a positive multiple of its first joint, and the sign of its sine.
+    """Write an angle with its first joint positive, for instance -q1 - q2 as q1 + q2.
 
-    For instance -q1 - q2 becomes q1 + q2 with the sign -1.
+    Returns this angle and the sign that its sine gets, 1 or -1.
     """
     return (angle, 1) if angle.turn[0][1] > 0 else (-angle, -1)

@@ -72,7 +72,7 @@ class Listing:
     def steps(
         self, domain: Domain, symbol: Callable[[str], Any]
     ) -> tuple[dict[str, Any], list[Any]]:
-        """Evaluate the recursion in another domain, for instance as SymPy expressions.
+        """Evaluate the equations with other objects than text, for instance SymPy expressions.
 
         Returns the value of each intermediate variable by name, and the list of the outputs. Each
         value is in terms of the symbols of the inputs and of earlier variables.

@@ -120,10 +120,10 @@ class SymbolicRobot:
     def equations(
         self, name: str, *, of: int | None = None, frame: int = 0
     ) -> tuple[list[tuple[Any, Any]], Any]:
-        """Derive the recursion of a model, in the form of `sympy.cse`.
+        """Return the recursion of a model as a list of equations, and the model in their symbols.
 
-        Returns a list of equations (symbol, expression), and the model in terms of these symbols.
-        The symbols have the names of SYMORO.
+        As from `sympy.cse`, an equation is a pair (symbol, expression). The symbols have the names
+        of SYMORO.
         """
         return of_listing(self.model(name, of=of, frame=frame))
 
@@ -137,7 +137,7 @@ class SymbolicRobot:
         frame: int = 0,
         rows: Sequence[int] | None = None,
     ) -> str:
-        """Print a model as text, like `symgen show --model`.
+        """Write a model as text, like the command `symgen show --model`.
 
         form : closed or recursive.
         format : text, latex (a document that compiles), latex-fragment (its formulas alone), sympy
@@ -161,7 +161,7 @@ class SymbolicRobot:
 
     @cached_property
     def symbols(self) -> dict[str, Any]:
-        """Every symbol of the models, by name.
+        """All symbols of the models by name, for instance q1, QP1, GAM1 and ZZ1R.
 
         These are the constants, positions, velocities, accelerations, torques and parameters, and
         the rates G of passive joints that only the closure equations determine.
@@ -201,7 +201,7 @@ class SymbolicRobot:
     # --- models ---
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
-        """Return the method that gives a model as a SymPy object.
+        """Return the method that computes the model called `name` as a SymPy object.
 
         For instance arm.inertia_matrix() or arm.pose(of=6, frame=4).
         """

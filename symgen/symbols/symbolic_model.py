@@ -27,10 +27,9 @@ LARGEST = 10_000  # terms of a model, multiplied out
 
 @dataclass(frozen=True)
 class ClosedModel:
-    """The closed form of a model.
+    """The closed form of a model: formulas of its nonzero entries, and a common denominator.
 
-    It has the nonzero entries by their indices, a common denominator or None, and the angles of the
-    symbols C and S.
+    The denominator is None for most models. `angles` explains the symbols C and S in the formulas.
     """
 
     entries: Mapping[Place, Tree]
@@ -70,7 +69,7 @@ class SymbolicModel:
 
     @property
     def axes(self) -> tuple[tuple[str, ...], ...]:
-        """Labels of the rows, then labels of the columns."""
+        """Labels of the rows, then of the columns, of the matrix or vector of the model."""
         d, parameters = self.source.derivation, self.source.parameters
         return tuple(labels(d, axis, parameters) for axis in self.model.axes)
 
@@ -95,7 +94,7 @@ class SymbolicModel:
 
     @property
     def title(self) -> str:
-        """Name of the robot, then name of the model."""
+        """Title of the model: name of the robot, then name of the model."""
         return (
             f"{self.source.robot.title or self.source.robot.name}: "
             f"{self.model.name.replace('_', ' ')}"
@@ -115,7 +114,7 @@ class SymbolicModel:
 
     @cached_property
     def closed(self) -> ClosedModel:
-        """The closed form of the model.
+        """The closed form of the model: each entry as one factored formula.
 
         Raises SymgenError if the closed form has too many terms or does not exist; the message
         names the form that works.
@@ -235,8 +234,8 @@ class SymbolicModel:
             rows = {k for k in self.rows if 1 <= k <= 6}
             if not len(rows) == len(self.rows) == n:
                 raise SymgenError(
-                    f"rows {list(self.rows)}; expected {n} different rows of the Jacobian among 1 "
-                    f"to 6 ({', '.join(TWIST)})"
+                    f"rows {list(self.rows)}; expected {n} different rows of the Jacobian, each "
+                    f"a number from 1 to 6 ({', '.join(TWIST)})"
                 )
             return [k - 1 for k in self.rows]
         moved = [k for k, row in enumerate(matrix) if any(row)]
@@ -281,7 +280,7 @@ class SymbolicModel:
 
     @cached_property
     def listing(self) -> Listing:
-        """The recursion as equations, in the order in which they are computed.
+        """The recursion of the model as equations, in the order in which they are computed.
 
         Raises SymgenError if the model has no recursion.
         """

@@ -41,9 +41,9 @@ def of_model(model: SymbolicModel) -> Any:
 
 
 def of_listing(model: SymbolicModel) -> tuple[list[tuple[Any, Any]], Any]:
-    """Convert the recursion of a model to SymPy, in the form of `sympy.cse`.
+    """Return the recursion of a model as SymPy equations, and the model in their symbols.
 
-    Returns a list of equations (symbol, expression), and the model in terms of these symbols.
+    As from `sympy.cse`, an equation is a pair (symbol, expression).
     """
     steps, outputs = model.listing.steps(Objects(), symbol)
     values = dict(zip(model.listing.places, map(sympy.sympify, outputs), strict=True))
@@ -63,7 +63,7 @@ def _shaped(model: SymbolicModel, values: Mapping[tuple[int, ...], Any]) -> Any:
 
 
 class Objects:
-    """Operations that evaluate the nodes of a computation graph to SymPy objects.
+    """Operations that convert the nodes of a computation graph to SymPy objects.
 
     `rational` is the function that converts a rational number.
     """
@@ -85,7 +85,7 @@ class Objects:
 
 
 def source_text(name: str, steps: list[tuple[Any, Any]], value: Any) -> str:
-    """Write Python code that builds `value` under the name `name`.
+    """Write Python code with SymPy that computes `value` and stores it under the name `name`.
 
     The code defines the symbols, then the intermediate variables in `steps`, then the value.
     Rational numbers stay exact.

@@ -98,7 +98,7 @@ WRONG = [
         10,
         ["'inertial'", "expected one of inertia, viscous"],
     ),
-    ("inertia, along: all", "inertia", 10, ["acts along nothing", "give `along`"]),
+    ("inertia, along: all", "inertia", 10, ["acts on no joint", "give `along`"]),
     ("inertia, along: all", "inertia, along: most", 10, ["'most'", "expected `all` or a table"]),
     ("inertia, along: all", "inertia, along: {1: q1**2}", 10, ["q1**2", "such as q5 + q6"]),
     ("inertia, along: all", "inertia, along: {1: q1 + 1}", 10, ["q1 + 1", "such as q5 + q6"]),

@@ -222,7 +222,7 @@ def test_robots_with_columns_are_written_as_they_are_read() -> None:
         ("A: {along: 1, torque: qd, energy: q, unit: N*m}", "one of `torque` and `energy`"),
         ("A: {along: 1, energy: qd, unit: N*m}", "positions only"),
         ("A: {along: 1, torque: 1/qd, unit: N*m}", "not finite"),
-        ("A: {kind: tanh, along: 1, torque: qd}", "tanh has its law"),
+        ("A: {kind: tanh, along: 1, torque: qd}", "tanh already defines the law"),
         ("A: {along: 9, torque: qd, unit: N*m}", "frame 9 does not exist"),
         ("FV: {along: 1, torque: qd, unit: N*m}", "is an element of this robot too"),
         ("A: {kind: tanh, along: 1, fit: {v: 1}}", "no scalar"),

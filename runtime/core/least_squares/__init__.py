@@ -1,1 +1,1 @@
-"""Least squares with its statistics, eqs. (7) to (11), weights by joint."""
+"""Least squares, ordinary or weighted by joint, with its statistics, eqs. (7) to (11)."""

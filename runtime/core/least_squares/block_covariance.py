@@ -1,19 +1,18 @@
-"""Uncertainty without the assumption of independent residuals: blocks of time left out one by one, or drawn again.
+"""Uncertainty with correlated residuals: blocks of time are left out one by one, or drawn again.
 
 Filtered residuals are correlated over time, and the joints of one instant with each other; eq. (10)
-knows neither. Time is cut into K blocks,
-longer than the memory of the residuals, and only blocks are taken as independent; a block holds the
-rows of all joints in its interval. With
-T T' = (W'W)^-1, G_k = T' W_k'W_k T the share of block k in what is known, and g_k = W_k' (Y_k - W_k
-X), the estimate without block k is
+accounts for neither. Time is cut into K blocks, longer than the memory of the residuals, and only
+blocks are assumed to be independent; a block holds the rows of all joints in its interval. With
+T T' = (W'W)^-1, G_k = T' W_k'W_k T the share of block k in the information on X, and
+g_k = W_k' (Y_k - W_k X), the estimate without block k is
 
     X - T (1 - G_k)^-1 T' g_k         so that         C_b = (K - 1)/K  sum_k u_k u_k',
             u_k = T (1 - G_k)^-1 T' g_k
 
-the jackknife over blocks. Without (1 - G_k)^-1 residuals count that the fit has shrunk: sigma is
-0.8 of the scatter with 60 parameters and 50
-blocks. (1 - G_k)^-1/2 in its place (CR2) is exact for independent residuals and too small for
-correlated ones, which blocks are made for.
+the jackknife over blocks. Without (1 - G_k)^-1 the residuals are too small, because the fit has
+reduced them: sigma is 0.8 of the scatter with 60 parameters and 50 blocks. (1 - G_k)^-1/2 in its
+place (CR2) is exact for independent residuals and too small for correlated ones, for which blocks
+are used.
 
 References: Bell and McCaffrey (2002) for (1 - G_k); MacKinnon, Nielsen and Webb (2023), CV3, for
 the jackknife; Kunsch (1989) for drawn blocks.
@@ -30,7 +29,7 @@ from runtime.core.rows.factor import Array
 
 
 def block_covariance(blocks: Iterable[Array], X: Array, T: Array) -> Array:
-    """Jackknife covariance over blocks of time, shape (b, b).
+    """Compute the jackknife covariance of X over blocks of time, shape (b, b).
 
     nan for fewer than two blocks, and for a parameter that only one block determines.
 
@@ -48,7 +47,9 @@ def block_covariance(blocks: Iterable[Array], X: Array, T: Array) -> Array:
 
 
 def deletions(blocks: Iterable[Array], X: Array, T: Array, into: Array) -> Array:
-    """sqrt((K - 1)/K) into (1 - G_k)^-1 T'g_k for every block, shape (K, b): the effect of its deletion.
+    """Compute how X changes if each block of time is left out, scaled for the jackknife.
+
+    Row k is sqrt((K - 1)/K) into (1 - G_k)^-1 T'g_k, shape (K, b).
 
     into : ndarray, shape (b, rank): T for least squares.
     """
@@ -71,9 +72,9 @@ def deletions(blocks: Iterable[Array], X: Array, T: Array, into: Array) -> Array
 
 
 def _without_its_own(G: Array, g: Array, into: Array, size: Array) -> Array:
-    """into (1 - G)^-1 g on the directions that other blocks know too.
+    """Compute into (1 - G)^-1 g on the directions of X that other blocks determine too.
 
-    nan if one that they do not know takes part.
+    nan for a parameter that depends on another direction.
     """
     share, V = np.linalg.eigh(G)
     others = share < 1 - LIMIT.BLOCK_ALONE
@@ -86,14 +87,14 @@ def _without_its_own(G: Array, g: Array, into: Array, size: Array) -> Array:
 def drawn_again(
     blocks: Iterable[Array], estimator: Callable[[Array], Array], runs: int, seed: int
 ) -> Array:
-    """Estimates, shape (runs, b), from records made of blocks drawn with replacement.
+    """Estimate X again, shape (runs, b), from records made of blocks drawn with replacement.
 
     Parameters
     ----------
     blocks : iterable of ndarray, shape (rows, b + 1)
         Rows [W Y] of every block, weighted as for the fit.
     estimator : callable
-        X, shape (b,), from the Gram matrix of a whole record.
+        Function that returns X, shape (b,), from the Gram matrix of a whole record.
     runs : int
         Number of draws.
     seed : int
@@ -111,14 +112,17 @@ def drawn_again(
 def scatter(
     blocks: Iterable[Array], estimator: Callable[[Array], Array], runs: int, seed: int
 ) -> Array:
-    """Standard deviation of X, shape (b,), over the records of `drawn_again`."""
+    """Compute the standard deviation of X, shape (b,), over records of blocks drawn again.
+
+    The records are those of `drawn_again`.
+    """
     return np.asarray(np.std(drawn_again(blocks, estimator, runs, seed), axis=0, ddof=1))
 
 
 def gram_root(gram: Array) -> Array:
-    """Upper triangular R with R'R = gram, shape (c, c), for any positive semidefinite matrix.
+    """Compute an upper triangular R, shape (c, c), with R'R = gram.
 
-    Columns are first scaled to 1.
+    gram is any positive semidefinite matrix. Columns are first scaled to 1.
     """
     size = np.sqrt(np.where(np.diag(gram) > 0, np.diag(gram), 1.0))
     values, vectors = np.linalg.eigh(gram / np.outer(size, size))
@@ -128,7 +132,10 @@ def gram_root(gram: Array) -> Array:
 
 
 def gram_solution(gram: Array) -> Array:
-    """Least-squares X, shape (b,), from the Gram matrix of [W Y]; columns are first scaled to 1."""
+    """Compute the least-squares X, shape (b,), from the Gram matrix of [W Y].
+
+    Columns are first scaled to 1.
+    """
     A, y = gram[:-1, :-1], gram[:-1, -1]
     D = 1 / np.sqrt(np.where(np.diag(A) > 0, np.diag(A), 1.0))
     return np.asarray(D * np.linalg.lstsq(A * np.outer(D, D), D * y, rcond=None)[0])

@@ -1,4 +1,4 @@
-"""What every estimator returns: parameters, their deviations and the quality of the fit.
+"""Result of every estimator: parameters, their standard deviations and the quality of the fit.
 
 Equation numbers are those of the chapter (Experimental identification of the inverse dynamic model:
 minimal encoder resolution):
@@ -7,10 +7,10 @@ minimal encoder resolution):
     sigma    (10)    = square roots of the diagonal of C = sigma_rho^2 (W'W)^-1
     %sigma   (11)    = 100 sigma / |X|
 
-Eq. (10) supposes independent residuals; filtered ones are not. `sigma_corrected` stands beside it:
-blocks of time are taken as independent instead of samples
-(`runtime.core.least_squares.block_covariance`). What a record does not determine is nan in memory
-and null in JSON.
+Eq. (10) supposes independent residuals; filtered ones are not. `sigma_corrected` is given too: it
+assumes that blocks of time are independent, not samples
+(`runtime.core.least_squares.block_covariance`). A number that the record does not determine is nan
+in memory and null in JSON.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ Status = Literal[
 
 @dataclass(frozen=True)
 class JointFit:
-    """Fit of the rows of one joint.
+    """Quality of the fit of one joint: residual norm, relative error and scale of its rows.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class JointFit:
 
     @property
     def has_motor(self) -> bool:
-        """Whether the measured torque of the joint is not always zero."""
+        """Whether the joint has rows and its measured torque is not always zero."""
         return self.rows > 0 and not np.isnan(self.relative_error)
 
     @property
@@ -102,11 +102,11 @@ class Estimate:
     sigma_rho : float, N m or N
         Eq. (9) of the system that was solved; with weights near 1 and without unit.
     cond : float
-        Condition number of that W; inf if it is rank-deficient.
+        Condition number of the W that was solved; inf if W is rank-deficient.
     cond_unit : float
-        The same with columns of norm 1.
+        Condition number of W with columns of norm 1.
     rank : int
-        Numerical rank with columns of norm 1.
+        Numerical rank of W with columns of norm 1.
     residual_norm : float, N m or N
         ||Y - W X||, without weights.
     relative_error : float, %
@@ -130,8 +130,8 @@ class Estimate:
     units : mapping of str
         Units by name, such as kg*m**2.
     details : mapping
-        Further results of the method, by name; of feasible: standard parameters, eigenvalues, the
-        result of least squares alone.
+        Further results of the method, by name; for the method feasible: standard parameters,
+        eigenvalues, the result of least squares alone.
     """
 
     names: tuple[str, ...]
@@ -183,16 +183,16 @@ class Estimate:
 
     @property
     def worst_joint(self) -> JointFit:
-        """The joint with the largest relative error, among those with rows and a motor.
+        """Fit of the joint with the largest relative error, among joints with rows and a motor.
 
-        Without joints, an axis of a force sensor; it may measure only its noise.
+        If there is no such joint, an axis of a force sensor; it may measure only its noise.
         """
         return max(
             self.per_joint, key=lambda fit: (fit.has_motor, not fit.is_axis, fit.relative_error)
         )
 
     def __getitem__(self, name: str) -> float:
-        """Value of one parameter."""
+        """Return the value of one parameter by its name."""
         return float(self.X[self.names.index(name)])
 
     def __str__(self) -> str:
@@ -205,7 +205,7 @@ class Estimate:
         return self.to_latex()
 
     def to_json(self) -> str:
-        """JSON text of every field (estimate.json); null for nan and infinity."""
+        """Return the JSON text of all fields (estimate.json), with null for nan and infinity."""
         computed = {"relative_sigma": self.relative_sigma, "rows": self.rows}
         return json_text({"schema": SCHEMA, **vars(self), **computed})
 
@@ -219,13 +219,13 @@ class Estimate:
         return from_text(cls, text, SCHEMA, file)
 
     def to_table(self) -> str:
-        """Plain text with one line for each parameter and each joint."""
+        """Return a plain text with one line for each parameter and each joint."""
         parameters, joints = self.tables()
         note = ["", self.message] if self.message else []
         return "\n".join([*self._head(), "", parameters.to_text(), "", joints.to_text(), *note])
 
     def tables(self) -> tuple[Table, Table]:
-        """Tables of the parameters and of the joints."""
+        """Return two tables: one of the parameters, one of the joints."""
         parameters = [
             (
                 name,
@@ -274,7 +274,7 @@ class Estimate:
         )
 
     def to_latex(self, names: Sequence[str] | None = None, *, blocks: int = 1) -> str:
-        """LaTeX tabular (booktabs) like Table 2 of the chapter.
+        """Return a LaTeX table (booktabs) of the parameters, like Table 2 of the chapter.
 
         names : parameters and their order. blocks : number of blocks side by side.
         """

@@ -1,8 +1,9 @@
-"""From a factored linear system to an Estimate: eqs. (7)-(11), rank and residuals by joint, all from triangular factors.
+"""Estimates from a factored linear system: eqs. (7)-(11), rank, and residuals by joint.
 
-A System is the rows as a method weighs them. Ordinary least squares leaves them as they are;
-weighted least squares divides the rows of joint j by s_j. Removing columns from a System is cheap,
-which is what `runtime.core.essential` lives on; weights stay as they are while columns go.
+All numbers are computed from triangular factors. A System is the rows as a method weighs them.
+Ordinary least squares leaves them as they are; weighted least squares divides the rows of joint j
+by s_j. Removing columns from a System costs little, on which `runtime.core.essential` relies;
+weights do not change when columns are removed.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ class LinearOptions(Settings):
     block : float or None, s
         Length of the blocks of residuals behind `sigma_corrected`; default: that of the rows.
     passes : int
-        Largest number of passes of weights that are found by iteration.
+        Largest number of passes if weights are found by iteration.
     """
 
     rank_tolerance: Positive | None = None
@@ -55,18 +56,18 @@ class System:
     settings : EstimateSettings
         Method, weights, columns, options.
     raw : Factor
-        Factor of [W Y], of the columns still in play.
+        Factor of [W Y] with the remaining columns.
     weighted : Factor
-        Factor of the system that is solved, of the same columns.
+        Factor of the weighted system, which is solved, with the same columns.
     scales : tuple of float, N m or N
         s_j of each joint, by which its rows are divided; 1 without weights.
     whitener : ndarray, shape (n, n), or None
         Multiplies the n rows of one instant in place of the scales.
     known_variance : bool
-        The rows of the weighted system have variance 1: C = (W'W)^-1; else C = sigma_rho^2
-        (W'W)^-1.
+        Whether the rows of the weighted system have variance 1: then C = (W'W)^-1, else
+        C = sigma_rho^2 (W'W)^-1.
     iterations : int
-        Passes that found the weights.
+        Number of passes that found the weights.
     status, message : str
         As in an Estimate.
     options : LinearOptions
@@ -90,11 +91,11 @@ class System:
         return self.raw.names
 
     def select(self, names: Sequence[str]) -> System:
-        """The system with the columns `names` only."""
+        """Return the system with the columns `names` only."""
         return self._changed(lambda factor: factor.select(names))
 
     def drop(self, name: str) -> System:
-        """The system without one column, from its triangular factor."""
+        """Return the system without one column, computed from its triangular factor."""
         return self._changed(lambda factor: factor.drop(name))
 
     def _changed(self, change: Callable[[Factor], Factor]) -> System:
@@ -104,11 +105,11 @@ class System:
         )
 
     def solve(self) -> Solution:
-        """Least-squares solution of the weighted system."""
+        """Compute the least-squares solution of the weighted system."""
         return solve(self.weighted, self.options.rank_tolerance)
 
     def norms(self, X: Array) -> tuple[Array, Array]:
-        """||Y_j - W_j X|| and ||Y_j|| by joint, without weights, shape (n,) each."""
+        """Compute ||Y_j - W_j X|| and ||Y_j|| of every joint, without weights, shape (n,) each."""
         joints = self.raw.joints
         residual = np.array([joint.residual_norm(X) for joint in joints])
         return residual, np.array([joint.measured_norm for joint in joints])
@@ -119,7 +120,7 @@ class System:
         return self.options.block or self.observation.residual_block
 
     def block_rows(self) -> Iterator[Array]:
-        """Weighted rows [W Y] of every block of residuals, shape (rows, b + 1)."""
+        """Yield the weighted rows [W Y] of every block of residuals, shape (rows, b + 1)."""
         return self.observation.block_rows(
             self.names, 1 / np.array(self.scales), self.block, self.whitener
         )
@@ -128,11 +129,11 @@ class System:
 def ordinary(
     observation: Observation, settings: EstimateSettings, options: LinearOptions
 ) -> System:
-    """Ordinary least squares, eq. (7): the rows as they are, in N m.
+    """Make the system of ordinary least squares, eq. (7), with rows in N m and without weights.
 
     X = argmin ||Y - W X||,    C = sigma_rho^2 (W'W)^-1,    sigma_rho^2 = ||Y - W X||^2 / (r - b)
 
-    SettingsError if `settings` asks for a column that the observation lacks.
+    SettingsError if `settings` names a column that the observation lacks.
     """
     names = observation.names if settings.columns == "all" else tuple(settings.columns)
     if unknown := [name for name in names if name not in observation.names]:
@@ -143,7 +144,10 @@ def ordinary(
 
 
 def standard_deviations(system: System, fit: Solution) -> tuple[float, Array]:
-    """sigma_rho of eq. (9) and C of eq. (10), shape (b, b); nan for undetermined parameters."""
+    """Compute sigma_rho, eq. (9), and the covariance C of X, eq. (10), shape (b, b).
+
+    C is nan for undetermined parameters.
+    """
     freedom = system.weighted.rows - fit.rank
     sigma_rho = fit.residual_norm / np.sqrt(freedom) if freedom > 0 else np.nan
     C = fit.T @ fit.T.T * (1.0 if system.known_variance else sigma_rho**2)
@@ -159,7 +163,10 @@ def assemble(
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Estimate:
-    """Make the Estimate of a solved system; `model` gives units, joint numbers and the hash of the robot."""
+    """Make the Estimate of a solved system: parameters, statistics, and the fit of every joint.
+
+    model : gives units, names of the joints and the hash of the robot file.
+    """
     observation, names = system.observation, system.names
     sigma_rho, C = standard_deviations(system, fit)
     corrected = np.full(len(names), np.nan)  # as without redundancy
@@ -216,18 +223,18 @@ def assemble(
 
 
 def labels_of(model: GeneratedModel | None, n: int) -> tuple[str, ...]:
-    """Names of the joints; their numbers without a model."""
+    """Return the names of the joints, or their numbers from 1 without a model."""
     return tuple(map(str, range(1, n + 1))) if model is None else joint_labels(model)
 
 
 def condition(factor: Factor, rank: int) -> float:
-    """Condition number of W; inf if W is rank-deficient."""
+    """Compute the condition number of W from its factor; inf if W is rank-deficient."""
     b = len(factor.names)
     return (float(np.linalg.cond(factor.R11)) if b else 1.0) if rank == b else np.inf
 
 
 def outcome(system: System, fit: Solution) -> tuple[Status, str]:
-    """Status of a solution, and the text that explains it."""
+    """Return the status of a solution, such as "rank-deficient", and the text that explains it."""
     b = len(system.names)
     if fit.rank < b:
         silent = [group[0] for group in fit.groups if len(group) == 1]
@@ -262,7 +269,10 @@ def outcome(system: System, fit: Solution) -> tuple[Status, str]:
 
 
 def describe(observation: Observation, model: GeneratedModel | None = None) -> dict[str, Any]:
-    """Provenance: hashes of robot file and measured files, and versions of the packages."""
+    """Collect the hashes of robot file and measured files, and the versions of the packages.
+
+    They are the provenance of a result.
+    """
     try:
         own = version("symgen")
     except PackageNotFoundError:
@@ -284,6 +294,6 @@ def _undetermined(system: System, fit: Solution) -> list[int]:
 
 
 def percent(error: Array | float, of: Array | float) -> float:
-    """100 ||error|| / ||of||, %; nan if `of` is zero."""
+    """Compute 100 ||error|| / ||of||, %; nan if `of` is zero."""
     norm = float(np.linalg.norm(of))
     return 100 * float(np.linalg.norm(error)) / norm if norm > 0 else float("nan")

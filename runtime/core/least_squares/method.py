@@ -1,7 +1,7 @@
-"""What a method of estimation is: its options, the rows it starts from, and its fit.
+"""Definition of an estimation method: its options, the rows from which it starts, and its fit.
 
     start = rows(observation, settings, options)     least squares, solved once for every method
-    fitted = fit(start)                              what the method makes of it; None: nothing more
+    fitted = fit(start)                              the result of the method; None: nothing more
 
 A new method is a file with a function `fit` and a line in METHODS (`runtime.compose`).
 """
@@ -34,14 +34,14 @@ class Beginning:
     Attributes
     ----------
     observation : Observation
-        Rows held, with the columns asked for alone.
+        Rows used, with the fitted columns only.
     settings : EstimateSettings
     options : Settings
-        Those of the method, checked.
+        Options of the method, checked.
     system : System
         The rows as least squares weighs them.
     solution : Solution
-        Of that system.
+        Solution of that system.
     model : GeneratedModel or None
     """
 
@@ -55,20 +55,21 @@ class Beginning:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """Output of a method.
+    """Output of an estimation method: the weighted rows, the solution and its uncertainty.
 
     Attributes
     ----------
     system : System
-        Rows as the method weighs them in the end.
+        Rows with the final weights of the method.
     solution : Solution
-        With the X of the method.
+        Solution with the X of the method.
     covariance : ndarray, shape (b, b), or None
-        Of X; default: eq. (10) of `system`.
+        Covariance of X; default: eq. (10) of `system`.
     corrected : ndarray, shape (b,), or None
-        Deviations without the assumption of independent residuals; default: those of `system`.
+        Standard deviations without the assumption of independent residuals; default: those of
+        `system`.
     status, message : str
-        Outcome, where the rows are good.
+        Outcome, if the rows are good.
     details : mapping
     """
 
@@ -83,24 +84,26 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Method:
-    """One method of estimation.
+    """One estimation method that the setting estimate.method can name.
 
     Attributes
     ----------
     options : type
         Settings class of estimate.options.
     rows : callable
-        The weighted rows of the least squares that it starts from.
+        Function that weighs the rows for the least squares from which the method starts.
     fit : callable or None
-        What it makes of them; None: it is these least squares, which need no single row.
+        Function that computes the result of the method from this start; None: the result is that of
+        these least squares, which need no single row.
     weights : tuple of str
-        Weights that it takes.
+        Values of estimate.weights that the method accepts.
     observe : callable or None
-        Makes the rows of a problem, of a method that needs rows of its own, as one that simulates the closed loop of the records; None: those of the measured positions.
+        Function that makes the rows of a problem, for a method that needs rows of its own, such as
+        one that simulates the closed loop of the records; None: the rows of the measured positions.
     brief : mapping
-        Options under which resampled records and explanations are left out.
+        Options that leave out resampled records and explanations.
     any_rank : bool
-        Whether it has an answer where the rows do not determine all parameters.
+        Whether the method gives an estimate if the rows do not determine all parameters.
     """
 
     options: type[Settings]
@@ -112,7 +115,7 @@ class Method:
     any_rank: bool = False
 
     def checked(self, settings: EstimateSettings) -> Any:
-        """Options of the settings; raise SettingsError if these or the weights do not suit the method."""
+        """Return the options of the settings; SettingsError if options or weights do not suit the method."""
         message = (
             f"{settings.weights!r} with method {settings.method}; expected "
             f"{' or '.join(self.weights)}: it has its own weights or none, others belong to "
@@ -122,7 +125,7 @@ class Method:
         return structure(self.options, settings.options, OPTIONS)
 
     def system(self, observation: Observation, settings: EstimateSettings) -> System:
-        """Rows of the least squares that the method starts from."""
+        """Weigh the rows for the least squares from which the method starts."""
         options = self.checked(settings)
         if not isinstance(options, LinearOptions):
             given = getattr(options, "linear", {})
@@ -138,9 +141,9 @@ LINEAR: Mapping[str, Method] = {
 
 
 def linear_system(observation: Observation, settings: EstimateSettings) -> System:
-    """Factored and weighted rows for the method of `settings`.
+    """Factor and weigh the rows for the linear method (ols or wls) of `settings`.
 
-    Raises SettingsError for a method that is not one linear system.
+    SettingsError for a method that is not one linear system.
     """
     if settings.method not in LINEAR:
         message = f"{settings.method!r} is not one linear system; expected {' or '.join(LINEAR)}"
@@ -149,9 +152,10 @@ def linear_system(observation: Observation, settings: EstimateSettings) -> Syste
 
 
 def linear_companion(settings: EstimateSettings) -> EstimateSettings:
-    """Settings of a linear method: `settings` itself if its method is linear, else least squares with the same weights and columns.
+    """Return settings of a linear method: `settings`, or least squares with the same weights.
 
-    Essential parameters and weak directions of such a method are those of its companion.
+    `settings` is returned if its method is linear; else the columns stay the same too. Essential
+    parameters and weak directions of a method that is not linear are those of its companion.
     """
     if settings.method in LINEAR:
         return settings
@@ -167,7 +171,7 @@ def linear_estimate(
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Estimate:
-    """Estimate X of Y = W X + rho by one linear system; SettingsError for another method.
+    """Estimate X of Y = W X + rho by one linear system; SettingsError for a method that is not linear.
 
     Parameters
     ----------

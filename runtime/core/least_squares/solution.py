@@ -1,11 +1,11 @@
-"""Least squares from a triangular factor, with the rank of the record and the parameters it cannot separate.
+"""Least squares from a triangular factor, with its rank and the parameters that it cannot separate.
 
 With D the norms of the columns of W, R_11 D^-1 = U diag(s) V' is the singular value decomposition
-of a (b, b) matrix. Judged on unit columns, rank is the number of s_i above tolerance * s_1. Full
-rank: eq. (7) by back substitution, (W'W)^-1 = T T' with T = R_11^-1. Otherwise the solution of
-least norm in the units of D is taken, T = D^-1 V_1 diag(1/s_1), and P = V_2 V_2', the projector on
-the directions that leave W X unchanged, names the parameters: i and k are in one group when P_ik is
-not zero.
+of a (b, b) matrix. Judged on unit columns, rank is the number of s_i above tolerance * s_1. If the
+rank is full, eq. (7) is solved by back substitution, (W'W)^-1 = T T' with T = R_11^-1. Otherwise
+the solution is that of least norm in the units of D, T = D^-1 V_1 diag(1/s_1), and P = V_2 V_2',
+the projector on the directions that leave W X unchanged, names the parameters: i and k are in one
+group if P_ik is not zero.
 
 Reference: Gautier (1991) for rank and groups by orthogonal factorisation; Golub and Van Loan,
 section 5.5.
@@ -52,24 +52,30 @@ class Solution:
     groups: tuple[tuple[str, ...], ...]
 
     def variances(self) -> Array:
-        """diag (W'W)^-1, shape (b,)."""
+        """Return the diagonal of (W'W)^-1, shape (b,)."""
         return np.asarray(np.einsum("ij,ij->i", self.T, self.T))
 
 
 def unit_columns(R11: Array) -> tuple[Array, Array]:
-    """R_11 with columns of norm 1, and the norms; a zero column stays zero, with norm 1."""
+    """Scale the columns of R_11 to norm 1; return the scaled matrix and the norms.
+
+    A zero column stays zero, with norm 1.
+    """
     norms = np.linalg.norm(R11, axis=0)
     norms = np.where(norms > 0, norms, 1.0)
     return R11 / norms, norms
 
 
 def rank_tolerance(factor: Factor) -> float:
-    """Default tolerance on s_i / s_1 with unit columns: number of rows times the unit round-off."""
+    """Compute the default tolerance on s_i / s_1 for the rank, with unit columns.
+
+    It is the number of rows times the unit round-off.
+    """
     return float(max(factor.rows, len(factor.names)) * np.finfo(float).eps)
 
 
 def solve(factor: Factor, tolerance: float | None = None) -> Solution:
-    """Least-squares solution of eq. (7) from R, rank-deficient or not.
+    """Solve the least squares of eq. (7) from the factor R, even if W is rank-deficient.
 
     tolerance : smallest s_i / s_1 (unit columns) that counts as rank; default
     `rank_tolerance(factor)`.
@@ -92,7 +98,7 @@ def solve(factor: Factor, tolerance: float | None = None) -> Solution:
 
 
 def null_groups(V2t: Array, names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
-    """Groups of names that the record cannot separate.
+    """Group the parameters that the record cannot separate, from the null directions of W.
 
     V2t, shape (b - rank, b), has the null directions as orthonormal rows. A group contains names
     whose entries of P = V_2 V_2' (diagonal: its square root) exceed LIMIT.NULL_PARTICIPATION.
@@ -106,7 +112,7 @@ def null_groups(V2t: Array, names: Sequence[str]) -> tuple[tuple[str, ...], ...]
 
 
 def joint_scatter(factor: Factor, tolerance: float | None = None) -> Array:
-    """Standard deviation s_j of the residuals of each joint from its own least squares, shape (n,).
+    """Compute the standard deviation s_j of the residuals of each joint, shape (n,).
 
         s_j^2 = ||Y_j - W_j X_j||^2 / (N_j - b_j)
 

@@ -1,8 +1,8 @@
-"""Least squares weighted by joint: rows of joint j divided by s_j, the deviation of its residuals in N m.
+"""Least squares weighted by joint: rows of joint j are divided by s_j, the spread of its residuals.
 
     X = argmin sum_j ||Y_j - W_j X||^2 / s_j^2,    C = (sum_j W_j'W_j / s_j^2)^-1
 
-`weights` says where s_j comes from:
+s_j is a standard deviation in N m. The setting `weights` chooses how it is computed:
 
     joint       (default) s_j^2 = ||Y_j - W_j X_j||^2 / (N_j - b_j), X_j the least squares of joint
                 j alone, b_j = rank W_j. Exactly invariant
@@ -35,10 +35,10 @@ from runtime.core.study import EstimateSettings
 def weighted(
     observation: Observation, settings: EstimateSettings, options: LinearOptions
 ) -> System:
-    """Weight the rows as `settings.weights` asks; "none" means "joint", because of the name of the method.
+    """Weight the rows as `settings.weights` specifies; "none" means "joint" here.
 
-    s_j comes from joint j alone, or from the common least squares if joint j has too few rows.
-    It is never zero.
+    The name of the method, wls, promises weights. s_j is computed from joint j alone, or from the
+    common least squares if joint j has too few rows. It is never zero.
     """
     system = ordinary(observation, settings, options)
     raw, fit = system.raw, system.solve()
@@ -55,13 +55,13 @@ def weighted(
 def by_weights(
     observation: Observation, settings: EstimateSettings, options: LinearOptions
 ) -> System:
-    """Weight the rows as `settings.weights` asks; "none" leaves them unchanged."""
+    """Weight the rows as `settings.weights` specifies; "none" leaves them unchanged."""
     rows = ordinary if settings.weights == "none" else weighted
     return rows(observation, settings, options)
 
 
 def common_scales(raw: Factor, X: np.ndarray, rank: int) -> np.ndarray:
-    """s_j, shape (n,), from the residuals of the common X.
+    """Compute the standard deviations s_j, shape (n,), of the residuals of one X for all joints.
 
     Each joint loses its share b N_j/r of the degrees of freedom.
     """
@@ -72,7 +72,7 @@ def common_scales(raw: Factor, X: np.ndarray, rank: int) -> np.ndarray:
 
 
 def floored(raw: Factor, scales: np.ndarray) -> np.ndarray:
-    """Raise scales to at least LIMIT.EXACT_FIT times the rms of Y_j.
+    """Raise the scales s_j of the joints to at least LIMIT.EXACT_FIT times the rms of Y_j.
 
     An exact fit of a joint would otherwise get infinite weight.
     """
@@ -112,7 +112,10 @@ def _iterated(start: System) -> System:
 
 
 def _covariance(start: System) -> System:
-    """The rows of one instant times L^-1; those of `start` where the residuals are dependent."""
+    """Weight the n rows of one instant by L^-1, with L L' the covariance of the joint residuals.
+
+    The weights of `start` are used if the residuals are linearly dependent.
+    """
     observation, raw = start.observation, start.raw
     n, N = observation.n, observation.rows[0]
     same = set(observation.rows) == {N} and all(

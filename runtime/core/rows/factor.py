@@ -64,7 +64,7 @@ class JointFactor:
         return block
 
     def residual_norm(self, X: Array) -> float:
-        """Compute the residual norm ||Y_j - W_j X|| of this joint for the parameters X, shape (b,)."""
+        """Compute the residual norm ||Y_j - W_j X|| of this joint for X, shape (b,)."""
         return float(np.linalg.norm(self.R[:, :-1] @ X[self.columns] - self.R[:, -1]))
 
     @property

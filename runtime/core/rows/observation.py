@@ -221,10 +221,10 @@ class Observation:
         return float(max(max(self.rows) / BLOCKS, SHORTEST) / self.rate)
 
     def blocks(self, length: float | None = None) -> Array:
-        """Divide the records into intervals of `length` seconds and return the interval of each row.
+        """Divide the records into intervals of `length` seconds; return the interval number of each row.
 
-        Shape (r,), numbers from 0. Such an interval is a block of residuals. An interval never
-        extends over two records.
+        Shape (r,), numbers from 0. Such an interval is a block of residuals; no interval extends
+        over two records.
         """
         _, record = np.unique(self.record, return_inverse=True)
         first = np.full(record.max() + 1, np.inf)

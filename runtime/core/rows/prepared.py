@@ -58,7 +58,10 @@ class Prepared:
 
     @property
     def drives(self) -> Drives | None:
-        """Drives of the robot if the record was measured on the motor side, else None."""
+        """Drives of the robot, with the coupling that was used when the record was read.
+
+        None: the drives of the model.
+        """
         return self.record.origin.drives
 
     @cached_property
@@ -75,7 +78,7 @@ class Prepared:
 
     @cached_property
     def selection(self) -> Selection:
-        """Rows of the record that are used, after window, decimation, trim, low speed and `keep`."""
+        """Rows of the record that are used, by window, decimation, trim, low speed and `keep`."""
         signals, rows = self.study.signals, self.study.rows
         return select_rows(self.record, self.states.qd, signals, rows, keep=self.keep)
 
@@ -172,7 +175,7 @@ def observation_of(
     *,
     files: Mapping[str, str] | None = None,
 ) -> Observation:
-    """Build the system Y = W X + rho of one record with `columns`, an evaluator of W for all records.
+    """Build the system Y = W X + rho of one record; `columns` is an evaluator of W for all records.
 
     If errors of the velocities are known, two more kinds of rows are left out: rows in which
     missing positions leave the state unknown ("missing"), and rows in which the direction of dry

@@ -29,7 +29,7 @@ PROBES = 64  # random states that tell signals apart
 
 @dataclass(frozen=True, eq=False)
 class Entries:
-    """Table of the nonzero entries of the regressor; entries that are equal up to sign share a signal.
+    """Table of the nonzero entries of the regressor: entries equal up to sign share one signal.
 
     Model store[k[m], j[m]] = sign[m] * signal[which[m]]. Signal s first occurs at entry source[s].
 
@@ -75,7 +75,7 @@ class Columns:
 
     @cached_property
     def tape(self) -> Tape | None:
-        """Recorded operations that compute the distinct signals; None if the module must be called."""
+        """Recorded operations for the distinct signals; None if the module must be called."""
         n = len(self.model.JOINTS)
         return recorded(self.model, [divmod(int(place), n) for place in self.entries.place])
 
@@ -100,9 +100,9 @@ class Columns:
         return store
 
     def signals(self, states: States, plan: Plan | None) -> Iterator[tuple[slice, Array]]:
-        """Yield the decimated distinct signals, shape (S, instants), for successive slices of instants.
+        """Yield slices of successive instants, with the decimated distinct signals there.
 
-        Arrays are valid until the next ones are requested.
+        The signals have shape (S, instants). Arrays are valid until the next ones are requested.
 
         plan : plan of the decimation; None keeps every sample.
         """

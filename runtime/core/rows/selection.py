@@ -67,7 +67,7 @@ class Selection:
 
     @cached_property
     def settings(self) -> dict[str, Any]:
-        """All settings of signals and rows, with the decimation factor that was chosen for "auto"."""
+        """All settings of signals and rows, with the decimation factor chosen for "auto"."""
         signals, rows = to_mapping(self.signals), to_mapping(self.rows)
         return {"signals": signals, "rows": rows, "factor": self.factor}
 

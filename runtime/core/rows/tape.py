@@ -82,7 +82,7 @@ class Row:
 
 
 class Functions:
-    """Replacement of the NumPy module: functions of rows are recorded, functions of numbers computed."""
+    """Replacement of the NumPy module that records functions of rows and computes those of numbers."""
 
     def __getattr__(self, name: str) -> Any:
         function = getattr(np, name)

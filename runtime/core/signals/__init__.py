@@ -1,1 +1,1 @@
-"""Measured positions to q, qd, qdd, without phase: median, low-pass, differences, decimation (chapter 2.2.2)."""
+"""Filters from measured positions to q, qd, qdd without phase shift, and decimation (chapter 2.2.2)."""

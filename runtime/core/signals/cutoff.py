@@ -1,19 +1,20 @@
-"""The cut-off of the low-pass that suits a record: `signals.lowpass.cutoff: auto`.
+"""Automatic choice of the cut-off of the low-pass, setting `signals.lowpass.cutoff: auto`.
 
 Of every joint, with S the spectrum of the acceleration and N that of the noise of the positions as
 seen in it, G the gain of the low-pass on the acceleration,
 
     bias(fc) = sum_f [G (1 - G) S + G^2 N] / sum_f S
 
-is the share by which least squares misjudges the acceleration: what the low-pass takes from the
-columns but not from the torques, and the power of noise in the columns. fc minimises that of the
-worst joint. One pass forward and backward has the gain 1/(1 + (w/wc)^(2 order)), with
-w = tan(pi f/rate); the acceleration goes through one for each of `lowpass.on`. Friction switches
-where a joint reverses, and a low cut-off bends that: the highest is taken at which noise alone makes
-less than LIMIT.QUIET of the least bias, up to that of the chapter.
+is the relative error that least squares makes on the acceleration: the part that the low-pass
+removes from the columns but not from the torques, and the power of noise in the columns. fc
+minimises the bias of the worst joint. One pass forward and backward has the gain
+1/(1 + (w/wc)^(2 order)), with w = tan(pi f/rate); the acceleration passes one such filter for each
+entry of `lowpass.on`. Friction switches when a joint reverses, and a low cut-off distorts this
+switch. Therefore the highest cut-off is chosen at which noise alone makes less than LIMIT.QUIET of
+the least bias, at most that of the chapter.
 
 N is flat in the positions: the median of the spectrum in the upper band, and at least that of the
-steps that the positions show, step^2/12 over the band. The spectrum is one of second differences,
+steps that the positions show, step^2/12 over the band. The spectrum is that of second differences,
 so that little leaks from the motion to the noise; it counts as motion where its running mean is
 above LIMIT.MOTION times the noise. Positions read as counts have less noise: twice that cut-off.
 Measured: benchmarks/counts.md.
@@ -38,10 +39,12 @@ def cutoff(
     signals: Signals,
     crossing: float | tuple[float, ...] = np.inf,
 ) -> tuple[float, str]:
-    """Cut-off, Hz, to two digits, for records that are fitted together, and the reason in words.
+    """Choose the cut-off of the low-pass for records that are fitted together.
+
+    Returns the cut-off, Hz, rounded to two digits, and the reason in words.
 
     positions : q, shape (N, n), rad or m, and rate, Hz, of each record.
-    crossing : Hz, from which on recorded velocities replace differences of q
+    crossing : frequency, Hz, above which recorded velocities replace differences of q
         (`runtime.speeds`).
     """
     low, parts = signals.lowpass or Lowpass(), []
@@ -80,9 +83,10 @@ def cutoff(
 
 
 def stands(q: Array, rate: float, median: int = 1) -> Array:
-    """Whether each joint rests in the whole record, bool (n,).
+    """Find the joints that rest during the whole record, bool, shape (n,).
 
-    Its range is below LIMIT.STILL, or its deviation below LIMIT.STILL_NOISE times its white noise.
+    A joint rests if its range is below LIMIT.STILL, or if its standard deviation is below
+    LIMIT.STILL_NOISE times that of its white noise.
     """
     noise = np.sqrt(white_noise(q, rate, median))
     return np.asarray(
@@ -91,9 +95,11 @@ def stands(q: Array, rate: float, median: int = 1) -> Array:
 
 
 def noise_share(q: Array, rate: float, low: Lowpass, median: int = 1) -> Array:
-    """Share of position noise in the power of a filtered acceleration, shape (n,).
+    """Compute the share of position noise in the power of the filtered acceleration of each joint.
 
-    q : shape (N, n), rad or m. rate : Hz. low : with its cut-off as a number.
+    Shape (n,).
+
+    q : shape (N, n), rad or m. rate : Hz. low : low-pass with its cut-off as a number.
     """
     f, motion, noise = spectra(q, rate, median)
     power = _gain(f, rate, low, np.array([low.hertz]))[0] ** 2
@@ -102,13 +108,16 @@ def noise_share(q: Array, rate: float, low: Lowpass, median: int = 1) -> Array:
 
 
 def _gain(f: Array, rate: float, low: Lowpass, cutoffs: Array) -> Array:
-    """Gain G of the low-pass on the acceleration, shape (cut-offs, frequencies)."""
+    """Compute the gain G of the low-pass on the acceleration, shape (cut-offs, frequencies)."""
     ratio = np.tan(np.pi * f / rate) / np.tan(np.pi * cutoffs / rate)[:, None]
     return np.asarray((1 + ratio ** (2 * low.order)) ** -float(max(len(set(low.on)), 1)))
 
 
 def spectra(q: Array, rate: float, median: int = 1) -> tuple[Array, Array, Array]:
-    """Frequencies, shape (m,), Hz, and power of the acceleration, shape (m, n), of motion and of noise.
+    """Compute two power spectra of the acceleration: of the motion and of the position noise.
+
+    Returns the frequencies, Hz, shape (m,), the power of the motion and the power of the noise,
+    shape (m, n) each.
 
     median : window of the median filter that finds spikes, 1 for none.
     """
@@ -123,13 +132,16 @@ def spectra(q: Array, rate: float, median: int = 1) -> tuple[Array, Array, Array
 
 
 def white_noise(x: Array, rate: float, median: int = 1) -> Array:
-    """Variance of the white noise of each column of x, shape (n,)."""
+    """Estimate the variance of the white noise in each column of x, shape (n,)."""
     return _spectrum(x, rate, median)[3]
 
 
 def _spectrum(x: Array, rate: float, median: int) -> tuple[Array, Array, Array, Array]:
-    """Frequencies (m,), power (m, n) of second differences there, that of white noise of variance
-    1, shape (m, 1), and the variance of the white noise of x, shape (n,).
+    """Compute the spectrum of the second differences of x, and the white noise in x.
+
+    Returns four arrays: the frequencies, shape (m,), Hz; the power of the second differences, shape
+    (m, n); their power for white noise of variance 1, shape (m, 1); the variance of the white noise
+    of x, shape (n,).
     """
     smooth = median_filtered(x, median)
     away = np.abs(x - smooth)
@@ -146,6 +158,9 @@ def _spectrum(x: Array, rate: float, median: int) -> tuple[Array, Array, Array, 
 
 
 def step(x: Array) -> float:
-    """Smallest step between the values of x, shape (N,), above rounding; small if x has no steps."""
+    """Find the smallest step between the values of x, shape (N,), for instance one encoder count.
+
+    Differences of the size of rounding errors are left out. The result is small if x has no steps.
+    """
     steps = np.diff(np.unique(x))
     return float(min(steps[steps > 1e-6 * np.ptp(x)], default=0.0))

@@ -1,7 +1,7 @@
-"""Zero-phase decimation computed at the kept samples only, exactly, of signals that may arrive in pieces.
+"""Exact zero-phase decimation, computed at the kept samples only, of signals that come in pieces.
 
 Reference: a Chebyshev I low-pass forward and backward in second-order sections with odd padding of
-p samples, then every n_d-th sample, which computes N outputs and throws all but N/n_d away. In
+p samples, then every n_d-th sample, which computes N outputs and discards all but N/n_d. In
 modal form, lambda_i the poles of positive imaginary part and c_i their residues,
 
     H(z) = D + sum_i [c_i/(z - lambda_i) + conj],     h_0 = D,   h_j = 2 Re sum_i c_i lambda_i^(j-1)
@@ -19,12 +19,11 @@ sample of block b and v_b the backward state w at its last one, everything is li
 [P; Q; Y] u is one matrix product for all signals and blocks, 2 (16 + G) operations a sample; x and
 v are K/G short steps. The start, and the samples behind the last whole block with their reflection,
 are products of their own: x_0 = X0 u, [v; y] = A u + Ax x. The signals are never stored. Of a long
-record, PART kept samples are computed at a time, from the samples that decide them: the filter has
-forgotten all others except for TRUNCATION.
+record, PART kept samples are computed at a time, from the samples that decide them: the effect of
+all other samples on them is below TRUNCATION.
 
-|lambda|^n_d is between 0.4 and 0.83 whatever n_d, so nothing grows; residues come from zeros and
-poles, polynomial coefficients would lose all
-digits at n_d = 100.
+|lambda|^n_d is between 0.4 and 0.83 whatever n_d, so nothing grows. The residues are computed from
+zeros and poles, because polynomial coefficients would lose all digits at n_d = 100.
 """
 
 from __future__ import annotations
@@ -72,20 +71,20 @@ class Operator:
     lam: Array
 
     def impulse(self, length: int) -> Array:
-        """Impulse response h_0 ... h_(length-1)."""
+        """Compute the impulse response h_0 ... h_(length-1) of the filter."""
         return np.concatenate(
             [[self.D], 2 * (self.lam ** np.arange(length - 1)[:, None] @ self.c).real]
         )
 
     @property
     def reach(self) -> int:
-        """Samples until the slowest mode decays to TRUNCATION."""
+        """Number of samples until the slowest mode decays to TRUNCATION."""
         return ceil(log(TRUNCATION) / log(np.abs(self.lam).max()))
 
 
 @lru_cache(maxsize=32)
 def operator(factor: int) -> Operator:
-    """Operator of a decimation factor of at least 2."""
+    """Design the decimation filter for a factor of at least 2, in modal form."""
     zeros, poles, D = cheby1(ORDER, RIPPLE, CUTOFF / factor, output="zpk")
     lam = poles[poles.imag > 0]
     others = np.array([[p for p in poles if p != pole] for pole in lam])
@@ -95,7 +94,7 @@ def operator(factor: int) -> Operator:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Data of a decimation that do not depend on the signals, for N samples of which K are kept.
+    """Matrices of a decimation of N samples to K kept samples; they do not depend on the signals.
 
     Complex numbers are pairs Re, Im, 2 m of them.
 
@@ -127,7 +126,10 @@ class Plan:
     Ax: Array
 
     def pieces(self) -> list[tuple[int, int]]:
-        """Pieces [t0, t1) of about PIECE samples, made of whole blocks except the first and the last piece."""
+        """Divide the N samples into pieces [t0, t1) of about PIECE samples.
+
+        The pieces are made of whole blocks, except the first and the last piece.
+        """
         length = max(1, PIECE // self.L) * self.L
         cuts = [0, *range(self.phase + length, self.N, length), self.N]
         return list(pairwise(cuts))
@@ -135,7 +137,10 @@ class Plan:
 
 @lru_cache(maxsize=32)
 def plan(N: int, factor: int, phase: int, pad: int) -> Plan:
-    """Plan for N > pad samples; factor from 2 on, phase : first kept sample, 0 to factor - 1, pad : p."""
+    """Compute the matrices of the decimation of N samples by a factor of at least 2.
+
+    phase : first kept sample, 0 to factor - 1. pad : number p < N of samples that extend each end.
+    """
     op = operator(factor)
     K = len(range(phase, N, factor))
     G = max(1, min(MOST_KEPT, LONGEST // factor))
@@ -172,9 +177,11 @@ def decimate(u: Array, plan: Plan) -> Array:
 def decimated_parts(
     read: Callable[[int, int], Array], S: int, whole: Plan, most: int = PART
 ) -> Iterator[tuple[slice, Array]]:
-    """Iterate over consecutive kept samples [a, b) of S signals, at most `most` at a time: their values, shape (S, b - a).
+    """Yield slices [a, b) of the kept samples, with the values of S decimated signals there.
 
-    read : as for `decimated_pieces`; samples that several parts need are read again.
+    The values have shape (S, b - a), b - a being at most `most`.
+
+    read : as for `decimated_pieces`; samples that several slices need are read again.
     """
     far = operator(whole.factor).reach
     for a in range(0, whole.K, most):
@@ -189,9 +196,10 @@ def decimated_parts(
 
 
 def decimated_pieces(read: Callable[[int, int], Array], S: int, plan: Plan) -> Array:
-    """The same for S signals that are read once, piece by piece.
+    """Decimate S signals, which are read once, piece by piece, to shape (S, K).
 
-    read(t0, t1) gives the samples [t0, t1) of every signal, shape (S, t1 - t0); the array may be reused.
+    read(t0, t1) gives the samples [t0, t1) of every signal, shape (S, t1 - t0); the array may be
+    reused.
     """
     p, m2 = plan, len(plan.Mx)
     products = np.empty((p.blocks, S, p.PQY.shape[1]))
@@ -223,12 +231,15 @@ def decimated_pieces(read: Callable[[int, int], Array], S: int, plan: Plan) -> A
 
 
 def _later(read: Callable[[int, int], Array], begin: int, t0: int, t1: int) -> Array:
-    """The samples [t0, t1), counted from sample `begin`."""
+    """Return the samples [t0, t1) from the function `read`, counted from sample `begin`."""
     return read(begin + t0, begin + t1)
 
 
 def recursion(a: Array, x: Array, drive: Array) -> None:
-    """x_(b+1) = a x_b + drive_b: x, shape (B + 1, S, 2 m), x_0 given; drive, shape (B, S, 2 m)."""
+    """Compute the recursion x_(b+1) = a x_b + drive_b in place, from the given x_0.
+
+    x : shape (B + 1, S, 2 m). drive : shape (B, S, 2 m).
+    """
     z = x.view(complex)
     for before, after, d in zip(z, z[1:], drive.view(complex), strict=False):
         np.multiply(a, before, out=after)
@@ -236,21 +247,26 @@ def recursion(a: Array, x: Array, drive: Array) -> None:
 
 
 def copy_overlap(u: Array, t0: int, window: Array, start: int) -> None:
-    """Copy the samples of `window` (from `start` on) that u (from t0 on) contains."""
+    """Copy into `window` (samples from `start` on) the samples that u (from t0 on) has in common."""
     a, b = max(t0, start), min(t0 + u.shape[1], start + window.shape[1])
     if a < b:
         window[:, a - start : b - start] = u[:, a - t0 : b - t0]
 
 
 def _forward(op: Operator, length: int) -> tuple[Array, Array]:
-    """f of `length` samples: from these samples, shape (length, length), and from x at the first one, shape (length, 2 m)."""
+    """Return the forward pass over `length` samples as two matrices that give its output f.
+
+    One is applied to the samples, shape (length, length), the other to x at the first sample, shape
+    (length, 2 m).
+    """
     return np.tril(toeplitz(op.impulse(length))), _output(op, op.lam[:, None] ** np.arange(length))
 
 
 def _backward(op: Operator, length: int, kept: int) -> tuple[Array, Array]:
-    """The backward pass as two matrices that are applied to f, `length` samples: one gives
-    f_0 + lambda w_0, complex, shape (m, length), the other y at the first `kept` instants, shape
-    (kept, length).
+    """Return the backward pass as two matrices that are applied to f, `length` samples.
+
+    One gives f_0 + lambda w_0, complex, shape (m, length), the other y at the first `kept`
+    instants, shape (kept, length).
     """
     h = op.impulse(length)
     later = np.arange(length) - op.factor * np.arange(kept)[:, None]
@@ -258,7 +274,11 @@ def _backward(op: Operator, length: int, kept: int) -> tuple[Array, Array]:
 
 
 def _start(op: Operator, phase: int, pad: int) -> Array:
-    """x at the first kept sample from the first samples, shape (T0, 2 m): steady state of the first reflected one, then the others."""
+    """Return the matrix that gives the state x at the first kept sample from the first samples.
+
+    Shape (T0, 2 m). The filter starts in the steady state of the first reflected sample; then it
+    runs over the other reflected samples.
+    """
     T0, length = max(pad + 1, phase), pad + phase
     extended = np.zeros((length, T0))
     extended[:pad, 0] = 2
@@ -270,7 +290,11 @@ def _start(op: Operator, phase: int, pad: int) -> Array:
 
 
 def _end(op: Operator, left: int, kept: int, pad: int) -> tuple[Array, Array]:
-    """v before, and y at, the last `kept` instants: from the last samples, shape (T, 2 m + kept), and from x at the first of the `left` ones."""
+    """Return the two matrices that give v and y at the end of a record, after the last whole block.
+
+    v is the state before, and y the output at the last `kept` instants. One matrix is applied to
+    the last samples, shape (T, 2 m + kept), the other to x at the first of the `left` samples.
+    """
     length, T = left + pad, max(left, pad + 1)
     extended = np.zeros((length, T))
     extended[np.arange(left), np.arange(T - left, T)] = 1
@@ -292,7 +316,7 @@ def _end(op: Operator, left: int, kept: int, pad: int) -> tuple[Array, Array]:
 
 
 def _output(op: Operator, factors: Array) -> Array:
-    """2 Re c'(factors x) as a matrix on the pairs of x, shape (k, 2 m).
+    """Write 2 Re c'(factors x) as a matrix that is applied to the pairs Re, Im of x, shape (k, 2 m).
 
     Factors complex, shape (m, k).
     """
@@ -301,10 +325,10 @@ def _output(op: Operator, factors: Array) -> Array:
 
 
 def _pairs(C: Array) -> Array:
-    """Complex rows, shape (m, k), as rows Re, Im, shape (2 m, k)."""
+    """Convert complex rows, shape (m, k), to rows Re, Im, shape (2 m, k)."""
     return np.asarray(np.stack([C.real, C.imag], axis=1).reshape(-1, C.shape[-1]))
 
 
 def _transposed(*rows: Array) -> Array:
-    """The rows, one below the other, as contiguous columns: maps act on signals from the right."""
+    """Stack the rows and transpose them to contiguous memory, to multiply signals from the right."""
     return np.ascontiguousarray(np.vstack(rows).T)

@@ -4,8 +4,8 @@
     Chebyshev I forward and backward -> one sample in n_d, eq. (13)          Y and every column of W
 
 Never the (b, a) form: for decimation it is wrong by 2e-3 at a factor of 40 and diverges at 100.
-Both ends are extended by odd reflection;
-MATLAB's filtfilt takes 3*(filter length - 1) samples, scipy's default 3*(filter length).
+Both ends are extended by odd reflection: MATLAB's filtfilt uses 3*(filter length - 1) samples,
+scipy's default is 3*(filter length).
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class SpeedErrors:
-    """Known errors of the velocities; errors of different encoders are independent.
+    """Standard deviations of the velocities; errors of different encoders are independent.
 
-    deviation : ndarray, shape (N, encoders), per s; infinite if counts are missing and the state
-        is unknown.
+    deviation : ndarray, shape (N, encoders), standard deviation of each encoder velocity, per s;
+        infinite if counts are missing and the state is unknown.
     root : ndarray, shape (n, encoders), joint velocity per encoder velocity.
     """
 
@@ -42,13 +42,13 @@ class SpeedErrors:
         return SpeedErrors(self.deviation[samples], self.root)
 
     def along(self, G: Array) -> Array:
-        """Standard deviation of s = G qd, shape (N,); G, shape (n,)."""
+        """Compute the standard deviation of s = G qd, shape (N,); G has shape (n,)."""
         finite = np.where(self.known[:, None], self.deviation, 0.0)
         return np.where(self.known, np.sqrt(finite**2 @ (G @ self.root) ** 2), np.inf)
 
     @property
     def known(self) -> Array:
-        """Samples with a known state of every joint, bool, shape (N,)."""
+        """Whether the states of all joints are known, by sample, bool, shape (N,)."""
         return np.asarray(np.isfinite(self.deviation).all(axis=1))
 
 
@@ -56,9 +56,9 @@ class SpeedErrors:
 class States:
     """Joint positions, velocities and accelerations, shape (N, n) each, rad or m, per s, per s^2.
 
-    errors : what is known of errors of the velocities; None: they count as exact.
-    findings : what the reader says of the encoders.
-    channels : functions of time that laws of the model read, (N,) by name.
+    errors : errors of the velocities, if they are known; None: the velocities count as exact.
+    findings : sentences of the reader about the encoders.
+    channels : functions of time on which laws of the model depend, (N,) by name.
     """
 
     q: Array
@@ -79,10 +79,12 @@ class States:
 
 
 def filtered_states(q: Array, rate: float, signals: Signals, v: Array | None = None) -> States:
-    """Compute q, qd, qdd from measured positions: median, low-pass on q, difference, low-pass on qd, difference.
+    """Compute q, qd, qdd from measured positions by median, low-pass and central differences.
+
+    Order: median, low-pass on q, difference, low-pass on qd, difference.
 
     q : ndarray, shape (N, n), rad or m.   rate : Hz.   v : recorded velocities, shape (N, n), which
-    take over from the differences where signals.velocity says.
+    replace the differences above the frequency signals.velocity.
     """
     q = median_filtered(q, signals.median)
     low = signals.lowpass
@@ -100,7 +102,7 @@ def filtered_states(q: Array, rate: float, signals: Signals, v: Array | None = N
 
 
 def blended(qd: Array, v: Array, rate: float, crossing: float | tuple[float, ...]) -> Array:
-    """v + L (qd - v), shape (N, n), from differences qd and recorded velocities v.
+    """Combine differences qd and recorded velocities v to v + L (qd - v), shape (N, n).
 
     L is the zero-phase first-order low-pass at `crossing`, Hz (`runtime.speeds`).
     """
@@ -117,7 +119,10 @@ IN_CACHE = 4096
 
 
 def median_filtered(x: Array, window: int) -> Array:
-    """Running median over `window` samples of each column of x, shape (N, n); the ends repeat the end value."""
+    """Compute the running median over `window` samples of each column of x, shape (N, n).
+
+    The ends repeat the end value.
+    """
     if window == 1:
         return x
     if window not in (3, 5):
@@ -136,20 +141,26 @@ def median_filtered(x: Array, window: int) -> Array:
 
 
 def _inner(a: Array, b: Array, c: Array, d: Array) -> tuple[Array, Array]:
-    """The two middle ones of four values: their median with a fifth value is that of all five."""
+    """Find the two middle values of four: their median with a fifth value is that of all five."""
     return np.maximum(np.minimum(a, b), np.minimum(c, d)), np.minimum(
         np.maximum(a, b), np.maximum(c, d)
     )
 
 
 def lowpass_filtered(x: Array, rate: float, low: Lowpass) -> Array:
-    """Zero-phase Butterworth filter along the first axis of x, shape (N, n); each pass has -3 dB at the cut-off."""
+    """Filter x, shape (N, n), along its first axis by a zero-phase Butterworth low-pass.
+
+    Each of the two passes has -3 dB at the cut-off.
+    """
     return zero_phase(*butterworth(rate, low), x, axis=0)
 
 
 @lru_cache(maxsize=32)
 def butterworth(rate: float, low: Lowpass) -> tuple[Array, int]:
-    """Second-order sections of the low-pass, shape (sections, 6), and the number of samples that extend each end."""
+    """Design the low-pass as second-order sections, shape (sections, 6).
+
+    Returns also the number of samples that extend each end of a record.
+    """
     if low.hertz >= rate / 2:
         raise InputError(
             f"low-pass at {low.hertz:g} Hz for a record at {rate:g} Hz; expected less than the "
@@ -163,7 +174,11 @@ def butterworth(rate: float, low: Lowpass) -> tuple[Array, int]:
 
 
 def derivative(x: Array, rate: float, ends: str = "one-sided") -> Array:
-    """Central differences (x_(k+1) - x_(k-1)) rate/2 along the first axis; one-sided differences at both ends."""
+    """Differentiate x along its first axis by central differences (x_(k+1) - x_(k-1)) rate/2.
+
+    At both ends differences are one-sided, of first order if `ends` is "one-sided", else of second
+    order.
+    """
     return np.asarray(np.gradient(x, 1 / rate, axis=0, edge_order=1 if ends == "one-sided" else 2))
 
 
@@ -172,7 +187,10 @@ CLOCK = 1e-6
 
 
 def decimation_factor(signals: Signals, rate: float) -> int:
-    """n_d = 0.8 ws/(2 wf), eq. (13), rounded down to keep the band up to wf; 1 without decimation."""
+    """Compute the decimation factor n_d = 0.8 ws/(2 wf), eq. (13); 1 without decimation.
+
+    It is rounded down to keep the band up to wf.
+    """
     if signals.decimate is None:
         return 1
     if signals.decimate.factor != "auto":
@@ -186,18 +204,21 @@ def decimation_factor(signals: Signals, rate: float) -> int:
 
 
 def kept_samples(N: int, factor: int, phase: str) -> Array:
-    """Indices of the samples that decimation keeps: the first and every factor-th, or such that the last is kept (MATLAB)."""
+    """Return the indices of the samples that decimation keeps, one in `factor`.
+
+    The first sample is kept, or the last one (MATLAB).
+    """
     first = 0 if phase == "first" else factor - 1 - (factor * -(-N // factor) - N)
     return np.arange(first, N, factor)
 
 
 def decimated(x: Array, factor: int, settings: Decimate | None) -> Array:
-    """Zero-phase Chebyshev I filter along the last axis of x, shape (..., N), then one sample in `factor`.
+    """Decimate x, shape (..., N), along its last axis after a zero-phase Chebyshev I filter.
 
-    A factor of 1 returns x.
+    One sample in `factor` is kept. A factor of 1 returns x.
 
-    Of even order, the filter has gain 10**(-2*0.05/20) = 0.98855 at zero frequency: Y and every
-    column of W need it alike, offsets too.
+    The filter has even order and the gain 10**(-2*0.05/20) = 0.98855 at zero frequency. Y and every
+    column of W, offsets too, must therefore pass it alike.
     """
     how = decimation_plan(x.shape[-1], factor, settings)
     return (
@@ -208,7 +229,10 @@ def decimated(x: Array, factor: int, settings: Decimate | None) -> Array:
 def decimation_plan(
     N: int, factor: int, settings: Decimate | None, first: int | None = None
 ) -> Plan | None:
-    """Decimation of N samples; None for a factor of 1. first : first kept sample; default: by the settings."""
+    """Plan the decimation of N samples; None for a factor of 1.
+
+    first : first kept sample; default: by the settings.
+    """
     if factor == 1 or settings is None:
         return None
     pad = 3 * ORDER if settings.padding == "matlab" else 3 * (ORDER + 1)
@@ -219,13 +243,16 @@ def decimation_plan(
 
 
 def zero_phase(sos: Array, pad: int, x: Array, axis: int) -> Array:
-    """Filter forward and backward, with `pad` reflected samples at each end and the steady state of the first value."""
+    """Filter x forward and backward along `axis`, each pass from the steady state of its first value.
+
+    `pad` reflected samples extend each end.
+    """
     require_longer(x.shape[axis], pad)
     return np.asarray(sosfiltfilt(sos, x, axis=axis, padtype="odd", padlen=pad))
 
 
 def require_longer(samples: int, pad: int) -> None:
-    """Raise InputError unless x has more than `pad` samples."""
+    """Raise InputError if there are not more samples than the `pad` samples that extend each end."""
     if samples <= pad:
         raise InputError(
             f"{samples} samples; this zero-phase filter needs more than {pad}, use a longer record "

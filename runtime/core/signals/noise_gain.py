@@ -1,17 +1,18 @@
-"""What the filters of an identification make of white position noise: exact second moments, from their frequency responses.
+"""Effect of the filters of an identification on white position noise.
 
-Raw errors of one encoder are independent from sample to sample, variance 1. All filters are linear,
+The second moments are exact, from the frequency responses of the filters. Raw errors of one encoder
+are independent from sample to sample, variance 1. All filters are linear,
 of zero phase and of magnitude known at every frequency w (rad per sample), fs the sampling rate:
 
     low-pass
-        |H|^2, H the Butterworth filter run forward and backward, where `lowpass.on` asks for it
+        |H|^2, H the Butterworth filter run forward and backward, if `lowpass.on` names the signal
     difference    i fs sin w
     dq            K_1 = |H|^2           dqd  K_2 = |H|^2 K_1 i fs sin w          dqdd
                   K_3 = K_2 i fs sin w
     decimation    |G|^2, G the Chebyshev filter
 
     covariance of (dq, dqd, dqdd)                            C_0 = 1/(2 pi) int K K^* dw
-    of the same after decimation                             C   = 1/(2 pi) int |G|^4 K K^* dw
+    covariance after decimation                              C   = 1/(2 pi) int |G|^4 K K^* dw
     correlation of dqd at lag k, rho_k                       transform of |K_2|^2, rho_0 = 1
     sum of products of the decimation's impulse response, r_k      transform of |G|^4
 
@@ -43,11 +44,11 @@ MEMORY = 10
 
 @dataclass(frozen=True, eq=False)
 class Bandwidth:
-    """Covariance of filtered states for raw position errors of variance 1.
+    """Covariance of the filtered states q, qd, qdd for white position noise of variance 1.
 
     before : C_0, ndarray, shape (3, 3), of (dq, dqd, dqdd).
-    after : C, the same after decimation.
-    gain : of the decimation at frequency 0.
+    after : C, the covariance after decimation.
+    gain : gain of the decimation at frequency 0.
     speed : rho_k, k = 0, 1 ...: correlation of dqd.
     decimation : r_k of the decimation filter; r_0, the variance of decimated white noise, is 1
         without decimation.
@@ -61,7 +62,10 @@ class Bandwidth:
 
 
 def bandwidth(signals: Signals, rate: float) -> Bandwidth:
-    """Bandwidth of the filters of `signals` at `rate`, Hz; SettingsError for a median filter, which is not linear."""
+    """Compute the effect of the filters of `signals` on white position noise, at `rate`, Hz.
+
+    SettingsError for a median filter, which is not linear.
+    """
     if signals.median != 1:
         raise SettingsError(
             (
@@ -91,16 +95,16 @@ def bandwidth(signals: Signals, rate: float) -> Bandwidth:
 
 
 def _power(sos: Array, w: Array) -> Array:
-    """|H|^2: the gain of a filter run forward and backward."""
+    """Compute the gain |H|^2 of a filter that runs forward and backward."""
     return np.asarray(np.abs(sosfreqz(sos, w)[1]) ** 2)
 
 
 def _covariance(K: Array) -> Array:
-    """Mean of K K^* over the circle, shape (3, 3)."""
+    """Average K K^* over all frequencies, from -pi to pi rad per sample, shape (3, 3)."""
     ends = K[:, [0, -1]]
     return np.asarray(((K @ K.conj().T).real - (ends @ ends.conj().T).real / 2) / (K.shape[1] - 1))
 
 
 def _transform(spectrum: Array) -> Array:
-    """Correlation at lags from 0 on of a real, even spectrum."""
+    """Compute the correlation at lags 0, 1, 2 ... of a signal with a given real, even spectrum."""
     return np.asarray(np.fft.irfft(spectrum)[: len(spectrum) - 1])

@@ -1,4 +1,4 @@
-"""From a record to its joint states: what a reader is, and the reader of the chapter."""
+"""Readers, which compute the joint states q, qd, qdd of a record, and the reader of the chapter."""
 
 from __future__ import annotations
 
@@ -19,20 +19,21 @@ Reader: TypeAlias = Callable[[Record, Signals], States]
 
 @dataclass(frozen=True)
 class SignalReader:
-    """A position reader that a study can name.
+    """A reader that the setting signals.reader can name: it computes the joint states of a record.
 
     Attributes
     ----------
     states : Reader
+        Function that computes the states.
     options : type or None
-        Settings class of signals.options, which it reads there; None: it has none.
+        Settings class of signals.options; None: the reader has no options.
     """
 
     states: Reader
     options: type[Settings] | None = None
 
     def checked(self, signals: Signals) -> dict[str, Any]:
-        """All options with defaults; SettingsError if the settings do not suit."""
+        """Return all options of the reader with defaults; SettingsError if they do not suit."""
         path = ("signals", "options")
         if self.options is not None:
             return to_mapping(structure(self.options, signals.options, path))
@@ -44,13 +45,19 @@ class SignalReader:
 
 
 def lowpassed(record: Record, signals: Signals) -> States:
-    """Reader `lowpass`: median, low-pass and central differences of the positions (`runtime.core.signals.filters`)."""
+    """Compute the joint states of a record by median, low-pass and central differences.
+
+    This is the reader `lowpass` (`runtime.core.signals.filters`).
+    """
     require_positions(record.missing, "reader: lowpass", record.name, COUNTS)
     return filtered_states(record.q, record.rate, signals, record.channels.get("qd"))
 
 
 def require_motion(signals: Signals, who: str) -> None:
-    """Raise SettingsError if the records are poses at rest; who : the analysis that needs a motion."""
+    """Raise SettingsError if the records are static poses, for an analysis that needs a motion.
+
+    who : name of the analysis in the message.
+    """
     if signals.reader == "static":
         raise SettingsError(
             f"static, poses at rest; {who} needs records of a motion", path=("signals", "reader")

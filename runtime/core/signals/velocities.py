@@ -1,4 +1,4 @@
-"""Velocities that were recorded, compared with differences of the positions: how they differ on the motion itself.
+"""Comparison of recorded velocities v with differences of the recorded positions q.
 
 v = gain (dq/dt - lag d2q/dt2) + rest
 """
@@ -24,13 +24,13 @@ class SpeedAgreement:
     Attributes
     ----------
     gain : ndarray
-        Of the differences in the recorded velocity.
+        Factor between the differences and the recorded velocity.
     lag : ndarray, s
-        By which the recorded velocity is late, whatever its gain; nan if that is zero.
+        Delay of the recorded velocity, whatever its gain; nan if the gain is zero.
     share : ndarray
-        What gain and lag take, of the rms of the velocity.
+        Part of the rms of the velocity that the errors of gain and lag make.
     crossing : ndarray, Hz
-        f_c by the noise of both.
+        Frequency f_c above which the recorded velocity has less noise than the differences.
     """
 
     gain: Array
@@ -40,12 +40,15 @@ class SpeedAgreement:
 
     @property
     def agrees(self) -> Array:
-        """Joints with a usable recorded velocity, bool, shape (n,)."""
+        """Whether the recorded velocity of each joint is usable, bool, shape (n,)."""
         return np.asarray(self.share <= LIMIT.SPEED_DISAGREES)
 
 
 def agreement(q: Array, v: Array, rate: float, signals: Signals) -> SpeedAgreement:
-    """Compare recorded velocities v with positions q, shape (N, n), after the low-pass of the study."""
+    """Compare recorded velocities v with differences of positions q, by gain and delay.
+
+    Both have shape (N, n) and pass the low-pass of the study first.
+    """
     states = filtered_states(q, rate, signals)
     v_f, low = median_filtered(v, signals.median), signals.lowpass
     if low is not None:
