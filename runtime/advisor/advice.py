@@ -31,7 +31,7 @@ NAMES = {"lowpass": "positions", "counts": "counts"}  # of the readers, in words
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """Result of several CESTAC runs with one encoder step.
+    """Result of several CESTAC runs, which round all positions at random to one encoder step.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ def sampled(delta: float, ratios: Array) -> Sampled:
 
 @dataclass(frozen=True, eq=False)
 class Limit:
-    """Encoder step at which the change %e of the first parameter reaches `percent`.
+    """Encoder step at which the estimate of the first parameter changes by `percent` %.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class Limit:
 
     @property
     def agrees(self) -> bool:
-        """Whether the runs confirm the predicted %e.
+        """Whether CESTAC runs confirm the predicted change %e of the parameter.
 
         The difference may be the Student interval plus 30 % of %e, which is 15 % in Delta. True
         without runs.
@@ -101,7 +101,7 @@ class Limit:
 
 @dataclass(frozen=True, eq=False)
 class EncoderAdvice:
-    """Advice for one choice of coarse encoders, all others being exact.
+    """Coarsest steps for one choice of encoders, with all other encoders exact.
 
     Attributes
     ----------
@@ -136,7 +136,7 @@ class EncoderAdvice:
 
 @dataclass(frozen=True, eq=False)
 class ReaderAdvice:
-    """Advice on real encoders whose signals are read in one way: as positions, or as counts.
+    """Coarsest steps of real encoders whose signals are read in one way: positions or counts.
 
     Attributes
     ----------
@@ -157,8 +157,7 @@ class ReaderAdvice:
 
 @dataclass(frozen=True, eq=False)
 class Advice(Result, Part):
-    """Largest encoder steps that leave the estimate of one robot unbiased, and effect of torque
-    noise.
+    """Largest encoder steps at which the estimated parameters of one robot stay unbiased.
 
     Attributes
     ----------
@@ -202,11 +201,14 @@ class Advice(Result, Part):
         return "\n".join([self.verdict, *self.asked_lines(), *self.assumptions])
 
     def figures(self) -> tuple[Figure, ...]:
-        """Plot %e against the step Delta for every deciding parameter; no figure without one."""
+        """Plot the change of every deciding parameter against the encoder step.
+
+        No figure without a deciding parameter.
+        """
         return (advice_figure(self),) if self.deciding else ()
 
     def checks(self) -> tuple[Check, ...]:
-        """Return the check whether the encoder resolves enough."""
+        """Return the check with the question "Does the encoder resolve enough?", as a tuple."""
         return (answer(self),)
 
     def entries(self) -> dict[str, Any]:
@@ -219,7 +221,10 @@ class Advice(Result, Part):
 
     @property
     def deciding(self) -> tuple[str, ...]:
-        """Names of the parameters that decide the verdict: their %sigma (11) is at most 10."""
+        """Names of the parameters that decide the verdict.
+
+        Their relative standard deviation %sigma, eq. (11), is at most 10 %.
+        """
         return deciding_names(self.reference)
 
     @property
@@ -236,9 +241,9 @@ class Advice(Result, Part):
 
     @property
     def unit(self) -> str:
-        """Unit of the steps of the first advice, usually that on all encoders: "rad", "m" or both.
+        """Unit of the encoder steps: "rad", "m", or "rad or m" for encoders of both kinds.
 
-        It is "rad or m" if encoders of both kinds are coarse.
+        It is that of the first advice, usually on all encoders together.
         """
         return self.encoders[0].unit
 
@@ -250,9 +255,9 @@ class Advice(Result, Part):
         ]
 
     def worst(self, step: int, steps: Array | None = None) -> tuple[str, float]:
-        """Find the deciding parameter with the largest %e at a requested step.
+        """Find the deciding parameter that changes most at a requested encoder step.
 
-        Return its name and this %e.
+        Return its name and its change %e.
 
         step : number of the requested step, from 0.
         steps : changes at the requested steps; default: those of the advice.
@@ -264,14 +269,20 @@ class Advice(Result, Part):
 
     @property
     def negative(self) -> bool:
-        """Whether a requested step would bias least squares, or runs contradict the prediction."""
+        """Whether a requested step would bias least squares, or runs contradict the prediction.
+
+        The runs are those of CESTAC at the steps of the limits.
+        """
         several = (encoder for _, encoders, _ in self.ways for encoder in encoders)
         contradicted = any(not limit.agrees for encoder in several for limit in encoder.limits)
         return contradicted or any(self.worst(k)[1] > LIMIT.BIASED for k in range(len(self.asked)))
 
     @property
     def verdict(self) -> str:
-        """The verdict in sentences: coarsest steps of all encoders, and the most critical encoder.
+        """The verdict in sentences.
+
+        It states the coarsest steps of all encoders together, and which single encoder must be
+        finest.
         """
         parts: list[str] = []
         for name, encoders, _ in self.ways:
@@ -433,9 +444,10 @@ class Advice(Result, Part):
         return Table(caption, header, rows)
 
     def asked_lines(self) -> list[str]:
-        """Write one line for each requested step and rounding law: the largest predicted change.
+        """Write the largest predicted change of a parameter at each requested encoder step.
 
-        Return one text with all lines in a list, or an empty list without requested steps.
+        There is one line for each step and rounding law. Return one text with all lines in a list,
+        or an empty list without requested steps.
         """
         lines = []
         for k, delta in enumerate(self.asked):
@@ -538,7 +550,7 @@ def _panel(ax: Any, reader: str, encoder: EncoderAdvice, line: str, points: str,
     f"bias below {LIMIT.NEGLIGIBLE:g} % (usable to {LIMIT.BIASED:g} %)",
 )
 def answer(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer:
-    """Answer whether the encoder resolves enough, from the advice or from steps seen in positions.
+    """Answer whether the encoder is fine enough, from the advice or from steps in the positions.
 
     steps : without an advice, a sentence on the steps that the positions show.
     share : share of the mean square of an acceleration that these steps make.
@@ -580,7 +592,7 @@ def answer(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer
 
 @dataclass(frozen=True, eq=False)
 class NoAdvice(Part):
-    """Part of the report if no advice was requested: it judges steps seen in the positions."""
+    """Part of a report without an advice: it judges the encoder steps seen in the positions."""
 
     result: Identification
 
@@ -588,7 +600,7 @@ class NoAdvice(Part):
     title = "Resolution advice"
 
     def checks(self) -> tuple[Check, ...]:
-        """Return the check whether the encoder resolves enough."""
+        """Return the check with the question "Does the encoder resolve enough?", as a tuple."""
         simulated = self.result.study.estimate.method in ("iv", "didim")
         return (answer(None, *(("", 0.0) if simulated else visible_steps(self.result))),)
 
@@ -637,7 +649,7 @@ def confirm_by_runs(
 
 
 def limits_of(delta: Array, change: Array, reference: Estimate) -> tuple[Limit, ...]:
-    """Find the coarsest step at which every parameter that matters stays within each limit.
+    """Find the coarsest encoder steps that change the deciding parameters by at most 1 % and 5 %.
 
     nan if the finest step is already too coarse or no parameter is judged; inf if every step is
     fine enough.
@@ -659,7 +671,7 @@ def limits_of(delta: Array, change: Array, reference: Estimate) -> tuple[Limit, 
 
 
 def crossing(delta: Array, e: Array, percent: float) -> float:
-    """Find the first step at which the change e reaches `percent`.
+    """Find the first encoder step at which the change e of a parameter reaches `percent`.
 
     Between the points of the curve, lines are straight on logarithmic axes. nan if no point reaches
     it, or if the first point is already above.
@@ -676,12 +688,12 @@ def crossing(delta: Array, e: Array, percent: float) -> float:
 
 
 def counts(delta: float) -> str:
-    """Write an angle step as a share of a turn, for instance 2*pi/5236."""
+    """Write an encoder step in rad as a share of a turn, for instance 2*pi/5236."""
     return f"2*pi/{2 * np.pi / delta:.0f}" if 0 < delta < np.pi else ""
 
 
 def step_text(delta: float, unit: str) -> str:
-    """Write a step with its unit, for instance 9.16e-05 rad (2*pi/68626).
+    """Write an encoder step with its unit, for instance 9.16e-05 rad (2*pi/68626).
 
     An angle is also written as a share of a turn.
     """

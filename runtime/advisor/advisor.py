@@ -93,7 +93,7 @@ class Predictor:
 
     @cached_property
     def exact(self) -> Array:
-        """Estimate X with exact encoders, shape (b,)."""
+        """Parameters X estimated with exact encoders, shape (b,)."""
         return solution(self._total(0.0, ()), self.weights)
 
     def rate(self, encoders: Sequence[int]) -> Array:
@@ -248,7 +248,10 @@ def advise(
 
 
 def _selections(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str, tuple[int, ...]]:
-    """Choose the sets of coarse encoders that are judged: encoder numbers from 0, by label."""
+    """Make the sets of encoders that are coarse at the same time, by label.
+
+    The label is "all" or that of a joint; the encoders are numbered from 0.
+    """
     n = len(model.JOINTS)
     every = {ALL: tuple(range(n)), **{str(joint): (i,) for i, joint in enumerate(model.JOINTS)}}
     labels = tuple(wanted) if wanted is not None else tuple(every)[: n + 1 if n > 1 else 1]
@@ -264,7 +267,7 @@ def _selections(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str
 def _advice(
     predictor: Predictor, label: str, encoders: Sequence[int], reference: Estimate, unit: str
 ) -> EncoderAdvice:
-    """Compute the curve and the limits for one set of coarse encoders.
+    """Compute how the estimate changes with the step of some encoders, and their coarsest steps.
 
     Steps are tried in geometric progression until both limits are passed; the curve of all encoders
     extends beyond them.

@@ -164,8 +164,7 @@ class CoarseEncoders:
         return np.full(len(self.reference), np.nan)
 
     def locking(self, delta: Array) -> Array:
-        """Compute how much power of the rounding error passes the low-pass, relative to white
-        noise.
+        """Compute the power of the rounding error behind the low-pass, relative to white noise.
 
         The rounding error is a sawtooth. The result, shape (m,), is the largest power of all
         records and speeds.
@@ -190,10 +189,10 @@ class CoarseEncoders:
         return most
 
     def nodes(self, delta: float, moving: Sequence[int], read: int = 0) -> list[list[Array]]:
-        """Compute the errors of every record at some phases, the nodes of the quadrature.
+        """Compute the errors of every record for several phases of the encoder lines.
 
-        At first there are PHASES nodes. If `read` nodes are known already, as many new ones are
-        computed, in the middle between the known ones.
+        These phases are the nodes of a quadrature. At first there are PHASES nodes. If `read` nodes
+        are known already, as many new ones are computed, in the middle between the known ones.
 
         moving : numbers of the coarse encoders.
         """
@@ -207,14 +206,18 @@ class CoarseEncoders:
         ]
 
     def ratios(self, nodes: Sequence[Sequence[Array]], encoders: Sequence[int]) -> Array:
-        """Compute the ratio of X with these encoders coarse to X without, at every node.
+        """Compute the estimate X with these encoders coarse, divided by X with exact encoders.
 
-        Return the ratios, shape (count, b).
+        nodes : errors of every record, for each phase of the encoder lines.
+
+        Return one row for each phase, shape (count, b).
         """
         return np.array([self._ratio(errors, encoders) for errors in nodes])
 
     def sampled(self, encoders: Sequence[int], delta: float, runs: int | None = None) -> Sampled:
-        """Run CESTAC with these encoders coarse, eqs. (17), (18), (21).
+        """Run CESTAC with the step `delta` on these encoders, the others being exact.
+
+        Eqs. (17), (18), (21).
 
         runs : number of runs; default: that of the settings.
         """
@@ -238,14 +241,14 @@ class CoarseEncoders:
         return self._read(drawn, encoders, delta)
 
     def _counted_at_random(self, delta: float, encoders: Sequence[int], run: int) -> list[Array]:
-        """Draw errors of every record for the law `phase`, with random phases of the encoders."""
+        """Draw errors of every record for encoders that count lines, with random phases."""
         phases = stream(self.task.settings.seed, run, *encoders).random(len(self.root))
         return self._counts(delta, delta * phases, encoders, (run, *encoders, 0))
 
     def _counts(
         self, delta: float, phases: Array, encoders: Sequence[int], key: tuple[int, ...]
     ) -> list[Array]:
-        """Compute the errors of every record for encoders that count steps, with given phases.
+        """Compute the errors of every record for encoders that count lines, at given phases.
 
         key : selects the random numbers of uneven lines, which are the same in every record.
         """
@@ -259,7 +262,7 @@ class CoarseEncoders:
     def _read(
         self, drawn: Sequence[Sequence[Array]], encoders: Sequence[int], delta: float
     ) -> list[Array]:
-        """Compute the errors of the states that are read from simulated positions.
+        """Compute the errors of q, qd and qdd that follow from simulated encoder positions.
 
         drawn : for every record, the positions of each coarse encoder, shape (N,).
 
@@ -304,7 +307,10 @@ class CoarseEncoders:
         return np.asarray(self._solved(coarse) / (self.reference if every else self._solved(exact)))
 
     def _solved(self, parts: Sequence[tuple[States, Array]]) -> Array:
-        """Solve for X from the states of every record and the mask of its rows, bool (n, K)."""
+        """Solve least squares for X from the states of every record.
+
+        Each part has the states of a record and the mask of its rows, bool (n, K).
+        """
         rows = [
             observation_of(
                 self.columns,
@@ -320,9 +326,10 @@ class CoarseEncoders:
 
 
 def mean_change(ratios: Array) -> Array:
-    """Compute the mean change of the estimate and its standard deviation, shape (2, b), %.
+    """Compute the mean change of the estimate over the nodes, and its standard deviation, in %.
 
-    The standard deviation is that of the mean, if the nodes were independent.
+    Return both in one array, shape (2, b). The standard deviation is that of the mean, if the nodes
+    were independent.
 
     ratios : estimates at the nodes over the exact estimate, shape (count, b).
     """

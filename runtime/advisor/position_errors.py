@@ -81,7 +81,7 @@ class Perturbation:
     known: dict[tuple[int, int], Switched] = field(default_factory=dict)
 
     def expected(self, variance: float, encoders: Sequence[int]) -> Array:
-        """Compute the Gram matrices expected if errors of that variance are on the named encoders.
+        """Compute the Gram matrices expected if the given encoders have errors of this variance.
 
         The encoders are numbered from 0; all others are exact.
         """
@@ -123,9 +123,9 @@ class Perturbation:
             gram[j][np.ix_(columns, columns)] += shift.T @ shift + both
 
     def _at(self, switch: Switch, sigma: float) -> Switched:
-        """Interpolate the effect of an error of standard deviation sigma in the speed of a switch.
+        """Interpolate the effect of a velocity error on a switching column.
 
-        The effect is computed at two neighbouring standard deviations (nodes).
+        sigma : standard deviation of the error; the effect is computed at the two nearest nodes.
         """
         node = floor(log(sigma) / log(NODE))
         return self._node(switch, node).between(self._node(switch, node + 1), sigma)
@@ -166,7 +166,7 @@ def perturbation(
     *,
     drives: Drives | None = None,
 ) -> Perturbation:
-    """Prepare the effect of encoder errors on one record.
+    """Compute how errors of the encoders change the normal equations of one record.
 
     Encoders are on the side study.cestac.side. Filters are those of the study, with the median of
     study.cestac.
@@ -216,7 +216,7 @@ def perturbation(
 
 
 def _rows(observation: Observation, j: int) -> Array:
-    """Rows [W_j Y_j] of joint j."""
+    """Join the rows of W and the torques Y of joint j to one matrix [W_j Y_j]."""
     own = observation.joint(j)
     return np.column_stack([observation.W[own], observation.Y[own]])
 
@@ -231,9 +231,10 @@ def _smooth(
     root: Array,
     switching: Sequence[Switch],
 ) -> tuple[Array, Array]:
-    """Compute what errors of variance 1 of each encoder add to the Gram matrices.
+    """Compute what position errors of variance 1 of each encoder add to the Gram matrices.
 
-    Return these matrices, and the sensitivities of the rows to the error of the velocity.
+    Columns that switch sign are left out. Return these additions, and the sensitivities of the rows
+    to the error of the velocity.
 
     kept : states at the kept instants.
     mask : rows used, bool (n, K).

@@ -44,7 +44,7 @@ def reader_advice(
     confirm: bool = True,
     progress: Callable[[], None] = lambda: None,
 ) -> ReaderAdvice:
-    """Compute the advice on real encoders for one reader (positions or counts).
+    """Compute the coarsest steps of real encoders that are read in one way: positions or counts.
 
     reference : estimate of the records as measured, whose deciding parameters decide here.
     selections : numbers (from 0) of the coarse encoders, by label.
@@ -82,12 +82,13 @@ def curves(
     start: float,
     decisive: Sequence[int],
 ) -> dict[str, tuple[Array, Array]]:
-    """Compute the curve of each label: steps, and changes of the estimate at these steps.
+    """Compute, for each choice of coarse encoders, how the estimate changes with their step.
 
     Steps go from `start` down until all changes are below the first limit, and up until all are
     above the last limit. They are finer where constant speeds of the record lock to the sampling.
 
-    Return for each label the steps, shape (m,), and the changes with their standard deviations,
+    A label names a choice. Return for each label the steps, shape (m,), and the changes with their
+    standard deviations,
     shape (m, 2, b), %.
     """
     known: dict[str, dict[float, Array]] = {label: {} for label in selections}
@@ -101,9 +102,10 @@ def curves(
         return float(np.abs(mean_change(known[label][k])[0, decisive]).max(initial=0.0))
 
     def read(k: float, labels: Iterable[str], nodes: int = 0) -> list[str]:
-        """Compute the changes at step number k, at the first phases or at `nodes` more phases.
+        """Compute the changes of the estimate at step number k, for each choice of encoders.
 
-        Return the labels for which this is possible.
+        They are computed at the first phases of the encoder, or at `nodes` more phases. Return the
+        labels of the choices for which this is possible.
         """
         delta = start * LIMIT.READER_RATIO**k
         labels = [label for label in labels if (delta <= coarsest[[*selections[label]]]).all()]
@@ -164,7 +166,7 @@ def curves(
 def vague_steps(
     changes: Mapping[float, Array], decisive: Sequence[int], limit: float
 ) -> list[float]:
-    """Find the steps of a curve next to a limit at which the change is not yet certain enough.
+    """Find the encoder steps next to a limit at which the change is still too uncertain.
 
     The limit is between two steps. A step is returned if the standard deviation of its change moves
     the limit by more than LIMIT.CURVE_SHARPNESS of it, by straight lines on logarithmic axes. If

@@ -48,7 +48,7 @@ FAR = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Switched:
-    """Effect of a velocity error of standard deviation sigma on a column that switches sign.
+    """Effect of a velocity error of standard deviation sigma on a column of W that switches sign.
 
     shift : change of the mean, E f - f, after decimation, shape (K,).
     slope : c_1/sigma at the kept instants, shape (K,); it replaces the derivative.
@@ -114,7 +114,7 @@ def switch_with_error(
 
 
 def _coefficients(switch: Switch, u: Array, m: Array, phi: Array, sigma: float) -> Array:
-    """Compute the scaled Hermite coefficients c_n/sqrt(n!) of a switch, n = 1 ... ORDERS.
+    """Compute the scaled Hermite coefficients c_n/sqrt(n!) of a switching column, n = 1 ... ORDERS.
 
     Return them with one more row, shape (ORDERS + 1, len(u)). This row stands for all higher
     orders: the square root of the variance they contribute, with the sign of the next coefficient.
@@ -150,10 +150,10 @@ class Kernels:
 
 
 def kernels(band: Bandwidth, N: int, factor: int) -> Kernels:
-    """Compute the kernels for series of N samples that are decimated by `factor`.
+    """Compute the Fourier transforms with which variances over N samples are added (Kernels).
 
-    They change little over an eighth of `factor` samples, so sums over this number of samples
-    suffice.
+    factor : the samples are decimated by this factor. Kernels change little over an eighth of it,
+        so sums over this number of samples suffice.
     """
     size = max(1, factor // 8)
     bins = -(-N // size)
@@ -171,7 +171,10 @@ def kernels(band: Bandwidth, N: int, factor: int) -> Kernels:
 
 
 def _summed_variance(coefficients: Array, near: Array, known: Kernels) -> float:
-    """Add c_n(t) c_n(t') rho^n r over all orders n and instants t, t', by Parseval's theorem.
+    """Compute the variance of a switching column, added over all its instants.
+
+    It is the sum of c_n(t) c_n(t') rho^n r over all orders n and instants t, t', by Parseval's
+    theorem.
 
     coefficients : c_n/sqrt(n!) at the samples `near`, shape (ORDERS + 1, len(near)).
     """

@@ -301,8 +301,8 @@ def of_most_evidence(
 def box_moments(a: Array, b: Array) -> tuple[Array, Array, Array]:
     """Compute the log probability that a unit normal variable is between a and b, and derivatives.
 
-    Returns log Z, g = d log Z/dm and H = -d^2 log Z/dm^2, with Z = Phi(b) - Phi(a) and the mean m =
-    0. One of the bounds must be within a few standard deviations of zero.
+    Returns log Z, g = d log Z/dm and H = -d^2 log Z/dm^2 at the mean m = 0, with Z = Phi(b) -
+    Phi(a). One of the bounds must be within a few standard deviations of zero.
     """
     middle, half = np.abs(a + b) / 2, (b - a) / 2  # the side that is nearer to the mean first
     low, high = middle - half, middle + half

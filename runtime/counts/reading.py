@@ -103,7 +103,7 @@ class Reading:
         }
 
     def draw(self, rng: np.random.Generator) -> Array:
-        """Draw positions from the posterior, shape (N, n), in rad or m."""
+        """Draw random positions from their posterior distribution, shape (N, n), rad or m."""
         x = np.array(self.q)
         for part in self.parts:
             drawn = np.stack([each.draw(rng) for each in part.smoothed], axis=1)

@@ -113,7 +113,7 @@ class Smoothed:
         return mean + self.origin * (order == 0), np.sqrt(np.maximum(variance, 0))
 
     def draw(self, rng: np.random.Generator) -> Array:
-        """Draw positions from the posterior, shape (N,)."""
+        """Draw random positions from their posterior distribution, shape (N,)."""
         drawn = self.basis.at_samples(self.read.c + self.read.factor.draw(rng))
         return np.asarray(drawn[: self.basis.N] + self.origin)
 
@@ -172,9 +172,9 @@ class Counts:
     ) -> tuple[Boxes, Posterior]:
         """Estimate the motion from the counts, and check that it agrees with every count.
 
-        The most likely errors of the counts are estimated too: for a long record in its liveliest
-        part, for a motion known from `start` not again. If the motion does not agree with every
-        count, larger errors are tried. Raises InputError if no motion agrees with the counts.
+        The most likely errors of the counts are estimated too: in the liveliest part of a long
+        record, or from the errors in `start`. If the motion does not agree with every count, larger
+        errors are tried. Raises InputError if no motion agrees with the counts.
         """
         start = start if start and start.errors.count in sizes else None
         if start or len(self.y) > 4 * LIVELIEST:

@@ -160,7 +160,10 @@ class Basis:
 
 
 def third_differences(c: Array) -> Array:
-    """Compute c_(i+3) - 3 c_(i+2) + 3 c_(i+1) - c_i of the coefficients c, shape (M,)."""
+    """Compute the third differences of the coefficients c, shape (M,).
+
+    They are c_(i+3) - 3 c_(i+2) + 3 c_(i+1) - c_i.
+    """
     return np.asarray(c[3:] - c[:-3] + 3 * (c[1:-2] - c[2:-1]))
 
 
@@ -189,11 +192,11 @@ class Factor:
         return float(2 * np.log(self.L[0]).sum())
 
     def solve(self, g: Array) -> Array:
-        """Compute A^-1 g for g of shape (P,) or (P, k)."""
+        """Solve A x = g with the precision matrix A, for g of shape (P,) or (P, k)."""
         return np.asarray(dpbtrs(self.L, g, lower=1)[0].reshape(g.shape))
 
     def draw(self, rng: np.random.Generator) -> Array:
-        """Draw a vector from the normal law N(0, A^-1), shape (P,)."""
+        """Draw a random vector from the normal law of mean 0 and covariance A^-1, shape (P,)."""
         z = rng.standard_normal((self.L.shape[1], 1))
         return np.asarray(dtbtrs(self.L, z, uplo="L", trans="T")[0].ravel())
 

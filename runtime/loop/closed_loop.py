@@ -120,7 +120,7 @@ class LoopPart:
         }
 
     def decimated(self, x: Array) -> Array:
-        """Decimate signals of the record, shape (N, n, ...), like Y; the result has shape (n, ..., K)."""
+        """Decimate signals of the record like Y: from shape (N, n, ...) to shape (n, ..., K)."""
         window = np.moveaxis(x[: len(self.record)][self.selection.samples], 0, -1)
         return decimated(
             np.ascontiguousarray(window), self.selection.factor, self.selection.signals.decimate
@@ -184,10 +184,10 @@ class ClosedLoop:
     def simulated(
         self, runs: Sequence[Simulation], observation: Observation, *, exact: bool
     ) -> Observation:
-        """Replace W of `observation` by Z, the same rows and columns computed from the simulated motion.
+        """Replace W of `observation` by Z: the same rows and columns, from the simulated motion.
 
-        exact : use the exact simulated states; else the simulated positions pass through the filters of the
-        record.
+        exact : use the exact simulated states; else the simulated positions pass through the filters
+        of the record.
         """
         assert observation.closed_loop is not None
         states = [
@@ -217,7 +217,10 @@ class ClosedLoop:
         return np.asarray(np.concatenate(by_joint)[observation.closed_loop.rows])
 
     def inertia(self, X: Array) -> Array:
-        """Compute the mean inertia J_j of each joint, shape (n,): the mean of A_jj over the references."""
+        """Compute the mean inertia J_j of each joint over the references, shape (n,).
+
+        J_j is the mean of A_jj, A the inertia matrix with parameters X.
+        """
         functions: Any = self.model
         q = np.concatenate(
             [part.reference.q[:: max(1, len(part.reference) // 500)] for part in self.parts]

@@ -90,9 +90,10 @@ class ControlLaw:
         return len(self.P)
 
     def matrix(self, g: Array, *, ideal: bool) -> Array:
-        """Arrange the numbers of the law for one tick as a matrix, shape (n, columns), a row per joint.
+        """Arrange the numbers of the law for one tick as a matrix with one row per joint.
 
-        g : factor on the torque, shape (n,). ideal : encoder and converter have no steps.
+        g : factor on the torque, shape (n,). ideal : encoder and converter have no steps. The shape is
+        (n, columns).
         """
         vectors = {name: getattr(self, name) for name in VECTORS if name != "g"} | {"g": g}
         if ideal:
@@ -190,8 +191,10 @@ def parameters_of(model: GeneratedModel, controller: Controller | None = None) -
 def discrete_poles(law: ControlLaw, A: Array, B: Array, g: Array) -> Array:
     """Compute the poles of the sampled loop, linearised about a point at rest.
 
-    A : inertia matrix (n, n). B : viscous friction (n, n). The torque is constant between ticks. State:
-    q, qd, y1, y2, I, u. States without effect, such as an integral with gain 0, are left out.
+    A, B : inertia matrix and viscous friction, shape (n, n).
+
+    The torque is constant between ticks. State: q, qd, y1, y2, I, u. States without effect, such as
+    an integral with gain 0, are left out.
     """
     n = law.joints
     T, delay, last, average = law.flags

@@ -262,7 +262,7 @@ def round_function(
     *,
     whole: int,
 ) -> Any:
-    """Make the function of one round: the arm moves until the next slip stops, or for the whole of h.
+    """Make the function of one round: the arm moves until the next slip stops, or for all of h.
 
     whole : 1 for the whole of h. Results: q, qd, the remaining part of h, qdd, f, direction, Y, and
     which slips stopped.

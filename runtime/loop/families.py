@@ -50,7 +50,10 @@ class Family:
         raise NotImplementedError
 
     def joint(self, t: Array, p: Any, math: Any) -> States:
-        """Compute q, qd, qdd of one joint at the times t, shape (N,), from its coefficients p, shape (P,)."""
+        """Compute q, qd, qdd of one joint at the times t, shape (N,), from its coefficients p.
+
+        p has shape (P,).
+        """
         raise NotImplementedError
 
     def guess(self, rng: np.random.Generator, lower: float, upper: float, speed: float) -> Array:
@@ -204,11 +207,11 @@ class Polyline(Family):
 
     @property
     def ramps(self) -> list[tuple[float, float]]:
-        """Start and end time of the motion to each next position, s, before the corners are rounded."""
+        """Start and end time of the motion to each next position, s, if corners were not rounded."""
         raise NotImplementedError
 
     def stride(self, speed: float) -> float:
-        """Return the largest distance between neighbouring positions of a random guess, rad or m."""
+        """Return the largest distance between neighbouring positions of a guess, rad or m."""
         raise NotImplementedError
 
     @property

@@ -77,7 +77,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Fixed:
-    """End of an iteration: last step, list of passes, convergence, and ratio of the last two changes."""
+    """End of an iteration: last step, list of passes, convergence, ratio of the last two changes."""
 
     step: Step
     trail: tuple[dict[str, Any], ...]
@@ -87,7 +87,7 @@ class Fixed:
 
 
 def full(names: Sequence[str], X: Array, every: Sequence[str]) -> Array:
-    """Extend the parameters X of the columns `names` to all base parameters; the others are zero."""
+    """Extend parameters X of the columns `names` to all base parameters; the others are zero."""
     by_name = dict(zip(names, X, strict=True))
     return np.array([by_name.get(name, 0.0) for name in every])
 
@@ -95,8 +95,8 @@ def full(names: Sequence[str], X: Array, every: Sequence[str]) -> Array:
 def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]) -> Array:
     """Choose the parameters X that the iteration starts from.
 
-    `which` : ols (ordinary least squares), values (of the robot file), unit (unit inertias), or values
-    by name.
+    `which` : ols (ordinary least squares), values (of the robot file), unit (unit inertias), or
+    values by name.
     """
     names = start.observation.names
     if not isinstance(which, str):
@@ -136,7 +136,10 @@ def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]
 def iterate(
     loop: ClosedLoop, start: Beginning, update: Callable[[Sequence[Simulation], Array], Step]
 ) -> Fixed:
-    """Find the fixed point of X -> update(simulation with X, X), X the parameters of the columns."""
+    """Iterate X -> update(simulation with X, X) until X no longer changes.
+
+    X holds the parameters of the columns of the rows.
+    """
     options: FixedPointOptions = start.options
     names, every = start.observation.names, loop.model.BASE_PARAMETERS
     X = initial(loop, start, options.start)
@@ -219,7 +222,7 @@ def _simulated(
     J: Array | None,
     remedy: str,
 ) -> tuple[Array, Array, Sequence[Simulation], str]:
-    """Simulate the loop with X; if this fails, halve the step from the last X that could be simulated.
+    """Simulate the loop with X; if this fails, try X halfway to the last X that succeeded.
 
     Returns X, the gains g, the runs, and the reason if no simulation was possible. remedy : advice
     in the error if the first simulation fails.

@@ -96,9 +96,9 @@ def fit(start: Beginning) -> Fitted:
 def hausman(names: Sequence[str], d: Array, U: Array) -> dict[str, Any]:
     """Test whether the difference d of two estimates is larger than its covariance U'U allows.
 
-    d has shape (b,); U has shape (K, b), one row per block of samples. Returns the largest
-    |d_i|/sigma_i with its parameter and, if there are enough blocks, the chi-square statistic with its
-    probability.
+    d has shape (b,); U has shape (K, b), one row per block of samples. Returns the largest d_i
+    relative to its standard deviation, with its parameter and, if there are enough blocks, the
+    chi-square statistic with its probability.
     """
     sigma = np.linalg.norm(U, axis=0)
     z = np.abs(d) / np.where(sigma > 0, sigma, np.inf)

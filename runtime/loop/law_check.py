@@ -121,7 +121,7 @@ def _integral(steps: Array, first: float, bound: float) -> Array:
 
 
 def law_text(fits: Sequence[LawFit]) -> str:
-    """Write which share of the torque the law explains, by joint, and likely causes of a small share."""
+    """Write which share of the torque the law explains, by joint, and causes of a small share."""
     shares = ", ".join(f"{max(one.share, 0.0):.0f} % of joint {one.joint}" for one in fits)
     poor = [one for one in fits if one.share < LIMIT.LAW_POOR]
     if not poor:

@@ -295,7 +295,7 @@ def point_to_point(model: GeneratedModel, settings: Points, rate: float) -> Refe
 
 
 def _unit_piece(x: Array) -> tuple[Array, Array, Array]:
-    """Compute the position (0 to 1), velocity and acceleration of one move at x = t/T from 0 to 1."""
+    """Compute position (0 to 1), velocity and acceleration of one move at x = t/T in [0, 1]."""
     top = 1 / (1 - RAMP)
     up, down = np.clip(x / RAMP, 0, 1), np.clip((1 - x) / RAMP, 0, 1)
     v = top * np.minimum(up**2 * (3 - 2 * up), down**2 * (3 - 2 * down))

@@ -59,7 +59,7 @@ class JointMotion:
 
     @property
     def apart(self) -> str:
-        """Text that says how the simulation differs from the record; "" if it follows the record."""
+        """Text that says how the simulation differs from the record; "" if it does not."""
         if not self.position <= LIMIT.MOTION_APART:
             return f"position of joint {self.joint} off by {self.position:.0f} % of its motion"
         if self.tracking > LIMIT.MOTION_TRACKING and self.position > LIMIT.MOTION_SMALL:

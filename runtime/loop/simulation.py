@@ -243,7 +243,7 @@ class Simulator:
         return steps
 
     def _ticks(self, substeps: int) -> Any:
-        """Return the CasADi function that simulates BLOCK ticks; it is made once for each `substeps`."""
+        """Return the CasADi function that simulates BLOCK ticks; it is made only once."""
         if substeps not in self._compiled:
             tick = tick_function(
                 self.model, self.friction, self.constants, substeps, self.controller.integrator
@@ -312,7 +312,7 @@ def simulate(
 ) -> Simulation:
     """Simulate the closed loop of a controller along its reference.
 
-    records : records that may hold the reference. folder : folder of relative names of reference files.
+    records : records that may hold the reference. folder : folder of relative file names.
     ideal, name : as for `runtime.simulate`.
     """
     X = parameters_of(model, controller)

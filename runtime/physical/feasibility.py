@@ -218,7 +218,7 @@ def nearest_standard(
 ) -> Array:
     """Find the physical standard parameters chi with K chi = X, nearest to those of the robot file.
 
-    start : a chi that fulfils the conditions of a physical robot. It is the result if the solver finds
+    start : a chi that fulfils the conditions of a physical robot; the result if the solver finds
     nothing better.
     """
     scale, unit = scales(physical), units(physical)

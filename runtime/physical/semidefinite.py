@@ -61,7 +61,7 @@ def _clarabel() -> Any:
 
 @dataclass(frozen=True, eq=False)
 class LinearBounds:
-    """Linear inequalities lower <= A chi <= upper, one name per row; infinite if there is no bound."""
+    """Linear inequalities lower <= A chi <= upper, a name per row; infinite if without a bound."""
 
     names: tuple[str, ...]
     A: Array
@@ -346,7 +346,10 @@ class Quadratic:
         self.solver: Any = None
 
     def minimum(self, A: Array, g: Array) -> Array:
-        """Find the chi, shape (p,), that minimises 1/2 chi'A chi - g'chi; zeros if Clarabel finds none."""
+        """Find the chi, shape (p,), that minimises 1/2 chi'A chi - g'chi for this A and g.
+
+        The result is zeros if Clarabel finds no minimum.
+        """
         squares = (A * self.scale * self.scale[:, None])[self.upper]
         linear = -g * self.scale
         if self.solver is None:

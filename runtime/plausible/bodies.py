@@ -6,8 +6,8 @@ with the best weights, in nats,
 
     score = N sum_j log(sigma_j) + D(chi),   sigma_j^2 = max(||Y_j - W_j chi||^2 / N_j, floor_j^2)
 
-N is the number of rows of a joint that count, which is smaller if neighbouring residuals are
-correlated; a difference of 5 is a likelihood ratio of 150. Rows j are those of a torque as it was
+N is the number of independent rows of a joint, which is smaller than that of its rows; a difference
+of 5 is a likelihood ratio of 150. Rows j are those of a torque as it was
 measured, also if a cause changes the torques (`runtime.plausible.trials`).
 
 `Bodies` minimises half the weighted squares and D over the standard parameters of a physical robot
@@ -80,7 +80,7 @@ class Grams:
         return Grams(M.T @ self.of_joints @ M, self.rows, self.measured)
 
     def squares(self, X: Array) -> Array:
-        """Compute the squared norm of the residuals of each joint, ||Y_j - W_j X||^2; (n,)."""
+        """Compute the squared residual norm of each joint, ||Y_j - W_j X||^2, shape (n,)."""
         v = np.append(X, -1.0)
         return np.asarray(np.maximum(self.of_joints @ v @ v, 0.0))
 
@@ -105,7 +105,7 @@ class Grams:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Parameters, residuals by joint, and the score in nats.
+    """Result of one fit: parameters, residuals of each joint, and the score in nats.
 
     Attributes
     ----------
@@ -129,7 +129,7 @@ class Fit:
 def fit_of(grams: Grams, X: Array, N: float, penalty: float = 0.0) -> Fit:
     """Evaluate the parameters X: residuals and error of each joint, and the score.
 
-    N : number of rows of a joint that count.
+    N : number of independent rows of a joint.
     penalty : added to the score, nats.
     """
     sigma, measured = grams.sigma(X), grams.measured
@@ -273,7 +273,7 @@ class Bodies:
         return self.physical.values.get(names[0], 0.0) if single else 0.0
 
     def _pull(self, numbers: list[int], near: Array, linear: Array, size: float) -> None:
-        """Add a distance that draws the parameters with these numbers towards known values.
+        """Add a penalty that draws the parameters with these numbers towards known values.
 
         It is 1/2 x'near x - linear'x + size/2/tolerance^2, x the parameters.
         """
@@ -295,14 +295,19 @@ class Bodies:
         return self.distance(chi) + float(self.heavy @ chi)
 
     def minimum(self, A: Array, g: Array) -> Array:
-        """Find the physical chi that minimises 1/2 chi'A chi - g'chi + D(chi) + price'chi."""
+        """Find the physical parameters chi that minimise a quadratic function plus penalties.
+
+        The function is 1/2 chi'A chi - g'chi + D(chi) + price'chi, D the distance from known values
+        plus the price of the masses.
+        """
         return self.program.minimum(A + self.H, g + self.h - self.heavy - self.price)
 
     def stiffness(self, chi: Array) -> Array:
-        """Compute second derivatives of D, plus those of a logarithmic barrier on the conditions.
+        """Compute the second derivatives of the penalty D plus those of a barrier.
 
-        The barrier has the weight LIMIT.WEAK_PRICE. It makes the matrix large in the directions in
-        which parameters would leave their bounds.
+        The barrier is logarithmic, has the weight LIMIT.WEAK_PRICE, and bounds the parameters by
+        the physical conditions. It makes the matrix large in the directions in which parameters
+        would leave their bounds.
         """
         B = self.H.copy()
         sizes = [
@@ -322,7 +327,7 @@ class Bodies:
 def physical_fit(grams: Grams, bodies: Bodies, N: float, sigma: Array, rounds: int = 8) -> Fit:
     """Fit the parameters of a physical robot, near the known values of `bodies`.
 
-    N : number of rows of a joint that count.
+    N : number of independent rows of a joint.
     sigma : residuals of the joints that give the first weights; each fit gives new ones, at most
         `rounds` times.
     """

@@ -90,9 +90,9 @@ class Case:
         return np.array([unit == "rad" for unit in self.units])
 
     def limits(self, key: str, *shape: int) -> Array | None:
-        """Read the joint limits of the robot file named `key`, for instance qd; shape (n, *shape).
+        """Read the limits of q, qd, qdd or tau (`key`) of each joint from the robot file.
 
-        None if the file does not give them in this shape.
+        Return an array of shape (n, *shape), or None if the file does not give them in this shape.
         """
         given = np.asarray(dict(getattr(self.model, "LIMITS", {}) or {}).get(key, ()), dtype=float)
         return given if given.shape == (self.samples.n, *shape) else None

@@ -107,7 +107,7 @@ class Cause:
         return still and self.rate == 1 and not self.constants
 
     def states(self, samples: Samples) -> tuple[Array, Array, Array]:
-        """Apply the change to the states of the samples: return q, qd, qdd, shape (K, n) each."""
+        """Compute the changed states q, qd and qdd of the samples, shape (K, n) each."""
         q = samples.q @ self.P.T + self.p
         qd = self.rate * samples.qd @ self.P.T
         qdd = self.rate**2 * samples.qdd @ self.P.T
@@ -189,7 +189,7 @@ class Robot:
         return np.where(np.arange(self.n) == j, value, others)
 
     def positions(self, E: Array) -> Maps:
-        """Apply the matrix E to the position columns of the files; return P and p.
+        """Convert a change E of the position columns of the files into a change of joint positions.
 
         For files on the side of the motors, q' = R^-1 E R (q - offset) + offset, with R the gear
         ratio.
@@ -200,7 +200,7 @@ class Robot:
         return {"P": E}
 
     def torques(self, E: Array) -> Maps:
-        """Apply the matrix E to the torque columns of the files; return T.
+        """Convert a change E of the torque columns of the files into a change of joint torques.
 
         For files on the side of the motors, T = R' E R'^-1, with R the gear ratio.
         """
@@ -278,12 +278,15 @@ class Row:
 
 
 def study(robot: Robot) -> Iterator[Item]:
-    """Yield one item without words, for a cause that concerns the whole study."""
+    """Yield one empty item, for a cause that concerns the whole study and not single joints."""
     yield {}
 
 
 def several_joints(robot: Robot) -> Iterator[Item]:
-    """Yield one item for the whole study if the robot has more than one joint."""
+    """Yield one empty item if the robot has more than one joint.
+
+    The cause then concerns all joints together.
+    """
     yield from [{}] if robot.n > 1 else []
 
 
@@ -310,7 +313,7 @@ def turning_joints(robot: Robot) -> Iterator[Item]:
 
 
 def turns(robot: Robot) -> Iterator[Item]:
-    """Yield each revolute joint with each angle of TURNS, by which its zero may be wrong."""
+    """Yield each revolute joint with 90, -90 and 180 degrees, by which its zero may be wrong."""
     for item in turning_joints(robot):
         for text, angle in TURNS.items():
             yield {**item, "turn": text, "angle": angle}
@@ -347,9 +350,9 @@ def torque_units(robot: Robot) -> Iterator[Item]:
 
 
 def position_units(robot: Robot) -> Iterator[Item]:
-    """Yield each unit for which positions may have been mistaken, for instance degrees read as rad.
+    """Yield each mistake of the unit of positions, for instance degrees that are read as rad.
 
-    The unit concerns all revolute joints or all prismatic joints.
+    It concerns all revolute joints or all prismatic joints.
     """
     for unit, factor, turning, mistake in (
         ("deg", DEGREE, True, "degrees are read as rad"),
@@ -364,7 +367,7 @@ def position_units(robot: Robot) -> Iterator[Item]:
 
 
 def position_unit_of_joints(robot: Robot) -> Iterator[Item]:
-    """Yield each unit for which the position of a single joint may have been mistaken.
+    """Yield each mistake of the unit of a single joint position, such as degrees read as rad.
 
     Only if the robot has several joints of this kind (revolute or prismatic).
     """
@@ -407,17 +410,20 @@ def known_torques(robot: Robot) -> Iterator[Item]:
 
 
 def geared(robot: Robot) -> Iterator[Item]:
-    """Yield one item for the whole study if the robot has gears."""
+    """Yield one empty item if the robot has gears, whose ratio may be missing or applied twice."""
     yield from [{}] if not np.allclose(robot.R, np.eye(robot.n)) else []
 
 
 def with_constants(robot: Robot) -> Iterator[Item]:
-    """Yield one item for the whole study if the drives have torque constants."""
+    """Yield one empty item if the drives have torque constants.
+
+    They may be missing, or applied by mistake.
+    """
     yield from [{}] if not np.allclose(robot.constant, np.eye(robot.n)) else []
 
 
 def with_offsets(robot: Robot) -> Iterator[Item]:
-    """Yield one item for the whole study if the drives have position offsets."""
+    """Yield one empty item if the drives have position offsets, which may be missing or wrong."""
     yield from [{}] if robot.offset.any() else []
 
 
@@ -458,7 +464,7 @@ def axes(robot: Robot) -> Iterator[Item]:
 
 
 def alphas(robot: Robot) -> Iterator[Item]:
-    """Yield the angle alpha of each frame, turned by 90, -90 or 180 degrees."""
+    """Yield each frame with its angle alpha changed by 90, -90 and 180 degrees."""
     for frame in robot.frames:
         for text, turn in TURNS.items():
             before = robot.free[f"free_alpha{frame}"]
@@ -520,7 +526,7 @@ def odd_tables(robot: Robot) -> Iterator[Item]:
 
 
 def conventions(robot: Robot) -> Iterator[Item]:
-    """Yield alpha and d of all frames, each copied from the frame before or from the frame after.
+    """Yield the frame table with alpha and d of each frame copied from the frame before or after.
 
     This corrects a table in the distal convention that is read as Khalil's, or the reverse.
     """
@@ -567,17 +573,17 @@ def slow_joints(robot: Robot) -> Iterator[Item]:
 
 
 def in_positions(robot: Robot, item: Item) -> Maps:
-    """Apply the matrix E of an item to the columns of positions."""
+    """Change the position columns by the matrix E of an item, for instance a reversed sign."""
     return robot.positions(item["E"])
 
 
 def in_torques(robot: Robot, item: Item) -> Maps:
-    """Apply the matrix E of an item to the columns of torques."""
+    """Change the torque columns by the matrix E of an item, for instance a reversed sign."""
     return robot.torques(item["E"])
 
 
 def in_both(robot: Robot, item: Item) -> Maps:
-    """Apply the matrix E of an item to the columns of positions and to those of torques."""
+    """Change position and torque columns by the matrix E of an item, such as a reversed sign."""
     return robot.positions(item["E"]) | robot.torques(item["E"])
 
 
@@ -624,9 +630,9 @@ def constants_as_currents(robot: Robot) -> Array:
 
 
 def exchanged_ratios(robot: Robot, item: Item) -> Maps:
-    """Correct exchanged gear ratios of two joints.
+    """Exchange the gear ratios of two joints in the signals that the files give for the motors.
 
-    Only torques or positions that the files give on the side of the motors change.
+    Only torques or positions on the side of the motors change.
     """
     factors = item["factors"]
     maps = {"T": np.diag(factors)} if robot.sides[1] == "motor" else {}
@@ -634,12 +640,12 @@ def exchanged_ratios(robot: Robot, item: Item) -> Maps:
 
 
 def gravity(item: Item) -> Maps:
-    """Set gravity to the vector g of an item, m/s^2 in frame 0."""
+    """Change gravity in frame 0 to the vector g of an item, m/s^2."""
     return {"constants": dict(zip(GRAVITY, map(float, item["g"]), strict=True))}
 
 
 def chosen(item: Item) -> Array:
-    """Make a diagonal matrix: the factor of an item for its chosen joints, 1 for all others."""
+    """Make the diagonal matrix that multiplies the positions of some joints by a unit factor."""
     return np.diag(np.where(item["chosen"], item["factor"], 1.0))
 
 

@@ -170,7 +170,7 @@ class TorqueUnit(Part):
     title = "Unit of the torques"
 
     def warnings(self) -> tuple[str, ...]:
-        """Return the question to the user, as a tuple."""
+        """Return the question whether the torques have another unit, as a tuple."""
         return (self.sentence,)
 
 

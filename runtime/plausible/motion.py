@@ -84,10 +84,10 @@ def standing_share(samples: Samples, study: Study) -> Array:
 
 
 def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ...] | None:
-    """Propose the threshold `rows.low_speed` that leaves out rows of joints at rest, rad/s or m/s.
+    """Propose the speed threshold `rows.low_speed` that leaves out the rows of joints at rest.
 
-    One number for all joints if their thresholds are similar, otherwise one for each joint. None if
-    every joint rests in at most LIMIT.REST_SHARE of its rows.
+    In rad/s or m/s: one number for all joints if their thresholds are similar, otherwise one for
+    each joint. None if every joint rests in at most LIMIT.REST_SHARE of its rows.
     """
     if standing_share(samples, study).max() <= LIMIT.REST_SHARE:
         return None
@@ -100,7 +100,10 @@ def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ..
 
 
 def speed_of_rest(problem: Problem) -> float | tuple[float, ...] | None:
-    """Propose the threshold `rows.low_speed` for the records of a problem."""
+    """Propose the speed threshold that leaves out rows at rest, for the records of a problem.
+
+    See `low_speed_of_rest`.
+    """
     return low_speed_of_rest(samples_of(problem.prepared, problem.settings), problem.settings)
 
 
@@ -128,7 +131,7 @@ def motion_excites(case: Case) -> Answer | None:
 
 
 def excited(observation: Observation, signals: Signals, rate: float) -> Answer | None:
-    """Check whether the motion of these rows determines every parameter.
+    """Check whether the rows of one observation determine every parameter.
 
     None if W is rank-deficient, which the fit itself reports, or if a torque is zero throughout.
     """
@@ -150,9 +153,10 @@ def excited(observation: Observation, signals: Signals, rate: float) -> Answer |
 
 
 def unexcited_shares(observation: Observation, signals: Signals, rate: float) -> dict[str, float]:
-    """Compute share_i of each parameter (see the module), %, by parameter name.
+    """Predict the standard deviation of each parameter, in % of its largest possible value.
 
-    Raises LinAlgError if W is rank-deficient, and InputError if a torque is zero throughout.
+    It is share_i of the module docstring, by parameter name. Raises LinAlgError if W is
+    rank-deficient, and InputError if a torque is zero throughout.
     """
     s = np.array(
         [

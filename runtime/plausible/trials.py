@@ -68,7 +68,7 @@ class Trial:
         Fit under the conditions of a physical robot; None if it was not made because a simpler one
         shows that it cannot win.
     gain : float, nats
-        Score of the study as given minus that of this fit; some causes have a price on it.
+        Score of the study as given minus that of this fit, less a price for some causes.
     equivalent : bool
         Whether no fit can distinguish the cause from the study as given.
     """
@@ -95,7 +95,7 @@ class Baseline:
         Length of the robot.
     bodies : Bodies
     N : float
-        Number of rows of a joint that count, fewer than there are if residuals are correlated.
+        Number of independent rows of a joint.
     free, given : Fit
         Fit of free parameters by least squares, and fit of a physical robot.
     F : ndarray, shape (n, n)
@@ -115,10 +115,10 @@ class Baseline:
     F: Array
 
     def regressor(self, cause: Cause) -> Array | None:
-        """Evaluate the regressor of the study with a cause corrected, shape (K, n, b).
+        """Evaluate the regressor of the study after one cause of error is corrected.
 
-        Its columns are the standard parameters if the table of frames changes. None if it cannot be
-        evaluated.
+        Its columns are the standard parameters if the table of frames changes. Its shape is (K, n,
+        b); None if it cannot be evaluated.
         """
         if cause.on_torques:
             return self.D
@@ -130,9 +130,10 @@ class Baseline:
             return None
 
     def rows(self, cause: Cause) -> tuple[Array, Array, Array] | None:
-        """Form the rows of the study with a cause corrected, on the side of the files.
+        """Form the regressor and the torques of the study after one cause of error is corrected.
 
-        Return the regressor F T^-1 W', the torques F tau - F T^-1 known, and the rows used, bool
+        On the side of the files, return the regressor F T^-1 W', the torques F tau - F T^-1 known,
+        and the rows used, bool
         (K, n). Together they are T tau - known = W' X', multiplied by F T^-1. So every cause
         explains the same measured torques F tau, and residuals of coupled motors are not mixed.
         None if the regressor cannot be evaluated.
@@ -172,7 +173,10 @@ class Baseline:
         return np.asarray(Q[:, np.abs(np.diag(R)) > 1e-9])
 
     def grams(self, cause: Cause) -> Grams | None:
-        """Form the normal equations with a cause corrected; None if they cannot be evaluated."""
+        """Form the normal equations of the study after one cause of error is corrected.
+
+        None if the regressor cannot be evaluated.
+        """
         rows = self.rows(cause)
         return None if rows is None else Grams.of(*rows, self.tau)
 
@@ -202,9 +206,10 @@ class Baseline:
         return how(self.standard(grams), self.bodies, self.N, sigma)
 
     def trial(self, cause: Cause, sigma: Array | None = None) -> Trial:
-        """Fit a cause under the conditions of a physical robot, and compute its gain.
+        """Fit a physical robot after one cause of error is corrected, and compute the gain.
 
-        The number of rows that count is the larger one of the study and of the cause.
+        The gain is that of the score, in nats. The number of independent rows is the larger one of
+        the study and of the cause.
 
         sigma : residuals of the joints that give the first weights; default: those of least
             squares.
@@ -220,10 +225,10 @@ class Baseline:
         return Trial(cause, fit, gain)
 
     def unseen(self, cause: Cause) -> float:
-        """Compute the score of a cause on rows that were not fitted, in nats.
+        """Compute how well a study with one cause corrected predicts rows that were not fitted.
 
         The rows are divided into two parts, of alternating blocks of time. The fit of each part
-        predicts the other part; a smaller score is better.
+        predicts the other part; the result is the score in nats, and smaller is better.
         """
         rows = self.rows(cause)
         if rows is None:
@@ -250,7 +255,7 @@ class Baseline:
         return float((left / np.where(size > 0, size, 1.0)).max(initial=0.0))
 
     def hides(self, cause: Cause) -> bool:
-        """Whether no fit can distinguish a cause from the study as given.
+        """Whether no fit can distinguish a study with one cause corrected from the study as given.
 
         If so, the rows of the cause are in the span of W, and a physical robot explains both
         equally well. The columns are tested in random combinations, together with the change of the
@@ -274,7 +279,7 @@ class Baseline:
 
     @cached_property
     def normal(self) -> tuple[Array, Array, Array, Array]:
-        """Quantities of the physical fit of the study, around which the numbers xi are estimated.
+        """Linearisation of the physical fit of the study, to estimate an unknown number xi.
 
         These are W over the standard parameters, shape (K, n, p), the torques it explains, shape
         (K, n), the residuals e divided by sigma, shape (K, n), and the matrix A + B.
@@ -287,7 +292,12 @@ class Baseline:
         return W, explained, e, A + self.bodies.stiffness(self.given.X)
 
     def effect(self, change: Callable[[float], Cause]) -> Array:
-        """Compute the derivative J = d tau/d xi of the torques of the study by xi, shape (K, n)."""
+        """Compute the derivative of the study's torques by an unknown number xi, shape (K, n).
+
+        The number is for instance a factor or a zero; J = d tau/d xi is a finite difference.
+
+        change : makes the cause for a value of xi.
+        """
         explained = self.normal[1]
         cause = change(LIMIT.DIFFERENCE_STEP)
         rows = self.rows(cause)
@@ -300,7 +310,9 @@ class Baseline:
         return np.asarray((moved - plain) / LIMIT.DIFFERENCE_STEP)
 
     def first_step(self, J: Array) -> tuple[Array, Array] | None:
-        """Estimate the numbers xi to first order, with the parameters of the model free.
+        """Estimate unknown numbers of causes, such as a zero, to first order.
+
+        The parameters of the model are free.
 
         J : effects of a numbers, shape (a, K, n).
 
@@ -385,7 +397,7 @@ def bodies_of(physical: PhysicalModel, size: float, Y: Array, values: bool) -> B
 
 
 def counting_rows(D: Array, Y: Array, mask: Array, X: Array) -> float:
-    """Estimate how many rows of a joint count, on average over the joints that move.
+    """Estimate how many rows of a joint are independent, on average over the joints that move.
 
     The number is smaller than that of the rows, because neighbouring residuals are correlated.
     """
@@ -661,7 +673,7 @@ def _misfit(grams: Grams, X: Array) -> float:
 
 
 def loads(baseline: Baseline) -> list[Trial]:
-    """Try whether the robot had a load: the last link may have other values than in the robot file.
+    """Fit other values of the last link than those of the robot file, as if the robot had a load.
 
     The ten parameters of this link cost half of log N each. The list is empty if the file does not
     give them.

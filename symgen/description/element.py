@@ -158,8 +158,7 @@ class Element:
         return {parameter(name, j): x for name, x in values.items() for j in self.keys}
 
     def _of_key(self, law: Expression, j: int) -> Expression:
-        """Replace fitted scalars in `law` by symbols of key j (vs by vs3), fixed scalars by
-        numbers.
+        """Replace fitted scalars in `law` by symbols of key j (vs3 for vs), fixed ones by numbers.
 
         The transmitted torque tau_model becomes channel.tau_model3.
         """
@@ -303,8 +302,7 @@ def _positions(robot: Any, row: Any) -> tuple[float, float]:
 
 
 def check_channels(robot: Any) -> None:
-    """Check that a channel, a constant that varies with time, is used only as channel.NAME in laws.
-    """
+    """Check that a constant that varies with time (a channel) occurs only in laws."""
     of_frames = [
         getattr(f, name)
         for f in robot.frames

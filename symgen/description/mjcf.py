@@ -1,14 +1,17 @@
-"""MJCF to a Robot, by MuJoCo's own compiler (extra `mjcf`): its bodies and joints become a tree, the tree a table of Khalil frames.
+"""Reader of MJCF files by MuJoCo's own compiler (extra `mjcf`): bodies and joints become a tree.
 
-A body with joints 1 .. k, applied one after the other about the points p_i, is a chain of k links,
-all but the last without mass,
+The tree is then converted to a table of Khalil frames. A body with joints 1 .. k, applied one after
+the other about the points p_i, is a chain of k links, all but the last without mass:
 
     iTb = Trans, Rot of the body;  then for each joint  Trans(p) Rot(axis, q - ref) Trans(-p)  or
     Trans(axis (q - ref))
 
-Along each joint Gamma = ... + armature qdd + damping qd + frictionloss sign(qd) + stiffness (q -
-springref). Relations of joints and of fixed tendons that are linear are solved, exactly, for joints
-that no actuator drives.
+Along each joint,
+
+    Gamma = ... + armature qdd + damping qd + frictionloss sign(qd) + stiffness (q - springref)
+
+Linear relations of joints and of fixed tendons are solved exactly, for joints that no actuator
+drives.
 """
 
 from __future__ import annotations
@@ -40,9 +43,10 @@ JOINT_RELATION = 2  # mjtEq; the others left in the text are relations of tendon
 
 
 def parse_mjcf(content: bytes, file: str, *, exact: bool = False, sites: bool = False) -> Tree:
-    """Links and joints of an MJCF file.
+    """Read the links and joints of an MJCF file as a Tree.
 
-    `exact` as of `read_tree`; `sites`: each is a link on a fixed joint.
+    `exact` is used as in `read_tree`. If `sites` is true, each site becomes a link on a fixed
+    joint.
     """
     mjcf, angles = compiled(content), Angles(exact)
     tree = _tree(mjcf, angles, sites=sites)
@@ -52,20 +56,20 @@ def parse_mjcf(content: bytes, file: str, *, exact: bool = False, sites: bool = 
 
 @dataclass
 class _Growing:
-    """The tree as it grows.
+    """A tree of links and joints under construction, made from a compiled MJCF model.
 
     Attributes
     ----------
     mjcf : Mjcf
-        What MuJoCo compiled, and the lines of it.
+        The model that MuJoCo compiled, and the lines of its parts in the file.
     angles : Angles
-        Of the rotations of bodies and sites.
+        Rounding of the rotations of bodies and sites.
     names : list of str
-        Of the joints, in the order of the model.
+        Names of the joints, in the order of the model.
     links, bare, joints
-        As of `Tree`.
+        As in `Tree`.
     place : mapping
-        Link of each body, and pose (4, 4) of the body in the frame of that link.
+        For each body: its link, and the pose (4, 4) of the body in the frame of this link.
     """
 
     mjcf: Mjcf
@@ -122,7 +126,9 @@ def _tree(mjcf: Mjcf, angles: Angles, *, sites: bool) -> Tree:
 
 
 def _joint_names(model: Any) -> list[str]:
-    """Names of the joints, those without one by their number, each once."""
+    """List the names of the joints, all different; a joint without name is called joint and its
+    number.
+    """
     given = {model.joint(k).name for k in range(model.njnt)}
     names = []
     for k in range(model.njnt):
@@ -134,7 +140,7 @@ def _joint_names(model: Any) -> list[str]:
 
 
 def _new(growing: _Growing, name: str) -> str:
-    """A name that no link has yet."""
+    """Make a link name that is not used yet, from `name` and underscores at its end."""
     while name in growing.links:
         name += "_"
     return name
@@ -145,7 +151,7 @@ def _fixed(name: str, parent: str, pose: Array) -> Joint:
 
 
 def _pose(position: Array, quaternion: Array) -> Array:
-    """(4, 4) of a position and a unit quaternion w, x, y, z."""
+    """Compute the pose, shape (4, 4), for a position and a quaternion w, x, y, z."""
     w, x, y, z = (float(c) for c in quaternion / np.linalg.norm(quaternion))
     T = np.eye(4)
     T[:3, :3] = [
@@ -158,7 +164,10 @@ def _pose(position: Array, quaternion: Array) -> Array:
 
 
 def _turned(position: Array, quaternion: Array, what: str, angles: Angles) -> Array:
-    """`_pose` of a body or site, whose roll, pitch and yaw, as a URDF has them, are taken as `angles` says; with a pitch of a quarter turn roll and yaw are one angle."""
+    """Compute the pose of a body or site, with roll, pitch and yaw rounded by the rule in `angles`.
+
+    Roll is 0 if pitch is a quarter turn, because roll and yaw are then one angle.
+    """
     T = _pose(position, quaternion)
     R = T[:3, :3]
     pitch = math.atan2(-R[2, 0], math.hypot(R[0, 0], R[1, 0]))
@@ -171,7 +180,8 @@ def _turned(position: Array, quaternion: Array, what: str, angles: Angles) -> Ar
 
 
 def _body(growing: _Growing, b: int) -> None:
-    """The links of body b: one for each of its joints, or one that is fixed."""
+    """Add the links of body b to the tree: a link for each of its joints, or one on a fixed joint.
+    """
     model = growing.mjcf.model
     name = _new(growing, model.body(b).name or f"body{b}")
     link, pose = growing.place[int(model.body_parentid[b])]
@@ -201,9 +211,10 @@ def _body(growing: _Growing, b: int) -> None:
 
 
 def _joint(growing: _Growing, k: int, parent: str, child: str, pose: Array) -> tuple[Joint, Array]:
-    """Joint k on `parent`, where the body has `pose` at q = ref.
+    """Make joint k between the links `parent` and `child`.
 
-    The pose of the body in the frame of the joint.
+    `pose` is the pose of the body in the frame of `parent` at q = ref. Return the joint, and the
+    pose of the body in the joint frame.
     """
     model, line = growing.mjcf.model, growing.mjcf.joints[k]
     name, kind = growing.names[k], int(model.jnt_type[k])
@@ -252,7 +263,7 @@ def _joint(growing: _Growing, k: int, parent: str, child: str, pose: Array) -> t
 
 
 def _left_out(model: Any) -> list[str]:
-    """Forces that a Robot has no place for, by name."""
+    """Return notes on forces in the model that a Robot cannot store, such as forces of tendons."""
     notes = []
     if names := [model.body(b).name for b in range(model.nbody) if model.body_gravcomp[b]]:
         notes.append(f"gravcomp not read: {', '.join(f'{name!a:.60}' for name in names[:20])}")
@@ -284,9 +295,10 @@ def _left_out(model: Any) -> list[str]:
 
 
 def _relations(growing: _Growing) -> dict[str, Expression]:
-    """Express the joints that linear relations determine by the others.
+    """Solve the linear relations between joints for joints without an actuator, in exact
+    arithmetic.
 
-    Joints without an actuator are eliminated, in exact arithmetic.
+    The result has, for each solved joint, its position as an expression in the other joints.
     """
     model, names = growing.mjcf.model, growing.names
     relations: dict[str, Expression] = {}
@@ -310,7 +322,10 @@ def _relations(growing: _Growing) -> dict[str, Expression]:
 
 
 def _equation(model: Any, names: list[str], e: int, line: int) -> Expression:
-    """Left side of relation e: y1 - y1_0 - a0 - a1 (y2 - y2_0), y a joint position or the length of a fixed tendon."""
+    """Return the expression that relation e sets to zero: y1 - y1_0 - a0 - a1 (y2 - y2_0).
+
+    y is a joint position or the length of a fixed tendon, and y_0 its value at ref.
+    """
     kind, name = int(model.eq_type[e]), model.equality(e).name
     a0, a1, *higher = (ratio(float(x)) for x in model.eq_data[e][:5])
     if any(higher):
@@ -325,7 +340,7 @@ def _equation(model: Any, names: list[str], e: int, line: int) -> Expression:
 
 
 def _deflection(model: Any, names: list[str], kind: int, k: int) -> Expression:
-    """A joint position, or the length of a fixed tendon, less its value at ref."""
+    """Return a joint position, or the length of a fixed tendon, minus its value at ref."""
     if kind == JOINT_RELATION:
         reference = Expression.number(repr(float(model.qpos0[int(model.jnt_qposadr[k])])))
         return Expression.symbol(names[k]) - reference

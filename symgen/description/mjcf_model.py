@@ -1,10 +1,10 @@
-"""An MJCF file as MuJoCo's `MjSpec` compiles it, without what its mechanism does not need: no file
-that it names is opened, nothing is multiplied, nothing is drawn.
+"""Compilation of an MJCF file by MuJoCo's `MjSpec`, with only the parts that the mechanism needs.
 
-Assets, sensors, contacts, cameras and the rest are left out. A geom that is a mesh becomes one
-without mass where its body has an <inertial>, or never moves; a mass that only a mesh would tell is
-refused, and so are elements that replace many others (replicate, composite, flexcomp, attach,
-plugins). Of actuators the names of the joints that they drive are read.
+MuJoCo opens no other file. Assets, sensors, contacts, cameras and similar elements are left out. A
+geom that is a mesh becomes a geom without mass if its body has an <inertial> or never moves; a mass
+that only a mesh would give is refused. Elements that stand for many others (replicate, composite,
+flexcomp, attach, plugins) are refused too. Of actuators, only the names of the driven joints are
+read.
 """
 
 from __future__ import annotations
@@ -42,18 +42,18 @@ TEXTS = re.compile(r"\w*(name|class|joint\d?|tendon\d?|body\d?|model|mesh|materi
 
 @dataclass(frozen=True)
 class Mjcf:
-    """Mechanism of an MJCF file.
+    """The mechanism of an MJCF file: the compiled model, and the lines of its parts in the file.
 
     Attributes
     ----------
     name : str
-        Of the model.
+        Name of the model.
     model : MjModel
-        What MuJoCo compiled.
+        The model that MuJoCo compiled.
     weightless : bool
         Whether gravity is switched off.
     bodies, joints, relations : list of int
-        Line of the file of each body, joint, and relation of joints or tendons, in the order of
+        Line in the file of each body, joint, and relation of joints or tendons, in the order of
         `model`.
     driven : frozenset of str
         Names of the joints that an actuator drives.
@@ -72,9 +72,10 @@ class Mjcf:
 
 
 def with_includes(content: bytes, read: Callable[[str, int], bytes]) -> bytes:
-    """An MJCF file with the content of the files that it includes in their place, each on one line, so that lines of the file stay.
+    """Replace each <include> in an MJCF file by the content of the included file.
 
-    read : gives the bytes of an included file by its name and the line that includes it, or raises
+    The content is written on one line, so that the line numbers of the file stay. `read` returns
+    the bytes of an included file, from its name and the line that includes it, or raises
     DescriptionError.
     """
     parts, end = [], 0
@@ -94,7 +95,11 @@ def with_includes(content: bytes, read: Callable[[str, int], bytes]) -> bytes:
 
 
 def compiled(content: bytes) -> Mjcf:
-    """The mechanism of an MJCF file; DescriptionError, with the line, of what is no plain MJCF."""
+    """Compile an MJCF file and return its mechanism.
+
+    Raises DescriptionError, with the line, if the file is invalid or has elements that are not
+    supported.
+    """
     root = read_elements(content, DEEPEST)
     _refuse(root)
     notes = [f"<{tag}>" for tag in sorted({e.tag for e in root} & {*IGNORED})]
@@ -136,7 +141,7 @@ def compiled(content: bytes) -> Mjcf:
 
 
 def _refuse(root: XmlElement) -> None:
-    """DescriptionError of what is no MJCF, or none that is read."""
+    """Raise DescriptionError if the file is no MJCF, or has elements that are not supported."""
     if root.tag != "mujoco":
         hint = "; a URDF is read from a file that ends in .urdf" if root.tag == "robot" else ""
         raise DescriptionError(f"found <{root.tag[:40]}>; expected <mujoco>{hint}", line=root.line)
@@ -167,7 +172,7 @@ def _refuse(root: XmlElement) -> None:
 
 
 def _is_finite(word: str) -> bool:
-    """Whether a word is no number, or a finite one."""
+    """Whether a word is a finite number, or no number at all."""
     try:
         return isfinite(float(word))
     except ValueError:
@@ -175,7 +180,7 @@ def _is_finite(word: str) -> bool:
 
 
 def _take_out(holder: XmlElement) -> None:
-    """Remove what an element has and the mechanism does not need."""
+    """Remove all child elements, at every depth, that the mechanism does not need."""
     for e in list(holder):
         if _is_left_out(holder, e):
             holder.remove(e)
@@ -197,7 +202,10 @@ def _is_left_out(holder: XmlElement, e: XmlElement) -> bool:
 
 
 def _spec(root: XmlElement) -> tuple[Any, list[int]]:
-    """The MjSpec of a tree of elements, and the line of the file of each line of its text."""
+    """Build the MjSpec of the XML elements, and a list of line numbers.
+
+    The list has, for each line of the text that MuJoCo reads, the line of the original file.
+    """
     try:
         import mujoco
     except ImportError as error:
@@ -212,7 +220,11 @@ def _spec(root: XmlElement) -> tuple[Any, list[int]]:
 
 
 def _errors_with_lines(act: Callable[[], Any], lines: Sequence[int]) -> Any:
-    """Model that MuJoCo compiles; its errors get the line of the file, its remarks on simulation are dropped."""
+    """Call the MuJoCo function `act`; its errors become DescriptionErrors with the line of the
+    file.
+
+    MuJoCo's warnings on the simulation are dropped.
+    """
     import mujoco
 
     before = mujoco.get_mju_user_warning()
@@ -237,9 +249,9 @@ def _errors_with_lines(act: Callable[[], Any], lines: Sequence[int]) -> Any:
 def _take_out_meshes(
     body: Any, lines: Sequence[int], *, moves: bool, from_geoms: bool, all_weighed: bool
 ) -> None:
-    """The geoms of a body, and of those on it, that are meshes weigh nothing.
+    """Replace the meshes of a body and of its child bodies by geoms without mass.
 
-    DescriptionError if their mass matters.
+    Raises DescriptionError if the mass of a moving body depends on a mesh.
     """
     moves = moves or bool(body.joints)
     weighed = (moves or all_weighed) and (from_geoms or not body.explicitinertial)
@@ -255,7 +267,8 @@ def _take_out_meshes(
 
 
 def _no_mesh(geom: Any) -> bool:
-    """Make a mesh a sphere without mass; whether it was one."""
+    """Replace a geom that is a mesh by a sphere without mass; return whether the geom was a mesh.
+    """
     import mujoco
 
     is_mesh = bool(geom.meshname or geom.hfieldname)

@@ -1,16 +1,17 @@
-"""`.par` files of SYMORO, read into a Robot and what it cannot hold as notes.
+"""Reader of SYMORO's `.par` files; notes list the data that a Robot cannot store.
 
     (* Robotname = 'arm' *)   NL = 2   NJ = 2   NF = 2
     Type = 0 serial | 1 tree | 2 closed loops
     ant = {0,1}   sigma = {0,0}   b, d, r, gamma, alpha, mu, theta : NF entries;
     theta_j of a revolute joint is th1, t1 or q1 (+ constant)
     XX ... M, IA, FV, FS : NL entries, a symbol, a number or 0;  G : acceleration of gravity in
-    frame 0, as here
+    frame 0, as in a robot file
 
-Links are 1 .. NL, cut joints NL+1 .. NJ; frame NJ+k, fixed, coincides with cut joint NL+k, so that
-NF = 2 NJ - NL. Comments may be anywhere, lists may break over lines, keys are read in any case,
-Pi and ^ as in Mathematica. The format has no place for the value of a symbol; comments that SYMORO
-skips carry them: `(* constants: D3 = 0.45, g = 9.81 *)`, likewise `values` and `start 1`.
+Links are 1 .. NL, cut joints NL+1 .. NJ; the fixed frame NJ+k coincides with cut joint NL+k, so
+that NF = 2 NJ - NL. Comments are allowed everywhere, a list may extend over several lines, keys may
+be in upper or lower case, and Pi and ^ are allowed as in Mathematica. The format has no field for
+the value of a symbol. Values are given in comments, which SYMORO ignores: `(* constants: D3 = 0.45,
+g = 9.81 *)`, likewise `values` and `start 1`.
 
 W. Khalil, D. Creusot, SYMORO+: a system for the symbolic modelling of robots, Robotica 15, 1997.
 """
@@ -80,20 +81,20 @@ _IDENTITY = "1000010000100001"
 
 @dataclass
 class _Par:
-    """Texts of a file with their lines.
+    """The entries of a `.par` file as text, with their line numbers.
 
     Attributes
     ----------
-    name : str
-        Of the robot, from a comment.
-    lists : mapping
-        Entries of each key, with their lines.
-    numbers : mapping
-        Tables of the comments: constants, values, start 1, ...
-    notes : list of str
-        What was read otherwise than written.
     angles : Angles
         Angles near multiples of pi/12.
+    name : str
+        Name of the robot, from a comment.
+    lists : mapping
+        Entries of each key, each with its line.
+    numbers : mapping
+        Tables in the comments, by name: constants, values, start 1, ...
+    notes : list of str
+        What was read differently from the file.
     """
 
     angles: Angles
@@ -104,7 +105,8 @@ class _Par:
     notes: list[str] = field(default_factory=list)
 
     def line(self, path: Path) -> int:
-        """Line of the entry nearest to the path of a field of the Robot."""
+        """Find the line of the file that gives the field `path` of the Robot, for error messages.
+        """
         key = KEYS.get(str(path[-1]).lower() if path else "", "ant")
         items = self.lists.get(key) or [("", 1)]
         j = path[1] if len(path) > 1 and isinstance(path[1], int) else 1
@@ -114,24 +116,25 @@ class _Par:
 def read_par(
     content: bytes, file: str, constants: Mapping[str, float] | None = None, *, exact: bool = False
 ) -> tuple[Robot, tuple[str, ...]]:
-    """The robot of a `.par` file, and notes on what was read otherwise than written.
+    """Return the Robot of a `.par` file, and notes on data that were changed or left out.
 
     Parameters
     ----------
     content : bytes
-        Of the file.
+        Content of the file.
     file : str
-        Its name.
+        Name of the file.
     constants : mapping, SI and rad
-        Values of the geometric symbols and of gravity; they stand before those of a comment in the
+        Values of the geometric symbols and of gravity. They replace values in a comment of the
         file.
     exact : bool
-        As of `symgen.load_robot`.
+        As in `symgen.load_robot`.
 
     Raises
     ------
     DescriptionError
-        No `.par` file, no robot, or a symbol without value; the message names file and line.
+        The file is no `.par` file, describes no robot, or has a symbol without value; the message
+        names file and line.
     """
     par = _Par(Angles(exact))
     with located(file, par.line):
@@ -153,7 +156,7 @@ def _text(content: bytes) -> str:
 
 
 def _scan(text: str, par: _Par) -> None:
-    """Comments and entries of `text` into `par`."""
+    """Store the comments and entries of the file text in `par`."""
     text = _without_comments(text, par)
     position, end = 0, len(text.rstrip())
     while position < end:
@@ -189,9 +192,9 @@ def _scan(text: str, par: _Par) -> None:
 
 
 def _without_comments(text: str, par: _Par) -> str:
-    """`text` with blanks for its comments, which go into `par`.
+    """Replace the comments in `text` by blanks, and store their content in `par`.
 
-    One pass, however many a file opens.
+    The text is scanned once, however many comments it opens.
     """
     parts, position = [], 0
     while (start := text.find("(*", position)) >= 0:
@@ -220,7 +223,10 @@ def _comment(text: str, line: int, par: _Par) -> None:
 
 
 def _expression(text: str, line: int) -> Expression:
-    """Read an expression of the file: the grammar of robot files, and also Pi, ^, [ ] and capital functions."""
+    """Parse an expression of a `.par` file, whose grammar extends that of robot files.
+
+    Pi, ^, [ ] and function names with a capital letter are also allowed.
+    """
     text = re.sub(r"\b(Pi|PI|Sin|Cos|Tan|Sqrt)\b", lambda word: word.group().lower(), text)
     text = re.sub(r"\b(theta|th|t|q)\((\d+)\)", r"\1\2", text)
     try:
@@ -365,7 +371,10 @@ def _frames(par: _Par, NF: int, *, loops: bool) -> tuple[Frame, ...]:
 
 
 def _variable(e: Expression, j: int, key: str, line: int) -> str:
-    """Name of the joint variable in theta_j or r_j: th1, t1, theta1, q1 or r1, or the only symbol there."""
+    """Find the joint variable in the expression of theta_j or r_j: th1, t1, theta1, q1 or r1.
+
+    Another name is accepted if the expression is just this symbol.
+    """
     names = {"theta": (f"th{j}", f"t{j}", f"theta{j}", f"q{j}"), "r": (f"r{j}", f"q{j}")}[key]
     usual = sorted((s for s in e.symbols if s.lower() in names), key=lambda s: s not in names)
     alone = [s for s in e.symbols if e == Expression.symbol(s)]
@@ -381,7 +390,7 @@ def _variable(e: Expression, j: int, key: str, line: int) -> str:
 
 
 def _rounded(e: Expression, name: str, par: _Par) -> Expression:
-    """Decimal approximations of multiples of pi/12, as programs write them, become exact."""
+    """Replace a decimal that approximates a multiple of pi/12 by the exact multiple."""
     c = e.terms.get(())
     if c is None or len(e.terms) > 2 or not twelfths(float(c), SNAP):
         return e
@@ -392,7 +401,11 @@ def _rounded(e: Expression, name: str, par: _Par) -> Expression:
 def _parameters(
     par: _Par, NL: int, fixed: set[int]
 ) -> tuple[dict[str, float], set[int], dict[str, list[int]]]:
-    """Values by name, links whose ten inertial parameters are 0, and the joints that have Ia, FV, FS."""
+    """Return the parameter values, the massless links, and the joints with Ia, FV or FS.
+
+    A link is massless if its ten inertial parameters are 0 in the file. The joints are listed by
+    family (Ia, FV, FS) of parameters that are not 0 in the file.
+    """
     values: dict[str, float] = {}
     zero: dict[str, set[int]] = {}
     renamed: list[str] = []
@@ -434,7 +447,7 @@ def _value(e: Expression, name: str, line: int) -> float:
 
 
 def _note_rest(par: _Par) -> None:
-    """Notes on what a Robot has no place for."""
+    """Add notes on data in the file that a Robot cannot store, such as external forces."""
     if any(text != "0" for key in WRENCH for text, _ in par.lists.get(key, ())):
         par.notes.append(
             "forces of the environment (FX ... CZ) are not read; a robot here moves freely"

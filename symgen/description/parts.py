@@ -1,4 +1,4 @@
-"""The tables of a robot: rows of the frame table, rows and forms of elements, loops, drives, limits."""
+"""Tables of a robot file: frames, coefficients of elements, loops, drives and limits."""
 
 from __future__ import annotations
 
@@ -105,22 +105,25 @@ class Frame:
 
     @property
     def at_zero(self) -> tuple[Expression, ...]:
-        """The row, in the order of GEOMETRY, without q_j."""
+        """Values of gamma, b, alpha, d, theta and r for the joint position q_j = 0."""
         return self.gamma, self.b, self.alpha, self.d, self.theta0, self.r0
 
     @property
     def theta0(self) -> Expression:
-        """theta_j without q_j."""
+        """Value of theta_j for the joint position q_j = 0, rad."""
         return self.theta - Expression.symbol(self.q) if self.sigma == REVOLUTE else self.theta
 
     @property
     def r0(self) -> Expression:
-        """r_j without q_j."""
+        """Value of r_j for the joint position q_j = 0, m."""
         return self.r - Expression.symbol(self.q) if self.sigma == PRISMATIC else self.r
 
 
 def rows(texts: Mapping[int, str] | str, declared: Declared) -> Mapping[int, Row]:
-    """Rows of joints from their texts {j: text}; the text "all" gives every actuated joint its own."""
+    """Convert the table {j: text} of an element to rows of coefficients of the joint positions.
+
+    The text "all" gives a row for each actuated joint, in which this joint has the coefficient 1.
+    """
     if texts == "all":
         return {f.j: {f.j: ONE} for f in declared.frames if f.mu}
     return reduced(row_of, texts, declared)
@@ -129,7 +132,11 @@ def rows(texts: Mapping[int, str] | str, declared: Declared) -> Mapping[int, Row
 def reduced(
     reduce: Callable[[Expression, tuple[int, ...]], Any], texts: Any, declared: Declared
 ) -> dict[int, Any]:
-    """{j: text} to {j: row or form}."""
+    """Parse each text of a table {j: text}, and convert it by `reduce` to a row or a quadratic
+    form.
+
+    A joint number, or a list of joint numbers, means a row for each joint with its coefficient 1.
+    """
     joints = tuple(f.j for f in declared.frames if f.sigma != FIXED)
     result: dict[int, Any] = {}
     if isinstance(texts, int | list):  # joints, each along itself
@@ -147,7 +154,9 @@ PLANES = {"xy": ("XZ", "YZ", "MZ"), "xz": ("XY", "YZ", "MY"), "yz": ("XY", "XZ",
 
 
 def assumed(table: Mapping[str, str], declared: Declared) -> frozenset[str]:
-    """Standard parameters that a file says are zero, one by one or by the symmetry of a link."""
+    """Find the standard parameters that the file assumes to be zero, by name or by symmetry of a
+    link.
+    """
     names: set[str] = set()
     for key, text in table.items():
         link, plane = re.fullmatch(r"link ([1-9][0-9]*)", key), text.removeprefix("symmetric ")
@@ -169,7 +178,7 @@ def assumed(table: Mapping[str, str], declared: Declared) -> frozenset[str]:
 
 
 def by_joint(texts: Mapping[str, Any], declared: Declared) -> dict[int, Any]:
-    """{q3: x} to {3: x}."""
+    """Replace the keys of a table by joint numbers: {q3: x} becomes {3: x}."""
     for q in texts:
         if not re.fullmatch(r"q[1-9][0-9]{0,8}", q):
             raise DescriptionError(f"{q!r} is no joint; expected q1, q2, ...", path=(q,))
@@ -195,19 +204,22 @@ class Loop:
 
 
 def _of_motors(value: list[float] | float | None, declared: Declared) -> tuple[float, ...]:
-    """One number for each actuated joint."""
+    """Expand a number to one value per actuated joint; a list stays as it is, and None means 0."""
     if isinstance(value, list):
         return tuple(value)
     return tuple(value or 0.0 for f in declared.frames if f.mu)
 
 
 def _of_motors_if_given(value: Any, declared: Declared) -> tuple[float, ...] | None:
-    """One number for each actuated joint; None if none is given: currents are then refused."""
+    """Expand a number to one value per actuated joint; None stays None.
+
+    Measured currents are refused if no torque constant is given.
+    """
     return None if value is None else _of_motors(value, declared)
 
 
 def _rows(value: list[Any], _: Declared) -> tuple[tuple[float, ...], ...]:
-    """Rows of a matrix; a list of numbers is its diagonal."""
+    """Convert a list of rows to a matrix; a list of numbers becomes the diagonal of the matrix."""
     if any(isinstance(x, list) for x in value):
         return tuple(map(tuple, value))
     return tuple(
@@ -264,20 +276,23 @@ class LimitsTable:
 
 
 def parameter(family: str, j: int) -> str:
-    """Name of a standard parameter: family + link, e.g. XX2."""
+    """Build the name of a standard parameter from family and link, for instance XX2."""
     return f"{family}{j}"
 
 
 def row_of(e: Expression, joints: tuple[int, ...]) -> dict[int, Expression]:
-    """The row G of s = G q; raises ValueError if the expression is not linear and homogeneous in the q's."""
+    """Return the row G of coefficients of an expression G q in the joint positions q.
+
+    Raises ValueError if the expression is not linear and homogeneous in the joint positions.
+    """
     what = "a combination of joint positions such as q5 + q6 or 2*q3"
     return {j: c for (j,), c in _cofactors(e, combinations(joints, 1), what).items()}
 
 
 def form_of(e: Expression, joints: tuple[int, ...]) -> dict[tuple[int, int], Expression]:
-    """The symmetric matrix B of the quadratic form q' B q.
+    """Return the symmetric matrix B of an expression that is a quadratic form q' B q.
 
-    Raises ValueError if the expression is not one.
+    Raises ValueError if the expression is not a quadratic form.
     """
     form: dict[tuple[int, int], Expression] = {}
     what = "a quadratic form in the joint positions such as q6**2 + 2*q5*q6"
@@ -290,9 +305,10 @@ def form_of(e: Expression, joints: tuple[int, ...]) -> dict[tuple[int, int], Exp
 def _cofactors(
     e: Expression, products: Iterable[tuple[int, ...]], what: str
 ) -> dict[tuple[int, ...], Expression]:
-    """The constants c of e = sum of c q_i q_j ..., by the joints of each product that occurs.
+    """Return the constant coefficients of the given products of joint positions in `e`.
 
-    Raises ValueError if the expression is not such a sum.
+    The result maps the joints of each product to its coefficient: for e = 2 q5 q6, (5, 6) to 2.
+    Raises ValueError if `e` is not a sum of such products.
     """
     cofactors, rest = {}, e
     for joints in products:

@@ -1,16 +1,18 @@
-"""What a robot is: frames of Khalil and Kleinfinger, elements on its joints, loops, and nothing about how it is derived.
+"""The description of a robot: frames of Khalil and Kleinfinger, elements on the joints, and loops.
 
 Modified Denavit-Hartenberg [KK86]: frame j, antecedent i = ant(j), sigma_j = 0 revolute, 1
 prismatic, 2 fixed,
 
     iTj = Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r) .
 
-Signs, stated once. `gravity` is the acceleration of gravity in frame 0 (m/s^2); a body at rest with
-z0 up has gravity (0, 0, -g). Joint torque Gamma is what the actuator delivers, so friction enters
-with a plus: Gamma = A qdd + H + FV qd + FS sign(qd) + OFFSET. Inertia XX..ZZ are the tensor
-elements (XY =
--integral x y dm) about the origin
-of the link frame, MX MY MZ = M (centre of mass). SI and rad.
+Signs: `gravity` is the acceleration of gravity in frame 0 (m/s^2); on a robot with z0 up, gravity
+is (0, 0, -g). The joint torque Gamma is the torque that the actuator delivers, so friction has a
+plus sign:
+
+    Gamma = A qdd + H + FV qd + FS sign(qd) + OFFSET
+
+Inertia parameters XX .. ZZ are the tensor elements about the origin of the link frame (XY =
+-integral x y dm). First moments are MX MY MZ = M (centre of mass). Units are SI and rad.
 
 [KK86] W. Khalil, J.-F. Kleinfinger, A new geometric notation for open and closed-loop robots, ICRA
 1986.
@@ -91,12 +93,15 @@ def _frames(rows: Mapping[int, Frame], declared: Declared) -> tuple[Frame, ...]:
 
 
 def _massless(links: list[int], declared: Declared) -> frozenset[int]:
-    """These links, and the ends that a distal table gets."""
+    """Return the massless links: those of the file, and the end frames added to a classic table."""
     return frozenset((*links, *(f.j for f in declared.frames[declared.rows :])))
 
 
 def _rows_by_name(name: str) -> BeforeValidator:
-    """Rows of a table with their keys as the field `name`."""
+    """Make a validator that stores the key of each row of a table in the row, as the field `name`.
+
+    For instance, the row with the key 1 in `frames` gets the field j = 1.
+    """
 
     def row_of(key: Any, row: Any) -> Any:
         return {name: Given(key), **row} if isinstance(row, dict) else row
@@ -110,9 +115,10 @@ def _rows_by_name(name: str) -> BeforeValidator:
 
 @dataclass(frozen=True, config=CONFIG)
 class Robot:
-    """A mechanism, complete and checked.
+    """The complete, checked and immutable description of a robot, in SI units and rad.
 
-    Raises DescriptionError, with the path of the field, if it is none. Numbers in SI and rad.
+    Raises DescriptionError, with the path of the wrong field, if the fields make no valid
+    mechanism.
     """
 
     name: Annotated[str, Field(description="identifier; names the emitted module")]
@@ -233,7 +239,7 @@ class Robot:
         check_robot(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle by the fields, because read-only tables cannot be copied."""
+        """Pickle the fields as ordinary tables, because read-only tables cannot be pickled."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         plain: dict[str, Any] = {
             k: dict(x) if isinstance(x, MappingProxyType) else x for k, x in values.items()
@@ -245,11 +251,11 @@ class Robot:
 
     @cached_property
     def _hash(self) -> int:
-        """Made once: what is kept of a robot is looked up by it."""
+        """Hash of the robot, computed only once because caches look up robots by it."""
         return hash((self.name, self.frames, self.gravity, self.sha256))
 
     def frame(self, j: int) -> Frame:
-        """Frame number j."""
+        """Return the frame with the number j."""
         return self._by_number[j]
 
     @cached_property
@@ -258,12 +264,12 @@ class Robot:
 
     @cached_property
     def moving(self) -> tuple[int, ...]:
-        """Numbers of the joints that move (sigma 0 or 1), the cut ones included."""
+        """Numbers of the revolute and prismatic joints, including the cut joints of loops."""
         return tuple(f.j for f in self.frames if f.sigma != FIXED)
 
     @cached_property
     def joints(self) -> tuple[int, ...]:
-        """Numbers of the actuated joints: the order of q, qd, qdd, Gamma."""
+        """Numbers of the actuated joints, in the order of q, qd, qdd and Gamma."""
         return tuple(f.j for f in self.frames if f.mu)
 
     @cached_property
@@ -273,15 +279,16 @@ class Robot:
 
     @cached_property
     def start(self) -> dict[int, float]:
-        """Start positions of the loops, rad or m, which select the assembly mode."""
+        """Joint positions, rad or m, that select the assembly mode of the loops, by joint number.
+        """
         return {j: x for loop in self.loops for j, x in loop.start.items()}
 
     @cached_property
     def longest(self) -> float:
-        """Longest length of the frames at the constants of the file, m; 1 if all are zero.
+        """Largest of the lengths b, d and r in the frame table, m; 1 if all are zero.
 
-        For a robot with loops, only frames around the loops count, because the arm that carries them
-        may be far larger.
+        For a robot with loops, only frames around the loops count, because the arm that holds the
+        loops may be far larger.
         """
         around = {j for l in self.loops for j in {*self.path(l.cut)} ^ {*self.path(l.twin)}}
         frames = [f for f in self.frames if not around or f.j in around]
@@ -290,17 +297,21 @@ class Robot:
 
     @cached_property
     def cut(self) -> frozenset[int]:
-        """Frames without a link: the cut joint of each loop and its twin."""
+        """Numbers of the frames without a link: the cut joint of each loop, and its twin frame."""
         return frozenset(k for loop in self.loops for k in (loop.cut, loop.twin))
 
     @cached_property
     def links(self) -> tuple[int, ...]:
-        """Numbers of the links that carry inertial parameters."""
+        """Numbers of the links that have inertial parameters."""
         return tuple(f.j for f in self.frames if f.j not in self.cut and f.j not in self.massless)
 
     @cached_property
     def parameters(self) -> tuple[str, ...]:
-        """Names of the standard parameters in the order of eq. (4): link by link, then further families in file order."""
+        """Names of the standard parameters: link by link, then of further elements in file order.
+
+        For each link, the order is that of eq. (4): XX .. ZZ, MX, MY, MZ, M, then Ia, FV, FS and
+        OFFSET, as far as the robot has them.
+        """
         by_family = {e.family: e for e in self.elements}
         names: list[str] = []
         for f in self.frames:
@@ -318,24 +329,32 @@ class Robot:
 
     @cached_property
     def channels(self) -> dict[str, tuple[str, ...]]:
-        """Parameters whose laws read each channel (a constant that is a function of time), by channel."""
+        """For each channel (a constant that varies with time): the parameters whose laws depend on
+        it.
+        """
         read = [(c, parameter(e.family, j)) for e in self.elements for j in e.keys
                 for c in e.channels(j)]  # fmt: skip
         return {c: tuple(name for own, name in read if own == c) for c, _ in read}
 
     @property
     def loaded(self) -> tuple[str, ...]:
-        """Parameters whose laws read the torque of the rest of the model; such a robot has no forward dynamics."""
+        """Parameters of friction laws that depend on the torque that the joint transmits.
+
+        A robot with such parameters has no forward dynamics.
+        """
         read = (own for c, own in self.channels.items() if c.startswith(TRANSMITTED))
         return tuple(name for own in read for name in own)
 
     def root(self, loop: Loop) -> int:
-        """The last frame that carries both ends of a loop; joints before it turn the whole loop."""
+        """Find the last frame that both branches of a loop have in common.
+
+        The joints up to this frame move the whole loop. The result is 0 for the base.
+        """
         twin = self.path(loop.twin)
         return max((j for j in self.path(loop.cut) if j in twin), key=twin.index, default=0)
 
     def path(self, j: int) -> tuple[int, ...]:
-        """Frames from the base to j, including j."""
+        """List the frames from the base (not included) to frame j (included)."""
         frames: list[int] = []
         while j:
             frames.insert(0, j)
@@ -344,9 +363,10 @@ class Robot:
 
 
 def one_joint_parameters(robot: Robot, families: Collection[str]) -> set[str]:
-    """Find the parameters of `families`, such as FV, that a format with one number per joint can hold.
+    """Find the parameters of `families`, such as FV, that a format with one number per joint can
+    hold.
 
-    They act on one joint alone, and alike in both directions.
+    Such a parameter acts on one joint alone, and equally in both directions of motion.
     """
     return {
         parameter(e.family, j)

@@ -1,4 +1,7 @@
-"""A robot file as data: its JSON Schema, and reading it into a Robot, with what is wrong in a sentence that names the field."""
+"""JSON Schema of robot files, and conversion of the data in a robot file to a Robot.
+
+Error messages name the wrong field.
+"""
 
 from __future__ import annotations
 
@@ -25,9 +28,9 @@ CONVENTIONS = {
 
 
 def robot_of(data: Mapping[str, Any], file: str, sha256: str) -> Robot:
-    """The Robot of a robot file of version SCHEMA.
+    """Build the Robot from the data of a robot file, and check all fields.
 
-    DescriptionError carries the path of the field at fault.
+    Raises DescriptionError with the path of the wrong field.
     """
     data = {"file": Given(file), "sha256": Given(sha256), **data}
     columns = data.get("columns") or {}
@@ -70,7 +73,8 @@ def robot_of(data: Mapping[str, Any], file: str, sha256: str) -> Robot:
 
 
 def _with_columns(data: dict[str, Any]) -> dict[str, Any]:
-    """`columns` among the elements, which they are."""
+    """Move the table `columns` of a robot file into its `elements`, because columns are elements.
+    """
     columns, elements = data.pop("columns", {}), data.get("elements", {})
     if not columns:
         return data
@@ -87,7 +91,7 @@ def _with_columns(data: dict[str, Any]) -> dict[str, Any]:
 
 @cache
 def json_schema() -> dict[str, Any]:
-    """JSON Schema of a robot file, for editors."""
+    """Return the JSON Schema of robot files, by which editors check and complete a file."""
     schema = TypeAdapter(Robot).json_schema()
     version = {"description": "schema version", "title": "Symgen", "type": "integer"}
     convention = {
@@ -117,12 +121,12 @@ def json_schema() -> dict[str, Any]:
 
 
 def schema_text() -> str:
-    """Text of robot.schema.json, which is installed in this folder."""
+    """Return the text of robot.schema.json, the schema file that is installed in this folder."""
     return json.dumps(json_schema(), indent=2, ensure_ascii=False) + "\n"
 
 
 def schema_file() -> pathlib.Path:
-    """The installed robot.schema.json."""
+    """Return the path of the installed file robot.schema.json."""
     return pathlib.Path(__file__).with_name("robot.schema.json")
 
 
@@ -138,9 +142,10 @@ _UNKNOWN, _OURS = "unexpected_keyword_argument", "described"
 
 
 def explain(error: ValidationError) -> DescriptionError:
-    """The first thing that is wrong.
+    """Convert a pydantic error to a DescriptionError that explains its most important problem.
 
-    A misspelt key comes before the one it leaves missing, what an expression says after both.
+    An unknown key comes first, because a misspelt key also makes another key missing. Errors inside
+    expressions come last.
     """
     first = min(
         error.errors(include_url=False), key=lambda e: (e["type"] != _UNKNOWN, e["type"] == _OURS)
@@ -183,7 +188,7 @@ def explain(error: ValidationError) -> DescriptionError:
 
 
 def _advice(path: Path, given: Any, message: str) -> str:
-    """Remedy, if a value of the wrong type shows what was meant."""
+    """Return a hint if a wrong value shows what the user probably meant, else ""."""
     if path[-1:] == ("sigma",):
         return ": 0 revolute, 1 prismatic, 2 fixed"
     if path[:2] == ("drives", "ratio"):
@@ -196,7 +201,7 @@ def _advice(path: Path, given: Any, message: str) -> str:
 
 
 def _keys(path: Path) -> list[str]:
-    """The keys a table may have."""
+    """List the keys that the table at `path` in a robot file may have."""
     schema = json_schema()
     if path:
         table = schema["properties"][str(path[0])]

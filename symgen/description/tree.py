@@ -1,10 +1,12 @@
-"""A tree of links and joints with any axes, as URDF and MJCF describe it: what both are read into, and
-what becomes a table of Khalil frames; and part of one: joints held at positions, of a chain from
-`base` to `tip` all but those between these two links, at zero.
+"""A robot as a tree of links and joints with axes in any direction, read from a URDF or MJCF file.
 
-A joint that is held is a fixed joint with the pose of that position; what follows it stands where
-its relation says. The inertia of a link that no longer moves belongs to the body that holds it, as
-with any fixed joint.
+The tree is later converted to a table of Khalil frames. A part of the tree can be selected: some
+joints are held at given positions, and for a chain from `base` to `tip` all joints that are not
+between these two links are held at zero.
+
+A held joint becomes a fixed joint with the pose of that position. A joint that follows held joints
+has the position that its relation gives. The inertia of a link that no longer moves belongs to the
+body that holds the link, as with any fixed joint.
 """
 
 from __future__ import annotations
@@ -28,7 +30,7 @@ MOVING, FIXED_TYPE, FREE_TYPE = ("revolute", "continuous", "prismatic"), "fixed"
 
 @dataclass(frozen=True)
 class Inertial:
-    """Mass and inertia of a link.
+    """Mass, centre of mass and inertia tensor of a link.
 
     Attributes
     ----------
@@ -39,7 +41,8 @@ class Inertial:
     I : ndarray, shape (3, 3), kg m^2
         Tensor elements about the centre of mass, in that frame.
     wrong : str
-        Which link of the file it is and why no body has this inertia; "" where one has.
+        Name of the link in the file, and the reason why no body has this inertia; "" if a body can
+        have this inertia.
     """
 
     M: float
@@ -50,14 +53,18 @@ class Inertial:
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint; along it, torque or force Gamma += armature qdd + damping qd + friction sign(qd) + stiffness (q - rest).
+    """A joint between two links of a tree, with its axis, limits, friction, armature and spring.
+
+    Along the joint, the torque or force is
+
+        Gamma += armature qdd + damping qd + friction sign(qd) + stiffness (q - rest)
 
     Attributes
     ----------
     name : str
-        Of the file.
+        Name in the file.
     kind : str
-        One of MOVING, FIXED_TYPE, or FREE_TYPE, which has to be held.
+        One of MOVING, FIXED_TYPE, or FREE_TYPE; a joint of FREE_TYPE must be held.
     parent, child : str
         Names of the links; the frame of `child` is the joint frame at q = 0.
     pose : ndarray, shape (4, 4)
@@ -65,11 +72,11 @@ class Joint:
     axis : ndarray, shape (3,)
         Unit vector in the joint frame.
     line : int
-        Of the file.
+        Line of the file.
     limits : mapping, SI and rad
-        Among lower, upper, velocity and effort.
+        Those of lower, upper, velocity and effort that the file gives.
     damping, friction, armature, stiffness, rest : float, SI and rad
-        As above.
+        Coefficients of the equation above.
     """
 
     name: str
@@ -89,32 +96,32 @@ class Joint:
 
 @dataclass(frozen=True)
 class Tree:
-    """Links and joints of a robot, in the order of the file.
+    """The links and joints of a robot, in the order of the file.
 
     Attributes
     ----------
     name : str
-        Of the robot.
+        Name of the robot.
     links : mapping
-        Inertial of each link, None where the file has none.
+        Inertial of each link by name; None if the file has none.
     joints : tuple of Joint
         One for each link but the root.
     root : str
         The link that has no parent.
     relations : mapping
-        Positions of the joints that follow others, by name: linear in those of joints that follow
-        none, whose names are the symbols.
+        Positions of the joints that follow others, by name. Each is a linear expression in the
+        positions of independent joints, whose names are the symbols.
     bare : frozenset of str
         Links between the joints of one body, which have no mass.
     gravity : tuple of float, m/s^2
         Acceleration of gravity in the root link.
     notes : tuple of str
         What was not read.
+    places : mapping
+        For an MJCF, in the order of its bodies: pose (4, 4) of the frame of each body in the frame
+        of its link. A URDF has one frame for both.
     angles : str
         How angles near multiples of pi/12 were read.
-    places : mapping
-        Of MJCF, in the order of its bodies: pose (4, 4) of the frame of each body in the frame of
-        its link. A URDF has one frame for both.
     """
 
     name: str
@@ -130,7 +137,7 @@ class Tree:
 
 
 def turn(axis: int, angle: float) -> Array:
-    """Rotation matrix about x, y or z (axis 0, 1, 2); quarter turns exact."""
+    """Compute the rotation matrix about x, y or z (axis 0, 1 or 2), exact for quarter turns."""
     c, s = math.cos(angle), math.sin(angle)
     c, s = (float(round(x)) if abs(x - round(x)) < 1e-15 else x for x in (c, s))
     j, k = (axis + 1) % 3, (axis + 2) % 3
@@ -140,7 +147,10 @@ def turn(axis: int, angle: float) -> Array:
 
 
 def rotation(rpy: Sequence[float], what: str, angles: Angles) -> Array:
-    """R = Rz(yaw) Ry(pitch) Rx(roll) of `what`, each as `angles` takes it."""
+    """Compute R = Rz(yaw) Ry(pitch) Rx(roll), after rounding the angles by the rule in `angles`.
+
+    `what` names the link or joint in the report on rounded angles.
+    """
     roll, pitch, yaw = (
         x if (k := angles.twelfths(x, f"{name} of {what}")) is None else k * (math.pi / 12)
         for name, x in zip(("roll", "pitch", "yaw"), rpy, strict=True)
@@ -149,9 +159,10 @@ def rotation(rpy: Sequence[float], what: str, angles: Angles) -> Array:
 
 
 def transform(row: Sequence[float]) -> Array:
-    """iTj = Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r) of a row gamma, b, alpha, d, theta, r.
+    """Compute the pose iTj, shape (4, 4), from a row gamma, b, alpha, d, theta, r of the frame
+    table.
 
-    (4, 4).
+        iTj = Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r)
     """
     gamma, b, alpha, d, theta, r = row
     T = np.eye(4)
@@ -167,14 +178,14 @@ def transform(row: Sequence[float]) -> Array:
 
 @dataclass(frozen=True)
 class TreePart:
-    """Part of a tree that is kept.
+    """Selection of a part of a tree: joints that are held, and the chain whose joints move.
 
     Attributes
     ----------
     lock : mapping, rad or m
-        Positions at which joints are held, by name.
+        Positions at which joints are held, by joint name.
     chain : tuple of str or None
-        Base and tip, names of links.
+        Names of the base link and the tip link; None for the whole tree.
     """
 
     lock: Mapping[str, float] = field(default_factory=dict)
@@ -185,13 +196,15 @@ WHOLE_TREE = TreePart()
 
 
 def part_of(tree: Tree, part: TreePart) -> Tree:
-    """Tree in which the joints of `part.lock` and those outside `part.chain` are held; notes name them.
+    """Return the tree with the joints in `part.lock` and the joints outside `part.chain` held.
+
+    Notes of the tree name the held joints.
 
     Raises
     ------
     DescriptionError
-        No such joint or link, a joint that does not move or follows another, a tip that does not
-        hang on the base by a joint that moves.
+        A joint or link does not exist, a joint to be held does not move or follows another joint,
+        or no moving joint lies between base and tip.
     """
     for name in part.lock:
         _require_independent(tree, name)
@@ -210,7 +223,10 @@ def part_of(tree: Tree, part: TreePart) -> Tree:
 
 
 def _beside(tree: Tree, base: str, tip: str) -> dict[str, float]:
-    """Positions of the moving joints that are not between two links: zero, of one that follows that where its leaders are at zero."""
+    """Return the positions at which the moving joints outside the chain `base` to `tip` are held.
+
+    The position is zero, or for a joint that follows others its position when these are at zero.
+    """
     for link in (base, tip):
         if link not in tree.links:
             raise DescriptionError(
@@ -247,7 +263,7 @@ def _require_independent(tree: Tree, name: str) -> None:
 
 
 def _hold(tree: Tree, positions: Mapping[str, float]) -> Tree:
-    """The tree with joints held at `positions`, and with them the joints that follow no other."""
+    """Hold the joints at `positions`, and the joints whose positions these determine completely."""
     exact = {name: Expression.number(repr(x)) for name, x in positions.items()}
     relations = {
         name: e.substitute(exact) for name, e in tree.relations.items() if name not in positions
@@ -264,7 +280,12 @@ def _hold(tree: Tree, positions: Mapping[str, float]) -> Tree:
 
 
 def _motion(joint: Joint, q: float) -> Array:
-    """(4, 4) of a joint at position q: along its axis, or about it, R = 1 + sin q [a] + (1 - cos q) [a]^2."""
+    """Compute the displacement, shape (4, 4), of a joint at position q, along or about its axis.
+
+    About an axis a, the rotation is
+
+        R = 1 + sin q [a] + (1 - cos q) [a]^2
+    """
     T = np.eye(4)
     if joint.kind == FREE_TYPE and q:
         raise DescriptionError(

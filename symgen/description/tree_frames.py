@@ -1,16 +1,17 @@
-"""A tree of joints with any axes becomes a table of Khalil and Kleinfinger.
+"""Conversion of a tree of links and joints into a frame table of Khalil and Kleinfinger.
 
-Links joined by fixed joints are one body. Body j moves about or along z_j, the axis of its joint;
-x_i lies on the common normal of z_i and of the axis of the first joint that body i carries, so that
-this joint has gamma = b = 0; further branches have them. Parallel axes: the normal through the
-origin. Axes that are nearly parallel have no usable normal: a fixed frame without link turns in
-between. A joint position is that of the file, sign and zero included; frame 0 is the root link's.
-Where fixed joints are kept, each link that one holds is a fixed frame too, its link frame that of
-the file, after all that move; its inertia stays with the body, so that formulas and numbers of
-joints are the same either way.
+Links joined by fixed joints are one body. Body j turns about or moves along z_j, the axis of its
+joint. x_i lies on the common normal of z_i and of the axis of the first joint on body i, so that
+this joint has gamma = b = 0; further joints on the body have other values. For parallel axes, the
+normal through the origin is used. For nearly parallel axes, the common normal is too far away; a
+fixed frame without link turns z in between. Joint positions are those of the file, including sign
+and zero; frame 0 is the frame of the root link. If fixed joints are kept, each link on a fixed
+joint gets a fixed frame too, equal to its link frame in the file; these frames come after all
+moving frames. Its inertia stays with the body, so that formulas and joint numbers are the same in
+both cases.
 
-Lengths become constants, equal ones (except for the sign) the same constant, so that the formulas know
-what is special about the robot.
+Lengths become constants. Lengths that are equal up to the sign become the same constant, so that
+the formulas use the special geometry of the robot.
 """
 
 from __future__ import annotations
@@ -34,14 +35,14 @@ STEEP = 0.02
 
 @dataclass
 class Body:
-    """Body j while its frame is placed.
+    """A body, that is links joined by fixed joints, while its frame j is chosen.
 
     Attributes
     ----------
     links : mapping
-        Pose (4, 4) of each of its links in frame j.
+        Pose (4, 4) of each link of the body in frame j.
     joints : list
-        Joints on it, each with the pose of its parent link in frame j.
+        Joints on the body, each with the pose of its parent link in frame j.
     """
 
     links: dict[str, Array]
@@ -50,20 +51,20 @@ class Body:
 
 @dataclass
 class Table:
-    """The table as it grows.
+    """The frame table of a robot under construction.
 
     Attributes
     ----------
     tree : Tree
-        What is turned into the table.
+        The tree that is converted to the table.
     frames : list of Frame
         Rows so far.
     constants : mapping, m
         Lengths by name.
     joint, bodies, fixed_links : mapping
-        Joint, body and link on a fixed joint by frame number.
+        Joint, body, and link on a fixed joint, by frame number.
     notes : list of str
-        What a reader should know of the table.
+        Remarks on the table for the user.
     """
 
     tree: Tree
@@ -76,7 +77,11 @@ class Table:
 
 
 def placed(tree: Tree, *, keep_fixed: bool = False) -> Table:
-    """Frames of all bodies, a body before what it carries, branch by branch; then those of the links that fixed joints hold, if kept."""
+    """Choose the frames of all bodies of a tree, from the root outward, and return the frame table.
+
+    A body comes before the bodies that are mounted on it, branch by branch. If `keep_fixed`, the
+    frames of links on fixed joints come last.
+    """
     table = Table(tree)
     table.bodies[0] = _body(tree, tree.root, np.eye(4))
     waiting = [(0, joint, parent) for joint, parent in reversed(table.bodies[0].joints)]
@@ -92,7 +97,7 @@ def placed(tree: Tree, *, keep_fixed: bool = False) -> Table:
 
 
 def _keep(table: Table, ant: int, name: str, pose: Array) -> None:
-    """A fixed frame on `ant` that is the frame of link `name`, whose pose in `ant` is given."""
+    """Append a fixed frame on frame `ant` for the link `name`, which has `pose` in frame `ant`."""
     if _nearly_parallel(pose[:3, 2]):
         to_aside, ant = _row(table, ant, FIXED, _normal(np.array([1.0, 0.0, 0.0]), pose[:3, 3]))
         pose = np.linalg.inv(to_aside) @ pose
@@ -104,7 +109,10 @@ def _keep(table: Table, ant: int, name: str, pose: Array) -> None:
 
 
 def _body(tree: Tree, link: str, pose: Array) -> Body:
-    """The links that fixed joints hold on `link`, which has `pose`, and the joints they carry."""
+    """Collect the links fixed to `link`, and the moving joints mounted on these links.
+
+    `pose` is the pose of `link`; the result has all poses in the same frame.
+    """
     body, waiting = Body({link: pose}, []), [link]
     while waiting:
         link = waiting.pop(0)
@@ -120,7 +128,10 @@ def _body(tree: Tree, link: str, pose: Array) -> Body:
 
 
 def _add(table: Table, ant: int, joint: Joint, parent: Array) -> int:
-    """Number of the frame of `joint` on body `ant`, where its parent link has pose `parent`."""
+    """Append the frame of `joint` on body `ant`, and return the number of the new frame.
+
+    `parent` is the pose of the parent link of the joint in frame `ant`.
+    """
     pose = parent @ joint.pose
     axis, point = pose[:3, :3] @ joint.axis, pose[:3, 3]
     if _nearly_parallel(axis):
@@ -154,14 +165,16 @@ def _add(table: Table, ant: int, joint: Joint, parent: Array) -> int:
 
 
 def _nearly_parallel(axis: Array) -> bool:
-    """Whether the common normal of z and `axis` is too far away to compute with."""
+    """Whether `axis` is almost parallel to z, so that their common normal is too far away to be
+    used.
+    """
     return SAME < math.hypot(axis[0], axis[1]) < STEEP
 
 
 def _normal(axis: Array, point: Array) -> tuple[float, float, float, float]:
-    """gamma, b, alpha, d to the line through `point` along `axis`, both in the frame before it.
+    """Compute gamma, b, alpha, d that lead from a frame to the line through `point` along `axis`.
 
-    |gamma| <= pi/2.
+    `point` and `axis` are given in this frame; |gamma| <= pi/2.
     """
     x, y, z = axis
     s = math.hypot(x, y)
@@ -182,8 +195,9 @@ def _normal(axis: Array, point: Array) -> tuple[float, float, float, float]:
 
 
 def _numbered(row: Sequence[float]) -> tuple[float, ...]:
-    """The numbers as the table holds them: multiples of pi/12 exact, DIGITS decimals. Angles first,
-    lengths second, in turn.
+    """Round alternating angles and lengths as the table stores them.
+
+    Angles that are multiples of pi/12 are exact; other numbers get DIGITS decimals.
     """
     return tuple(_angle(x)[0] if k % 2 == 0 else round(x, DIGITS) + 0.0 for k, x in enumerate(row))
 
@@ -200,7 +214,7 @@ def _angle(x: float) -> tuple[float, Expression]:
 def _row(
     table: Table, ant: int, sigma: int, before: Sequence[float], theta: float = 0.0, r: float = 0.0
 ) -> tuple[Array, int]:
-    """Append a frame; returns its pose at q = 0 in its antecedent and its number."""
+    """Append a frame; return its pose in its antecedent at q = 0, shape (4, 4), and its number."""
     j = len(table.frames) + 1
     gamma, b, alpha, d = before = _numbered(before)
     q = Expression.symbol(f"q{j}")
@@ -223,7 +237,7 @@ def _row(
 
 
 def _length(table: Table, name: str, x: float) -> Expression:
-    """0, or a constant of this value: an earlier one if it is equal."""
+    """Return length `x` as 0 or as plus or minus a constant; equal lengths share one constant."""
     if abs(x) <= SAME:
         return ZERO
     equal = next(

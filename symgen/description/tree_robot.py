@@ -1,11 +1,12 @@
-"""The Robot of a URDF or MJCF, by its tree of links and joints: its Khalil frames, its joints as elements and limits, its inertials as standard parameters.
+"""Conversion of a URDF or MJCF file, read as a tree of links and joints, into a Robot.
 
-With pose jX of a link in frame j, centre of mass c and rotation R = jR of the inertia I of the
-file:
+Joints become Khalil frames, elements and limits; inertials become standard parameters. With the
+pose jX of a link in frame j, the centre of mass c, and the rotation R = jR of the axes in which the
+file gives the inertia I,
 
     M,    MS = M c,    J = R I R' + M (c'c 1 - c c')
 
-are tensor elements about the origin of frame j, summed over the links of a body.
+where J has the tensor elements about the origin of frame j. The links of a body are summed.
 """
 
 from __future__ import annotations
@@ -55,31 +56,35 @@ def read_tree(
     keep_fixed: bool = False,
     part: TreePart = WHOLE_TREE,
 ) -> tuple[Robot, tuple[str, ...]]:
-    """The robot of a URDF or MJCF, and notes: which joint is which q, which link, body or site is which kept frame, which angle was changed, what was not read.
+    """Return the Robot of a URDF or MJCF file, and notes for the user.
+
+    The notes list which joint is which q, which link, body or site is which kept frame, which angle
+    was changed, and what was not read.
 
     Parameters
     ----------
     content : bytes
-        Of the file.
+        Content of the file.
     file : str
-        Its name; its suffix names the format.
+        Name of the file; its suffix selects the format.
     exact : bool
-        Angles are those of the file; else roll, pitch and yaw within SNAP of a multiple of pi/12
-        are taken as that, since files say 1.5708, and an AngleWarning lists them. Those of an MJCF
-        are of the rotations of bodies and sites, however written.
+        Whether angles stay as written. Otherwise, a roll, pitch or yaw within SNAP of a multiple of
+        pi/12 becomes this multiple, because files contain 1.5708 for pi/2, and an AngleWarning
+        names the largest change. In an MJCF, these are the angles of bodies and sites, in any
+        notation.
     keep_fixed : bool
-        Links held by fixed joints (tool0, flange), bodies without joints, and sites, are fixed
-        frames (sigma 2) without parameters, for frame_poses and jacobian; else such links and
+        Whether links on fixed joints (tool0, flange), bodies without joints, and sites become fixed
+        frames (sigma 2) without parameters, for frame_poses and jacobian. Otherwise, such links and
         bodies are only part of the body that holds them, and sites are left out. Their inertia
-        belongs to that body either way.
+        belongs to that body in both cases.
     part : TreePart
-        Joints held at a position, and the chain that is kept.
+        Joints held at a position, and the chain whose joints move.
 
     Raises
     ------
     DescriptionError
-        No URDF or MJCF, or no tree of hinges and slides on a resting base; the message names file
-        and line.
+        The file is no URDF or MJCF, or describes no tree of revolute and prismatic joints on a
+        fixed base; the message names file and line.
     """
     with located(file):
         tree = part_of(parse_tree(content, file, exact=exact, sites=keep_fixed), part)
@@ -87,7 +92,10 @@ def read_tree(
 
 
 def parse_tree(content: bytes, file: str, *, exact: bool = False, sites: bool = False) -> Tree:
-    """Links and joints of a URDF or MJCF file, by its suffix; `sites` of an MJCF are links too."""
+    """Read the links and joints of a URDF or MJCF file; the suffix of `file` selects the format.
+
+    If `sites` is true, the sites of an MJCF become links too.
+    """
     if file.lower().endswith(".urdf"):
         return parse_urdf(content, file, exact=exact)
     return parse_mjcf(content, file, exact=exact, sites=sites)
@@ -96,9 +104,10 @@ def parse_tree(content: bytes, file: str, *, exact: bool = False, sites: bool = 
 def robot_of_tree(
     tree: Tree, file: str, sha256: str, *, keep_fixed: bool = False
 ) -> tuple[Robot, tuple[str, ...]]:
-    """The robot, and notes: which joint is which q, which link is which kept frame, and what was not read.
+    """Build the Robot of a tree, and notes for the user.
 
-    Raises DescriptionError, with the line of the joint at fault, where the tree is no robot.
+    The notes list which joint is which q, which link is which kept frame, and what was not read.
+    Raises DescriptionError, with the line of the wrong joint, if the tree describes no robot.
     """
     if free := [joint for joint in tree.joints if joint.kind == FREE_TYPE]:
         raise DescriptionError(
@@ -163,7 +172,11 @@ def _robot(table: Table, file: str, sha256: str) -> Robot:
 
 
 def _labels(table: Table) -> dict[int, str]:
-    """Names of the joints of the file, and of the links that are kept frames, where no joint has the same."""
+    """Return the labels of the frames: names in the file of joints and of links kept as fixed
+    frames.
+
+    A name is left out if it is not allowed as a label or is already used.
+    """
     names = {j: joint.name for j, joint in table.joint.items()} | table.fixed_links
     strange = sorted(name for name in names.values() if not is_label(name))
     if strange:
@@ -185,7 +198,10 @@ def _identifier(name: str) -> str:
 def _gravity(
     g: tuple[float, float, float],
 ) -> tuple[tuple[Expression, Expression, Expression], dict[str, float]]:
-    """Gravity by constants: g where it points along -z, else one for each component that is not zero."""
+    """Express gravity by constants: g if it points along -z, else one for each nonzero component.
+
+    Return the three components as expressions, and the values of the constants by name.
+    """
     if g[:2] == (0.0, 0.0) and g[2] < 0:
         return (ZERO, ZERO, -Expression.symbol("g")), {"g": -g[2]}
     names = [f"g{axis}" if x else "" for axis, x in zip("xyz", g, strict=True)]
@@ -194,7 +210,8 @@ def _gravity(
 
 
 def _constraints(table: Table) -> dict[int, Expression]:
-    """q_j of the joints that follow others."""
+    """Express the position q_j of each joint that follows others by the positions of these joints.
+    """
     positions = {joint.name: Expression.symbol(f"q{j}") for j, joint in table.joint.items()}
     relations = table.tree.relations
     return {
@@ -207,8 +224,8 @@ def _constraints(table: Table) -> dict[int, Expression]:
 def _keys(table: Table, family: str, actuated: list[int]) -> list[int]:
     """Find the joints that have a parameter of `family`.
 
-    These are all actuated joints, and the joints that follow others where the file gives a value.
-    A spring needs a value of the file in any case.
+    These are all actuated joints, and the joints that follow others if the file gives a value. A
+    spring (family K) needs a value of the file in any case.
     """
     value = next(value for name, _, value in JOINT_TERMS if name == family)
     return [
@@ -219,7 +236,9 @@ def _keys(table: Table, family: str, actuated: list[int]) -> list[int]:
 def _limits(
     table: Table, actuated: list[int]
 ) -> dict[str, tuple[float, ...] | tuple[tuple[float, float], ...]]:
-    """Limits that every actuated joint has; a kind that one joint lacks is left out and noted."""
+    """Collect the limits that all actuated joints have; other kinds of limits are left out and
+    noted.
+    """
     rows = [table.joint[j] for j in actuated]
     limits: dict[str, tuple[float, ...] | tuple[tuple[float, float], ...]] = {}
     bounds = tuple(
@@ -241,7 +260,10 @@ def _limits(
 
 
 def _values(table: Table, actuated: list[int]) -> tuple[dict[str, float], frozenset[int]]:
-    """Standard parameters by name, empty if no link has inertia, and the frames without a link of their own."""
+    """Return the standard parameters by name, and the numbers of the frames without mass.
+
+    There are no standard parameters if no link of the file has an inertia.
+    """
     links = table.tree.links
     bodies = {j: body for j, body in table.bodies.items() if j in table.joint}
     bare = {j for j, body in bodies.items() if set(body.links) <= table.tree.bare}
@@ -269,13 +291,16 @@ def _values(table: Table, actuated: list[int]) -> tuple[dict[str, float], frozen
 
 
 def _standard(table: Table, body: Body) -> Array:
-    """XX XY XZ YY YZ ZZ MX MY MZ M of a body in its frame, shape (10,)."""
+    """Compute XX XY XZ YY YZ ZZ MX MY MZ M of a body in its frame, shape (10,)."""
     links = [(table.tree.links[name], X) for name, X in body.links.items()]
     return sum((ten_of(own, X) for own, X in links if own is not None), start=np.zeros(10))
 
 
 def inertial_of(ten: Sequence[float] | Array) -> Inertial:
-    """Mass, centre and tensor about it, axes of the frame, of XX XY XZ YY YZ ZZ MX MY MZ M."""
+    """Convert XX XY XZ YY YZ ZZ MX MY MZ M to mass, centre of mass, and tensor about this centre.
+
+    The tensor has the axes of the frame in which the ten parameters are given.
+    """
     *J, mx, my, mz, M = (float(x) for x in ten)
     c, I, pose = np.array([mx, my, mz]) / M if M else np.zeros(3), np.zeros((3, 3)), np.eye(4)
     I[np.triu_indices(3)] = J
@@ -285,7 +310,10 @@ def inertial_of(ten: Sequence[float] | Array) -> Inertial:
 
 
 def ten_of(inertial: Inertial, X: Array) -> Array:
-    """XX XY XZ YY YZ ZZ MX MY MZ M, shape (10,), of a link with pose X, (4, 4), in the frame of its body."""
+    """Convert mass, centre and tensor of a link to XX XY XZ YY YZ ZZ MX MY MZ M, shape (10,).
+
+    The result is given in the frame of the body, in which the link has the pose X, shape (4, 4).
+    """
     own = X @ inertial.pose
     R, c, M = own[:3, :3], own[:3, 3], inertial.M
     J = R @ inertial.I @ R.T + M * (c @ c * np.eye(3) - np.outer(c, c))

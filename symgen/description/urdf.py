@@ -1,8 +1,8 @@
-"""URDF to a Robot: the text becomes a tree of links and joints, the tree a table of Khalil frames (`tree_frames`) with values (`tree_robot`).
+"""Reader of URDF files: the XML text becomes a tree of links and joints.
 
-Numbers are read as they are; meshes, textures and packages are never opened. A URDF library would
-load them, and its XML parser expands entities (`xml_text` reads neither). Every error names its
-line.
+`tree_frames` converts the tree to Khalil frames, and `tree_robot` adds the values. Numbers are read
+as they are; meshes, textures and packages are never opened. A URDF library would load such files,
+and its XML parser would expand entities, which `xml_text` refuses. Every error names its line.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ ROUNDING = 1e-6  # of moments that a file rounds
 
 
 def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
-    """Links and joints of a URDF file; `exact` as of `read_tree`."""
+    """Read the links and joints of a URDF file as a Tree; `exact` as in `read_tree`."""
     angles = Angles(exact)
     root = read_elements(content)
     if root.tag != "robot":
@@ -111,13 +111,19 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
 
 
 def _left_out(root: XmlElement) -> Iterator[str]:
-    """Tags of the elements of a robot, its links and its joints that are not read."""
+    """Yield the tags of XML elements in a robot, its links and its joints that are not read."""
     for e in (root, *root):
         yield from (child.tag for child in e if e.tag in READ and child.tag not in READ[e.tag])
 
 
 def _relations(joints: list[Joint], mimics: dict[str, Mimic]) -> dict[str, Expression]:
-    """q = multiplier q_leader + offset of the joints that mimic another, through any that follow each other."""
+    """Express the position of each mimic joint by the position of the joint that it finally
+    follows.
+
+        q = multiplier q_leader + offset
+
+    If the leader is a mimic joint too, its own leader is used, and so on.
+    """
     moving = {joint.name for joint in joints if joint.kind != FIXED_TYPE}
     relations: dict[str, Expression] = {}
     for joint in (joint for joint in joints if joint.name in mimics):
@@ -138,7 +144,9 @@ def _relations(joints: list[Joint], mimics: dict[str, Mimic]) -> dict[str, Expre
 
 
 def _pose(holder: XmlElement, what: str, angles: Angles) -> Array:
-    """(4, 4) of the <origin> of a link or joint: R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    """Read the <origin> of a link or joint as a pose, shape (4, 4), with R = Rz(yaw) Ry(pitch)
+    Rx(roll).
+    """
     T, e = np.eye(4), holder.find("origin")
     if e is None:
         return T
@@ -169,7 +177,7 @@ def _inertial(link: XmlElement, angles: Angles) -> Inertial | None:
 
 
 def no_body(M: float, tensor: Array) -> str:
-    """Why no body has this mass and this tensor about its centre of mass; "" if one has."""
+    """Explain why no body has mass M and this tensor about its centre of mass; "" if a body can."""
     if not M and tensor.any():
         return "mass 0 with an inertia"
     small, middle, large = np.linalg.eigvalsh(tensor)
@@ -233,7 +241,9 @@ def _joint(e: XmlElement, angles: Angles) -> Joint:
 
 
 def _root(links: dict[str, Inertial | None], joints: list[Joint], line: int) -> str:
-    """The one link without parent; every other must hang on it by one joint."""
+    """Find the base, which is the only link without a parent; check that joints and links form a
+    tree.
+    """
     parent: dict[str, str] = {}
     names: set[str] = set()
     for joint in joints:

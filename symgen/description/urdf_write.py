@@ -1,8 +1,10 @@
-"""URDF of a Robot with values: one link and one joint per frame, z axes, link frames those of Khalil; with notes on what is not carried.
+"""Writer of URDF files: one link and one joint for each frame of a Robot with values.
 
-The joint frame is iTj at q_j = 0 as x y z and roll, pitch, yaw. Inertials are about the centre of
-mass, c = MS / M:
-I = J - M (c'c 1 - c c').
+Joint axes are z axes, and link frames are Khalil's. Notes list what a URDF cannot store. The joint
+frame is iTj at q_j = 0, as x y z and roll, pitch, yaw. Inertials are about the centre of mass c =
+MS / M:
+
+    I = J - M (c'c 1 - c c')
 """
 
 from __future__ import annotations
@@ -37,21 +39,21 @@ _DYNAMICS = {"FV": "damping", "FS": "friction"}
 def write_urdf(
     robot: Robot, values: Mapping[str, float] | None = None
 ) -> tuple[str, tuple[str, ...]]:
-    """Text of the URDF, and what of `robot` it does not carry.
+    """Return the URDF text of `robot`, and notes on what a URDF cannot store.
 
     Parameters
     ----------
     robot : Robot
-        Without loops; passive joints follow one joint each.
+        A robot without loops; each passive joint follows one joint.
     values : mapping, SI, optional
-        Standard parameters by name; those of the robot file if left out. A URDF holds masses, so
-        they must be those of a physical robot:
-        of a feasible estimate, or CAD.
+        Standard parameters by name; by default, those of the robot file. A URDF holds masses, so
+        the values must be those of a physical robot: of a feasible estimate, or from CAD.
 
     Raises
     ------
     DescriptionError
-        Loops, relations of several joints, inertial parameters without value, moments without mass.
+        The robot has loops, a relation of several joints, inertial parameters without value, or
+        first moments without mass.
     """
     values = dict(robot.values if values is None else values)
     if robot.loops:
@@ -155,7 +157,11 @@ def _limit(robot: Robot, f: Frame) -> dict[str, float]:
 
 
 def _follows(robot: Robot, j: int) -> tuple[int, float, float]:
-    """q_j = multiplier q_i + offset; DescriptionError if it depends on several joints."""
+    """Find the joint i that passive joint j follows, with q_j = multiplier q_i + offset.
+
+    Return i, the multiplier and the offset. Raises DescriptionError if q_j depends on several
+    joints.
+    """
     e = robot.constraints[j]
     leaders = [i for i in robot.moving if f"q{i}" in e.symbols]
     factor = e.coefficient(f"q{leaders[0]}") if len(leaders) == 1 else None
@@ -170,9 +176,9 @@ def _follows(robot: Robot, j: int) -> tuple[int, float, float]:
 
 
 def _roll_pitch_yaw(R: Array) -> Array:
-    """R = Rz(yaw) Ry(pitch) Rx(roll).
+    """Compute roll, pitch and yaw, rad, of a rotation matrix R = Rz(yaw) Ry(pitch) Rx(roll).
 
-    Roll is read off what yaw and pitch leave, so that it is exact at pitch = +-pi/2 too.
+    Roll is computed last, from R without yaw and pitch, so that it is exact at pitch = +-pi/2 too.
     """
     c = math.hypot(R[0, 0], R[1, 0])
     yaw = math.atan2(R[1, 0], R[0, 0]) if c > 1e-12 else 0.0

@@ -1,4 +1,7 @@
-"""Numbers for a robot that come from elsewhere: constants of a command line, standard parameters of a table or of an estimate."""
+"""Values from outside the robot file: constants of a command line, and standard parameters.
+
+Standard parameters come from a table or from an estimate.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +16,10 @@ from symgen.errors import DescriptionError
 
 
 def assignment(text: str, option: str = "--constant") -> tuple[str, float]:
-    """Name and number of NAME=NUMBER, as `option` takes them, the number a constant expression.
-    Raises DescriptionError or ExpressionError.
+    """Split the text NAME=NUMBER of a command line option into the name and the number.
+
+    The number may be a constant expression such as pi/2. Raises DescriptionError or
+    ExpressionError.
     """
     name, equals, value = text.rpartition("=")
     try:
@@ -26,11 +31,10 @@ def assignment(text: str, option: str = "--constant") -> tuple[str, float]:
 
 
 def values_of_csv(content: bytes, file: str) -> dict[str, float]:
-    """Standard parameters by name from lines of name,value or name,value,note.
+    """Read standard parameters by name from CSV lines name,value or name,value,note.
 
-    A header with these names may be the first line.
-
-    Raises DescriptionError, with file and line, where a line is something else, or there is none.
+    A header with these names may be the first line. Raises DescriptionError, with file and line, if
+    a line has another form, or if there is no value.
     """
     values: dict[str, float] = {}
     try:
@@ -57,12 +61,15 @@ def values_of_csv(content: bytes, file: str) -> dict[str, float]:
 
 
 def with_values(robot: Robot, values: Mapping[str, float]) -> Robot:
-    """`robot` with these standard parameters as its values, over those of its file."""
+    """Return a copy of `robot` with these values of standard parameters added to those of its file.
+
+    A new value replaces the value of the file.
+    """
     return replace(robot, values={**robot.values, **values})
 
 
 def with_estimate(robot: Robot, standard: object, file: str) -> Robot:
-    """`robot` with the standard parameters of a feasible estimate as its values.
+    """Return a copy of `robot` with the standard parameters of a physically feasible estimate.
 
     Parameters
     ----------
@@ -74,7 +81,7 @@ def with_estimate(robot: Robot, standard: object, file: str) -> Robot:
     Raises
     ------
     DescriptionError
-        The estimate has no standard parameters, or those of another robot.
+        The estimate has no standard parameters, or has parameters of another robot.
     """
     if not isinstance(standard, dict):
         raise DescriptionError(

@@ -1,8 +1,9 @@
-"""XML text to plain elements with their lines, refusing what a table of numbers does not need.
+"""Reader of XML files: elements with line numbers; constructs that a robot does not need are
+refused.
 
-The file is read by expat alone: a document type (hence entities, internal or external) ends the
-reading where it stands, nesting and the number of elements are bounded while reading, and nothing a
-file names is opened. Every error names its line.
+The file is read by expat alone. A document type (hence entities, internal or external) is refused
+where it starts, depth and number of elements are limited during reading, and no file that the text
+names is opened. Every error names its line.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS, LARGEST = 5_000_000, 30, 50_000, 1e9
 
 
 class XmlElement(ElementTree.Element):
-    """An element of ElementTree, with the line and the byte where it starts."""
+    """An element of an XML file, with the line and the byte at which it starts."""
 
     def __init__(self, tag: str, attributes: dict[str, str], line: int, byte: int) -> None:
         super().__init__(tag, attributes)
@@ -34,7 +35,7 @@ class XmlElement(ElementTree.Element):
         def find(self, path: str, namespaces: Any = None) -> XmlElement | None: ...
 
     def own(self, *tags: str) -> Iterator[XmlElement]:
-        """Children with these tags, those inside its frames (MJCF) too."""
+        """Yield the children with these tags, also those inside <frame> elements of an MJCF."""
         for child in self:
             if child.tag in tags:
                 yield child
@@ -42,7 +43,9 @@ class XmlElement(ElementTree.Element):
                 yield from child.own(*tags)
 
     def word(self, name: str, default: str | None = None) -> str:
-        """An attribute."""
+        """Return the attribute `name` as text, or `default`; raise DescriptionError if both are
+        missing.
+        """
         value = self.attrib.get(name, default)
         if value is None:
             raise DescriptionError(f"<{self.tag}> has no {name}; add it", line=self.line)
@@ -71,7 +74,9 @@ class XmlElement(ElementTree.Element):
 
 
 def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> XmlElement:
-    """Parse XML and return its root element; DescriptionError names the line that is not plain XML."""
+    """Parse an XML file and return its root element; DescriptionError names the line that is
+    refused.
+    """
     if len(content) > MAX_BYTES:
         raise DescriptionError(
             f"more than {MAX_BYTES} bytes; put meshes into files of their own", line=1

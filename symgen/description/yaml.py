@@ -1,6 +1,7 @@
-"""Robot files: YAML 1.2 text to plain data with line numbers, from there to a checked Robot, and back to a text that reads as the same Robot.
+"""Reader and writer of robot files in YAML 1.2.
 
-Only what a table of numbers needs is read: mappings, lists and scalars of the core schema. Tags,
+A text is read as plain data with line numbers and then converted to a checked Robot. A written text
+is read as the same Robot. Only mappings, lists and scalars of the core schema are read. Tags,
 anchors and aliases, merge keys, repeated keys, second documents and non-finite numbers are refused,
 so that a file means what it shows. Whatever the bytes are, the only exception that leaves this
 module is DescriptionError, with file and line.
@@ -79,7 +80,10 @@ def _check_version(data: Any) -> None:
 
 
 def _document(content: bytes, lines: dict[Path, int]) -> Any:
-    """Plain data of the one document in `content`; `lines` receives the line of every key path."""
+    """Parse `content` as one YAML document and return its data as Python objects.
+
+    `lines` receives the line number of every key path.
+    """
     if len(content) > MAX_BYTES:
         raise DescriptionError(f"more than {MAX_BYTES} bytes; a robot file has a few thousand")
     try:
@@ -108,7 +112,7 @@ def _document(content: bytes, lines: dict[Path, int]) -> Any:
 
 
 def _value(node: Node, path: Path, lines: dict[Path, int], resolver: Any) -> Any:
-    """Plain data of a node, and the line of every key path in it."""
+    """Convert a YAML node to plain Python data, and store the line of every key path in `lines`."""
     line = node.start_mark.line + 1
     lines.setdefault(path, line)
     if len(path) > MAX_NESTING:
@@ -142,7 +146,7 @@ def _value(node: Node, path: Path, lines: dict[Path, int], resolver: Any) -> Any
 
 
 def _scalar(node: ScalarNode, line: int) -> Any:
-    """null, bool, int and float of the YAML 1.2 core schema when plain, else text."""
+    """Convert a plain YAML scalar to None, bool, int or float by the core schema, else to text."""
     text: str = node.value
     if len(text) > MAX_SCALAR:
         raise DescriptionError(
@@ -159,7 +163,9 @@ def _scalar(node: ScalarNode, line: int) -> Any:
 
 
 def tables_of(robot: Robot) -> dict[str, Any]:
-    """The tables of a robot file, by their keys; expressions are not yet text."""
+    """Return the tables of the robot file of `robot` by key; expressions are not yet converted to
+    text.
+    """
     drives = robot.drives
     return {
         "symgen": SCHEMA,
@@ -197,7 +203,8 @@ def tables_of(robot: Robot) -> dict[str, Any]:
 
 
 def write_yaml(robot: Robot, *, comments: Sequence[str] = ()) -> str:
-    """Text of the file; `comments` are its first lines, each after a #."""
+    """Return the text of the robot file of `robot`; `comments` are its first lines, each after a #.
+    """
     lines = [f"# {line}" for line in comments]
     for key, table in tables_of(robot).items():
         if key in BY_ROW and table:
@@ -210,7 +217,8 @@ def write_yaml(robot: Robot, *, comments: Sequence[str] = ()) -> str:
 
 
 def flow(value: Any) -> str:
-    """A value on one line; a name that YAML reads as something else between quotes."""
+    """Write a value on one line of YAML; reserved words such as yes and no are put between quotes.
+    """
     if isinstance(value, Mapping):
         return f"{{{', '.join(f'{flow(key)}: {flow(x)}' for key, x in value.items())}}}"
     if isinstance(value, tuple | list):
@@ -238,6 +246,6 @@ def _row(row: Row) -> str:
 
 
 def _form(form: Form) -> str:
-    """q' B q, each pair once."""
+    """Write the quadratic form q' B q as text, with each product q_i q_j once."""
     terms = [(i, j, c if i == j else c * 2) for (i, j), c in form.items() if i <= j]
     return " + ".join(f"q{i}*q{j}" if c == ONE else f"({c})*q{i}*q{j}" for i, j, c in terms)

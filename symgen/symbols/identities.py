@@ -58,7 +58,7 @@ class Identities:
         return c
 
     def tidy(self, c: Coefficient) -> Coefficient:
-        """Write the coefficient c in fewer terms.
+        """Write the coefficient c in fewer terms, by the identities of cosines and sines.
 
         Pairs of terms that an identity turns into one term are replaced, until no such pair is
         left.

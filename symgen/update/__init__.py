@@ -1,1 +1,1 @@
-"""Identified values back into the URDF or MJCF file that a robot was read from."""
+"""Write identified values back into the URDF or MJCF file from which a robot was read."""

@@ -1,4 +1,4 @@
-"""What `symgen.apply` returns: the new text of a file, and what of it changed."""
+"""Result of `symgen.apply`: the new text of a URDF or MJCF file, and the list of its changes."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ SOURCES = {"record": "the record", "sum": "the record, in sums", "file": "feasib
 
 @dataclass(frozen=True)
 class Change:
-    """One number of the file that changes.
+    """One change of a number in a URDF or MJCF file.
 
     Attributes
     ----------
     place, number, unit : str
         Link or joint, which of its numbers, and its unit.
     before, after : float
-        In the file, and in the new text.
+        Value in the file, and value in the new text.
     sigma : float
-        Standard deviation that the record leaves, of the part that it tells; conditions of a
-        physical robot aside; nan if the record does not determine it.
+        Standard deviation of the part of the number that the record determines, without the
+        conditions of a physical robot; nan if the record does not determine the number.
     told_by : str
-        record: determined; sum: only together with other numbers, this is the value nearest to the
-        file; file: no torque depends on it,
-        and it changes only if no physical robot is left otherwise.
+        Source of the value. record: the record determines it. sum: the record determines only a sum
+        with other numbers, and this is the value nearest to the file. file: no torque depends on
+        the number, and it changes only if no physical robot is possible otherwise.
     """
 
     place: str
@@ -46,7 +46,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Applied:
-    """Text of a URDF or MJCF file with identified values.
+    """Text of a URDF or MJCF file with identified values, and the list of its changes.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Applied:
     added : tuple of str
         Attributes and elements that the file did not have.
     placeless : mapping, SI
-        Parameters for which the format has no place, by name.
+        Parameters for which the format has no attribute, by name.
     placeless_sigma : mapping, SI
         Standard deviations of these parameters.
     joints : mapping
@@ -67,12 +67,13 @@ class Applied:
     spread : tuple of str
         Links on fixed joints that also changed, because no physical link was possible otherwise.
     undetermined : tuple of str
-        Numbers of links that affect no torque. They keep the value of the file; if one had to
-        change, it stands in `changes` with `told_by` "file".
+        Numbers of links that affect no torque and keep the value of the file. A number of this kind
+        that had to change is listed in `changes`, with `told_by` "file".
     strange : tuple of str
         Links whose mass or centre is far from that of the file.
     lost : tuple of str
-        Base parameters that are not in the estimate or not determined; they keep the values of the file.
+        Base parameters that are not in the estimate or not determined; they keep the values of the
+        file.
     """
 
     file: str
@@ -96,11 +97,11 @@ class Applied:
 
     @property
     def names_files(self) -> bool:
-        """Whether the text has relative names of other files, such as meshes."""
+        """Whether the text names other files, such as meshes."""
         return b"filename=" in self.content or b"file=" in self.content
 
     def diff(self) -> str:
-        """Changed lines, in the format of `diff -u`."""
+        """Return the changed lines, in the format of `diff -u`."""
         old, new = (
             text.decode("utf-8", "replace").splitlines(keepends=True)
             for text in (self.before, self.content)
@@ -108,7 +109,7 @@ class Applied:
         return "".join(difflib.unified_diff(old, new, self.file, f"{self.file} (identified)", n=0))
 
     def table(self) -> Table:
-        """Table of the changed numbers."""
+        """Return a table of the changed numbers."""
         rows = [
             (
                 c.place,
@@ -130,7 +131,7 @@ class Applied:
         )
 
     def notes(self) -> list[str]:
-        """Remarks for the user."""
+        """List remarks for the user, for instance on parameters that the format cannot store."""
         notes = [f"added: {'; '.join(self.added)}"] if self.added else []
         if self.placeless:
             listed = ", ".join(
@@ -183,7 +184,7 @@ class Applied:
         )
 
     def to_json(self) -> str:
-        """JSON text: file, format, changes and remarks."""
+        """Return a JSON text with the file name, the format, the changes and the remarks."""
         return json_text(
             {
                 "schema": "symgen-apply/1",
@@ -206,7 +207,7 @@ def _percent(c: Change) -> str:
 
 
 def _by_place(lines: Sequence[str]) -> str:
-    """Join lines `link: number` into one text in which each link stands once."""
+    """Join lines `link: number` into one text in which the name of each link occurs once."""
     places: dict[str, list[str]] = {}
     for line in lines:
         place, _, what = line.partition(": ")

@@ -1,12 +1,13 @@
-"""Identified values into the URDF or MJCF file of a robot, in place: numbers change, every other byte stays.
+"""Write identified values into the URDF or MJCF file of a robot; only numbers in the text change.
 
     applied = symgen.apply("results", "arm.urdf")        # or an Estimate, an Identification
-    print(applied)                                       # what changes, from, to, deviation
+    print(applied)                                       # numbers that change: from, to, sigma
     applied.write("arm_identified.urdf")
 
-The estimate knows base parameters, sums of the parameters of several links. Of all physical robots
-that have these sums, the one nearest to the file is written (`symgen.update.nearest`). Before
-anything is returned the new text is read again: it must say what was to be written.
+An estimate gives base parameters, which are sums of the parameters of several links. Of all
+physical robots that have these sums, the robot nearest to the file is written
+(`symgen.update.nearest`). Before the result is returned, the new text is read again, and its values
+must be those that were to be written.
 """
 
 from __future__ import annotations
@@ -47,27 +48,26 @@ def apply(
     chain: tuple[str, str] | None = None,
     exact: bool = False,
 ) -> Applied:
-    """Insert identified values into the text of a URDF or MJCF file; nothing is written yet.
+    """Return the text of a URDF or MJCF file with identified values in it; no file is written yet.
 
     Parameters
     ----------
     estimate : Estimate, Identification, str or Path
-        Result, its estimate.json, or the folder that `symgen identify -o` wrote. Of a whole
-        identification the parameters that are used are taken, or the physical ones if
-        the essential ones do (`Identification.whole_estimate`).
+        Result of an identification, its estimate.json, or the folder that `symgen identify -o`
+        wrote. Of an Identification, the parameter set in use is taken, or the physical set if the
+        essential set is in use (`Identification.whole_estimate`).
     model : str or Path
         The file: .urdf, or .xml and .mjcf (MJCF).
     robot : str or Path, optional
-        Robot file that was identified, if it is not `model` itself: converted from it, perhaps
-        with other elements or drives.
+        Robot file that was identified, if it is not `model` itself: a file converted from `model`,
+        perhaps with other elements or drives.
     lock, chain, exact
-        As of `read_robot`, and as when the robot was identified or converted.
+        As in `read_robot`, with the same values as when the robot was identified or converted.
 
     Raises
     ------
     DescriptionError
-        The estimate is one of another robot, no physical robot has it, or the file has no place for
-        it.
+        The estimate is of another robot, no physical robot has it, or the file has no place for it.
     """
     path = Path(model)
     content = content_of(path)
@@ -152,7 +152,10 @@ def _estimate(given: Any) -> Estimate:
 
 
 def _require_same_joints(result: Estimate, robot: Robot, of: str) -> None:
-    """Raise DescriptionError if the estimate names joints and the robot has others."""
+    """Check that the joint names in the estimate, if there are any, are those of the robot.
+
+    Raises DescriptionError if they are not.
+    """
     theirs = result.provenance.get("labels")
     if not isinstance(theirs, Mapping):
         return
@@ -181,9 +184,9 @@ def _inertial(physical: PhysicalModel) -> set[str]:
 def _determined_names(
     result: Estimate, physical: PhysicalModel, of: str
 ) -> tuple[list[str], Array, list[str]]:
-    """Split the base parameters.
+    """Separate the base parameters that the record determines from the other base parameters.
 
-    Returns names and values of those that the record determines, and the names of the others.
+    Return the names and values of the determined parameters, and the names of the others.
     """
     if unknown := [name for name in result.names if name not in physical.base]:
         raise DescriptionError(
@@ -202,11 +205,10 @@ def _determined_names(
 
 
 def _root(result: Estimate, names: Sequence[str]) -> Array:
-    """Square root of the covariance of the known base parameters, (b, b).
+    """Compute a square root, shape (b, b), of the covariance of the determined base parameters.
 
-    It uses corrected deviations where there are any.
-
-    Zero if there is none.
+    Corrected standard deviations are used if they are larger. The result is zero if the covariance
+    is unknown.
     """
     at = [result.names.index(name) for name in names]
     C = np.nan_to_num(result.covariance[np.ix_(at, at)])

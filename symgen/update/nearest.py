@@ -1,23 +1,27 @@
-"""Numbers of a file that give the identified base parameters, as near to the file's as physics allows: the feasible program of `identify`, with the file as prior.
+"""Find physical values that give the identified base parameters and are nearest to those of a file.
 
-    min ||(u - u0) / S||     subject to  K chi(u) = X,  every condition of `runtime.physical.inertia`
+This is the optimisation of the feasible estimate in `identify`, with the file as prior:
 
-u are the numbers that the file states, u0 as it states them, S their sizes: of each link with
-inertia mass M, centre c and tensor I about it, and the parameters of the elements on the joints.
-chi are the ten parameters of each link in the frame j of its body, and those of the elements:
+    min ||(u - u0) / S||     subject to  K chi(u) = X,  every condition of
+    `runtime.physical.inertia`
+
+u are the numbers of the file: for each link with inertia, mass M, centre c and tensor I about the
+centre, and the parameters of the elements on the joints. u0 are their values in the file, S their
+sizes. chi are the ten parameters of each link in the frame j of its body, and the parameters of the
+elements:
 
     MS = M c,    J = I + M (c'c 1 - c c')
 
-K chi(u) = X is linearised until it holds; where the numbers are no physical robot, the program of
-`runtime.physical.feasibility` gives chi, its prior the values of the file. A number on which no
-base parameter depends does not move, nor does a mass that enters none but by its first moment and
-its tensor.
+K chi(u) = X is linearised and solved repeatedly until it holds. If the resulting numbers are no
+physical robot, the optimisation of `runtime.physical.feasibility` gives chi, with the values of the
+file as prior. A number on which no base parameter depends does not change. A mass does not change
+if base parameters depend on it only through its first moment and its tensor.
 
-A body may be several links, held together by fixed joints: the record knows their sum. First the
-link that the joint carries changes alone; only if no physical link is left, the others change
-with it. What the torques cannot separate from a motor inertia is one, whether the format has a place
-for it or not; other elements that the file does not have change only if links cannot take them
-in.
+A body may be several links, held together by fixed joints: the record determines only their sum.
+First, only the link on the moving joint changes; the other links change with it only if no physical
+link is possible otherwise. A motor inertia gets what the torques cannot separate from it, whether
+the format has a place for it or not. Other elements that the file does not have change only if the
+links cannot give the same torques.
 """
 
 from __future__ import annotations
@@ -47,22 +51,22 @@ TINY = 1e-15  # SI; an eigenvalue so little below zero is rounding
 
 @dataclass(frozen=True, eq=False)
 class Nearest:
-    """Numbers u, shape (p,), of the links of a file and of the elements on its joints.
+    """Numbers u, shape (p,), of links and joint elements that are nearest to those of the file.
 
     Attributes
     ----------
     u, u0 : ndarray, shape (p,)
-        Found, and of the file.
+        Numbers found, and numbers of the file.
     chi : ndarray, shape (p,)
         Standard parameters chi(u).
     gain : ndarray, shape (p, b)
-        d u / d X without conditions.
+        d u / d X without the physical conditions.
     seen, told : ndarray of bool, shape (p,)
-        Numbers that a base parameter depends on, and those that X alone tells.
+        Whether a base parameter depends on the number, and whether X alone determines the number.
     links : mapping of list of int
-        Places of the ten numbers of each link.
+        Indices of the ten numbers of each link.
     elements : mapping of int
-        Place of each parameter of an element.
+        Index of each parameter of an element.
     spread : tuple of str
         Links behind fixed joints that had to change too.
     """
@@ -80,19 +84,20 @@ class Nearest:
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """The unknowns of the program.
+    """The unknowns of the optimisation: the numbers of the links and joint elements of a file.
 
     Attributes
     ----------
     physical : PhysicalModel
-        With ten parameters by link of the file, and the elements.
+        Model with ten parameters for each link of the file, and the elements.
     links : list of (FileLink, list of int)
-        Links, and the places of their ten.
+        Links, and the indices of their ten numbers.
     u0, size, ease : ndarray, shape (p,)
-        As the file states them, their sizes, and how many of these they change as readily as
-        others change one.
+        Values in the file, typical sizes, and ease of change: a number with ease 10 changes by ten
+        sizes as readily as a number with ease 1 changes by one size.
     masses : ndarray of bool, shape (p,)
-        Masses that enter no base parameter but by first moments and tensors.
+        Whether the number is a mass on which base parameters depend only through first moments and
+        tensors.
     """
 
     physical: PhysicalModel
@@ -103,7 +108,7 @@ class Numbers:
     masses: Array
 
     def head(self, count: int) -> Numbers:
-        """The program with the first `count` numbers alone."""
+        """Return the same unknowns restricted to the first `count` numbers."""
         p = self.physical
         kept = tuple(c for c in p.conditions if max(c.numbers) < count)
         part = replace(p, standard=p.standard[:count], K=p.K[:, :count], conditions=kept)
@@ -112,14 +117,17 @@ class Numbers:
         return Numbers(part, links, *(x[:count] for x in of_numbers))
 
     def chi(self, u: Array) -> Array:
-        """Standard parameters that the numbers u give, shape (p,)."""
+        """Compute the standard parameters, shape (p,), from the numbers u."""
         chi = u.copy()
         for link, at in self.links:
             chi[at] = link.place.ten(u[at])
         return chi
 
     def slope(self, u: Array) -> Array:
-        """d chi / d u, shape (p, p): chi is of second order in every number."""
+        """Compute d chi / d u, shape (p, p), by central differences.
+
+        The differences are exact, because chi is of second order in every number.
+        """
         T = np.eye(len(u))
         for link, at in self.links:
             for k, place in enumerate(at):
@@ -130,7 +138,7 @@ class Numbers:
         return T
 
     def seen(self, u: Array) -> Array:
-        """Numbers that a base parameter depends on, bool (p,)."""
+        """Find the numbers on which a base parameter depends; bool, shape (p,)."""
         A = self.physical.K @ self.slope(u) * self.size
         share = np.abs(A) > MISSED * np.linalg.norm(A, axis=1, keepdims=True)
         return np.asarray(np.any(share, axis=0))
@@ -144,27 +152,28 @@ def nearest(
     X: Array,
     absent: Collection[str] = (),
 ) -> Nearest:
-    """The numbers of `links`, and of the elements, nearest to those of the file.
+    """Find the numbers of links and joint elements that give X and are nearest to those of the
+    file.
 
     Parameters
     ----------
     physical : PhysicalModel
-        Of the robot, one link for each body.
+        Model of the robot, with one link for each body.
     links : sequence of FileLink
-        The first of a body is the one that changes first.
+        Links of the file. The first link of a body is the one that changes first.
     values : mapping, SI
-        Of the elements on the joints, by name.
+        Values of the elements on the joints, by name.
     names : sequence of str
-        Base parameters with values.
+        Names of the base parameters that are given.
     X : ndarray, shape (len(names),), SI
-        Their values.
+        Values of these base parameters.
     absent : collection of str
         Elements that the file does not have; they change only if the links cannot.
 
     Raises
     ------
     DescriptionError
-        A base parameter that no link of the file can give, or no physical robot.
+        No link of the file can give a base parameter, or no physical robot has X.
     """
     whole, elements, counts = _of_file(physical, links, values, absent)
     K, chi0 = whole.physical.rows(names), whole.chi(whole.u0)
@@ -209,10 +218,12 @@ def _of_file(
     values: Mapping[str, float],
     absent: Collection[str],
 ) -> tuple[Numbers, dict[str, int], list[int]]:
-    """Numbers of the file, places of the elements, and, for each attempt, which numbers may change.
+    """Collect the numbers of the file as unknowns, in the order in which they may change.
 
-    First links that lead a body, and elements; then elements that the file does not have and the
-    links can take in; then the other links.
+    Return the unknowns, the index of each element, and for each attempt how many numbers may
+    change. The first attempt has the first link of each body, and the elements. The second adds
+    elements that the file does not have and that the links can replace; the third adds the other
+    links.
     """
     leading = {link.j: link for link in reversed(links)}
     led = [leading[j] for j in physical.links if j in leading]
@@ -264,14 +275,17 @@ def _of_file(
 
 
 def _sizes_of(x: Array) -> Array:
-    """Typical sizes of NUMBERS: the mass, and by the extent of the link its centre and moments."""
+    """Estimate typical sizes of the mass, the centre and the tensor of a link, shape (10,).
+
+    The sizes of centre and tensor follow from the extent of the link.
+    """
     M, moments = x[0], float(np.abs(x[[4, 7, 9]]).sum()) / 2
     extent = np.sqrt(x[1:4] @ x[1:4] + moments / M) if M > 0 else 1.0
     return np.array([M, *[max(extent, 1e-3)] * 3, *[max(moments, 1e-3 * M * extent**2)] * 6])
 
 
 def _spare(physical: PhysicalModel, own: Sequence[str], absent: Sequence[str]) -> list[str]:
-    """Find parameters that the file lacks and whose columns the other parameters make up."""
+    """Find elements that the file lacks and whose effect on the base parameters others can give."""
     spare: list[str] = []
 
     def rank(names: Sequence[str]) -> int:
@@ -287,7 +301,10 @@ def _spare(physical: PhysicalModel, own: Sequence[str], absent: Sequence[str]) -
 
 
 def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple[Array | None, str]:
-    """Numbers with K chi(u) = rest; None, and why, where no physical robot has them."""
+    """Find numbers u of a physical robot with K chi(u) = rest.
+
+    Return u and "", or None and the reason why no physical robot has these base parameters.
+    """
     K = part.physical.rows(names)
     sizes = np.maximum(np.abs(X), np.abs(K) @ scales(part.physical))
     reached = K @ np.linalg.lstsq(K, rest, rcond=None)[0]
@@ -317,16 +334,16 @@ def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple
 
 
 def _violated(part: Numbers, u: Array) -> bool:
-    """Whether a condition is violated by numbers that moved."""
+    """Whether the numbers that changed violate a condition of a physical robot."""
     chi, moved = part.chi(u), u != part.u0
     conditions = [c for c in part.physical.conditions if moved[list(c.numbers)].any()]
     return any(c.smallest(chi) < -TINY for c in conditions)
 
 
 def _solve(part: Numbers, K: Array, rest: Array, start: Array, free: Array) -> Array | None:
-    """Find the numbers nearest to `start` with K chi(u) = rest; only those in `free` move.
+    """Find the numbers nearest to `start` with K chi(u) = rest, by Newton's method.
 
-    None if Newton's steps do not find them.
+    Only the numbers in `free` change. The result is None if the steps do not reach a solution.
     """
     S, u = (part.size * part.ease)[free], start.copy()
     for _ in range(STEPS):
@@ -345,9 +362,10 @@ def _solve(part: Numbers, K: Array, rest: Array, start: Array, free: Array) -> A
 
 
 def _hold(part: Numbers, chi: Array) -> Array:
-    """Numbers of chi, but with the file's value wherever no base parameter depends on it.
+    """Convert chi to numbers of the file; numbers without effect on base parameters keep their
+    value.
 
-    If that gives no physical link, chi's own numbers stay.
+    If these values violate a condition of a physical robot, the numbers in it are those of chi.
     """
     u = chi.copy()
     for link, at in part.links:
@@ -360,10 +378,10 @@ def _hold(part: Numbers, chi: Array) -> Array:
 
 
 def strange(link: FileLink, closest: Nearest) -> str:
-    """Say how far mass and centre of a link are from those of the file.
+    """Describe how far mass and centre of a link are from those of the file; "" if they are near.
 
-    "" if the mass is within a factor STRANGE and the centre has moved by less than the size of the
-    link.
+    They are near if the mass is within a factor STRANGE and the centre has moved by no more than
+    the size of the link.
     """
     before, after = (u[closest.links[link.name]] for u in (closest.u0, closest.u))
     m0, m, far = before[0], after[0], float(np.linalg.norm((after - before)[1:4]))

@@ -1,15 +1,16 @@
-"""Where a URDF or MJCF file holds the numbers of its links and joints: one map for each format.
+"""Find and edit the numbers of links and joints in the text of a URDF or MJCF file.
 
-With pose X of the link (URDF) or body (MJCF) in frame j and orientation R, in the link, of the axes
-in which the file states the tensor:
+With pose X of the link (URDF) or body (MJCF) in frame j, and the orientation R, in the link, of the
+axes in which the file states the tensor, the numbers are
 
     mass M,    centre MS / M in the link frame,    I = R' (J - M (c'c 1 - c c')) R about the centre
 
-A URDF has the axes of its <inertial>, which stay, and <dynamics> of a joint; motor inertia, offsets
-and springs have no place. MJCF has fullinertia in axes of the body, or diaginertia with the
-orientation of its principal axes. A body whose inertia comes from its geoms gets an <inertial>;
-inertiafromgeom="true" becomes "auto", by which the others stay as they are. What a class of
-defaults says for many joints is not changed: a joint that differs gets an attribute of its own.
+A URDF uses the axes of its <inertial>, which stay, and <dynamics> of a joint; it has no attribute
+for motor inertia, offsets and springs. An MJCF has fullinertia in axes of the body, or diaginertia
+with the orientation of its principal axes. A body whose inertia comes from its geoms gets an
+<inertial>; inertiafromgeom="true" becomes "auto", so that other bodies stay as they are. A class of
+defaults, which holds for many joints, is not changed: a joint that differs gets an attribute of its
+own.
 """
 
 from __future__ import annotations
@@ -73,7 +74,9 @@ class Attributes:
 
     @property
     def order(self) -> list[int]:
-        """Indices in NUMBERS of the numbers, in the order of the file."""
+        """Indices in NUMBERS of the numbers of a link, in the order in which the format writes
+        them.
+        """
         return [k for row in self.inertial.values() for places in row.values() for k in places]
 
 
@@ -103,22 +106,22 @@ MJCF = Attributes(
 
 @dataclass(frozen=True, eq=False)
 class LinkPlace:
-    """A link or body of the file and its <inertial>, if it has one.
+    """The XML elements of a link of the file, and the frames in which its numbers are given.
 
     Attributes
     ----------
     attributes : Attributes
-        Map of the format.
+        Names of the attributes in this format.
     link : XmlElement
         <link> or <body>.
     inertial : XmlElement or None
-        <inertial>.
+        <inertial>, if the link has one.
     X : ndarray, shape (4, 4)
-        Pose of the link in frame j.
+        Pose of the link (URDF) or body (MJCF) in frame j.
     axes : ndarray, shape (3, 3)
-        Orientation of the axes of the tensor in the link, as the file has it or MuJoCo compiles it.
+        Orientation of the axes of the tensor in the link, as in the file or as compiled by MuJoCo.
     stated : ndarray, shape (10,), or None
-        NUMBERS as a URDF states them; those of an MJCF are compiled.
+        NUMBERS as a URDF states them; None for an MJCF, whose numbers are compiled.
     """
 
     attributes: Attributes
@@ -130,12 +133,14 @@ class LinkPlace:
 
     @property
     def principal(self) -> bool:
-        """Whether an MJCF states principal moments."""
+        """Whether the file gives principal moments of inertia (diaginertia of an MJCF)."""
         full = self.inertial is None or "fullinertia" in self.inertial.attrib
         return self.attributes is MJCF and not full
 
     def numbers(self, ten: Array) -> Array:
-        """NUMBERS, shape (10,), by which the file states ten parameters given in frame j."""
+        """Convert ten inertial parameters in frame j to mass, centre and tensor of the file, shape
+        (10,).
+        """
         if not np.any(ten):
             return np.zeros(10)
         if ten[-1] <= 0:
@@ -146,7 +151,9 @@ class LinkPlace:
         return np.array([own.M, *(R.T @ (own.pose[:3, 3] - self.X[:3, 3])), *tensor])
 
     def ten(self, x: Array) -> Array:
-        """The ten parameters in frame j, shape (10,), that NUMBERS of the file state."""
+        """Convert mass, centre and tensor of the file to ten inertial parameters in frame j, shape
+        (10,).
+        """
         pose, (xx, xy, xz, yy, yz, zz) = np.eye(4), x[4:]
         if self.principal or self.attributes is URDF:
             pose[:3, :3] = self.axes
@@ -155,7 +162,7 @@ class LinkPlace:
         return ten_of(Inertial(float(x[0]), pose, I), self.X)
 
     def write(self, edits: XmlEdits, x: Array) -> None:
-        """The edits that make the file state NUMBERS x, shape (10,)."""
+        """Add the edits that change mass, centre and tensor in the file to x, shape (10,)."""
         if self.inertial is None:
             row = self.attributes.inertial[""]
             words = _words({key: x[[*row[key]]] for key in ("pos", "mass", "fullinertia")})
@@ -192,7 +199,7 @@ class LinkPlace:
 
 
 class Places:
-    """Elements of a file, found by the names of links and joints."""
+    """The XML elements of the links and joints of a file, found by name."""
 
     def __init__(self, content: bytes, tree: Tree, attributes: Attributes) -> None:
         root = read_elements(content, DEEPEST)
@@ -228,7 +235,7 @@ class Places:
                 )
 
     def link(self, name: str, tree: Tree, X: Array) -> LinkPlace:
-        """Where the numbers of link `name` stand; the link has pose X in frame j of `tree`."""
+        """Find the XML elements with the numbers of link `name`; the link has pose X in frame j."""
         link, inertial = self.links[name], tree.links[name]
         e = next(link.own("inertial"), None)
         if e is not None and e not in link:
@@ -245,12 +252,16 @@ class Places:
         return LinkPlace(self.attributes, link, e, X @ place, axes, of_file)
 
     def attribute(self, family: str, joint: Joint) -> str | None:
-        """Where a joint holds a parameter; None if it has no place."""
+        """Return the XML attribute for a parameter of a joint, such as damping; None if there is
+        none.
+        """
         without = family in SPRING and not joint.stiffness
         return None if without else self.attributes.joint.get(family)
 
     def heed_inertials(self, edits: XmlEdits) -> None:
-        """The edit that makes MuJoCo use an <inertial> that was inserted."""
+        """Add the edit that makes MuJoCo use an inserted <inertial>: inertiafromgeom becomes
+        "auto".
+        """
         own = (e for body in self.links.values() for e in body.own("inertial"))
         ignored = next(own, None)
         if self.from_geoms and ignored is not None:
@@ -269,7 +280,10 @@ class Places:
         values: Mapping[str, float],
         before: Mapping[str, float],
     ) -> None:
-        """The edits that make the file state `values` of a joint, by family, where it says `before`."""
+        """Add the edits that change the parameters of a joint in the file to `values`, by family.
+
+        `before` has the values in the file; equal values are not edited.
+        """
         e, names = self.joints[joint.name], self.attributes.joint
         new = {family: x for family, x in values.items() if not same(x, before[family])}
         own = {names[family]: x for family, x in new.items() if family not in SPRING}
@@ -303,7 +317,10 @@ def _words(attributes: Mapping[str, Any]) -> str:
 
 
 def principal(I: Array) -> tuple[Array, Array]:
-    """Moments (3,) and axes V (3, 3) with I = V diag(moments) V', V as near to the identity as it may be."""
+    """Compute principal moments (3,) and axes V (3, 3) of a tensor: I = V diag(moments) V'.
+
+    Order and signs of the axes are chosen so that V is as near to the identity as possible.
+    """
     if np.abs(I - np.diag(np.diag(I))).max() <= DIAGONAL * np.abs(I).max():
         return np.diag(I).copy(), np.eye(3)
     moments, V = np.linalg.eigh((I + I.T) / 2)
@@ -317,7 +334,7 @@ def principal(I: Array) -> tuple[Array, Array]:
 
 
 def quaternion(R: Array) -> Array:
-    """Unit quaternion w, x, y, z of a rotation matrix, w not negative."""
+    """Convert a rotation matrix to a unit quaternion w, x, y, z with w >= 0."""
     xx, yy, zz = np.diag(R)
     squares = np.array([1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz]) / 4
     k = int(np.argmax(squares))
@@ -332,7 +349,7 @@ def quaternion(R: Array) -> Array:
 
 
 def _bodies(e: XmlElement) -> Iterator[XmlElement]:
-    """Bodies in the order of MuJoCo: a body before those inside it."""
+    """Yield the bodies in MuJoCo's order: each body before the bodies inside it."""
     for child in e:
         if child.tag == "body":
             yield child
@@ -342,18 +359,18 @@ def _bodies(e: XmlElement) -> Iterator[XmlElement]:
 
 @dataclass(frozen=True, eq=False)
 class FileLink:
-    """A link of the file with inertia.
+    """A link of a URDF or MJCF file that has inertia.
 
     Attributes
     ----------
     name : str
-        Of the file.
+        Name in the file.
     j : int
-        Body it belongs to.
+        Number of the body to which the link belongs.
     ten : ndarray, shape (10,)
         XX .. ZZ, MX, MY, MZ, M of the file in frame j.
     place : LinkPlace
-        Places of its numbers.
+        XML elements with its numbers.
     """
 
     name: str
@@ -363,26 +380,26 @@ class FileLink:
 
     @property
     def numbers(self) -> Array:
-        """NUMBERS, shape (10,), as the file states them."""
+        """Mass, centre and tensor as the file states them, shape (10,), in the order of NUMBERS."""
         return self.place.numbers(self.ten) if self.place.stated is None else self.place.stated
 
 
 @dataclass(frozen=True, eq=False)
 class RobotText:
-    """A parsed URDF or MJCF file that knows where each number stands in its text.
+    """A parsed URDF or MJCF file, with the places of its numbers in the text.
 
     Attributes
     ----------
     file : str
-        Its name.
+        Name of the file.
     tree : Tree
-        Links and joints that are read: all of the file, or a chain of it.
+        Links and joints that are used: all of the file, or a chain of it.
     table : Table
         Khalil frames of `tree`.
     robot : Robot
         The robot of `tree`.
     places : Places
-        Where each number stands in the text.
+        XML elements with the numbers.
     """
 
     file: str
@@ -393,7 +410,8 @@ class RobotText:
 
     @property
     def links(self) -> list[FileLink]:
-        """The links with inertia of the bodies that move, body by body, the one that the joint carries first."""
+        """Links with inertia on bodies that move, body by body, the link on the moving joint first.
+        """
         return [
             FileLink(name, j, ten_of(inertial, X), self.places.link(name, self.tree, X))
             for j in self.robot.links
@@ -402,21 +420,26 @@ class RobotText:
         ]
 
     def joint_values(self, j: int) -> dict[str, float]:
-        """Values of the file for the elements along joint j, by family."""
+        """Return the values in the file of the elements on joint j, by family: Ia, FV, FS, OFFSET,
+        K.
+        """
         return {family: value(self.table.joint[j]) for family, _, value in JOINT_TERMS}
 
     def attribute(self, family: str, j: int) -> str | None:
-        """Where joint j holds a parameter; None: the format has no place for it."""
+        """Return the XML attribute for a parameter of joint j; None if the format has no such
+        attribute.
+        """
         return self.places.attribute(family, self.table.joint[j])
 
 
 def read_text(content: bytes, path: Path, exact: bool, part: TreePart) -> RobotText:
-    """The file as `symgen.description.read_robot` reads it.
+    """Read a URDF or MJCF file as `read_robot` does, and find the places of its numbers in the
+    text.
 
     Raises
     ------
     DescriptionError
-        No URDF or MJCF; the message names file and line.
+        The file is no URDF or MJCF; the message names file and line.
     """
     with located(path.name):
         if (suffix := path.suffix.lower()) not in TREES:
@@ -433,7 +456,11 @@ def read_text(content: bytes, path: Path, exact: bool, part: TreePart) -> RobotT
 
 
 def require_same_frames(text: RobotText, robot: Robot, file: str) -> None:
-    """Raise DescriptionError unless the frames of `robot` are those of the text: parameters of a link mean nothing in another frame."""
+    """Check that the frames of `robot` are those of the file, because link parameters depend on
+    them.
+
+    Raises DescriptionError if a frame differs.
+    """
     ours, theirs = ({f.j: f for f in one.frames} for one in (text.robot, robot))
     different = [
         j for j in ours.keys() ^ theirs.keys() if j in ours or theirs[j].sigma != FIXED

@@ -1,4 +1,6 @@
-"""The edits that make a file state what was found, the table of what changed, and the check that the new text is read as that."""
+"""Edits that write the identified values into a file, the list of changes, and a check of the new
+text.
+"""
 
 from __future__ import annotations
 
@@ -21,18 +23,18 @@ SLIDING = {"FV": "N*s/m", "FS": "N", "Ia": "kg", "OFFSET": "N", "K": "N/m"}
 
 @dataclass(frozen=True, eq=False)
 class Writing:
-    """Values that are written into a file.
+    """The values to be written into a URDF or MJCF file, and the text of this file.
 
     Attributes
     ----------
     text : RobotText
         The file.
     nearest : Nearest
-        What it is to say.
+        The values to be written.
     own : mapping
-        Family and joint of the elements that act along one joint, by name.
+        Family and joint of the parameters of elements that act along one joint, by name.
     root : ndarray, shape (b, b)
-        Root of the covariance of the base parameters.
+        Square root of the covariance of the base parameters.
     """
 
     text: RobotText
@@ -41,7 +43,7 @@ class Writing:
     root: Array
 
     def links(self, edits: XmlEdits) -> list[Change]:
-        """Edit the links that change; one row for each number of every link."""
+        """Edit the links that change, and return a Change for each number of every link."""
         rows, moved = [], []
         for link in self.text.links:
             x = self.nearest.u[self.nearest.links[link.name]]
@@ -55,7 +57,9 @@ class Writing:
         return rows
 
     def _link_rows(self, link: FileLink) -> list[Change]:
-        """One row for each number of a link: from, to, deviation, and source."""
+        """Make a Change for each number of a link: old and new value, standard deviation, and
+        source.
+        """
         rows, at = [], self.nearest.links[link.name]
         for k in link.place.attributes.order:
             name, label, unit = NUMBERS[k]
@@ -79,7 +83,9 @@ class Writing:
         return "record" if self.nearest.told[k] else "sum"
 
     def joints(self, edits: XmlEdits) -> list[Change]:
-        """Edit the joints; one row for each number that the file has a place for."""
+        """Edit the joints, and return a Change for each parameter for which the format has an
+        attribute.
+        """
         rows = []
         for j, joint in self.text.table.joint.items():
             attributes = {
@@ -102,12 +108,12 @@ class Writing:
         return float(self.nearest.u[self.nearest.elements[name]])
 
     def sigma(self, k: int) -> float:
-        """Deviation of number k."""
+        """Compute the standard deviation of number k."""
         return float(np.linalg.norm(self.nearest.gain[k] @ self.root))
 
     @property
     def placeless(self) -> dict[str, float]:
-        """Parameters that change and that the file has no place for."""
+        """New values, by name, of changed parameters for which the format has no attribute."""
         return {
             name: float(self.nearest.u[k])
             for name, k in self.nearest.elements.items()
@@ -116,7 +122,11 @@ class Writing:
         }
 
     def require_read_back(self, again: RobotText) -> None:
-        """Raise DescriptionError unless the written text, read `again`, says what was to be written."""
+        """Check that the written text, which was read again as `again`, gives the values to be
+        written.
+
+        Raises DescriptionError if it does not.
+        """
         for link in again.links:
             at = self.nearest.links.get(link.name)
             wanted = np.zeros(10) if at is None else self.nearest.chi[at]

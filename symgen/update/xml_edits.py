@@ -1,9 +1,9 @@
-"""Numbers of an XML text replaced in place: every other byte stays.
+"""Replacement of numbers in an XML text; every other byte stays.
 
-`symgen.description.xml_text` reads the text, refuses what is no plain XML, and tells where each
-element starts. Here the start tag is read again, as bytes: an edit is a span of bytes and what
-stands there instead. What has no place yet (an attribute, an element) is inserted and counted as
-such.
+`symgen.description.xml_text` reads the text, refuses XML that is not plain, and gives the byte at
+which each element starts. Here the start tag is read again, as bytes. An edit is a span of bytes
+and the text that replaces these bytes. An attribute or element that does not exist yet is inserted,
+and listed in `added`.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ FIGURES = re.compile(rb"\S+")
 
 @dataclass
 class XmlEdits:
-    """A text and its edits.
+    """An XML text, and the edits to make in it, by byte position.
 
     Attributes
     ----------
     content : bytes
-        As it was read.
+        The text as it was read.
     edits : list
         Start, end and replacement of each edit.
     added : list of str
-        What was inserted, in words.
+        Sentences on what was inserted.
     """
 
     content: bytes
@@ -43,7 +43,7 @@ class XmlEdits:
     added: list[str] = field(default_factory=list)
 
     def edited(self) -> bytes:
-        """The text with all edits."""
+        """Return the text with all edits made."""
         parts, last = [], 0
         for start, end, text in sorted(self.edits, key=lambda edit: edit[:2]):
             parts += [self.content[last:start], text]
@@ -57,15 +57,14 @@ class XmlEdits:
         values: Sequence[float],
         default: Sequence[float] | None = None,
     ) -> None:
-        """Replace the numbers of an attribute; if it has more numbers, its first ones.
-
-        Those that stay are not touched.
+        """Replace the first numbers of the attribute `name` by `values`; equal numbers stay as
+        written.
 
         Parameters
         ----------
         default : sequence of float
-            What a missing attribute means; it is added where the values differ. None: it is added
-            in any case.
+            Values that a missing attribute means; the attribute is added only if `values` differ
+            from these. None: a missing attribute is always added.
         """
         span = self._value(e, name)
         if span is None:
@@ -92,7 +91,7 @@ class XmlEdits:
             self.added.append(f"line {e.line}: {name}={word} in <{e.tag}>")
 
     def replace_attribute(self, e: XmlElement, old: str, new: str, values: Sequence[float]) -> None:
-        """Replace one attribute by another."""
+        """Replace the attribute `old` by the attribute `new` with the numbers `values`."""
         match = self._attributes(e)[old.encode()]
         self.edits.append((match.start("name"), match.end(), f'{new}="{numbers(values)}"'.encode()))
         self.added.append(f"line {e.line}: {new} in place of {old} of <{e.tag}>")
@@ -119,7 +118,9 @@ class XmlEdits:
         self.added.append(f"line {e.line}: {name} of <{e.tag}>")
 
     def _value(self, e: XmlElement, name: str) -> tuple[int, int] | None:
-        """Place of the value of an attribute, without its quotes."""
+        """Find the first and last byte of the value of an attribute, without quotes; None if it is
+        missing.
+        """
         match = self._attributes(e).get(name.encode())
         return None if match is None else (match.start("quoted") + 1, match.end("quoted") - 1)
 
@@ -146,7 +147,7 @@ def same(x: float, y: float) -> bool:
 
 
 def number(x: float) -> str:
-    """Write a number by the shortest text that means this double."""
+    """Write a number as the shortest decimal text that gives exactly this double."""
     return repr(float(x) + 0.0)
 
 
