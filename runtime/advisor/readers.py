@@ -87,9 +87,8 @@ def curves(
     Steps go from `start` down until all changes are below the first limit, and up until all are
     above the last limit. They are finer where constant speeds of the record lock to the sampling.
 
-    A label names a choice. Return for each label the steps, shape (m,), and the changes with their
-    standard deviations,
-    shape (m, 2, b), %.
+    A label names a choice of encoders. Return for each label the steps, shape (m,), and the changes
+    with their standard deviations, shape (m, 2, b), %.
     """
     known: dict[str, dict[float, Array]] = {label: {} for label in selections}
     finest, coarsest = real.finest, real.coarsest

@@ -1,1 +1,1 @@
-"""The law of a controller as the torque of a record that has none."""
+"""Torque computed by the law of the controller, for records without a measured torque."""

@@ -1,12 +1,18 @@
-"""What is to be found of the law whose torque replaces a measured one: `controller.law` with kd: fit, delay: fit.
+"""Fit of the gain kd and of the delay of a control law whose torque replaces a measured one.
 
-    W X = tau(t - delay),      tau = sat(tau_0 + kd v),      v = qd_ref - qd, tau_0 the law without kd
-        = Y + (kd - k) V - (delay - d) d/dt Y          at the last kd k and delay d; V is v where the drive does not cut, else zero
+Settings: `controller.law` with kd: fit, delay: fit.
 
-Least squares of X, kd of every joint and one delay together, weighted by joint; deviations are
-those of blocks of time. Where the drive cuts, the law is not linear in kd: passes begin at several
-kd, a step that raises the misfit is halved, and the kd of smallest misfit is taken. Where qd_ref
-does not move and the drive does not cut, V is the column of FV and their sum alone is known.
+    W X = tau(t - delay),      tau = sat(tau_0 + kd v),      v = qd_ref - qd
+        = Y + (kd - k) V - (delay - d) d/dt Y
+
+tau_0 is the torque of the law without kd, k and d are the last values of kd and delay, and V is v
+where the drive does not cut the torque, else zero.
+
+X, kd of every joint and one delay are estimated together by least squares weighted by joint; the
+standard deviations are those of blocks of time. If the drive cuts the torque, the law is not linear
+in kd: passes begin at several kd, a step that raises the misfit is halved, and the kd of smallest
+misfit is the result. If qd_ref does not move and the drive does not cut, V is the column of FV, and
+only the sum of kd and FV is determined.
 """
 
 from __future__ import annotations
@@ -37,20 +43,21 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class LawEstimate(Result):
-    """Gains of the velocity and delay of a law.
+    """Estimated velocity gains kd and estimated delay of a control law.
 
     Attributes
     ----------
     joints : tuple of str
     kd, sigma : ndarray, shape (n,), N m s/rad or N s/m
-        Gains and their deviations, jointly with all parameters; nan if kd and FV cannot be
+        Gains and their standard deviations, jointly with all parameters; nan if kd and FV cannot be
         separated, or kd was given.
     delay, sigma_delay : float, s
-        From the logged signals to the torque; nan if it was given.
+        Delay from the logged signals to the torque, and its standard deviation; nan if it was
+        given.
     text : str
         The same in words.
     error : float, %
-        Of the torque, with what was found.
+        Relative error of the torque, with the estimated values.
     """
 
     joints: tuple[str, ...]
@@ -66,7 +73,11 @@ KIND = "law"
 
 
 def law_of_controller(problem: Problem) -> Problem:
-    """The step: records with the torque of the completed law, where the settings ask for kd or the delay of a law; the problem itself if they do not."""
+    """Estimate kd and delay of the control law, and compute the torque of the records by the law.
+
+    This is a step of the preparation of a problem. Only values that the settings set to "fit" are
+    estimated; if there are none, the problem is returned unchanged.
+    """
     settings: Any = problem.settings
     controllers = [r.controller for r in settings.record if r.by_law and r.controller is not None]
     asked = [c for c in controllers if "fit" in (c.law.kd, c.law.delay)]
@@ -91,7 +102,7 @@ def law_of_controller(problem: Problem) -> Problem:
 
 @dataclass(frozen=True)
 class GainDoubt(Part):
-    """Another kd than the stated one explains the records."""
+    """Warning that another gain kd than the stated one explains the records."""
 
     sentence: str
 
@@ -99,18 +110,24 @@ class GainDoubt(Part):
     title = "Law of the controller"
 
     def warnings(self) -> tuple[str, ...]:
-        """The question to the user."""
+        """Return the question about the gains for the user, as the only warning."""
         return (self.sentence,)
 
 
 def doubt_of_gains(result: Identification) -> GainDoubt | None:
-    """Whether the stated kd are doubtful; None if they are not, or there are none."""
+    """Return a warning if the stated gains kd are doubtful, else None."""
     sentence = gain_doubt(result.problem, result.estimate.relative_error)
     return GainDoubt(sentence) if sentence else None
 
 
 def gain_doubt(problem: Problem, error: float) -> str:
-    """Whether another kd than the stated one explains the records, a sentence; "" if it does not, or they hold none. error : of the stated one, %."""
+    """Write a sentence if another gain kd than the stated one explains the records, else "".
+
+    The sentence is written if another kd more than halves the error. It is also "" if the records
+    do not use the torque of the law.
+
+    error : relative error of the torque with the stated kd, %.
+    """
     settings: Any = problem.settings
     by_law = ["law_v" in record.channels for record in problem.records]
     laws = [r.controller.law for r in settings.record if r.controller is not None]
@@ -130,7 +147,7 @@ def gain_doubt(problem: Problem, error: float) -> str:
 
 
 def law_estimate(problem: Problem, law: Law, saturation: Array) -> LawEstimate:
-    """kd of every joint and the delay, as far as `law` asks for them.
+    """Estimate kd of every joint and the delay, if `law` sets them to "fit".
 
     saturation : ndarray, shape (n,), N m or N
         Largest torque of the drives; inf if they do not cut.
@@ -165,7 +182,12 @@ def law_estimate(problem: Problem, law: Law, saturation: Array) -> LawEstimate:
 def _search_kd(
     torques: TorquesOfLaw, gains: Sequence[str], late_too: bool, kd: Array, cuts: bool
 ) -> tuple[Array, float, float]:
-    """kd, the delay and the misfit where passes from `kd` end. cuts : the law is not linear in kd."""
+    """Search kd and the delay by Gauss-Newton passes from a first value of kd.
+
+    Returns kd, the delay and their misfit, which is nan if the drives do not cut.
+
+    cuts : whether the drives cut the torque; then the law is not linear in kd.
+    """
     labels = [f"KD{j}" for j in joint_labels(torques.model)]
     delay = 0.0
     misfit = torques.misfit(kd, delay) if cuts else np.nan
@@ -193,7 +215,7 @@ def _search_kd(
 
 @dataclass(frozen=True, eq=False)
 class TorquesOfLaw:
-    """Records whose torque is the law, with the rows of their regressor.
+    """The records whose torque is computed by the control law, with the rows of their regressor.
 
     Attributes
     ----------
@@ -212,12 +234,15 @@ class TorquesOfLaw:
     saturation: Array
 
     def torques(self, kd: Array, delay: float) -> list[Array]:
-        """Torques of the records with these gains, shape (N, n) each."""
+        """Compute the torques of all records with given gains and delay, shape (N, n) each."""
         records = [prepared.record for prepared in self.records]
         return [torque_of(record, kd, delay, self.saturation) for record in records]
 
     def slopes(self, kd: Array, delay: float) -> list[Array]:
-        """Derivatives of the torques by kd: v where the drives do not cut."""
+        """Compute the derivatives of the torques by kd: v without saturation, else zero.
+
+        v = qd_ref - qd, late by the delay.
+        """
         slopes = []
         for prepared in self.records:
             record = prepared.record
@@ -227,7 +252,7 @@ class TorquesOfLaw:
         return slopes
 
     def fit(self, gains: Sequence[str], late_too: bool, kd: Array, delay: float) -> Estimate:
-        """X, and how far kd and the delay are to move, from one linear fit."""
+        """Estimate X and the corrections of kd and of the delay by one linear fit."""
         torques = self.torques(kd, delay)
         Y = with_torques(self.rows, self.records, torques)
         columns: dict[str, Array] = {}
@@ -246,7 +271,10 @@ class TorquesOfLaw:
         return linear_estimate(wide, EstimateSettings("wls", "joint"), model=self.model)
 
     def misfit(self, kd: Array, delay: float) -> float:
-        """sum_j N_j log ||Y_j - W_j X||, X by least squares weighted by joint."""
+        """Compute the misfit sum_j N_j log ||Y_j - W_j X|| of given gains and delay.
+
+        X is the least-squares estimate weighted by joint.
+        """
         fit = self.fit((), False, kd, delay)
         return float(
             sum(joint.rows * np.log(joint.residual_norm) for joint in fit.per_joint if joint.rows)
@@ -254,13 +282,16 @@ class TorquesOfLaw:
 
 
 def torque_of(record: Record, kd: Array, delay: float, saturation: Array) -> Array:
-    """Torque of the law of a record with these gains, late by `delay`, shape (N, n)."""
+    """Compute the torque of the control law for a record, late by `delay` s, shape (N, n)."""
     tau = record.tau + kd * record.channels["law_v"] if np.any(kd) else record.tau
     return late(record.t, np.clip(tau, -saturation, saturation), np.nan_to_num(delay))
 
 
 def _apart(fit: Estimate, name: str) -> bool:
-    """Whether a gain can be distinguished from every parameter."""
+    """Whether the gain `name` can be distinguished from every other parameter of the fit.
+
+    Its correlations with the others must be below LIMIT.KD_ALIKE.
+    """
     k = fit.names.index(name)
     scale = np.sqrt(np.diag(fit.covariance))
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,10 +1,12 @@
-"""The torque of a controller's law, for records that hold no torque: many legged robots log q, the reference and the gains alone.
+"""Torque computed by the law of a controller, for records that contain no measured torque.
+
+Many legged robots log only q, the reference and the gains.
 
     tau = sat(P (q_ref - q) + Vr qd_ref - Vm qd + tau_ff)
 
 P, Vr, Vm of `runtime.loop.settings.Law`, joint side, SI; qd as recorded, else differences
-q_k - q_(k-1) over the period. With kd: fit the share of kd is left out and nothing is cut yet: kd
-is found with the parameters, under the saturation (`runtime.controller.fitted`).
+q_k - q_(k-1) over the period. With kd: fit, the part of kd is left out and the torque is not cut
+yet: kd is estimated with the parameters, with the saturation (`runtime.controller.fitted`).
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class TorqueLaw:
-    """The law of n joints.
+    """The control law of n joints, which gives torques from recorded signals.
 
     Attributes
     ----------
@@ -32,9 +34,9 @@ class TorqueLaw:
     saturation : ndarray, shape (n,), N m or N
         Largest torque; inf if none is given.
     fit : bool
-        Whether kd is to be found.
+        Whether kd is estimated.
     delay : float, s
-        From the logged signals to the torque.
+        Delay from the logged signals to the torque.
     """
 
     P: Array
@@ -45,13 +47,16 @@ class TorqueLaw:
     delay: float = 0.0
 
     def signals(self, t: Array, own: Mapping[str, Array], rate: float) -> dict[str, Array]:
-        """Signals of a whole record, by name, with the torque of the law and law_v, qd_ref - qd, both late by the delay."""
+        """Add the torque tau of the law, and law_v = qd_ref - qd, to the signals of a record.
+
+        Both are late by the delay. own : signals of the whole record, by name.
+        """
         v = own.get("qd_ref", 0.0) - velocity(own["q"], own, rate)
         made = {"tau": self.torque(own["q"], own, rate), "law_v": v}
         return {**own, **{key: late(t, x, self.delay) for key, x in made.items()}}
 
     def torque(self, q: Array, channels: Mapping[str, Array], rate: float) -> Array:
-        """Torques of the law, shape (N, n), N m or N.
+        """Compute the torques of the law, shape (N, n), N m or N.
 
         Parameters
         ----------
@@ -71,14 +76,17 @@ class TorqueLaw:
 
 
 def velocity(q: Array, channels: Mapping[str, Array], rate: float) -> Array:
-    """Velocities that the law takes, shape (N, n): as recorded, else differences backward."""
+    """Return the velocities for the law, shape (N, n): recorded ones, else backward differences."""
     if "qd" in channels:
         return channels["qd"]
     return np.asarray(np.diff(q, axis=0, prepend=q[:1]) * rate)
 
 
 def late(t: Array, x: Array, delay: float) -> Array:
-    """x, shape (N, n), later by `delay` s, between samples by a cubic spline; ends repeat."""
+    """Delay the signal x, shape (N, n), by `delay` s.
+
+    A cubic spline interpolates between samples; the end values repeat.
+    """
     if not delay:
         return x
     from scipy.interpolate import CubicSpline  # 60 ms, where it is used
@@ -87,9 +95,11 @@ def late(t: Array, x: Array, delay: float) -> Array:
 
 
 def torque_law(controller: Controller | None, n: int, limits: Mapping[str, Any]) -> TorqueLaw:
-    """The law of a controller for n joints with these LIMITS.
+    """Make the torque law of n joints from the settings of a controller.
 
-    SettingsError if it has a memory, or is none.
+    SettingsError for gains that need more than the recorded signals, such as that of an integral.
+
+    limits : limits of the robot file.
     """
     law = (controller or Controller()).law
     gains = law.gains(n)

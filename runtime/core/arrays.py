@@ -1,6 +1,7 @@
-"""Conversion of the arrays that callers give to float64; anything else raises an InputError.
+"""Conversion of input arrays to float64; an array without real numbers raises an InputError.
 
-    real(t, "t")        float64; InputError for dates, texts, complex or masked numbers, None, ragged lists
+    real(t, "t")        float64; InputError for dates, texts, complex or masked numbers, None,
+                        ragged lists
 
 Every array of a caller is converted here, because NumPy casts without a warning: a datetime64 would
 become nanoseconds, a complex number would lose its imaginary part, a masked array its mask.

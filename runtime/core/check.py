@@ -2,8 +2,10 @@
 
 The state of the answer is one of these:
 
-good       within the limit doubtful   usable with the care that the remedy describes no         not
-usable open       not examined, or only the user can answer; the verdict does not count it
+    good       within the limit
+    doubtful   usable with the care that the remedy describes
+    no         not usable
+    open       not examined, or only the user can answer; the verdict does not count it
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ P = ParamSpec("P")
 
 @dataclass(frozen=True)
 class Check:
-    """One question of the verdict with its answer.
+    """One question about a record or an identification, with its answer, its limit and a remedy.
 
     Attributes
     ----------
@@ -58,7 +60,7 @@ class Check:
 
 
 class Answer(NamedTuple):
-    """The answer to a Question: its state and its finding.
+    """The answer to a Question: its state (good, doubtful, no or open) and its finding, a sentence.
 
     remedy and limit, if given, replace those of the Question.
     """

@@ -268,7 +268,7 @@ def total_error(fit: Estimate) -> Answer:
 def explained_by_joint(
     estimate: Estimate, fit: Estimate, expected: float = float("nan")
 ) -> Answer | None:
-    """Check the relative error of the joint with the largest error, which the total error may hide.
+    """Check the largest relative error of a single joint, which the total error may hide.
 
     Return None if fewer than two joints have a motor. If predictions are expected to be good
     (`expected`, %), the answer is never "no".
@@ -326,12 +326,16 @@ def predicted(
     differ: bool = False,
     expected: float = float("nan"),
 ) -> Answer:
-    """Check the largest relative error, %, on data that were not fitted; "open" if it is nan.
+    """Check the relative error, %, of the model on data that were not fitted.
+
+    error : the largest one; the answer is "open" if it is nan.
 
     halves : whether the error is that of one half of the record, with parameters from the other
     half. Half a record may not excite all parameters: the answer is good up to the second limit, or
     up to the last limit if predictions of other motions are expected to be good (`expected`, %),
-    and never "no". differ : whether records disagree by more than LIMIT.RELEVANT_DIFFERENCE.
+    and never "no".
+
+    differ : whether records disagree by more than LIMIT.RELEVANT_DIFFERENCE.
     """
     limits = [
         min(max(times * fit.relative_error, least), most)
@@ -410,7 +414,7 @@ def certain(fit: Estimate, bootstrap: Mapping[str, float]) -> Answer:
     "use these values only together, or record a motion that separates them (symgen excite)",
 )
 def separate(fit: Estimate) -> Answer:
-    """Check that no two estimates are strongly correlated by the covariance of eq. (10)."""
+    """Check that no two parameters have strongly correlated estimates, eq. (10)."""
     deviation = np.sqrt(np.diag(fit.covariance))
     with np.errstate(divide="ignore", invalid="ignore"):
         correlation = fit.covariance / np.outer(deviation, deviation)

@@ -108,7 +108,10 @@ def rate_of(stamps: Stamps, t: Array) -> float:
 
 
 def remedy(stamps: TimeStamps) -> dict[str, Any]:
-    """Propose settings `record.resample` that bridge short gaps and split the record at others."""
+    """Propose settings `record.resample` that make irregular time stamps uniform.
+
+    Short gaps are bridged by interpolation; at long gaps the record is split.
+    """
     periods = [gap.step / stamps.period for gap in stamps.gaps]
     most = max(BRIDGED / stamps.period, BRIDGED_PERIODS)
     short = [gap for gap in periods if gap <= most]
@@ -121,7 +124,7 @@ def remedy(stamps: TimeStamps) -> dict[str, Any]:
 
 
 def remedy_text(t: Array, stamps: TimeStamps, *, arrays: bool = False) -> str:
-    """Write sentences on the mean sampling rate, the rate of the median step, and a remedy.
+    """Write sentences for the user on irregular time stamps: the mean sampling rate and a remedy.
 
     A second remedy is for samples that are uniform although their stamps jitter. arrays : whether
     the record is made of arrays; the remedy is then a function call, not a setting.

@@ -19,8 +19,10 @@ class Result:
         class Delay(Result, keys="joints shift")
 
     keys : names of the fields and properties in JSON, in this order; "key:name" writes the field
-    `name` under `key`. Default: all fields. schema : kind and version of the result, the first key
-    in JSON; None for a part of another result.
+    `name` under `key`. Default: all fields.
+
+    schema : kind and version of the result, the first key in JSON; None for a part of another
+    result.
     """
 
     _keys: ClassVar[str]

@@ -79,7 +79,7 @@ class Drives:
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> Drives:
-        """Make drives from the constant DRIVES of an emitted module."""
+        """Make drives from the constant DRIVES of an emitted model, a generated Python module."""
         constant = mapping.get("torque_constant")
         return cls(
             mapping["ratio"],
@@ -94,7 +94,7 @@ class Drives:
         return len(self.ratio)
 
     def decoupled(self, coupling: Coupling) -> Drives:
-        """Return the same drives with couplings used for positions, torques, both or neither.
+        """Return the same drives with gear couplings used for positions, torques, both or neither.
 
         coupling : "position", "torque", "both" or "none".
         """
@@ -153,8 +153,8 @@ class Drives:
 def encoder_drives(side: str, drives: Drives | None, section: str = "signals") -> Drives | None:
     """Return the drives between joints and encoders; None if the encoders are at the joints.
 
-    section : section of the study whose key `side` is "joint" or "motor", for messages. Raise
-    SettingsError if the encoders are at the motors and the robot has no drives.
+    Raise SettingsError if the encoders are at the motors and the robot has no drives. section :
+    section of the study whose key `side` is "joint" or "motor", for messages.
     """
     if side == "joint":
         return None

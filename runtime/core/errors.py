@@ -110,7 +110,7 @@ class SettingsError(InputError):
 
 
 class ModelError(InputError):
-    """Error: a module that is not an emitted model, or that lacks a function which is needed."""
+    """Error: a module that is not an emitted (generated) model, or that lacks a needed function."""
 
 
 class DataUnavailableError(InputError):
@@ -125,7 +125,7 @@ class DataUnavailableError(InputError):
 
 
 def instant(t: float) -> str:
-    """Write a time, s, for messages: with six digits, or to the millisecond from 1e5 s on.
+    """Write a time, s, for messages with six digits; times from 1e5 s on to the millisecond.
 
     Time stamps that count from an epoch such as 1970 are that large.
     """

@@ -167,10 +167,10 @@ def _removals(steps: Sequence[Removal], threshold: float) -> int:
 
 
 def _trail(system: System, threshold: float) -> list[Removal]:
-    """Remove the parameter with the largest %sigma, again and again, and return these steps.
+    """Remove the parameter with the largest %sigma, again and again; return these removals.
 
-    The steps end when the ratio of sigma_rho to its first value reaches `threshold`, or with one
-    parameter left. A step holds %sigma before its removal and the ratio after its removal.
+    They end when the ratio of sigma_rho to its first value reaches `threshold`, or with one
+    parameter left. A Removal has %sigma before the removal and the ratio after the removal.
     """
     steps: list[Removal] = []
     fit = system.solve()

@@ -1,6 +1,7 @@
 """Estimation of X from the rows Y = W X + rho of a prepared problem, by eqs. (6) to (11).
 
-rows = observe_rows(problem) fit  = estimated(problem, rows)
+rows = observe_rows(problem)
+fit  = estimated(problem, rows)
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Settings of earlier versions, or at a wrong place, each with a sentence on the replacement."""
+"""Removed or misplaced settings of a study file, each with a sentence on the replacement."""
 
 from __future__ import annotations
 

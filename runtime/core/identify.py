@@ -27,7 +27,7 @@ Extra: TypeAlias = Callable[[Identification], Part | None]
 
 @dataclass(frozen=True)
 class OnRequest:
-    """An analysis that is made only on request.
+    """An analysis that is made only if the user requests it.
 
     Attributes
     ----------

@@ -44,7 +44,7 @@ def cache_folder(of: str) -> Path:
 
 
 def is_writable_by_others(folder: Path) -> bool:
-    """Whether another user can change or replace the folder; its content is then no proof."""
+    """Whether another user can change or replace the folder, so that its content is not safe."""
     if os.name != "posix":
         return False
     for place in (folder, *folder.absolute().parents):
@@ -61,7 +61,7 @@ def is_writable_by_others(folder: Path) -> bool:
 
 
 def is_emitted(text: bytes) -> bool:
-    """Whether this installation has emitted and certified the text of a module."""
+    """Whether this installation has generated and certified the given text of a module."""
     try:
         folder = cache_folder("modules")
         return (folder / sha256(text).hexdigest()[:KEY]).is_dir() and not is_writable_by_others(
@@ -82,7 +82,7 @@ class _Text(importlib.abc.InspectLoader):
 
 
 def module_of(path: Path, *, trust: bool = False) -> ModuleType:
-    """Load the module of an emitted file.
+    """Load an emitted (generated) file as a Python module, if it can be trusted.
 
     Raise ModelError if this installation has not emitted the file, unless `trust` is true.
     """

@@ -1,4 +1,4 @@
-"""Names, formulas and numbers in HTML, as people write them.
+"""Names, formulas and numbers in HTML, with indices, exponents and units as in print.
 
 The parameter ZZ1R is printed as ZZ with the index 1R, and `D3**2*(M3 + M4)` with an exponent and no
 star. Every text passes through `element`, which escapes whatever is not Markup already: no name and
@@ -87,7 +87,7 @@ def formula(text: str) -> Markup:
 
 
 def unit(text: str) -> str:
-    """Write a unit as people do: kg*m**2 becomes kg m², N*m*s/rad becomes N m s/rad."""
+    """Write a unit as in print: kg*m**2 becomes kg m², N*m*s/rad becomes N m s/rad."""
     return text.replace("**2", "²").replace("*", "\u00a0")
 
 

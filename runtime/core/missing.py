@@ -38,11 +38,11 @@ class Missing:
     follows: Array | None = None
 
     def at_joints(self) -> Array:
-        """Return the samples and joints with unknown position, bool, shape (N, n)."""
+        """Return a mask of the samples and joints with unknown position, bool, shape (N, n)."""
         return self.samples if self.follows is None else self.samples @ self.follows.T
 
     def at_encoders(self, drives: Drives | None) -> Array:
-        """Return the samples and encoders without a count, bool, shape (N, n).
+        """Return a mask of the samples and encoders without a count, bool, shape (N, n).
 
         The encoders are at the joints if `drives` is None, else at the motors of `drives`. A motor
         that turns with two joints has no count if one of these joints has no position. If motor
@@ -53,7 +53,7 @@ class Missing:
         return self.samples if self.follows is not None else self.samples @ (drives.motion != 0).T
 
     def near_gaps(self, longest: int, reach: int) -> Array:
-        """Return the samples in or near long gaps, bool, shape (N,).
+        """Return a mask of the samples in or near long gaps, bool, shape (N,).
 
         A gap is long if it has more than `longest` samples; near means at most `reach` samples
         away.

@@ -69,7 +69,10 @@ class GeneratedModel(Protocol):
     casadi: Callable[..., Any]  # casadi.Function of a function of the module, by name
 
     def store(self, N: int) -> Array:
-        """Make a workspace of shape (b, n, N) for `out`, zero where an entry is always zero."""
+        """Make an array for the argument `out` of the other functions, shape (b, n, N).
+
+        Entries that are always zero are already zero in this array.
+        """
 
     def regressor(
         self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float
@@ -136,7 +139,7 @@ def require_emitted(model: Any) -> None:
 
 
 def _reduced(module: ModuleType) -> tuple[Callable[..., ModuleType], tuple[Any, ...]]:
-    """Return how pickle rebuilds a module in another process: an emitted one from its text.
+    """Define how pickle sends a module to another process: an emitted module as its text.
 
     The receiving process trusts the sending one. Any other module is imported by its name. Raise
     InputError for an emitted module without a file.
@@ -237,7 +240,7 @@ def constants_of(model: GeneratedModel, constants: Mapping[str, float]) -> dict[
 
 
 def channels_of(model: GeneratedModel) -> Mapping[str, tuple[str, ...]]:
-    """Return the base parameters that depend on each channel, by name of the channel.
+    """Return, for each channel, the base parameters that depend on this channel.
 
     A channel is a measured quantity in a law of the robot file, such as a temperature: a constant
     that is a function of time.
@@ -246,9 +249,9 @@ def channels_of(model: GeneratedModel) -> Mapping[str, tuple[str, ...]]:
 
 
 def require_no_channels(model: GeneratedModel, what: str) -> None:
-    """Raise InputError if laws of the model use channels, because `what` does not provide them.
+    """Raise InputError if laws of the model need measured signals, such as a temperature.
 
-    A channel is a measured quantity in a law, such as a temperature. what : name of the caller.
+    Such signals are called channels. what : name of the caller, which has no such signals.
     """
     if channels := channels_of(model):
         names = sorted({name for own in channels.values() for name in own})
@@ -259,9 +262,10 @@ def require_no_channels(model: GeneratedModel, what: str) -> None:
 
 
 def joint_labels(model: GeneratedModel) -> tuple[str, ...]:
-    """Return the labels of the joints in results: the number, and the name if it adds something.
+    """Return the labels of the joints in results: the number and perhaps the name, as in "2 elbow".
 
-    For instance "2 elbow", but "2" if the robot file names the joint "joint_2".
+    The name is left out if it adds nothing, for instance "2" if the robot file names the joint
+    "joint_2".
     """
     names = getattr(model, "LABELS", {})
     more = {
@@ -312,7 +316,7 @@ def elements_of(
 def base_columns(
     model: GeneratedModel, names: str | Sequence[str], essential: Sequence[str], *path: str
 ) -> tuple[str, ...]:
-    """Return the parameters that a setting selects: the `essential` ones, all, or those it names.
+    """Return the base parameters that a setting selects: the essential, all, or the named ones.
 
     names : value of the setting: "essential", "all" or names. path : keys of the setting. Raise
     SettingsError for a name that is not a base parameter.

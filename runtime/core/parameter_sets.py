@@ -73,16 +73,17 @@ def physical_asked(errors: Mapping[Any, float], first: bool) -> bool:
 
 
 def physical_possible(observation: Observation, settings: EstimateSettings, fit: Estimate) -> bool:
-    """Whether the physical set can be fitted in addition to `fit`, the fit of all parameters.
+    """Whether physically consistent parameters can be fitted in addition to `fit`.
 
-    This needs all columns, a fit with status ok, and weights other than "covariance".
+    `fit` has all parameters. This needs all columns, a fit with status ok, and weights other than
+    "covariance".
     """
     whole = settings.columns == "all" and fit.status == "ok"
     return whole and settings.weights != "covariance"
 
 
 def physical_set(problem: Problem, observation: Observation) -> tuple[Estimate, EstimateSettings]:
-    """Fit the physical parameters to all rows; return this fit, and settings for later fits.
+    """Fit physically consistent parameters to all rows; also return settings for later fits.
 
     The settings are for fits of parts of the rows: they fix the prior, its weight and the bounds by
     reach as found from all rows.
@@ -104,7 +105,10 @@ def physical_set(problem: Problem, observation: Observation) -> tuple[Estimate, 
 def held_out_validation(
     problem: Problem, observation: Observation, choices: Mapping[Any, EstimateSettings]
 ) -> CrossValidation:
-    """Divide the record into LIMIT.HELD_OUT_PARTS parts, and predict each part from the others."""
+    """Divide the record into equal parts, and predict each part by a fit of the other parts.
+
+    The number of parts is LIMIT.HELD_OUT_PARTS.
+    """
     number, folds = observation.equal_parts(LIMIT.HELD_OUT_PARTS), []
     for p in np.unique(number):
         part = observation.where(number == p)
@@ -132,7 +136,7 @@ def best_set(errors: Mapping[Any, float], essential: bool = False) -> SetName:
 
 
 def whole_set(names: Collection[SetName], model_columns: SetName) -> SetName:
-    """Return the name of a set with all base parameters, for a robot file or a program.
+    """Return the name of the set to use if all base parameters are needed, as in a robot file.
 
     This is `model_columns`, the set that is used. If that is the essential set, it is the physical
     set if `names` has it, else "all".
@@ -143,7 +147,7 @@ def whole_set(names: Collection[SetName], model_columns: SetName) -> SetName:
 
 
 def ranking_text(errors: Mapping[SetName, float], counts: Mapping[SetName, int], where: str) -> str:
-    """Write the sets in the order of their errors on unseen data, in one sentence.
+    """Write in one sentence how well each set of parameters predicts unseen data, best first.
 
     counts : number of parameters of each set. where : name of the unseen data.
     """

@@ -101,11 +101,11 @@ class Part:
         return False
 
     def text(self) -> str:
-        """Return paragraphs of text, one per line."""
+        """Return the text of the part: paragraphs, one per line."""
         return ""
 
     def brief(self) -> str:
-        """Return a short text for a short print."""
+        """Return a shorter text of the part, for a short print."""
         return ""
 
     def warnings(self) -> Sequence[str]:
@@ -134,11 +134,11 @@ class Part:
         return {} if summary is None else {self.name: summary}
 
     def files(self) -> Mapping[str, str]:
-        """Return the texts of further files, by file name."""
+        """Return the texts of further files to write, by file name."""
         return {}
 
     def arrays(self) -> Mapping[str, Mapping[str, np.ndarray]]:
-        """Return the arrays of NPZ and MAT files, by file name without its ending."""
+        """Return arrays to write as NPZ and MAT files, by file name without its ending."""
         return {}
 
 

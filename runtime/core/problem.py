@@ -32,7 +32,7 @@ SIGNALS = "signals"
 
 @dataclass(frozen=True)
 class Note:
-    """Message of a step about a problem.
+    """Message of a preparation step about a problem (model, records and settings).
 
     Attributes
     ----------
@@ -148,7 +148,7 @@ Step: TypeAlias = Callable[[Problem], Problem]
 
 
 def prepared(problem: Problem, steps: Iterable[Step]) -> Problem:
-    """Apply all steps to the problem, in their order, and return the changed problem."""
+    """Apply all preparation steps to the problem, in their order, and return the result."""
     for step in steps:
         problem = step(problem)
     return problem

@@ -1,6 +1,6 @@
 """Messages about the progress of long work, by the logger "runtime.core.progress", level INFO.
 
-logging.getLogger("runtime.core.progress").setLevel(logging.INFO)
+    logging.getLogger("runtime.core.progress").setLevel(logging.INFO)
 
 A handler is needed too; `symgen` has one, which prints the messages after two seconds.
 """

@@ -1,4 +1,4 @@
-"""A measured record: time, joint positions and joint torques, joint side, SI, uniformly sampled.
+"""A measured record: time, positions and torques of the joints, SI, uniformly sampled.
 
 `runtime.reading.records` makes records from files. A record made from arrays passes the same
 checks.
@@ -75,7 +75,9 @@ class Origin:
 
 @dataclass(frozen=True, eq=False, init=False)
 class Record:
-    """A measured record: joint side, SI, uniform sampling. The arrays are read-only copies.
+    """A measured record: positions and torques of the joints, in SI, uniformly sampled.
+
+    The arrays are read-only copies.
 
     Parameters
     ----------
@@ -261,7 +263,7 @@ def _array(x: ArrayLike | None, label: str, file: str) -> Array:
 
 
 def _channel(label: str, x: ArrayLike, shape: tuple[int, ...], file: str) -> Array:
-    """Check a channel of a record and make it read-only.
+    """Check a channel (a further measured signal) of a record, and make it read-only.
 
     shape : that of the positions, (N, n).
     """
@@ -280,7 +282,7 @@ def _channel(label: str, x: ArrayLike, shape: tuple[int, ...], file: str) -> Arr
 def _missing(
     missing: ArrayLike | Missing | None, shape: tuple[int, ...], file: str
 ) -> Missing | None:
-    """Convert the marks of missing positions to a Missing; None if no position is missing.
+    """Convert marks of missing positions to an object Missing; None if no position is missing.
 
     shape : that of the positions, (N, n).
     """

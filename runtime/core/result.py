@@ -98,7 +98,7 @@ class Identification:
     missing: tuple[str, ...] = ()
 
     def part(self, name: str) -> Any:
-        """Return the part with this name; None if there is none."""
+        """Return the part (result of a further analysis) with this name; None if there is none."""
         return next((part for part in self.parts if part.name == name), None)
 
     def with_part(self, part: Part) -> Identification:
@@ -118,12 +118,12 @@ class Identification:
 
     @property
     def prepared(self) -> tuple[Prepared, ...]:
-        """The records with their filtered states."""
+        """The fitted records with their filtered states q, qd, qdd."""
         return self.problem.prepared
 
     @property
     def records(self) -> tuple[Record, ...]:
-        """The records, joint side, SI."""
+        """The fitted records, with positions and torques of the joints in SI."""
         return self.problem.records
 
     @property

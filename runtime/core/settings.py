@@ -271,6 +271,8 @@ def _value_at(path: Path, value: Any) -> Any:
 def to_mapping(settings: Any) -> dict[str, Any]:
     """Convert a Study, or a section of it, to a complete mapping of plain values.
 
-    Plain values are dicts, lists, numbers and texts. study_from_mapping(to_mapping(s)) == s
+    Plain values are dicts, lists, numbers and texts. The conversion can be reversed:
+
+        study_from_mapping(to_mapping(s)) == s
     """
     return plain(settings)  # type: ignore[no-any-return]

@@ -16,9 +16,10 @@ SIGNED = ("inertia", "viscous", "coulomb", "dissipative")
 
 
 def is_form(acts: Mapping[Any, float]) -> bool:
-    """Whether an element of ELEMENTS is a quadratic form q'Bq, not an element along s = G q.
+    """Whether an element of a model, such as a spring, is a quadratic form q'Bq.
 
-    acts : its coefficients; those of a form have pairs of joints as keys.
+    Other elements act along a combination s = G q of joints. acts : coefficients of the element, by
+    joint; in a quadratic form by pair of joints.
     """
     return any(isinstance(key, tuple) for key in acts)
 

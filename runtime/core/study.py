@@ -42,7 +42,7 @@ SCHEMA = 1
 
 
 def version(number: int) -> int:
-    """Return the version of a study file; raise SettingsError if it is not SCHEMA."""
+    """Return the version of a study file; raise SettingsError for a version that cannot be read."""
     require(number == SCHEMA, f"schema {number}; this version reads {SCHEMA}")
     return number
 
@@ -78,7 +78,7 @@ class Lowpass(Settings):
 
     @property
     def hertz(self) -> float:
-        """The cut-off frequency, Hz; for "auto", which needs a record, that of the chapter."""
+        """Cut-off frequency as a number, Hz; for "auto" that of the chapter, 50 Hz."""
         return CHAPTER_CUTOFF if self.cutoff == "auto" else float(self.cutoff)
 
 

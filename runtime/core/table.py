@@ -16,7 +16,7 @@ LINE = 80  # characters of a line
 
 @dataclass(frozen=True)
 class Table:
-    """A table of text or Markup for terminal, page and notebook.
+    """A table whose cells are text or HTML (Markup), for terminal, page and notebook.
 
     Attributes
     ----------
@@ -114,9 +114,6 @@ def with_intervals(
     """Write name, value, half of the 95 % interval and unit of each parameter, in aligned cells.
 
     Digits end at the second digit of the interval.
-
-    >>> with_intervals(["ZZ1R", "FV1"], [1.79263, 8.0], [0.0104, 0.2], ["kg*m**2", "N*m*s/rad"])
-    ['ZZ1R  1.793 +- 0.020  kg*m**2', 'FV1   8.00  +- 0.39   N*m*s/rad']
 
     >>> with_intervals(["ZZ1R", "FV1"], [1.79263, 8.0], [0.0104, 0.2], ["kg*m**2", "N*m*s/rad"])
     ['ZZ1R  1.793 +- 0.020  kg*m**2', 'FV1   8.00  +- 0.39   N*m*s/rad']

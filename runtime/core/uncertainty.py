@@ -345,7 +345,7 @@ def f_tests(essential: Essential, share: float = 1.0) -> tuple[FTest, ...]:
 
 
 def sets(essential: Essential) -> tuple[tuple[float, int, tuple[str, ...]], ...]:
-    """Compare the essential sets of all thresholds with the set that is used.
+    """Compare the essential parameters at each threshold with the set that is used.
 
     Return for each threshold: the threshold, the number of parameters left, and the names that
     differ from the used set ("-": removed in addition, "+": not removed).

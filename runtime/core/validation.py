@@ -88,7 +88,7 @@ def direct_comparison(observation: Observation, fit: Estimate) -> tuple[JointCom
 
 @dataclass(frozen=True)
 class Prediction:
-    """Error of one set of columns on one part of the data.
+    """Error of one set of parameters on one part of the data.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ class Prediction:
 
 @dataclass(frozen=True)
 class CrossValidation(Result):
-    """Errors of every set of columns on every part of the data.
+    """Errors of every set of parameters on every part of the data.
 
     missing : sentences on the sets that could not be fitted. further : whether the predicted parts
     are separate records.
@@ -128,7 +128,7 @@ class CrossValidation(Result):
     further: bool = False
 
     def errors(self) -> dict[str, float]:
-        """Return the largest relative error on unseen data, %, of each set of columns."""
+        """Return the largest relative error on unseen data, %, of each set of parameters."""
         unseen = [p for p in self.predictions if not p.fitted]
         return {
             columns: max(p.relative_error for p in unseen if p.columns == columns)
@@ -143,7 +143,7 @@ class CrossValidation(Result):
         return CrossValidation(joints, predictions, missing, self.further)
 
     def table(self, form: str = ".3f") -> Table:
-        """Make a table of the errors in %, one line for each part and set of columns."""
+        """Make a table of the errors in %, one line for each part and set of parameters."""
         return Table(
             "Relative error, %",
             ("part", "parameters", "use", "total", *(f"joint {j}" for j in self.joints)),
@@ -224,7 +224,7 @@ def cross_validation(
     fitted: Mapping[Any, Estimate] | None = None,
     further: bool = False,
 ) -> CrossValidation:
-    """Fit every set of columns to one observation, and predict other observations.
+    """Fit every set of parameters to one observation, and predict other observations.
 
     A set whose fit fails is left out, with a sentence in `missing`.
 
@@ -316,7 +316,7 @@ class Direction:
 
 @dataclass(frozen=True)
 class WeakDirections(Result, keys="threshold pairs groups directions", schema=1):
-    """Parameters that the record separates badly.
+    """Parameters that the record separates badly, because their estimates are correlated.
 
     They are given as correlated pairs, as groups of such pairs, and as the directions of the
     smallest singular values of W with unit columns.

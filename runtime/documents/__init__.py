@@ -1,1 +1,1 @@
-"""Texts of files: studies and estimates read and written, YAML, within limits."""
+"""Reading and writing of study files and results, in YAML and JSON, within limits of size."""

@@ -1,6 +1,7 @@
-"""Layouts of estimate.json and cestac.json as types, their JSON Schemas, and the estimate in a file that a robot file or a program is given.
+"""Types and JSON Schemas of estimate.json and cestac.json, and reading of estimates from files.
 
-SI units, rad, joint side. Equation numbers are those of the chapter. A number that does not exist is null. Readers leave out keys that they do not know; keys may be added under the same version.
+SI units, rad, joint side. Equation numbers are those of the chapter. A number that does not exist
+is null. Readers ignore keys that they do not know; keys may be added under the same version.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from runtime.documents.files import result_text
 
 @dataclass(frozen=True, eq=False)
 class EssentialDocument:
-    """Essential parameters, fitted alone.
+    """Essential parameters, fitted without the other parameters.
 
     Attributes
     ----------
@@ -41,13 +42,13 @@ class EssentialDocument:
     relative_sigma : ndarray, shape (b,), %
         100 sigma / |X|, eq. (11).
     sigma_corrected : ndarray, shape (b,), SI
-        Sigma without the assumption of independent residuals.
+        Standard deviations without the assumption of independent residuals.
     relative_error : float, %
         100 ||Y - W X|| / ||Y||.
     per_joint : tuple of JointFit
         Fit by joint.
     threshold : float
-        Largest ratio of sigma_rho to its first value.
+        Largest allowed ratio of sigma_rho to its first value.
     trail : tuple of mapping
         Parameters in the order in which they were removed.
     """
@@ -65,7 +66,9 @@ class EssentialDocument:
 
 @dataclass(frozen=True, eq=False)
 class SetDocument:
-    """One of the nested sets of parameters (`runtime.core.parameter_sets`).
+    """One of the nested parameter sets (essential, feasible, all) with its values and errors.
+
+    See `runtime.core.parameter_sets`.
 
     Attributes
     ----------
@@ -99,7 +102,7 @@ class SetDocument:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SetsDocument(Estimate):
-    """All parameters by the method of the study, and the nested sets.
+    """Estimate of all parameters by the method of the study, with the nested parameter sets.
 
     Attributes
     ----------
@@ -115,7 +118,9 @@ class SetsDocument(Estimate):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class IdentificationDocument(SetsDocument):
-    """Parameters of a robot with their uncertainty; with the keys from `sets` on where a whole identification is written.
+    """Content of estimate.json: the parameters of a robot, their uncertainty and all checks.
+
+    The keys from `sets` on are present only if a whole identification was written.
 
     Attributes
     ----------
@@ -124,21 +129,22 @@ class IdentificationDocument(SetsDocument):
     model_columns : str
         Name of the set that is used.
     essential : EssentialDocument
-        Essential parameters, fitted alone.
+        Essential parameters, fitted without the others.
     validation : tuple of mapping
         Predictions of parts of the data with parameters from other parts.
     weak_directions : WeakDirections
-        Parameters that trade against each other, and the directions that W sees least.
+        Parameters whose changes compensate each other, and the directions with the smallest
+        effect in W.
     warnings : tuple of str
         Sentences to read before the values are used.
     trust : mapping
-        Deviations by blocks, whiteness, F-tests.
+        Standard deviations by blocks, whiteness, F-tests.
     by_record : tuple of RecordError
-        Of several records, the error of each, with the parameters that are used.
+        Error of each record, with the parameters that are used, if there are several records.
     verdict : str
         One sentence.
     checklist : mapping
-        Question by question whether the values can be used; the answer in a word.
+        Questions whether the values can be used, each with its answer in a word.
     feasibility : mapping
         Whether a physical robot can have the parameters.
     payload : mapping
@@ -171,7 +177,7 @@ class IdentificationDocument(SetsDocument):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LevelDocument(LevelResult):
-    """One resolution of a study.
+    """One level of a study in cestac.json, that is one step of position and torque.
 
     Attributes
     ----------
@@ -187,7 +193,7 @@ class LevelDocument(LevelResult):
 
 @dataclass(frozen=True, eq=False)
 class CestacDocument:
-    """Resolution study of encoders and torques.
+    """Content of cestac.json: the result of a study of the encoder resolution.
 
     Attributes
     ----------
@@ -196,11 +202,11 @@ class CestacDocument:
     X_LS : ndarray, shape (b,), SI
         Estimate from the unperturbed record.
     relative_sigma_LS : ndarray, shape (b,), %
-        Its relative deviations, eq. (11).
+        Relative standard deviations of X_LS, eq. (11).
     deciding : tuple of str
         Parameters that decide the verdict.
     verdict : str
-        The worst of the levels.
+        The worst verdict of the levels.
     enough : str or None
         Coarsest encoder step that is practically unbiased, as are all finer ones; None: no step is.
     levels : tuple of LevelDocument
@@ -210,7 +216,7 @@ class CestacDocument:
     provenance : mapping
         Hashes, versions, records.
     notes : tuple of str
-        What the figures do not say.
+        Remarks for the user, a sentence each.
     """
 
     names: tuple[str, ...]
@@ -226,19 +232,20 @@ class CestacDocument:
 
 
 def load_estimate(path: Path | str) -> Estimate:
-    """The Estimate in a file that `Estimate.to_json` or `symgen identify -o` wrote.
+    """Read the Estimate from a file that `Estimate.to_json` or `symgen identify -o` wrote.
 
-    InputError as `Estimate.from_json`.
+    InputError as for `Estimate.from_json`.
     """
     return from_text(Estimate, result_text(path), ESTIMATE, str(path))
 
 
 def load_whole_estimate(path: Path | str) -> Estimate:
-    """The estimate of all base parameters in estimate.json that a robot file or a program is given:
-    of the set that is used, or where that is the essential one, of the physical
-    parameters (`whole_set`). Of its fields, names, X, sigma_corrected, relative_error and
-    details.standard are those of that set; the others, the covariance among them, those of
-    least squares. InputError as `load_estimate`.
+    """Read the estimate of all base parameters from estimate.json, for a robot file or a program.
+
+    It is that of the set that is used, or, if the essential set is used, that of the physical
+    parameters (`whole_set`). Its fields names, X, sigma_corrected, relative_error and
+    details.standard are those of that set; the other fields, for instance the covariance, are those
+    of least squares. InputError as for `load_estimate`.
     """
     fit, text = load_estimate(path), result_text(path)
     if not json.loads(text).get("sets"):
@@ -265,15 +272,15 @@ def load_whole_estimate(path: Path | str) -> Estimate:
 
 
 class ResultSchema(GenerateJsonSchema):
-    """JSON Schema of results, in which null means nan or infinity."""
+    """Generator of the JSON Schema of results, in which null means nan or infinity."""
 
     def float_schema(self, schema: core_schema.FloatSchema) -> dict[str, Any]:
-        """A number or null."""
+        """Return the JSON Schema of a number: a number or null."""
         return {"type": ["number", "null"]}
 
 
 def result_schema(of: str) -> dict[str, Any]:
-    """JSON Schema of estimate.json ("estimate") or of cestac.json ("cestac")."""
+    """Return the JSON Schema of estimate.json ("estimate") or of cestac.json ("cestac")."""
     kind, schema = {
         "estimate": (IdentificationDocument, ESTIMATE),
         "cestac": (CestacDocument, CESTAC),

@@ -1,4 +1,4 @@
-"""Files of text: whether there is one, its text, and settings in YAML with the line of every key."""
+"""Reading of text files, and of settings in YAML with the line of every key."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ LARGEST = 200_000_000  # bytes of a JSON result; that of 1000 parameters has 30 
 
 
 def require_file(path: Path) -> int:
-    """Bytes of a file on disk; InputError for folders, and for pipes and devices, which may never answer or never end."""
+    """Return the size of a file, bytes; InputError for a folder, a pipe or a device.
+
+    A pipe or a device might never answer or never end.
+    """
     try:
         status = path.stat()
     except (OSError, ValueError) as e:
@@ -35,7 +38,7 @@ def require_file(path: Path) -> int:
 
 
 def result_text(path: str | Path) -> str:
-    """The text of a file with a JSON result."""
+    """Read the text of a file with a JSON result; InputError if the file is too large."""
     path = Path(path)
     try:
         if require_file(path) > LARGEST:
@@ -50,7 +53,7 @@ def result_text(path: str | Path) -> str:
 
 
 def text_of(path: str | Path) -> str:
-    """The text of a file of settings."""
+    """Read the text of a settings file; InputError if the file is too large."""
     path = Path(path)
     if require_file(path) > 4 * LIMIT.YAML_CHARACTERS:  # bytes of so many characters
         raise InputError(
@@ -68,7 +71,7 @@ def text_of(path: str | Path) -> str:
 
 
 def settings_from_text(kind: type[T], text: str, *, file: str) -> T:
-    """The settings of a YAML text.
+    """Convert a YAML text to settings of the class `kind`.
 
     Parameters
     ----------
@@ -91,7 +94,10 @@ def settings_from_text(kind: type[T], text: str, *, file: str) -> T:
 
 @contextmanager
 def lines_of(path: str | Path) -> Iterator[None]:
-    """A SettingsError on a setting of this study file names the file and the line."""
+    """Add file name and line to a SettingsError that is raised in the block, and raise it again.
+
+    path : the study file whose setting is wrong.
+    """
     try:
         yield
     except SettingsError as e:
@@ -102,6 +108,6 @@ def lines_of(path: str | Path) -> Iterator[None]:
 def _at_line(
     error: SettingsError, lines: Mapping[tuple[str | int, ...], int], file: str
 ) -> SettingsError:
-    """The error with the line of its key, or of the section that should hold it."""
+    """Return the error with the line of its key, or of the section in which the key is missing."""
     places = (error.path[:k] for k in range(len(error.path), -1, -1) if error.path[:k] in lines)
     return SettingsError(error.reason, path=error.path, file=file, line=lines.get(next(places, ())))

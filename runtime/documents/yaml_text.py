@@ -1,6 +1,8 @@
-"""YAML 1.2 to plain values with the line of every key, within limits.
+"""Conversion of YAML 1.2 texts to plain values, with the line of every key and within limits.
 
-Only what settings need is read: mappings, lists and scalars of the core schema. Anchors, aliases, tags, merge keys, repeated keys and second documents are refused, so that a file means what it shows and no text grows in memory.
+Only the parts of YAML that settings need are accepted: mappings, lists and scalars of the core
+schema. Anchors, aliases, tags, merge keys, repeated keys and second documents are refused, so that
+the values are those that a person sees in the file, and no text grows in memory.
 """
 
 from __future__ import annotations
@@ -29,7 +31,11 @@ CONSTANTS: dict[str, bool | None] = {
 
 
 def yaml_values(text: str, *, file: str) -> tuple[Any, dict[Path, int]]:
-    """Built-in dict (keys as texts), list, str, int, float, bool and None, and the line, from 1, of every key path; SettingsError with file and line."""
+    """Convert a YAML text to plain values; return also the line, from 1, of every key path.
+
+    Plain values are dict (keys as texts), list, str, int, float, bool and None. SettingsError with
+    file and line.
+    """
     if len(text) > LIMIT.YAML_CHARACTERS:
         raise InputError(
             f"{len(text)} characters; such a file has at most {LIMIT.YAML_CHARACTERS}", file=file
@@ -55,7 +61,10 @@ def yaml_values(text: str, *, file: str) -> tuple[Any, dict[Path, int]]:
 
 
 def yaml_text(mapping: Mapping[str, Any]) -> str:
-    """A mapping of plain values as YAML, keys in their order, lists of numbers on one line."""
+    """Write a mapping of plain values as YAML, with keys in their order.
+
+    Lists of numbers are on one line.
+    """
     yaml = _yaml()
     yaml.default_flow_style = None
     yaml.sort_base_mapping_type_on_output = False
@@ -66,14 +75,17 @@ def yaml_text(mapping: Mapping[str, Any]) -> str:
 
 
 def _yaml() -> Any:
-    """Reader and writer of YAML 1.2; the package is loaded when a text is read or written."""
+    """Return a reader and writer of YAML 1.2; its package is loaded only when this is called."""
     from ruamel.yaml import YAML
 
     return YAML(typ="safe", pure=True)
 
 
 def _require_plain(text: str, file: str) -> None:
-    """Raise SettingsError at the first thing that is not plain, too deep or too much, before anything is built of the text."""
+    """Raise SettingsError if a YAML text is not plain, is nested too deeply or has too many values.
+
+    The test comes before any value is built from the text.
+    """
     depth = 0
     documents = 0
     for count, event in enumerate(_yaml().parse(text)):
@@ -94,7 +106,7 @@ def _require_plain(text: str, file: str) -> None:
 
 
 def _value(node: Node, path: Path, lines: dict[Path, int], file: str) -> Any:
-    """The plain value of a node; its line, and those of all in it, are put among the `lines`."""
+    """Convert a YAML node to a plain value, and put its line and those of its keys into `lines`."""
     from ruamel.yaml import MappingNode, ScalarNode
 
     lines.setdefault(path, node.start_mark.line + 1)
@@ -127,7 +139,7 @@ def _value(node: Node, path: Path, lines: dict[Path, int], file: str) -> Any:
 
 
 def _scalar(text: str) -> Any:
-    """null, bool, int and float of the core schema; any other word is a text."""
+    """Convert a YAML scalar to None, bool, int or float; any other word stays a text."""
     if text in CONSTANTS:
         return CONSTANTS[text]
     number = NUMBER.fullmatch(text)

@@ -114,9 +114,9 @@ def _information(
     qd: Any,
     qdd: Any,
 ) -> Any:
-    """Write A = sum_j W_wj'W_wj / M over the M points of the grid, shape (c, c).
+    """Write the information matrix A = sum_j W_wj'W_wj / M over the M points of the grid.
 
-    W_wj holds the weighted rows of joint j.
+    W_wj holds the weighted rows of joint j; A has shape (c, c).
     """
     n, M = len(weights.s), q.shape[0]
     inputs = [ca.SX.sym(name, n) for name in ("q", "qd", "qdd")]

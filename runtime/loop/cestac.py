@@ -53,7 +53,7 @@ ALIKE = ("around", "reference")  # estimate.options that are the loop's, whateve
 
 @dataclass(frozen=True)
 class Loop:
-    """The simulated closed loop of a study.
+    """The closed loop (arm, controller, encoders) that a study of encoder resolution simulates.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class Loop:
 
     @cached_property
     def reference(self) -> Reference:
-        """Reference of the controller, for place: loop."""
+        """Reference that the controller follows in simulated records (place: loop)."""
         return reference_of(self.simulator.controller, self.model, records=self.problem.records)
 
     @cached_property
@@ -102,9 +102,9 @@ class Loop:
 
     @cached_property
     def closed(self) -> ClosedLoop:
-        """Closed loop of the measured records.
+        """Closed loop of the measured records; for place: loop, of one simulated record.
 
-        For place: loop, it is the closed loop of a record simulated with the encoder of the study.
+        The simulated record is made with the encoder of the study.
         """
         if self.study.cestac.place == "record":
             return closed_loop(self.problem, self.problem.prepared, self.simulator, **self.options)
@@ -117,7 +117,7 @@ class Loop:
 
     @property
     def estimate(self) -> EstimateSettings:
-        """Settings of the estimate, without loop options if its method simulates no loop."""
+        """Settings of the estimate; without `around` and `reference` if its method has no loop."""
         settings: EstimateSettings = self.study.estimate
         if self.problem.method.observe is not None:
             return settings
@@ -153,7 +153,7 @@ class Loop:
         return self.closed.measured()
 
     def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
-        """Attach the loop, with perturbed positions of every record, to rows from these positions.
+        """Attach the closed loop to rows computed from perturbed positions of every record.
 
         positions : shape (N, n) per record.
         """
@@ -191,7 +191,7 @@ class Loop:
         return self._of(simulator, int(random.integers(2**31)), level.delta)
 
     def _of(self, simulator: Any, seed: int, delta: float) -> ClosedLoop:
-        """Simulate one record with `simulator`, and make its closed loop.
+        """Make a record by simulation with `simulator`, and the closed loop of this record.
 
         The closed loop itself is simulated with the encoder of the settings. A reader of encoder
         counts gets the step; without any step, the positions are low-pass filtered instead.
@@ -223,7 +223,7 @@ def _loop(problem: Problem) -> Loop:
 def loop_of(problem: Problem, simulator: Simulator | None = None) -> Loop | None:
     """Make the loop of a problem, or None if neither its study nor its method simulates a loop.
 
-    simulator : default: made from the section `controller`.
+    simulator : default: made from the section `controller`; SettingsError if that is missing.
     """
     study: Any = problem.settings
     if study.cestac.place != "loop" and problem.method.observe is None:

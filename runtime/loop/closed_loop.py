@@ -64,7 +64,7 @@ ASSUMED = (
 
 
 class LoopOptions(Settings):
-    """estimate.options of every method that simulates the closed loop.
+    """Options (estimate.options) of every method that simulates the closed loop.
 
     Attributes
     ----------
@@ -184,10 +184,10 @@ class ClosedLoop:
     def simulated(
         self, runs: Sequence[Simulation], observation: Observation, *, exact: bool
     ) -> Observation:
-        """Replace W of `observation` by Z: the same rows and columns, from the simulated motion.
+        """Replace W of `observation` by Z, the observation matrix of the simulated motion.
 
-        exact : use the exact simulated states; else the simulated positions pass through the filters
-        of the record.
+        The rows and columns stay the same. If `exact`, Z is computed from the exact simulated
+        states; else the simulated positions pass through the filters of the record.
         """
         assert observation.closed_loop is not None
         states = [
@@ -267,7 +267,7 @@ def closed_loop(
     keep: Sequence[Array] = (),
     **options: Any,
 ) -> ClosedLoop:
-    """Make the closed loop of records for simulation: their references, their rows, the law check.
+    """Make the closed loop of records: references, rows used, and a check of the control law.
 
     measured : the records with filtered states.
     keep : bool, shape (N,) or (N, n) per record: samples that may be used.
@@ -364,10 +364,10 @@ def _reference(
 
 
 def slips(qd: Array, G: Array) -> Array:
-    """Compute the smallest speed of all dry friction that acts on each joint, shape (N, n).
+    """Compute, for each joint, the smallest slip speed of the dry friction that acts on it.
 
-    The speed of the joint itself counts too. qd : shape (N, n). G : shape (elements, n); G qd are
-    the slips of dry friction.
+    The speed of the joint itself counts too. The result has shape (N, n), like qd. G : shape
+    (elements, n); G qd are the slips of the friction elements.
     """
     speed: Array = np.abs(qd)
     for element in G:

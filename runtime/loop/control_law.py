@@ -90,10 +90,9 @@ class ControlLaw:
         return len(self.P)
 
     def matrix(self, g: Array, *, ideal: bool) -> Array:
-        """Arrange the numbers of the law for one tick as a matrix with one row per joint.
+        """Arrange the gains, limits and steps of the law as a matrix for one tick, a row per joint.
 
-        g : factor on the torque, shape (n,). ideal : encoder and converter have no steps. The shape is
-        (n, columns).
+        g : factor on the torque, shape (n,). ideal : encoder and converter have no steps.
         """
         vectors = {name: getattr(self, name) for name in VECTORS if name != "g"} | {"g": g}
         if ideal:

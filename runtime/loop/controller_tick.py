@@ -6,7 +6,7 @@
     tau   = g sat(u), u of this tick or of the tick before, in steps of the converter, held until
             the next tick
     q, qd = Runge-Kutta of order 4 in equal substeps (or CVODES), cut where a slip stops
-    (`runtime.loop.dry_friction`)
+    (`runtime.loop.stick_slip`)
 
 State of a tick: q, qd, the last two positions shown, I, and u. Everything that changes from run to
 run is an input, so that one compilation serves all runs.
@@ -82,7 +82,7 @@ class LoopInputs:
 
 
 def blocks(rows: Array, size: int) -> Iterator[tuple[Array, int]]:
-    """Yield the rows in blocks of `size` rows, each with the number of its valid rows.
+    """Yield the input rows in blocks of `size` rows, each block with its number of valid rows.
 
     The last block is filled up with copies of its last row.
     """
@@ -213,7 +213,7 @@ def sliding_friction(friction: DryFriction, qd: MX, plus: MX, minus: MX) -> tupl
 
 
 def keeps_sliding(friction: DryFriction, direction: MX, qd: MX, end: MX) -> MX:
-    """Whether every slip has the same direction at the velocity qd and at the velocity `end`."""
+    """Whether every friction element slips in the same direction at the velocities qd and `end`."""
     G = ca.DM(friction.G)
     return ca.mmin(ca.vertcat(ca.fabs(G @ qd), direction * (G @ end))) > LIMIT.SLIP_REST
 
@@ -229,9 +229,9 @@ def flow_function(model: GeneratedModel, constants: dict[str, float], integrator
 def _rounds(
     model: GeneratedModel, friction: DryFriction, constants: dict[str, float], flow: Any
 ) -> Any:
-    """Make the function of the arm for slips that stop or rest.
+    """Make the CasADi function of the arm for a step in which friction elements stop or rest.
 
-    A step h is divided into rounds; each round lasts until the next slip stops.
+    The step h is divided into rounds; each round lasts until the next slip stops.
     """
     inputs = plant_inputs(model, friction)
     cut, whole = (round_function(model, friction, constants, flow, whole=k) for k in (0, 1))
@@ -262,7 +262,7 @@ def round_function(
     *,
     whole: int,
 ) -> Any:
-    """Make the function of one round: the arm moves until the next slip stops, or for all of h.
+    """Make the CasADi function of the arm until the next friction element stops, or for all of h.
 
     whole : 1 for the whole of h. Results: q, qd, the remaining part of h, qdd, f, direction, Y, and
     which slips stopped.
@@ -287,7 +287,7 @@ def round_function(
 
 
 def plant_inputs(model: GeneratedModel, friction: DryFriction | None = None) -> list[MX]:
-    """Make the symbols q, qd, tau, Xs, plus, minus, h, the inputs of the functions of the arm.
+    """Make the symbolic inputs of the functions of the arm: q, qd, tau, Xs, plus, minus, h.
 
     Without dry friction, plus and minus are empty.
     """
@@ -348,7 +348,7 @@ def _cvodes(model: GeneratedModel, constants: dict[str, float]) -> Any:
 
 
 def compiled(function: Any, cache: Path | None = None) -> Any:
-    """Compile a CasADi function to C, or load it from the cache of compiled files.
+    """Compile the C code of a CasADi function, or load it from the cache of compiled files.
 
     If this fails, the result is the function itself, with a FallbackWarning.
     """

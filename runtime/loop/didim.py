@@ -30,7 +30,7 @@ from runtime.loop.result import Simulation
 
 
 def fit(start: Beginning) -> Fitted:
-    """Fit the parameters by method didim.
+    """Fit the parameters by method DIDIM, which simulates the closed loop in each pass.
 
     `details` holds the list of passes, and the contraction (ratio of the last two changes of X).
     SettingsError if no loop is attached to the observation.

@@ -35,7 +35,10 @@ Corners = Annotated[Whole, Field(ge=2, le=LIMIT.PART_SIZE)]
 
 
 class Family:
-    """A family of motions of one form; subclasses are settings, `family` is their name in files."""
+    """Base class of the families of joint motions, for instance of Fourier series.
+
+    `family` is the name of the family in files.
+    """
 
     family: str
 
@@ -207,7 +210,7 @@ class Polyline(Family):
 
     @property
     def ramps(self) -> list[tuple[float, float]]:
-        """Start and end time of the motion to each next position, s, if corners were not rounded."""
+        """Start and end time of the motion to each next position, s, for sharp corners."""
         raise NotImplementedError
 
     def stride(self, speed: float) -> float:

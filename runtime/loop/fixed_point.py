@@ -38,7 +38,7 @@ PASS = ("norm", "g", "change")  # of a pass, in `details`
 
 
 class FixedPointOptions(LoopOptions):
-    """estimate.options of methods iv and didim.
+    """Options (estimate.options) of methods iv and didim.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Fixed:
-    """End of an iteration: last step, list of passes, convergence, ratio of the last two changes."""
+    """End of the iteration: last step, list of passes, convergence, ratio of last two changes."""
 
     step: Step
     trail: tuple[dict[str, Any], ...]
@@ -87,7 +87,7 @@ class Fixed:
 
 
 def full(names: Sequence[str], X: Array, every: Sequence[str]) -> Array:
-    """Extend parameters X of the columns `names` to all base parameters; the others are zero."""
+    """Extend X of the columns `names` to all base parameters; missing parameters are zero."""
     by_name = dict(zip(names, X, strict=True))
     return np.array([by_name.get(name, 0.0) for name in every])
 
@@ -136,7 +136,7 @@ def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]
 def iterate(
     loop: ClosedLoop, start: Beginning, update: Callable[[Sequence[Simulation], Array], Step]
 ) -> Fixed:
-    """Iterate X -> update(simulation with X, X) until X no longer changes.
+    """Repeat the simulation and the update of the parameters X until X no longer changes.
 
     X holds the parameters of the columns of the rows.
     """
@@ -277,7 +277,7 @@ def _contraction(trail: Sequence[Mapping[str, Any]]) -> float:
 
 
 def outcome_of(loop: ClosedLoop, fixed: Fixed, method: str) -> tuple[Status, str, dict[str, Any]]:
-    """Return the status, the message and the details of an iteration.
+    """Return the status, the message and the details of an IV or DIDIM iteration.
 
     The details give the parameters after each pass, the norm of the residual, the gains, and the
     largest change in standard deviations.

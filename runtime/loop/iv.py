@@ -40,7 +40,7 @@ from runtime.loop.result import Simulation
 
 
 def fit(start: Beginning) -> Fitted:
-    """Fit the parameters by method iv on the rows of the measured positions.
+    """Fit the parameters by method IDIM-IV on the rows of the measured positions.
 
     SettingsError if no loop is attached to the observation.
     """
@@ -111,7 +111,7 @@ def hausman(names: Sequence[str], d: Array, U: Array) -> dict[str, Any]:
 
 
 def _solve(W: Array, Z: Array, Y: Array) -> tuple[Array, Array, Array]:
-    """Solve the weighted system for X; return X, its covariance C, and A = (Z'VW)^-1."""
+    """Solve weighted rows with the instruments Z; return X, its covariance C, and A = (Z'VW)^-1."""
     size = np.linalg.norm(W, axis=0)
     W, Z = W / size, Z / size
     try:

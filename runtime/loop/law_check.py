@@ -140,10 +140,9 @@ def law_text(fits: Sequence[LawFit]) -> str:
 
 
 def _share(y: Array, x: Array) -> tuple[float, float, float]:
-    """Compute how well x explains y.
+    """Compute the share of a signal y that a signal x explains, without and with a best factor.
 
-    Returns the share of y that x explains, %; the best factor of x; and the share with this factor,
-    %.
+    Returns the share, %; the best factor of x; and the share with this factor, %.
     """
     norm, size = float(np.linalg.norm(y)), float(x @ x)
     if not norm:

@@ -20,7 +20,7 @@ TORQUE = {"rad": "N m", "m": "N"}  # unit of the torque by that of the position
 
 
 class SimulationError(InputError):
-    """A simulation fails: inertia not positive definite, loop unstable, or motion lost.
+    """Error of a simulation: inertia not positive definite, loop unstable, or motion lost.
 
     `time` : time of the reference at which this appears, s.
     """
@@ -32,7 +32,7 @@ class SimulationError(InputError):
 
 @dataclass(frozen=True, eq=False)
 class Simulation(Result):
-    """A simulated run at the recorded ticks; arrays of shape (N, n), joint side, SI.
+    """Signals of one simulated run at the recorded ticks; shape (N, n), joint side, SI.
 
     Attributes
     ----------

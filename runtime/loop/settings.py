@@ -41,7 +41,7 @@ def _a_motion(mapping: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 class Law(Settings):
-    """Control law of each joint.
+    """Settings of the control law of each joint: pid or cascade.
 
     e = q_r - q_m, u in the unit of the drive, torque = gain u.
 
@@ -136,7 +136,7 @@ class Encoder(Settings):
 
 
 class Torque(Settings):
-    """Path of the torque from the command to the arm and to the record, N m or N at the joint.
+    """Settings of the torque between command, arm and record, N m or N at the joint.
 
     Attributes
     ----------

@@ -59,7 +59,7 @@ class JointMotion:
 
     @property
     def apart(self) -> str:
-        """Text that says how the simulation differs from the record; "" if it does not."""
+        """Text on how the simulation differs from the record; "" if it follows the record."""
         if not self.position <= LIMIT.MOTION_APART:
             return f"position of joint {self.joint} off by {self.position:.0f} % of its motion"
         if self.tracking > LIMIT.MOTION_TRACKING and self.position > LIMIT.MOTION_SMALL:
@@ -76,9 +76,9 @@ class JointMotion:
 def simulated_motion(
     loop: ClosedLoop, observation: Observation, X: Array
 ) -> tuple[JointMotion, ...]:
-    """Simulate the records with all base parameters X, shape (b,), and compare each joint.
+    """Simulate the records with base parameters X, and compare the motion of each joint.
 
-    InputError if the simulation is not possible.
+    X has shape (b,). InputError if the simulation is not possible.
     """
     runs = loop.run(X)
     gaps = [

@@ -243,7 +243,7 @@ class Simulator:
         return steps
 
     def _ticks(self, substeps: int) -> Any:
-        """Return the CasADi function that simulates BLOCK ticks; it is made only once."""
+        """Return the CasADi function of BLOCK ticks; it is made once for each `substeps`."""
         if substeps not in self._compiled:
             tick = tick_function(
                 self.model, self.friction, self.constants, substeps, self.controller.integrator

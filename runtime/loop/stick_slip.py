@@ -66,12 +66,12 @@ def friction_function(
 
 
 def kinetic(direction: SX, plus: SX, minus: SX) -> SX:
-    """Compute the friction forces, shape (m,), of elements that slide; 0 if a direction is 0."""
+    """Compute the friction forces, shape (m,), of sliding elements; 0 for a direction of 0."""
     return (direction > 0) * plus - (direction < 0) * minus
 
 
 def _at_rest(D: SX, free: SX, moving: SX, plus: SX, minus: SX) -> tuple[SX, SX]:
-    """Compute the forces of friction elements at rest, and the direction in which each starts.
+    """Compute forces of friction elements at rest, and the directions in which they start to slip.
 
     Both have shape (m,); the direction is 0 if the element stays at rest. ds/dt = free - D f.
     """

@@ -1,1 +1,1 @@
-"""Runs of a study in processes or on a cluster, and where they lie on disk."""
+"""Parallel runs of a study in processes or on a cluster, and their storage on disk."""

@@ -1,11 +1,11 @@
-"""Runs of a long study on disk, so that it can be killed and go on.
+"""Storage of the runs of a long study on disk, so that an interrupted study can continue.
 
     FOLDER/runs.npz     level, run, X, residual_norm of the runs; `study`, JSON of what makes them:
                         settings, hashes of record and model, versions
 
-The file is written whole under another name and then renamed. A study goes on only if `study`
-says the same, number of runs aside. Runs depend on their key alone, so a resumed study has the bits
-of an uninterrupted one.
+The file is written whole under another name and then renamed. A study continues only if `study` is
+the same, except for the number of runs. Each run depends on its key alone, so the result has the
+same bits as that of an uninterrupted study.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ UNFINISHED = ".unfinished"
 
 
 class Checkpoint:
-    """The runs of one study in FOLDER; written every `every` seconds, and by `flush`."""
+    """The stored runs of one study in a folder, written every `every` seconds and by `flush`."""
 
     def __init__(self, folder: str | Path, *, every: float = LIMIT.ARCHIVE_PERIOD) -> None:
         self.file = Path(folder) / FILE
@@ -40,9 +40,9 @@ class Checkpoint:
         self._last = monotonic()
 
     def resume(self, identity: Mapping[str, Any], b: int) -> Runs:
-        """The runs, b parameters each, that an earlier study left.
+        """Return the runs that an earlier study stored in the folder, b parameters each.
 
-        identity : JSON values that tell studies apart.
+        identity : JSON values that differ between different studies.
 
         Raises
         ------
@@ -63,13 +63,13 @@ class Checkpoint:
         return self._runs[0]
 
     def add(self, runs: Runs) -> None:
-        """Take new runs; write them when it is time."""
+        """Add new runs; write all runs if the last write is more than `every` seconds ago."""
         self._runs.append(runs)
         if monotonic() - self._last > self.every:
             self.flush()
 
     def flush(self) -> None:
-        """Write the runs, if there are new ones."""
+        """Write all runs to disk, if there are new ones."""
         runs = Runs.joined(self._runs, self._runs[0].X.shape[1])
         if len(runs) > self.written:
             unfinished = self.file.with_name(FILE + UNFINISHED)
@@ -91,12 +91,15 @@ class Checkpoint:
         self._last = monotonic()
 
     def remove(self) -> None:
-        """Delete the file, once other files hold its runs."""
+        """Delete the file, once other files contain its runs."""
         self.file.unlink(missing_ok=True)
         self.file.with_name(FILE + UNFINISHED).unlink(missing_ok=True)
 
     def _read(self, b: int) -> Runs:
-        """The runs of the file; pickled objects are refused."""
+        """Read the runs from the file; InputError if it is damaged or belongs to another study.
+
+        Pickled objects are refused.
+        """
         try:
             with np.load(self.file, allow_pickle=False) as archive:
                 study = str(archive["study"])

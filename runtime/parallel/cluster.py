@@ -1,7 +1,8 @@
-"""A map over the workers of a Dask cluster (extra `scale`), for whoever takes `map=`.
+"""Function like `map` that computes on the workers of a Dask cluster (extra `scale`).
 
-Its workers must have the versions of this process and run what this process sends; trust the
-scheduler you name. Numbers are those of one process in every bit on one kind of machine.
+It is an argument `map=` of other functions. The workers must have the versions of this process and
+run the code that this process sends; use only a scheduler that you trust. Results are those of one
+process in every bit on one kind of machine.
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ PACKAGES = ("symgen", "numpy", "scipy")  # whose versions decide the bits
 
 @contextmanager
 def cluster(scheduler: str, timeout: float = TIMEOUT) -> Iterator[Callable[..., Iterator[Any]]]:
-    """A map over the workers of the scheduler at this address, such as tcp://10.0.0.1:8786.
+    """Yield a function like `map` that computes on the workers of a Dask scheduler.
+
+    scheduler : its address, such as tcp://10.0.0.1:8786.
 
     Raises
     ------
@@ -53,14 +56,17 @@ def cluster(scheduler: str, timeout: float = TIMEOUT) -> Iterator[Callable[..., 
 
 
 def _mapped(client: Any, function: Callable[..., Any], keys: Any) -> Iterator[Any]:
-    """Results in the order of the keys; the function travels once to each worker."""
+    """Yield the results in the order of the keys; the function is sent once to each worker."""
     sent = client.scatter(packed(function), broadcast=True, hash=False)
     for future in [client.submit(there, sent, key, pure=False) for key in keys]:
         yield future.result()
 
 
 async def _shake_hands(scheduler: str, timeout: float) -> None:
-    """Connect once: something that listens and never answers would keep a Client waiting for ever."""
+    """Connect once to the scheduler, to test that it answers.
+
+    A Client would wait for ever for a program that listens and never answers.
+    """
     from distributed.comm import connect
 
     comm = await asyncio.wait_for(connect(scheduler, timeout=timeout), timeout)
@@ -68,7 +74,10 @@ async def _shake_hands(scheduler: str, timeout: float) -> None:
 
 
 def _check_versions(client: Any) -> None:
-    """Refuse workers whose bits could differ, or that cannot run our tasks."""
+    """Raise InputError for workers with other versions of symgen, NumPy or SciPy than this process.
+
+    Their results could differ in some bits. Workers that cannot run the tasks are refused too.
+    """
     here = _versions()
     try:
         of_workers = client.run(_versions)

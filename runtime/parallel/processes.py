@@ -1,11 +1,10 @@
-"""A map that works in several processes, for whoever takes `map=`.
+"""Function like `map` that computes in several processes, for the argument `map=` of functions.
 
     with processes(4) as several:
         result = cestac(model, record, study, map=several)
 
 The processes are spawned, never forked (a fork after BLAS has started its threads may hang).
-Results come in the order of the arguments and agree in every bit with
-those of one process.
+Results are in the order of the arguments and agree in every bit with those of one process.
 """
 
 from __future__ import annotations
@@ -29,7 +28,9 @@ Map = Callable[..., Iterator[Any]]
 
 @contextmanager
 def processes(count: int) -> Iterator[Map]:
-    """A map in `count` processes; the built-in one for 0 and 1.
+    """Yield a function like `map` that computes in `count` processes.
+
+    For 0 and 1 it is the built-in map.
 
     Raises
     ------
@@ -54,12 +55,12 @@ def processes(count: int) -> Iterator[Map]:
 
 
 def packed(function: Callable[[Any], Any]) -> bytes:
-    """A function as it travels."""
+    """Pickle a function to bytes, so that it can be sent to another process."""
     return bytes(ForkingPickler.dumps(function))
 
 
 def there(sent: bytes, key: Any) -> Any:
-    """The value of a packed function, in the process that computes it."""
+    """Compute the value of a packed function in the process that receives it."""
     return _unpacked(sent)(key)
 
 
@@ -70,7 +71,7 @@ def _unpacked(sent: bytes) -> Callable[[Any], Any]:
 
 
 def _begin() -> None:
-    """Ctrl-C is for the process that asked; end with it."""
+    """Prepare a worker process: it ignores Ctrl-C, and ends when its parent process ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     threading.Thread(target=_end_with_parent, daemon=True).start()

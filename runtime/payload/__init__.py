@@ -1,1 +1,1 @@
-"""A load fixed to a link, and the torque constants of the drives from it."""
+"""Parameters of a load fixed to a link, and torque constants of the drives from a weighed load."""

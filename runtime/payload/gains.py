@@ -1,4 +1,4 @@
-"""Torque constants of the drives from a weighed load.
+"""Torque constants of the drives, estimated from a load of known mass.
 
 The torque of a record is v, computed with the torque constants of the robot file; the true one is g
 v, a factor per motor. V holds the share of every motor in the torque of every joint (block diagonal
@@ -7,16 +7,16 @@ without coupling), a without the load, b with it:
     [[V_a, -W_a, 0, 0], [V_b, -W_b, -W_Lu, -W_Lk chi_Lk]] [g; X; chi_Lu; 1] = 0
 
     together   W and the load's columns are exact, V is noisy: total least squares with exact
-               columns. With Q a basis of the exact columns and D the deviations of the columns of
-               V, g ~ D^-1 times the smallest right singular vector of (V - Q Q'V) D^-1; the last
-               entry gives the size.
+               columns. With Q a basis of the exact columns and D the standard deviations of the
+               columns of V, g ~ D^-1 times the smallest right singular vector of (V - Q Q'V) D^-1;
+               the last entry gives the size.
     per joint  v_j = W_j (X/g_j) + W_Lu (chi_Lu/g_j) + W_Lk chi_Lk (1/g_j): one least squares per
                motor, noise on the left side alone; drives without coupling only.
 
-The load is that of the torques times g; its deviations hold those of g.
+The reported load is computed from the torques times g; its standard deviations include those of g.
 
-A motor whose torque does not change with the load says nothing: its gain is refused by its own
-deviation. Without a weighed load no record separates g from X.
+The gain of a motor whose torque does not change with the load is not determined: its large standard
+deviation shows this, and it is refused. Without a weighed load no record separates g from X.
 
 Reference: Gautier and Briot (2011), global identification of drive gains and dynamic parameters;
 identification.md 5.8.
@@ -53,23 +53,23 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class DriveGains(Result, keys="joints constant together sigma alone sigma_alone refused"):
-    """Factors g on the torque constants of the records, one per motor; nan if a method has none.
+    """Correction factors g of the torque constants, one per motor; nan if a method gives no factor.
 
     Attributes
     ----------
     joints : tuple of str
     constant : ndarray, shape (n,), N m/A or N m/V
-        Torque constants by which the records were read: theirs, or those of the robot file.
+        Torque constants with which the records were read, of the records or of the robot file.
     together : ndarray, shape (n,)
         g by total least squares over all joints.
     sigma : ndarray, shape (n,)
-        Deviation of `together`, from resampled blocks of time.
+        Standard deviation of `together`, from resampled blocks of time.
     alone : ndarray, shape (n,)
         g of each motor by least squares on its own joint.
     sigma_alone : ndarray, shape (n,)
-        Deviation of `alone`.
+        Standard deviation of `alone`.
     sigma_load : ndarray, shape (u,)
-        Deviations of the unknown parameters of the load, those of g among them.
+        Standard deviations of the unknown parameters of the load, including those of g.
     """
 
     joints: tuple[str, ...]
@@ -82,12 +82,15 @@ class DriveGains(Result, keys="joints constant together sigma alone sigma_alone 
 
     @property
     def factors(self) -> Array:
-        """Factors g, shape (n,); 1 if no load determines them."""
+        """Correction factors g of the torque constants, shape (n,); 1 without an estimate."""
         return np.where(np.isfinite(self.together), self.together, 1.0)
 
     @property
     def refused(self) -> tuple[str, ...]:
-        """Motors with an undetermined factor: %sigma of the joint solution is LIMIT.GAIN_REFUSED or more."""
+        """Motors whose factor is not determined: its %sigma is LIMIT.GAIN_REFUSED or more.
+
+        The factor is that of the joint solution `together`.
+        """
         return tuple(
             j
             for j, g, s in zip(self.joints, self.together, self.sigma, strict=True)
@@ -96,7 +99,7 @@ class DriveGains(Result, keys="joints constant together sigma alone sigma_alone 
 
     @property
     def text(self) -> str:
-        """One sentence."""
+        """Sentence that says which torque constants the load does not determine, if any."""
         if not self.refused:
             return (
                 "every gain is determined by the load, whose parameters are those with them; "
@@ -108,7 +111,7 @@ class DriveGains(Result, keys="joints constant together sigma alone sigma_alone 
         )
 
     def table(self) -> Table:
-        """One line per motor."""
+        """Return the table of the factors, with one line per motor."""
         columns = (self.together, self.sigma, self.alone, self.sigma_alone)
         return Table(
             "Factors on the torque constants by which the records were read",
@@ -123,7 +126,7 @@ class DriveGains(Result, keys="joints constant together sigma alone sigma_alone 
         )
 
     def to_table(self) -> str:
-        """The table as text."""
+        """Return the table of the factors as text."""
         return self.table().to_text()
 
 
@@ -135,16 +138,16 @@ def drive_gains(
     *,
     seed: int = 1,
 ) -> DriveGains:
-    """Gains from records without and with a load of known mass.
+    """Estimate correction factors of the torque constants, from records with and without a load.
 
     Parameters
     ----------
     without, loaded : sequence of Prepared
-        Joint side, without and with the load.
+        Records without and with the load, joint side.
     settings : PayloadSettings
-        Where the load is fixed, and its mass.
+        Where the load is fixed, and its mass, which must be known.
     seed : int
-        Of the resampling.
+        Seed of the resampling.
     """
     if not without or not loaded or "M" not in settings.known:
         raise InputError(
@@ -195,7 +198,7 @@ def _drives(model: GeneratedModel) -> Drives:
 
 
 def _with_motors(model: GeneratedModel, record: Prepared, drives: Drives) -> Observation:
-    """W and Y of a record, and behind W one column per motor: its share in the torque of the joint of the row."""
+    """Add one column per motor to W of a record: the torque of this motor on each joint."""
     selection = record.certain(model)
     observation = record.observation(model)
     motor = drives.motor_command(record.record.torque) * drives.torque_constant
@@ -213,9 +216,10 @@ def _with_motors(model: GeneratedModel, record: Prepared, drives: Drives) -> Obs
 def _with_load(
     model: GeneratedModel, observation: Observation, settings: PayloadSettings, mounted: float
 ) -> Observation:
-    """Columns W, W_Lu, the torque of the known part of the load, motors.
+    """Insert the columns of the load into W, before the columns of the motors.
 
-    Those of the load zero if it is not mounted.
+    Order: W, W_Lu, torque of the known part of the load, motors. The columns of the load are zero
+    if it is not mounted.
     """
     load = load_columns(model, physical_model(model), settings)
     b = len(model.BASE_PARAMETERS)
@@ -234,7 +238,11 @@ def _with_load(
 def _alone(
     observation: Observation, exact: Array, load: Array, drives: Drives
 ) -> tuple[Array, Array, Array]:
-    """Deviation of the torque residual of every joint, and 1/(coefficient of the load) where one motor moves one joint."""
+    """Estimate the factor g of each motor by least squares on the rows of its own joint.
+
+    Returns the standard deviation of the torque residual of every joint, g, and the standard
+    deviation of g. g is 1/(coefficient of the known load), and nan if motors are coupled.
+    """
     n = observation.n
     deviation = np.ones(n)
     gain = np.full(n, np.nan)
@@ -273,7 +281,11 @@ def _together(
     drives: Drives,
     seed: int,
 ) -> tuple[Array, Array]:
-    """g by total least squares with exact columns, then X and the load, nan of columns that others hold, and their deviations over resampled blocks of time."""
+    """Estimate g, X and the load together by total least squares with exact columns.
+
+    Returns the values and their standard deviations over resampled blocks of time, for g, X and the
+    load in this order; nan for columns that depend on others.
+    """
     weight = np.repeat(
         1 / np.maximum(deviation, 1e-12 * np.abs(observation.Y).max()), observation.rows
     )
@@ -293,7 +305,10 @@ def _together(
 
 
 def _gains(R: Array, D: Array) -> Array:
-    """g, and the parameters of the exact columns, from the triangular factor of [exact, known load, V]."""
+    """Compute g and the parameters of the exact columns from the factor R of all columns.
+
+    Columns of R: exact columns, known load, V.
+    """
     n = len(D)
     e = len(R) - n - 1
     g = np.linalg.svd(R[-n:, -n:] / D)[2][-1] / D
@@ -303,7 +318,10 @@ def _gains(R: Array, D: Array) -> Array:
 
 
 def _column_deviations(rows: Sequence[int], deviation: Array, drives: Drives) -> Array:
-    """Deviations of the errors of the columns of V with rows of joint j divided by s_j: s_j^2 = sum_m (R_mj sigma_m)^2."""
+    """Compute the standard deviations of the errors in the columns of V, with weighted rows.
+
+    Rows of joint j are divided by s_j, and s_j^2 = sum_m (R_mj sigma_m)^2.
+    """
     largest = (deviation**2).max()
     variance = (
         largest * nnls(drives.ratio.T**2, deviation**2 / largest)[0]
@@ -313,7 +331,7 @@ def _column_deviations(rows: Sequence[int], deviation: Array, drives: Drives) ->
 
 
 def _independent(A: Array) -> Array:
-    """Columns of A that the others do not hold, by pivoting on unit columns."""
+    """Find linearly independent columns of A, by pivoting on columns of norm 1."""
     norms = np.linalg.norm(A, axis=0)
     used = np.flatnonzero(norms)
     R, order = qr(triangularise(A[:, used] / norms[used]), mode="r", pivoting=True)
@@ -322,7 +340,7 @@ def _independent(A: Array) -> Array:
 
 
 def scaled(model: GeneratedModel, record: Prepared, gains: DriveGains) -> Observation:
-    """Rows of a record with the torques of every motor times its factor."""
+    """Build the rows of a record, with the torque of every motor multiplied by its factor g."""
     n = len(model.JOINTS)
     motors = _with_motors(model, record, _drives(model))
     Y = motors.W[:, -n:] @ gains.factors

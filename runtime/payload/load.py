@@ -1,12 +1,13 @@
-"""A mass fixed to a link, or to a frame of it: its parameters from records with and without it, known or unknown.
+"""Inertial parameters of a load fixed to a link, from records with and without the load.
 
     [Y_a; Y_b - W_Lk chi_Lk] = [[W_a, 0], [W_b, W_Lu]] [X; chi_Lu]        W_L = W K_L
 
-a without, b with the load; K_L the ten columns of K = dX/dchi of the link that carries it, so chi_L are XX ... M of the load
-alone at the frame of that link, or with K_L A (`runtime.payload.mount`) at a frame fixed to it.
-Known ones (a weighed M) move to the left. A parameter of the load is reported only if it has an
-effect; its deviation says whether the motion excites it. Where friction changes with the load, rows
-b have friction columns of their own.
+a without, b with the load; K_L the ten columns of K = dX/dchi of the link to which the load is
+fixed. chi_L are then XX ... M of the load alone at the frame of that link, or with K_L A
+(`runtime.payload.mount`) at a frame fixed to the link. Known parameters (a weighed M) move to the
+left. A parameter of the load is reported only if it has an effect; its standard deviation shows
+whether the motion excites it. If friction changes with the load, rows b have friction columns of
+their own.
 
 Reference: Khalil, Gautier and Lemoine (2007), identification of the payload inertial parameters of
 industrial manipulators.
@@ -42,17 +43,17 @@ FRICTION = ("viscous", "coulomb")
 
 @dataclass(frozen=True, eq=False)
 class Payload(Result):
-    """A load fixed to a link: ten inertial parameters at the frame of the link, or at a frame fixed to it.
+    """The estimated load on a link: its inertial parameters and their standard deviations.
 
     Attributes
     ----------
     link : int
-        Number of the link that carries the load.
+        Number of the link to which the load is fixed.
     names : tuple of str
         Families XX .. M of the unknown parameters that have an effect, in that order.
     value : ndarray, shape (u,), kg m^2, kg m or kg
     sigma : ndarray, shape (u,)
-        Deviations by blocks of time where known, else eq. (10).
+        Standard deviations by blocks of time if they are known, else eq. (10).
     given : mapping of str to float
         Parameters that were given, by family.
     estimate : Estimate
@@ -71,7 +72,7 @@ class Payload(Result):
 
     @property
     def place(self) -> str:
-        """Where it is fixed, in words."""
+        """Words that name the link or frame to which the load is fixed, such as "link 6"."""
         return (
             f"link {self.link}"
             if self.frame in (None, self.link)
@@ -79,7 +80,7 @@ class Payload(Result):
         )
 
     def __getitem__(self, family: str) -> float:
-        """Value of one parameter by family: payload["M"]."""
+        """Return the value of one parameter by its family, such as payload["M"] for the mass."""
         return (
             float(self.given[family])
             if family in self.given
@@ -87,7 +88,7 @@ class Payload(Result):
         )
 
     def table(self) -> Table:
-        """One line per parameter."""
+        """Return the table of the load, with one line per parameter."""
         rows = [(name, number(x, ".6g"), "given", _unit(name)) for name, x in self.given.items()]
         rows += [
             (name, number(x, ".6g"), number(sigma, ".2g"), _unit(name))
@@ -97,11 +98,11 @@ class Payload(Result):
         return Table(caption, (f"load on {self.place}", "value", "sigma", "unit"), rows)
 
     def to_table(self) -> str:
-        """The table as text."""
+        """Return the table of the load as text."""
         return self.table().to_text()
 
     def summary(self) -> dict[str, Any]:
-        """The payload as a mapping for JSON."""
+        """Return the load as a mapping for JSON."""
         parameters = {
             n: {"value": x, "sigma": s}
             for n, x, s in zip(self.names, self.value, self.sigma, strict=True)
@@ -123,12 +124,12 @@ def payload(
     *,
     provenance: Mapping[str, Any] | None = None,
 ) -> Payload:
-    """The load from observations without and with it, fitted together with all base parameters.
+    """Estimate a load and all base parameters together, from records without and with the load.
 
     Parameters
     ----------
     without, loaded : sequence of Observation
-        Rows of the records without and with the load, held.
+        Rows of the records without and with the load.
     settings : PayloadSettings
         Where the load is fixed, and which of its parameters are known.
     method : EstimateSettings, optional
@@ -150,9 +151,9 @@ def payload(
     )
 
     def extended(rows: Observation, mounted: float) -> Observation:
-        """Columns of the load behind W, zero if it is not mounted.
+        """Add the columns of the load to W; they are zero if it is not mounted.
 
-        The torque of its known part moved to Y.
+        The torque of its known parameters is moved to Y.
         """
         of_load = mounted * np.hstack([rows.W @ load.columns, rows.W[:, friction]])
         Y = rows.Y - mounted * (rows.W @ load.torque)
@@ -182,7 +183,7 @@ def payload(
 
 
 def friction_columns(model: GeneratedModel, physical: PhysicalModel) -> list[int]:
-    """Base parameters that are made of viscous and Coulomb friction alone."""
+    """List the numbers of the base parameters that consist only of viscous and Coulomb friction."""
     elements = elements_of(model)
     friction = np.array(
         [name in elements and elements[name][0] in FRICTION for name in physical.standard]
@@ -192,7 +193,7 @@ def friction_columns(model: GeneratedModel, physical: PhysicalModel) -> list[int
 
 @dataclass(frozen=True, eq=False)
 class LoadColumns:
-    """How a load enters the base parameters.
+    """Columns by which the parameters of a load change the base parameters.
 
     Attributes
     ----------
@@ -203,7 +204,7 @@ class LoadColumns:
     columns : ndarray, shape (b, u)
         dX/dchi of the unknown parameters.
     torque : ndarray, shape (b,)
-        Base parameters of the given ones.
+        Change of the base parameters by the known parameters.
     """
 
     mount: Mount
@@ -215,7 +216,10 @@ class LoadColumns:
 def load_columns(
     model: GeneratedModel, physical: PhysicalModel, settings: PayloadSettings
 ) -> LoadColumns:
-    """Columns of the load of the settings; SettingsError if there is no such link or frame."""
+    """Compute the columns by which the load of the settings changes the base parameters.
+
+    SettingsError if there is no such link or frame.
+    """
     try:
         place = mount(model, settings.frame, settings.link)
     except InputError as e:

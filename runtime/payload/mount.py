@@ -1,7 +1,8 @@
-"""Effect of a tool or load of known inertia on the base parameters: its ten parameters in the frame it is mounted on and in that of the link.
+"""Effect of a tool or load of known inertia on the base parameters of a robot.
 
-With P the pseudo-inertia of a body (`runtime.physical.inertia`), about and along the axes of frame f,
-and lTf the pose of f in the frame of its link l,
+The ten parameters of the load are those in the frame at which it is mounted; they are transformed
+to the frame of the link. With P the pseudo-inertia of a body (`runtime.physical.inertia`), about
+and along the axes of frame f, and lTf the pose of f in the frame of its link l,
 
     P_l = lTf P_f lTf',            hence chi_l = A(lTf) chi_f, A of shape (10, 10),
     X of the robot with the load = X + K_l chi_l,     K_l the columns of K = dX/dchi of link l.
@@ -25,14 +26,14 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Mount:
-    """Where a load is fixed.
+    """The link to which a load is fixed, and the frame of the load's parameters.
 
     Attributes
     ----------
     link : int
-        Link that carries it.
+        Link to which the load is fixed.
     frame : int
-        Frame of its parameters: that of the link, or one fixed to it.
+        Frame of its parameters: that of the link, or one fixed to the link.
     T : ndarray, shape (4, 4)
         Pose of the frame in the frame of the link.
     """
@@ -43,7 +44,7 @@ class Mount:
 
     @property
     def place(self) -> str:
-        """The link or frame that carries the load, in words."""
+        """Words that name the link or frame to which the load is fixed, such as "link 6"."""
         return (
             f"link {self.link}"
             if self.frame == self.link
@@ -52,13 +53,16 @@ class Mount:
 
     @property
     def action(self) -> Array:
-        """A, shape (10, 10): ten parameters at `frame` to those at the frame of the link, in the order of INERTIAL."""
+        """Matrix A, shape (10, 10), from ten parameters at `frame` to those at the link's frame.
+
+        Their order is that of INERTIAL.
+        """
         return np.column_stack(
             [ten_parameters(self.T @ pseudo_inertia(unit) @ self.T.T) for unit in np.eye(10)]
         )
 
     def columns(self, physical: PhysicalModel) -> Array:
-        """dX/dchi of the load at `frame`, shape (b, 10)."""
+        """Compute the derivative dX/dchi of X by the load's parameters at `frame`, shape (b, 10)."""
         own = physical.K[:, physical.link(self.link)]
         if self.frame == self.link:
             return own
@@ -74,7 +78,7 @@ def mount(
     link: int | None = None,
     constants: Mapping[str, float] | None = None,
 ) -> Mount:
-    """The link that carries a frame, and the pose of the frame in it.
+    """Find the link to which a frame is fixed, and the pose of the frame in the frame of the link.
 
     Parameters
     ----------
@@ -82,14 +86,14 @@ def mount(
     frame : int, optional
         Any declared frame; default: that of the link.
     link : int, optional
-        Default: the one that carries the frame, or the last link with inertia.
+        Default: the link to which the frame is fixed, or the last link with inertia.
     constants : mapping, optional
         Values in place of the robot file's, as for `frame_poses`.
 
     Raises
     ------
     InputError
-        No such frame or link, or a frame that no link with inertia carries.
+        No such frame or link, or a frame that is fixed to no link with inertia.
     """
     links = physical_model(model).links
     link = links[-1] if link is None and frame is None else link
@@ -130,17 +134,20 @@ def load_effect(
     link: int | None = None,
     **constants: float,
 ) -> Array:
-    """Change of the base parameters by a known load, shape (b,), in the order of BASE_PARAMETERS: X + load_effect(...) is the robot with it.
+    """Compute the change of the base parameters by a known load, shape (b,).
+
+    X + load_effect(...) are the parameters of the robot with the load, in the order of
+    BASE_PARAMETERS.
 
     Parameters
     ----------
     model : GeneratedModel
     load : mapping
-        Some of XX XY XZ YY YZ ZZ MX MY MZ M at the frame, SI; what is left out is zero.
+        Some of XX XY XZ YY YZ ZZ MX MY MZ M at the frame, SI; those left out are zero.
     frame : int, optional
         Default: that of the link.
     link : int, optional
-        Default: the one that carries the frame, or the last link with inertia.
+        Default: the link to which the frame is fixed, or the last link with inertia.
     **constants : float
         Values in place of the robot file's.
     """
@@ -151,7 +158,7 @@ def load_effect(
 
 
 def load_vector(load: Mapping[str, float]) -> Array:
-    """The ten parameters in the order of INERTIAL; InputError for another name."""
+    """Return the ten parameters of a load in the order of INERTIAL; InputError for another name."""
     if unknown := [name for name in load if name not in INERTIAL]:
         raise InputError(
             f"unknown parameter {', '.join(unknown)} of a load; expected some of "
@@ -163,13 +170,15 @@ def load_vector(load: Mapping[str, float]) -> Array:
 def load_of_body(
     mass: float, centre: Any, inertia: Any = None, rotation: Any = None
 ) -> dict[str, float]:
-    """Parameters of a body from its data sheet: about the origin and along the axes of the frame it is mounted on.
+    """Compute the ten inertial parameters of a body from the numbers of its data sheet.
+
+    They are about the origin and along the axes of the frame on which the body is mounted.
 
     Parameters
     ----------
     mass : float, kg
     centre : array_like, shape (3,), m
-        Of mass, in that frame.
+        Centre of mass, in that frame.
     inertia : array_like, shape (3, 3), kg m^2, optional
         Tensor about the centre of mass (products as tensor elements, Ixy = -integral x y dm);
         default: a point.
@@ -193,7 +202,10 @@ def load_of_body(
 
 
 def ten_parameters(P: Array) -> Array:
-    """The ten parameters of a pseudo-inertia, in the order of INERTIAL: J = tr(S) 1 - S of its matrix S of second moments."""
+    """Return the ten inertial parameters of a pseudo-inertia, in the order of INERTIAL.
+
+    J = tr(S) 1 - S, with S its matrix of second moments.
+    """
     S = P[:3, :3]
     J = np.trace(S) * np.eye(3) - S
     return np.array([*J[np.triu_indices(3)], *P[:3, 3], P[3, 3]])

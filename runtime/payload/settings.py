@@ -1,4 +1,4 @@
-"""Settings of a load: where it is fixed, and what is known of it."""
+"""Settings of a load: where it is fixed, and which of its parameters are known."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ LOAD = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 
 
 class PayloadSettings(Settings):
-    """Records with a load fixed to a link; the records of the study are those without it.
+    """Settings of a load fixed to a link; the other records of the study are without the load.
 
     Attributes
     ----------
@@ -22,12 +22,13 @@ class PayloadSettings(Settings):
         Frame fixed to that link, such as a tool frame (sigma 2), at which the parameters of the
         load are meant; default: that of the link.
     known : mapping of float, SI
-        Those of XX XY XZ YY YZ ZZ MX MY MZ M of the load, at that frame, that were weighed or
-        computed.
+        Parameters of the load, among XX XY XZ YY YZ ZZ MX MY MZ M at that frame, that were
+        weighed or computed.
     friction : bool
-        The records with the load have friction of their own.
+        Whether the records with the load have friction parameters of their own.
     gains : bool
-        Also estimate the torque constants of the drives from the load; its M must be known.
+        Whether the torque constants of the drives are also estimated from the load; its M must
+        be known.
     """
 
     link: Whole | None = None

@@ -1,4 +1,4 @@
-"""The load of a study: its parameters, and the torque constants of the drives that carry it.
+"""Analysis of a load: its inertial parameters, and the torque constants of the drives.
 
 `runtime.payload.load`, `runtime.payload.gains`.
 """
@@ -31,14 +31,14 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class PayloadStudy(Result, Part, keys="payload drive_gains:gains"):
-    """A load.
+    """Result of the analysis of a load: inertial parameters, and torque constants of drives.
 
     Attributes
     ----------
     payload : Payload
-        From the records without and with the load, fitted together.
+        Parameters from the records without and with the load, fitted together.
     gains : DriveGains or None
-        Torque constants of the drives; None if study.payload.gains does not ask for them.
+        Torque constants of the drives; None if study.payload.gains is false.
     """
 
     payload: Payload
@@ -48,21 +48,21 @@ class PayloadStudy(Result, Part, keys="payload drive_gains:gains"):
     title = "Load"
 
     def text(self) -> str:
-        """How it was found; what stays open of the torque constants."""
+        """Return a text on how the load and the torque constants were estimated."""
         how = "Records with and without the load, fitted together."
         return how if self.gains is None else f"{how}\nTorque constants: {self.gains.text}."
 
     def tables(self) -> list[Table]:
-        """Parameters of the load; torque constants motor by motor."""
+        """Return the table of the load, and the table of the torque constants if it exists."""
         gains = [] if self.gains is None else [self.gains.table()]
         return [self.payload.table(), *gains]
 
     def entries(self) -> dict[str, Any]:
-        """Entries of estimate.json: the load and the torque constants."""
+        """Return the entries of estimate.json: the load and the torque constants."""
         return self.summary()
 
     def brief(self) -> str:
-        """Load and torque constants with their 95 % intervals, four in a line."""
+        """Return the load and the torque constants, with 95 % confidence intervals, as text."""
         load, gains = self.payload, self.gains
         given = [f"{name} {value:.4g} (given)" for name, value in load.given.items()]
         estimated = with_intervals(load.names, load.value, load.sigma)
@@ -80,7 +80,7 @@ LOADED = "loaded"
 
 
 def load_of_study(result: Identification) -> PayloadStudy | None:
-    """The load of study.payload; None if the study has none."""
+    """Estimate the load that study.payload describes; None if the study has no load."""
     study: Any = result.study
     if study.payload is None:
         return None
@@ -89,14 +89,14 @@ def load_of_study(result: Identification) -> PayloadStudy | None:
 
 
 def payload_study(problem: Problem, loaded: Sequence[Record]) -> PayloadStudy:
-    """The load of settings.payload, by ols, or by wls where the settings have weights.
+    """Estimate the load of settings.payload by ols, or by wls if the settings have weights.
 
     Parameters
     ----------
     problem : Problem
-        Prepared; its records are those without the load.
+        Problem with prepared records, all without the load.
     loaded : sequence of Record
-        Joint side, with the load, prepared by the same steps.
+        Records with the load, joint side, prepared by the same steps.
 
     Raises
     ------
@@ -130,5 +130,5 @@ def payload_study(problem: Problem, loaded: Sequence[Record]) -> PayloadStudy:
 
 
 def _rows(model: GeneratedModel, record: Prepared, gains: DriveGains | None) -> Observation:
-    """Rows of a record, with the torques of every motor times its factor where it is sought."""
+    """Build the rows of a record, with corrected torques if torque constants were estimated."""
     return record.observation(model) if gains is None else scaled(model, record, gains)

@@ -43,7 +43,7 @@ class Consistency(Part):
 
     @property
     def fitted(self) -> bool:
-        """Whether `fit` was made under the conditions of a physical robot."""
+        """Whether the parameters were fitted under the conditions of a physical robot."""
         return "standard" in self.fit.details
 
     def text(self) -> str:
@@ -60,10 +60,10 @@ class Consistency(Part):
         return "" if self.judged is None else f"The parameters are {self.judged.text}."
 
     def tables(self) -> list[Table]:
-        """Make the tables of an estimate that was made under the conditions of a physical robot.
+        """Make tables of the physical conditions and the standard parameters, if `fit` has them.
 
-        One table gives the smallest eigenvalue of each condition, the other the standard
-        parameters. For other estimates the list is empty.
+        The first table gives the smallest eigenvalue of each condition. If the parameters were not
+        fitted under these conditions, the list is empty.
         """
         if not self.fitted:
             return []
@@ -125,7 +125,7 @@ def physical(part: Consistency) -> Answer:
 
 
 def as_fitted(result: Identification) -> Consistency:
-    """Make the part of a result whose physical check was not requested.
+    """Make the part on physical consistency of a result whose physical check was not requested.
 
     The part still shows parameters that were fitted under the conditions of a physical robot.
     """

@@ -100,8 +100,8 @@ class Feasibility:
     physical : bool
         Whether some robot has these parameters, whatever the limits that were given or guessed.
     blocking : tuple of (str, float)
-        Conditions that had to be released, in order, each with the t* before its release; empty if
-        t* >= 0.
+        Conditions (or limits) that prevent t* >= 0, in the order of their release, each with the t*
+        before; empty if t* >= 0.
     chi : ndarray, shape (p,)
         Standard parameters at t*.
     """
@@ -246,7 +246,7 @@ def nearest_standard(
 
 
 def limit_rows(physical: PhysicalModel, limits: RobotLimits | None) -> LinearBounds:
-    """Write the limits of a robot as linear inequalities lower <= A chi <= upper."""
+    """Write the limits of standard parameters as linear inequalities lower <= A chi <= upper."""
     limits = limits or RobotLimits()
     entries: list[tuple[str, dict[int, float], float, float]] = []
     for name, (low, high) in limits.bounds.items():
@@ -342,7 +342,7 @@ def known_inertia(physical: PhysicalModel) -> tuple[int, ...]:
 
 
 def unsolved(status: str, rows: LinearBounds, attempt: Callable[[LinearBounds], Optimum]) -> str:
-    """Write why no solution was found: the likely cause, and what to try.
+    """Write why no physical robot was found: the likely cause, and what to try.
 
     attempt : function that solves the same problem with other limits. Each limit is left out in
     turn, to find out which limit prevents a solution.
@@ -366,9 +366,10 @@ def unsolved(status: str, rows: LinearBounds, attempt: Callable[[LinearBounds], 
 
 
 def _inside(e: Ellipsoid) -> Array:
-    """Return the matrix Q, shape (4, 4), of an ellipsoid: tr(P Q) >= 0 if the mass lies inside.
+    """Return the matrix Q of an ellipsoid: tr(P Q) >= 0 if the mass of the link lies inside.
 
-    With homogeneous coordinates on the left, x'Qx = 1 - (x - c)' A^-1 (x - c), A = diag(axes^2).
+    P is the pseudo-inertia of the link. With homogeneous coordinates on the left,
+    x'Qx = 1 - (x - c)' A^-1 (x - c), A = diag(axes^2).
     """
     A, c = np.diag(1 / np.square(e.axes)), np.array([e.centre]).T
     return np.block([[-A, A @ c], [c.T @ A, 1 - c.T @ A @ c]])

@@ -75,7 +75,7 @@ DECADES = WEIGHTS[::2]  # of the search for the weight of smallest held-out erro
 
 
 class FeasibleOptions(RobotLimits):
-    """estimate.options of method feasible, in addition to the options of `RobotLimits`.
+    """Options (estimate.options) of method feasible, in addition to those of `RobotLimits`.
 
     Attributes
     ----------
@@ -211,7 +211,7 @@ def conditions_of(judged: Feasibility | None) -> dict[str, Any]:
 def within_limits(
     physical: PhysicalModel, names: Sequence[str], X: Array, options: FeasibleOptions
 ) -> Feasibility:
-    """Check whether X is physical and, if so, whether it is also within the limits of the robot.
+    """Check whether base parameters X are physical and, if so, within the limits of the robot.
 
     The two are separate because the limits are known or guessed values of a robot, not physics.
     """
@@ -233,10 +233,10 @@ def solve_with_weight(
     options: FeasibleOptions,
     without_prior: Array | None = None,
 ) -> tuple[Array, float]:
-    """Find chi and the weight of the prior distance D, for a factored system.
+    """Find the standard parameters chi, and the weight of their distance D from the prior values.
 
-    Returns chi, shape (p,), and the weight. without_prior : chi of weight 0, shape (p,), if it is
-    known.
+    rows : the factored system. without_prior : chi of weight 0, if it is known. Returns chi, shape
+    (p,), and the weight.
     """
     if options.prior == "none":
         if without_prior is None:
@@ -264,7 +264,7 @@ def solve_with_weight(
 def held_out_weight(
     observation: Observation, system: System, physical: PhysicalModel, options: FeasibleOptions
 ) -> float:
-    """Choose the weight of D with which four fifths of the record predict the left-out fifth best.
+    """Choose the weight of the prior that predicts each fifth of the record best from the others.
 
     The squared errors of the five predictions are added; if two weights are equally good, the
     larger is chosen. A weight is abandoned as soon as it cannot be the best, since no prediction
@@ -358,10 +358,10 @@ def reach_text(options: FeasibleOptions) -> str:
 def by_reach(
     rows: Factor, physical: PhysicalModel, unbounded: FeasibleOptions, bounded: FeasibleOptions
 ) -> tuple[Array | None, Array | None]:
-    """Fit chi without a prior twice: without, then with the bounds guessed from the robot's size.
+    """Fit chi twice without a prior: without and with the bounds guessed from the robot's size.
 
-    Returns both chi; None for a fit without solution, for instance if no robot is within the
-    bounds.
+    Returns both standard parameter vectors chi; None for a fit without solution, for instance if no
+    robot is within the bounds.
     """
     found: list[Array | None] = []
     for limits in (unbounded, bounded):
@@ -399,7 +399,7 @@ def prior_text(physical: PhysicalModel, options: FeasibleOptions, weight: float)
 
 
 def part_factor(part: Observation, system: System) -> Factor:
-    """Compute the triangular factor of some rows, with the joint weights of the fit of all rows."""
+    """Compute the triangular factor of a part of the rows, with the joint weights of all rows."""
     chosen = part.columns(system.names)
     return factor(chosen.W, chosen.Y, chosen.rows, chosen.names).weighted(
         1 / np.array(system.scales)

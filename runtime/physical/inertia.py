@@ -125,7 +125,7 @@ class PhysicalModel:
         return {condition.name: condition.smallest(chi) for condition in self.conditions}
 
     def rows(self, names: Sequence[str]) -> Array:
-        """Return the rows of K of the base parameters `names`."""
+        """Return the rows of K (X = K chi) that belong to the base parameters `names`."""
         return self.K[[self.base.index(name) for name in names]]
 
 

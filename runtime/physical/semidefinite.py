@@ -78,19 +78,19 @@ class LinearBounds:
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """The set of all chi = origin + basis w; origin has shape (p,), basis (p, m)."""
+    """The set of all chi = origin + basis w with free w; origin has shape (p,), basis (p, m)."""
 
     origin: Array
     basis: Array
 
 
 def everything(scale: Array) -> Space:
-    """Make the space of all chi, with w in units of `scale`, shape (p,)."""
+    """Make the space of all standard parameters chi, in units of `scale`, shape (p,)."""
     return Space(np.zeros(len(scale)), np.diag(scale))
 
 
 def solutions(K: Array, X: Array, scale: Array) -> Space:
-    """Make the space of all chi with K chi = X; K has full row rank."""
+    """Make the space of all standard parameters chi with K chi = X; K has full row rank."""
     return Space(
         scale * np.linalg.lstsq(K * scale, X, rcond=None)[0], scale[:, None] * null_space(K * scale)
     )
@@ -388,7 +388,7 @@ def _solved(*data: Any) -> Any:
 
 
 def _solution(solve: Callable[[], Any]) -> Any:
-    """Run Clarabel; return None if it stops with an error of its own."""
+    """Run `solve`, a call of Clarabel; return None if Clarabel stops with an error of its own."""
     try:
         return solve()
     except BaseException as e:  # a panic of Rust is no Exception
@@ -413,9 +413,10 @@ def triangle(B: Array) -> Array:
 
 @lru_cache(maxsize=8)
 def _triangles(conditions: tuple[Condition, ...], p: int) -> tuple[Array, Array]:
-    """Write the scaled matrices of all conditions as triangles, one below the other, over all chi.
+    """Write the scaled matrices of all conditions as upper triangles, one below the other.
 
-    Returns the triangles, shape (rows, p), and the triangles of identity matrices, shape (rows,).
+    The triangles are over all p standard parameters, shape (rows, p). The second result has the
+    triangles of identity matrices, shape (rows,).
     """
     ones = [triangle(np.eye(c.B.shape[1])[None])[:, 0] for c in conditions]
     return np.vstack(

@@ -164,7 +164,7 @@ def read_bag(path: Path, options: Options) -> JointTable:
 
 
 def digest_of(path: Path) -> str:
-    """Compute the SHA-256 of a bag.
+    """Compute the SHA-256 of a ROS bag, which may be a file or a folder.
 
     For a folder, it is that of the list of the hashes and names of its files, which must be inside
     the folder.
@@ -248,7 +248,7 @@ def _topic(connections: list[Any], wanted: str | None, file: str) -> str:
 
 
 def _as_defined(definition: Any) -> bool:
-    """Whether a message definition in the bag has the fields of JointState.
+    """Whether a bag defines the message JointState with the same fields as ROS.
 
     Only .msg text is compared. A definition in another language is checked by its hash instead.
     """
@@ -258,7 +258,7 @@ def _as_defined(definition: Any) -> bool:
 
 
 def _messages(reader: Any, topic: str, decode: Any) -> list[JointState]:
-    """Read the messages of the topic in the order of the log.
+    """Read the messages of one topic of a bag, in the order of the log.
 
     Their time is the stamp of the header, or the time of the log if every stamp is zero.
     """

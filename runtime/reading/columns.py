@@ -86,7 +86,7 @@ def column_names(
 
 
 def _of_motors(names: tuple[str, ...], motors: Sequence[bool]) -> tuple[str, ...]:
-    """Complete the columns of the torques with NONE for each joint without a motor.
+    """Add the mark NONE to the torque columns for each joint without a motor.
 
     names : columns of all joints, or of the joints with a motor only. Other names are returned
     unchanged.
@@ -240,7 +240,7 @@ class Conversion:
 def conversion(
     settings: RecordSettings, drives: Drives | None, first: Table, last: Table, n: int
 ) -> Conversion:
-    """Find how the columns of a record are converted to the joint side and SI units.
+    """Make the Conversion of the columns of a record to the joint side and SI units.
 
     Parameters
     ----------

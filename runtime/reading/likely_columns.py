@@ -118,7 +118,7 @@ def likely_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str
 
 
 def known_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str, Any]:
-    """Propose settings like `likely_columns`, but also for some of the columns only.
+    """Propose settings of a record from its column names, even if they show some quantities only.
 
     Torques are left out if their number differs from that of the positions.
     """
@@ -185,9 +185,9 @@ def families_of(names: Sequence[str], joints: Sequence[str] = ()) -> Iterator[Fa
 
 
 def _quantity(stem: str) -> tuple[str, int]:
-    """Find the quantity that the words of a stem mean, and the place of the word in `WORDS`.
+    """Find the quantity that the words of a column name mean, for instance "tau".
 
-    Return ("", 0) if the words mean no quantity.
+    Also return the place of the word in `WORDS`. Return ("", 0) if the words mean no quantity.
     """
     words = _words(stem)
     for exact in (True, False):

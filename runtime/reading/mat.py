@@ -61,9 +61,9 @@ def read_mat(path: Path, options: Options) -> Table:
 
 
 def _by_scipy(path: Path, others: dict[str, str]) -> dict[str, Any]:
-    """Read the members of a file of versions 4 to 7.
+    """Read the variables of a MATLAB file of versions 4 to 7 by scipy.
 
-    A member whose class is not numeric is not read; its class is added to `others`.
+    A variable whose class is not numeric is not read; its class is added to `others`.
     """
     from scipy.io import loadmat, whosmat
 
@@ -93,10 +93,10 @@ def _flatten(
     others: dict[str, str],
     depth: int = 0,
 ) -> None:
-    """Collect all arrays of numbers in `arrays`, also those inside structures, as rec.pos.
+    """Collect the numeric arrays of a MATLAB file, also those inside structures, as rec.pos.
 
-    Members that cannot be read are described in `others`. read : function that returns the value of
-    a member.
+    They are added to `arrays`. Members that cannot be read are described in `others`. read :
+    function that returns the value of a member.
     """
     for key, member in members.items():
         name = f"{path}{key}"
@@ -112,9 +112,9 @@ def _flatten(
 
 
 def _of_scipy(x: Any) -> Member:
-    """Return the value of a member of a file of versions 4 to 7: an array, a structure, or words.
+    """Return a variable of a MATLAB file (versions 4 to 7) as array, structure or description.
 
-    Words describe a member that is neither.
+    A description, in words, is for a variable that is neither.
     """
     if isinstance(x, np.ndarray) and is_numeric(x):
         return x
@@ -130,10 +130,11 @@ def _members(group: Any) -> dict[str, tuple[Any, str]]:
 
 
 def _of_hdf5(member: tuple[Any, str]) -> Member:
-    """Return the value of a member of a file of version 7.3: an array, a structure, or words.
+    """Return a variable of a MATLAB file (version 7.3) as array, structure or description.
 
-    Words describe a member that is neither. Links to other files are not followed. An empty array
-    has the attribute MATLAB_empty, because the file holds its dimensions in place of numbers.
+    A description, in words, is for a variable that is neither. Links to other files are not
+    followed. An empty array has the attribute MATLAB_empty, because the file holds its dimensions
+    in place of numbers.
     """
     import h5py
 

@@ -1,5 +1,4 @@
-"""Reading of NumPy files without pickled objects: archives of arrays (.npz), single arrays (.npy).
-"""
+"""Reading of NumPy files without pickled objects: arrays (.npy), archives of arrays (.npz)."""
 
 from __future__ import annotations
 
@@ -41,7 +40,7 @@ def read_npy(path: Path, options: Options) -> Table:
 
 
 def archive_of(path: Path) -> dict[str, Array]:
-    """Read the arrays of a .npz file, by name.
+    """Read all arrays of a .npz file and return them by name.
 
     Raise InputError for pickled objects, damage, and an archive that is too large.
     """

@@ -119,7 +119,7 @@ def resampled(
     *,
     file: str,
 ) -> tuple[list[Stretch], float, str]:
-    """Resample the signals; return stretches at a uniform rate, this rate in Hz, and a sentence.
+    """Resample the signals; return stretches without gaps, their rate in Hz, and a sentence.
 
     Parameters
     ----------

@@ -122,7 +122,7 @@ class Columns(Settings):
 
     @property
     def further(self) -> dict[str, tuple[str, ...]]:
-        """Columns that do not belong to joints, by name of the channel or wrench."""
+        """Columns of signals that do not belong to a joint, by name of the channel or wrench."""
         own = {name: (column,) for name, column in self.channels.items()}
         return own | {f"{WRENCH}{frame}": names for frame, names in self.wrench.items()}
 

@@ -69,7 +69,7 @@ def read_text(path: Path, options: Options) -> Table:
 
 
 def _lines(path: Path) -> Lines:
-    """Yield the lines that are neither empty nor comments, each with its number."""
+    """Yield the lines of a text file that are neither empty nor comments, with their numbers."""
     number = 0
     try:
         with opened(path) as stream, TextIOWrapper(stream, encoding="utf-8-sig") as text:

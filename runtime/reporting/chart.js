@@ -26,19 +26,6 @@ function floats(text) {
   return Float32Array.from({ length: bytes.length / 4 }, (_, k) => view.getFloat32(4 * k, true));
 }
 
-/** Steps of 1, 2 or 5 times a power of ten between two numbers, about `count` of them, and at least two: one tells no scale. */
-function ticks(low, high, count) {
-  const raw = (high - low) / count, power = 10 ** Math.floor(Math.log10(raw));
-  const step = power * [1, 2, 5, 10].find((factor) => factor * power >= raw * 0.999);
-  const found = [];
-  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push(k * step);
-  if (found.length < 2) return ticks(low, high, 2 * count);
-  const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
-  return found.map((value) => [value, minus(value.toFixed(digits))]);
-}
-
-const minus = (text) => (Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−"));
-
 class Chart {
   constructor(figure, data, group) {
     this.group = group;

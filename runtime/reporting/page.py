@@ -26,7 +26,7 @@ from runtime.core.table import Table
 from runtime.reporting.series import Series
 
 State = Literal["good", "doubtful", "no", "open", ""]
-SCRIPTS = ("chart.js", "page.js")
+SCRIPTS = ("ticks.js", "chart.js", "page.js")
 SIGNS = {"good": "✓", "doubtful": "!", "no": "✕", "open": "–"}
 WORDS = {"good": "good", "doubtful": "doubtful", "no": "no", "open": "not judged"}
 

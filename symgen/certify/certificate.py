@@ -98,8 +98,8 @@ class Certificate:
     texts : mapping
         Check of each emitted file, by file name; empty if no file was given.
     rank_in_floats : bool
-        Whether `rank` is the rank of the independent regressor, because F_p gives no closed states
-        at one geometry of the loops.
+        Whether `rank` is the rank of the independent regressor, because the loops cannot be closed
+        exactly modulo a prime.
     error_probability : float
         Bound on the probability that a false identity passes the exact checks; 1 if coefficients
         are numbers, which are checked in floating point.
@@ -143,7 +143,7 @@ class Certificate:
 
     @property
     def errors(self) -> dict[str, float]:
-        """Error of every function and table of every emitted file; a name is `bias of arm.py`."""
+        """Error of each function of each emitted file, by a name such as `bias of arm.py`."""
         return {
             f"{name} of {file}": error
             for file, text in self.texts.items()
@@ -299,7 +299,7 @@ def certify_formulas(
 
 
 def _special(robot: Robot, gap: float, W: Array) -> str:
-    """Explain why the rank of the base columns W is smaller at the constants of the robot file."""
+    """Explain why the base columns W lose rank at the constants of the robot file."""
     if roots := independent_roots(robot):
         return (
             f"{', '.join(roots)} {'count' if len(roots) > 1 else 'counts'} as any number: the rank "
@@ -317,7 +317,7 @@ def _special(robot: Robot, gap: float, W: Array) -> str:
 
 
 def independent_roots(robot: Robot) -> list[str]:
-    """List the square roots of expressions that are not rational numbers.
+    """List the square roots whose argument is not a rational number, such as sqrt(D3**2 + 1).
 
     Over F_p each of these roots is an independent unknown.
     """
@@ -325,7 +325,7 @@ def independent_roots(robot: Robot) -> list[str]:
 
 
 def _too_small(W: Array) -> str:
-    """Write how many combinations of base parameters have almost no effect.
+    """Write how many combinations of base parameters have almost no effect on the torques.
 
     Their singular values in W are below 1e-9 of the largest.
     """
@@ -336,7 +336,8 @@ def _too_small(W: Array) -> str:
 def hair_off(robot: Robot, what: str) -> str:
     """Write the message for a geometry that is almost, but not exactly, a special geometry.
 
-    An example is an angle that differs from pi/2 by rounding; floats cannot separate the two.
+    An example is an angle of 1.570796 rad in place of pi/2. The difference has an effect that no
+    record can show.
     """
     angles = "; ".join(nearly_round(robot, WITHIN)) or "round the numbers that are meant round"
     return (
@@ -347,7 +348,7 @@ def hair_off(robot: Robot, what: str) -> str:
 
 
 def vanishing_denominators(regrouping: Regrouping) -> list[str]:
-    """Describe each formula whose denominator is zero at the constants of the robot file."""
+    """Describe each formula that divides by zero at the constants of the robot file."""
     values, texts = regrouping.robot.constants, []
     for b in regrouping.base:
         below = {
@@ -370,7 +371,7 @@ def vanishing_denominators(regrouping: Regrouping) -> list[str]:
 
 
 def degree(regrouping: Regrouping) -> int:
-    """Compute a bound on the degree of the column identities in all random variables.
+    """Compute a bound on the polynomial degree of the identities between regressor columns.
 
     The variables are half-angle tangents, lengths, rates and directions of motion. An entry of the
     regressor passes each frame of a path at most three times: outwards in products of two
@@ -415,10 +416,10 @@ def degree(regrouping: Regrouping) -> int:
 def _modulo(
     regrouping: Regrouping, seed: int, p: int, sampler: Sampler
 ) -> tuple[int | None, list[str]]:
-    """Check the rank of the base columns and all formulas over F_p.
+    """Check the rank of the base columns and all regrouping formulas modulo a prime p.
 
-    Return the rank, None if F_p gives no closed states at one geometry, and the columns that differ
-    from their formulas.
+    Return the rank (None if the loops cannot be closed exactly modulo p), and the columns that
+    differ from their formulas.
     """
     robot = regrouping.robot
     names, own = robot.parameters, [robot.parameters.index(name) for name in regrouping.own]
@@ -460,10 +461,7 @@ def _false_in_floats(regrouping: Regrouping, W: Array, base: list[int]) -> list[
 
 @lru_cache(maxsize=4)
 def independent(robot: Robot) -> Sample:
-    """Compute the regressor of `robot` from its energies, at random states.
-
-    The result is cached for further certificates of the robot.
-    """
+    """Compute the regressor of `robot` from its energies, at random states; it is cached."""
     from symgen.derive.lagrange import (
         in_one_mode,
         sampled,
@@ -474,10 +472,10 @@ def independent(robot: Robot) -> Sample:
 
 
 def numeric_rank(W: Array, *, tolerance: float = 1e-9, proved: int = 0) -> tuple[int, float]:
-    """Compute the rank of a matrix by SVD after scaling its columns, and its gap.
+    """Compute the rank of a matrix by SVD of its scaled columns, and the gap s_rank / s_(rank+1).
 
-    The gap is s_rank / s_(rank+1). If `proved` is a larger rank that was proved exactly, it is the
-    result, provided that its last singular value exceeds the next by a factor of SEEN.
+    If `proved` is a larger rank that was proved exactly, it is the result, provided that its last
+    singular value exceeds the next by a factor of SEEN.
     """
     norms = np.linalg.norm(W, axis=0)
     acts = (

@@ -70,9 +70,9 @@ def cached_path(file: str, text: str) -> Path | None:
 def stored_path(file: str, text: str) -> Path:
     """Write `text` to a file in the cache, and return the path of the file.
 
-    The names of its folders depend on the certified part and on the whole text. If the cache cannot
-    be written, the file is in a folder of this process. SymgenError is raised if no file can be
-    written at all.
+    The folder of the file is named after the text without its certificate. A second folder, named
+    after the whole text, marks the text as certified. If the cache cannot be written, the file is
+    in a folder of this process. SymgenError is raised if no file can be written at all.
     """
     folder, whole = _entry(without_certificate(text)), _entry(text)
     if folder is not None and whole is not None:
@@ -145,7 +145,7 @@ def _key(text: str) -> str:
 
 
 def _entry(text: str) -> Path | None:
-    """Return the folder of a text in the cache.
+    """Return the cache folder of a source text; its name is a hash of the text.
 
     Return None if there is no home folder, or if other users may write to the cache. SymgenError is
     raised instead if SYMGEN_CACHE names such a folder.

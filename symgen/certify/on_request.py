@@ -1,4 +1,4 @@
-"""Expected values of the functions on request.
+"""Expected values of the functions that are emitted only on request.
 
 They follow from the regressor and the energies of Lagrange's equations alone.
 """
@@ -27,10 +27,10 @@ States = tuple[Array, Array, Array]
 def requested_values(
     model: Lagrange, regrouping: Regrouping, chi: Array, states: States, tree: States, qddr: Array
 ) -> dict[str, Callable[[], Array]]:
-    """Return, by name, functions that compute the expected values (N, ...) of models on request.
+    """Return functions that compute expected values, (N, ...), of models emitted on request.
 
-    states : q, qd, qdd of the actuated joints, shape (N, n); qdd serves as qdr too. tree :
-    position, rate and acceleration of all moving joints. qddr : reference accelerations.
+    `states` are q, qd, qdd of the actuated joints, shape (N, n); qdd serves as qdr too. `tree` are
+    the positions, rates and accelerations of all moving joints. `qddr` are reference accelerations.
     """
     robot, (q, qd, qdr), zero = regrouping.robot, states, 0 * states[0]
     own = [robot.parameters.index(name) for name in regrouping.own]
@@ -80,6 +80,9 @@ def requested_values(
 
 
 def of_elements(robot: Robot, which: Callable[[Element], bool]) -> Array:
-    """Whether each standard parameter belongs to an element that `which` selects, shape (p,)."""
+    """Whether each standard parameter belongs to an element, such as friction, of a given kind.
+
+    `which` selects the elements; the result has shape (p,).
+    """
     own = {parameter(e.family, j) for e in robot.elements if which(e) for j in e.keys}
     return np.array([name in own for name in robot.parameters])

@@ -1,4 +1,4 @@
-"""Run emitted source files and compare each function with independent values (the witness).
+"""Run emitted source files and compare each function with independently computed values.
 
 A Python module is imported and used in three ways: with arrays of NumPy, with arrays that it may
 not write to, and by CasADi. A C file is compiled and called in a process of its own. A file that
@@ -53,7 +53,7 @@ TILES = 71  # samples of the functions in C: some tiles, the last not full
 
 @dataclass(frozen=True)
 class TextCheck:
-    """Result of running one emitted source file and comparing its functions with the witness.
+    """Result of running an emitted source file and comparing it with independent values.
 
     Attributes
     ----------
@@ -62,9 +62,9 @@ class TextCheck:
     sha256 : str
         Hash of the text without the lines of its certificate.
     errors : mapping
-        Largest difference of each function from the witness, relative to the largest entry. It is
-        infinite if the function fails, if its result has another shape, or if a call without
-        constants differs from a call with the constants of the robot file.
+        Largest difference of each function from the independent values, relative to the largest
+        entry. It is infinite if the function fails, if its result has another shape, or if a call
+        without constants differs from a call with the constants of the robot file.
     constants : str
         Which constants the functions were called with.
     left_out : tuple of str
@@ -88,7 +88,7 @@ class TextCheck:
 
     @property
     def wrong(self) -> list[str]:
-        """Functions that differ from the witness; NaN counts as a difference."""
+        """Names of functions that differ from the independent values; NaN is a difference."""
         return [name for name, error in self.errors.items() if not error < TOLERANCE]
 
     @property
@@ -96,7 +96,7 @@ class TextCheck:
         return not self.wrong and bool(self.errors or self.not_run)
 
     def checks(self, file: str) -> list[tuple[bool, str]]:
-        """List for each function whether it agrees with the witness, and a text with its error."""
+        """List whether each function agrees with independent values, and a text with its error."""
         if self.not_run:
             return [(True, f"{file} {self.sentence}")]
         return [
@@ -127,7 +127,7 @@ class TextCheck:
 
 
 def text_check(file: str, text: str, target: str, witness: Witness) -> TextCheck:
-    """Run every function of a source file and compare the results with the witness.
+    """Run every function of a source file and compare the results with independent values.
 
     The lines of a certificate in the text are removed first.
     """
@@ -175,7 +175,7 @@ def with_certificate(text: str, check: TextCheck, formulas: str) -> str:
 def module_errors(
     path: Path, witness: Witness
 ) -> tuple[dict[str, float], dict[str, str], tuple[str, ...]]:
-    """Run the functions of a Python module and compare them with the witness.
+    """Run the functions of a Python module and compare the results with independent values.
 
     Return the error of each function, the messages of functions that failed, and the ways in which
     the module was run.
@@ -230,7 +230,7 @@ def largest(
     call: Use,
     witness: Witness,
 ) -> tuple[float, str]:
-    """Compute the largest error of a function in all its checks.
+    """Compute the largest error of a function over all its test calls.
 
     Return the error, and the message if the function failed. The error is infinite if the defaults
     of the function are not the constants of the robot file.
@@ -301,9 +301,9 @@ def _function(module: ModuleType, name: str, *frame: int) -> Any:
 
 
 def _derivative_error(module: ModuleType, witness: Witness) -> float:
-    """Compute the error of two derivatives of the torques that are known.
+    """Compare the derivatives of the torques by qdd and by X with the known values A and D.
 
-    The derivative by qdd is the inertia matrix A, the derivative by X is the regressor D.
+    Return the larger of the two errors.
     """
     function = module.casadi(DERIVATIVES)
     states = (witness.q[0], witness.qd[0], witness.qdd[0], witness.X)
@@ -315,10 +315,9 @@ def _derivative_error(module: ModuleType, witness: Witness) -> float:
 
 
 def same_elements(table: Any, constants: Mapping[str, float], witness: Witness) -> bool:
-    """Whether the table of elements of a module agrees with the robot file.
+    """Whether a module's table of elements (friction, springs, ...) agrees with the robot file.
 
-    An element is a friction, a spring or the like. Its kind, its direction of motion, and its row
-    or form are compared.
+    The kind, the direction of motion, and the row or form of each element are compared.
     """
     expected = element_names(witness.robot)
     if list(table) != [name for name in witness.robot.parameters if name in expected]:
@@ -354,7 +353,10 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
             return {f"{CLOSED}1": float("inf")}
 
         def given(f: str, check: Check, k: Any) -> list[list[float]]:
-            """List the arguments at the states k; a closed mechanism has one struct of states."""
+            """List the arguments of a C function at the states k.
+
+            A closed mechanism has one struct with all its states.
+            """
             named = dict(zip(MODELS[f].arguments, check.arguments, strict=True))
             if closed is not None:
                 named = {"s": closed} | {x: a for x, a in named.items() if x not in STATE_NAMES}
@@ -403,9 +405,9 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
 
 
 def _closed(library: Path, witness: Witness, constants: list[float]) -> Array:
-    """Close the loops at every state with the function of the C file, and return the structs.
+    """Close the loops at every state with the compiled C function; return the closed states.
 
-    A struct is NaN if Newton's method fails.
+    A state is NaN if Newton's method fails.
     """
     name, closure = witness.robot.name, close(witness.robot)
     n, m = len(witness.robot.joints), len(closure.tied)
@@ -429,7 +431,7 @@ def _results(library: Path, calls: list[Call]) -> Any:
 
 
 def _of_one_state(name: str, text: str, witness: Witness) -> Iterator[tuple[str, Check]]:
-    """Yield each C function of one state, with the check that holds its expected values.
+    """Yield each C function that has one state as input, with its expected values.
 
     A function with a frame as argument has one check per frame.
     """
@@ -445,7 +447,7 @@ def _one_state(name: str, text: str) -> list[str]:
 
 
 def _stored(f: str, shape: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the shape in which a result is stored; a model stored by columns has reversed axes."""
+    """Return the shape in which a result is stored; some models are stored with reversed axes."""
     return shape[::-1] if MODELS[f].by_columns else shape
 
 

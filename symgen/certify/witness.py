@@ -1,4 +1,4 @@
-"""Independent expected values of every function, at random states, parameters and constants.
+"""Independent expected values of every emitted function, at random states and parameters.
 
 The dynamics follow from energies, the poses from products of the matrices of the frames
 (`derive.lagrange`). Neither shares code with the recursions, the regrouping or the printers. The
@@ -44,7 +44,7 @@ RANDOM, OF_THE_FILE = "random constants", "the constants of the file"
 
 @dataclass(frozen=True)
 class Check:
-    """One call of a function, and the result that the function must give.
+    """One test call of a function, and the result that the function must give.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Check:
 
 
 class Witness:
-    """Independent expected values of every function of a robot.
+    """Independent expected values of every emitted function of a robot, at random states.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class Witness:
         Values of constants, of q1, QP1, QDP1 ... of actuated joints, and of parameters, which
         replace random values.
     options : sequence of str
-        Options whose models on request are needed.
+        Options of `symgen generate --with` whose models are needed too.
     """
 
     def __init__(
@@ -130,7 +130,7 @@ class Witness:
 
     @property
     def keywords(self) -> dict[str, float]:
-        """Constants that the functions accept as keyword arguments, with their drawn values."""
+        """Constants that the functions accept as keyword arguments, with values for the tests."""
         return {name: self.constants[name] for name in self.regrouping.constants}
 
     @property
@@ -174,7 +174,7 @@ class Witness:
 
     @cached_property
     def checks(self) -> dict[str, list[Check]]:
-        """Calls of each function with the results that it must give, by function name."""
+        """Test calls of each function with the expected results, by function name."""
         q, qd, qdd, X = self.q, self.qd, self.qdd, self.X
         N, _, b = self.own.shape
         columns = np.abs(self.own).max(axis=(0, 1))
@@ -241,7 +241,7 @@ class Witness:
     def value(
         self, name: str, of: int = 0, frame: int = 0, rows: Sequence[int] | None = None
     ) -> Array:
-        """Compute the value of a model, shape (N, ...).
+        """Compute the expected value of a model, such as the inertia matrix, shape (N, ...).
 
         The model is that of frame `of`, with components in frame `frame`. A determinant uses the
         given rows of the Jacobian, counted from 1, or else all rows that are not zero.
@@ -354,7 +354,7 @@ def _at(robot: Robot, constants: Mapping[str, float]) -> Sample:
 
 
 def _sampled(regrouping: Regrouping, fixed: Mapping[str, float]) -> tuple[Sample, str]:
-    """Draw random states, if possible with random constants.
+    """Draw random states and, if possible, random constants of the robot.
 
     Return the states, and a text that names the constants: random, or the ones of the file.
     """

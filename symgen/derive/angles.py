@@ -29,9 +29,10 @@ Variable = str | Number | Call | Unit
 
 
 def fixed_angles(robot: Robot) -> tuple[Expression, ...]:
-    """Return the fixed angles of a robot without their quarter turns, each once up to sign.
+    """Return the constant angles of a robot, such as alpha, without whole quarter turns.
 
-    A fixed angle that is only a number of quarter turns is left out.
+    An angle and its opposite count once. An angle that is only a number of quarter turns is left
+    out.
     """
     angles: dict[Expression, None] = {}
     for e in _angles(robot):
@@ -42,7 +43,7 @@ def fixed_angles(robot: Robot) -> tuple[Expression, ...]:
 
 
 class Units:
-    """The unit angles of a robot: every fixed angle is a sum of whole multiples of unit angles.
+    """The unit angles of a robot, such as pi/12: each fixed angle is a sum of their multiples.
 
     The first unit angle is pi/D. D is the common denominator of the fractions of pi with a moderate
     denominator and of the angles that the square roots need.
@@ -69,7 +70,7 @@ class Units:
         return [(PI, Fraction(1, self.D)), *self.free.items()]
 
     def of(self, angle: Expression) -> list[tuple[Unit, int]]:
-        """Write a fixed angle as a sum of unit angles: a list of (unit, whole multiple).
+        """Write a fixed angle as a sum of unit angles: a list of (unit angle, whole multiple).
 
         An amount that is no whole multiple of its unit angle becomes a unit angle itself.
         """
@@ -85,19 +86,19 @@ class Units:
         return parts
 
     def _is_turn(self, m: Monomial, c: Fraction) -> bool:
-        """Whether the amount c of monomial m is a whole multiple of pi/D."""
+        """Whether the angle c*m, with m a monomial such as pi, is a whole multiple of pi/D."""
         return m == PI and (c * self.D).denominator == 1
 
 
 def _common(a: Fraction, b: Fraction) -> Fraction:
-    """Return the largest fraction of which both a and b are whole multiples."""
+    """Return the largest fraction with whole multiples a and b, such as 1/6 for 1/2 and 2/3."""
     d = lcm(a.denominator, b.denominator)
     return Fraction(gcd(int(a * d), int(b * d)), d)
 
 
 @lru_cache(maxsize=64)
 def units_of(robot: Robot) -> Units:
-    """Return the unit angles of a robot."""
+    """Return the unit angles of a robot (see `Units`), stored after the first call."""
     return Units(robot)
 
 
@@ -145,15 +146,19 @@ def varies(a: str | Number | Call) -> bool:
 
 
 def rows_of(robot: Robot) -> list[Expression]:
-    """Return the coefficients of all elements: the rows `along` and the quadratic forms `form`."""
+    """Return the coefficients with which all elements (friction, springs...) act on joints.
+
+    They are the entries of the rows `along` and of the quadratic forms `form`.
+    """
     tables = [table for e in robot.elements for table in (e.along, e.form)]
     return [c for table in tables for row in table.values() for c in row.values()]
 
 
 def atoms_of(robot: Robot) -> Iterator[str | Number | Call]:
-    """Yield the symbols, numbers and calls in lengths, gravity, relations and element rows.
+    """Yield the symbols, numbers and function calls in the constant expressions of a robot.
 
-    A call is a function of an expression, such as a square root; its argument is searched too.
+    The expressions are lengths, gravity, joint relations and element rows; fixed angles are left
+    out. The argument of a function call, such as a square root, is searched too.
     """
     pending = [e for f in robot.frames for e in (f.b, f.d, f.r)]
     pending += [*robot.gravity, *robot.constraints.values(), *rows_of(robot)]
@@ -169,7 +174,7 @@ def _calls(robot: Robot) -> Iterator[Call]:
 
 
 def radicands(robot: Robot) -> tuple[int, ...]:
-    """Return the whole numbers under the square roots of a robot, each once, in ascending order.
+    """Return the whole numbers whose square roots occur in a robot, in ascending order.
 
     Each is a prime, or a number that no small prime divides.
     """

@@ -36,9 +36,10 @@ ALL = slice(None)
 
 
 def loop_ends(robot: Robot, algebra: GraphAlgebra, closure: Closure) -> list[tuple[Pose, Pose]]:
-    """Return, for each loop, the poses of its cut frame and of its twin, in the root of the loop.
+    """Return the poses of the two frames of each loop that must coincide: cut frame and twin.
 
-    Each pose is an orientation and an origin. Joints before the root do not change these poses.
+    Each pose is an orientation and an origin in the root frame of the loop. Joints before the root
+    do not change these poses.
     """
     roots = [robot.root(loop) for loop in robot.loops]
     pose = {root: frame_poses(Geometry(robot, algebra, closure, root)) for root in {*roots}}
@@ -47,9 +48,9 @@ def loop_ends(robot: Robot, algebra: GraphAlgebra, closure: Closure) -> list[tup
 
 
 def coincidence(ends: list[tuple[Pose, Pose]]) -> list[Scalar]:
-    """Return P_cut - P_twin and A_cut - A_twin, twelve differences for each loop.
+    """Return twelve differences for each loop, all zero if the cut frame and its twin coincide.
 
-    All are zero if the cut frame and its twin coincide.
+    The differences are P_cut - P_twin and A_cut - A_twin.
     """
     return [
         sub(x, y)
@@ -60,7 +61,7 @@ def coincidence(ends: list[tuple[Pose, Pose]]) -> list[Scalar]:
 
 
 def residuals(robot: Robot, algebra: GraphAlgebra, closure: Closure) -> list[Scalar]:
-    """Return P_cut - P_twin and the axial vector of A_cut' A_twin, six entries for each loop.
+    """Return six residuals for each loop: P_cut - P_twin, and the axial vector of A_cut' A_twin.
 
     If the cut joint is not independent, its angle is a sum of other angles, and the orientations
     agree in all configurations: the last three entries are then 0.
@@ -81,7 +82,7 @@ def residuals(robot: Robot, algebra: GraphAlgebra, closure: Closure) -> list[Sca
 def differences(
     residual: Callable[[Array], Array], q: Array, columns: slice | list[int] = ALL
 ) -> tuple[Array, Array]:
-    """Return the residual r at q (..., n), and its derivatives by central differences.
+    """Return the residual r at q (..., n), and its derivatives by q from central differences.
 
     r has shape (..., m). The derivatives by the `columns` of q have shape (..., m, columns).
     """
@@ -93,7 +94,7 @@ def differences(
 
 
 def inertia_of(torque: Callable[[Array], Array], q: Array) -> Array:
-    """Return the matrix A, shape (..., n, n), of a torque function A qdd + b.
+    """Return the inertia matrix A, shape (..., n, n), from a function that returns A qdd + b.
 
     Column i is torque(e_i) - torque(0) for the unit acceleration e_i; q only gives the shape of
     qdd.
@@ -144,7 +145,7 @@ INDEPENDENT_MOTIONS = 1e-7
 
 
 def declared_relations(robot: Robot) -> dict[int, tuple[dict[int, Expression], Expression]]:
-    """Return the constraints of a robot file as relations {j: (row, constant)}.
+    """Return the joint constraints of a robot file as linear relations {j: (row, constant)}.
 
     Each constrained joint is q_j = row q + constant, in the joints without a constraint.
     """
@@ -170,12 +171,12 @@ def declared_relations(robot: Robot) -> dict[int, tuple[dict[int, Expression], E
 
 @lru_cache(maxsize=16)
 def open_loops(robot: Robot) -> list[Scalar]:
-    """Return the differences between cut and twin frames of every loop, all joints independent."""
+    """Return the differences of the cut frame and its twin in each loop, all joints independent."""
     return coincidence(loop_ends(robot, GraphAlgebra(robot), open_tree(robot)))
 
 
 class Assembly:
-    """A mechanism with loops in floating point: finds configurations that close its loops.
+    """A mechanism with closed loops, in floating point: finds configurations that close its loops.
 
     A configuration q has shape (..., free joints), in the order of `free`: the moving joints
     without a relation.
@@ -208,11 +209,11 @@ class Assembly:
 
     @property
     def unknown(self) -> tuple[int, ...]:
-        """Numbers of the free joints without an actuator."""
+        """Numbers of the passive joints that no declared relation gives."""
         return tuple(self.free[k] for k in self.passive)
 
     def guess(self, start: Mapping[int, float], rng: np.random.Generator | None) -> Array:
-        """Return a configuration from which to search for a closed one.
+        """Return a start configuration for the search of a closed configuration.
 
         Joints named in `start` have that position. All others have a random position, or a fixed
         one if there is no random generator.
@@ -271,16 +272,17 @@ class Assembly:
         return closed if self.gap(closed) < 10 * TOLERANCE else None
 
     def rates(self, q: Array) -> Array:
-        """Return G, shape (passive, active): rates of passive joints per rate of active joints."""
+        """Return G, the rates of the passive joints per rate of the actuated joints.
+
+        Shape (passive, active).
+        """
         J = differences(self.rows, q)[1]
         return np.asarray(
             -np.linalg.lstsq(J[:, self.passive], J[:, self.active], rcond=INDEPENDENT_MOTIONS)[0]
         )
 
     def mobility(self, q: Array) -> tuple[int, int]:
-        """Return the degrees of freedom of the mechanism, and those left with all actuators
-        blocked.
-        """
+        """Return the number of freedoms, and the number left if all actuators are blocked."""
         J = differences(self.rows, q)[1]
         return len(self.free) - _rank(J), len(self.passive) - _rank(J[:, self.passive])
 

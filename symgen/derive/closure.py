@@ -86,7 +86,7 @@ class Closure:
         return tuple(turn), self.offset[j]
 
     def relation(self, row: Mapping[int, Expression], c: Expression = ZERO) -> Relation:
-        """Write s = row q + c in the independent joints; return the new row and the new constant.
+        """Rewrite a relation s = row q + c in the independent joints; return its row and constant.
 
         The given row may contain any moving joints.
         """
@@ -98,7 +98,7 @@ class Closure:
         return {i: g for i, g in sorted(total.items()) if g}, c
 
     def in_independent(self, row: Mapping[int, Expression]) -> ActiveRow:
-        """Return the row of s = row q, rewritten in the independent joints, as pairs (joint, G)."""
+        """Return the coefficients of s = row q in the independent joints: (joint, coefficient)."""
         return tuple(self.relation(row)[0].items())
 
     def project(self, algebra: GraphAlgebra, torque: Mapping[int, Scalar]) -> dict[int, Scalar]:

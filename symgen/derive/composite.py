@@ -34,7 +34,7 @@ Place = tuple[int, int]
 
 
 class CompositeLinks:
-    """Inertia tensor JP, first moments MSP and mass MP of every composite link, in its frame.
+    """Inertia JP, first moments MSP and mass MP of each link together with all links after it.
 
     A composite link is a link with all links mounted on it, as one rigid body.
 
@@ -70,7 +70,7 @@ class CompositeLinks:
                 self._take(f.j, f.ant)
 
     def _name(self, j: int) -> None:
-        """Name the parameters of composite link j in the graph, such as JP332 of link 2."""
+        """Name the inertial parameters of link j and all links after it, such as JP332 if j = 2."""
         for (k, m), x in zip(PLACES, self.JP[j], strict=True):
             self.algebra.name(x, self.named("JP", k, m, j))
         for k, x in enumerate(self.MSP[j], start=1):
@@ -78,7 +78,7 @@ class CompositeLinks:
         self.algebra.name(self.MP[j], self.named("MP", j))
 
     def _take(self, j: int, i: int) -> None:
-        """Add the parameters of composite link j to those of its antecedent i."""
+        """Add the inertia of link j and all links after it to the inertia of its antecedent i."""
         R = self.geometry.rotation[j]
         P = self.geometry.P[j]
         AS = R.up(self.MSP[j])
@@ -116,7 +116,7 @@ class CompositeLinks:
         return A
 
     def _column(self, k: int) -> dict[int, Scalar]:
-        """Return column k of the inertia matrix, {i: A_ik}, links only.
+        """Return the entries {i: A_ik} of column k of the inertia matrix, of the links only.
 
         The joints i are those between the base and joint k.
         """

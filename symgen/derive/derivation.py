@@ -94,7 +94,7 @@ def derive(robot: Robot) -> Derivation:
 
 
 def derived(robot: Robot, closing: Callable[[Robot], Closure]) -> Derivation:
-    """Derive the formulas of a robot with the closure that the function `closing` returns.
+    """Derive the formulas of a robot, with the independent joints chosen by the function `closing`.
 
     The closure defines the independent joints. Decimal numbers of the robot file stay inputs of the
     graph, so that formulas show them as written.
@@ -124,7 +124,7 @@ def derived(robot: Robot, closing: Callable[[Robot], Closure]) -> Derivation:
 def projected_twice(
     closure: Closure, algebra: GraphAlgebra, A: Mapping[tuple[int, int], Scalar]
 ) -> dict[tuple[int, int], Scalar]:
-    """Return {(i, k): (G' A G)_ik} of the actuated joints, from A of all moving joints."""
+    """Return the matrix G' A G of the actuated joints from the matrix A of all moving joints."""
     robot = closure.robot
     AG = {j: closure.project(algebra, {k: A[j, k] for k in robot.moving}) for j in robot.moving}
     columns = {

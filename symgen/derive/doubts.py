@@ -128,7 +128,7 @@ def equal_sides(robot: Robot) -> list[str]:
 
 
 def far_starts(robot: Robot) -> list[str]:
-    """Warn of joints that no closed configuration has near the `start` of their loop."""
+    """Warn of joints whose nearest closed position is far from the `start` of their loop."""
     closed, longest = close(robot).start, robot.longest
     units = {j: 1.0 if robot.frame(j).sigma == REVOLUTE else longest for j in robot.start}
     far = [j for j, x in robot.start.items() if abs(closed[j] - x) > FAR * units[j]]

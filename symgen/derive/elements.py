@@ -21,7 +21,7 @@ from symgen.description.robot import Element, Form, Row, parameter
 
 
 def element_column(motion: Motion, e: Element, j: int) -> dict[int, Scalar]:
-    """Return the regressor column {i: D_ik} of parameter j of an element, for instance FV2.
+    """Return the regressor column {i: D_ik} of an element parameter, such as FV2, by joint i.
 
     The joints i are the moving joints that this parameter acts on.
     """
@@ -40,12 +40,12 @@ def element_column(motion: Motion, e: Element, j: int) -> dict[int, Scalar]:
 
 
 def law_value(motion: Motion, e: Element, j: int, law: Expression) -> Scalar:
-    """Return the value of an expression in the states of an element, as a graph scalar."""
+    """Return a torque law or an energy of an element as a scalar of the expression graph."""
     return _Law(motion, e, j).of(law)
 
 
 class _Law:
-    """Writes the torque law of one element parameter as nodes of the graph.
+    """The torque law of one element parameter, with methods that write it as graph nodes.
 
     A velocity along several joints is named after the element, since rows of other elements may
     have the same joints.
@@ -56,7 +56,7 @@ class _Law:
         self.name = f"{motion.named('QP')}{parameter(e.family, j)}"
 
     def of(self, e: Expression) -> Scalar:
-        """Return the value of an expression as a graph scalar."""
+        """Return an expression of the torque law as a scalar of the expression graph."""
         total: Scalar = 0
         for m, c in e.ordered:
             varying = [(a, n) for a, n in m if varies(a)]
@@ -71,7 +71,7 @@ class _Law:
         return total
 
     def one_sided(self, law: Expression) -> Scalar:
-        """Return sd or sign(sd) for motion in the direction `when`, and zero for the other one."""
+        """Return sd or sign(sd) for motion in the direction `when`, and zero for other motion."""
         rate, key = self._atom("qd"), self.motion.geometry.closure.in_independent(self.row)
         if type(rate) is int or not key:
             return 0  # at rest, or the closure holds s still
@@ -123,7 +123,7 @@ class _Law:
 
 
 def is_opaque(e: Element, j: int) -> bool:
-    """Whether the law of an element parameter has a function that F_p cannot represent."""
+    """Whether a torque law has a function that exact arithmetic cannot represent, such as tanh."""
     pending = [e.law(j), e.potential(j)]
     for law in pending:
         for a in law.atoms:

@@ -132,7 +132,7 @@ def _square(d: Derivation, e: Element, j: int, x: Mapping[int, Scalar]) -> Scala
 
 
 class AtRates(Motion):
-    """Accelerations of all links for which the joint torques are C qdr, qdr reference rates.
+    """Link accelerations whose joint torques are C qdr, the Coriolis torques of reference rates.
 
     These accelerations are sum_k qdr_k (a_k + U_k r), see the head of this module; `joint_torques`
     turns them into C qdr. With qdr_k = 1 as the only rate, the result is column k of C.
@@ -181,7 +181,7 @@ class AtRates(Motion):
 
 
 def _link(z: Vector, zd: Vector, w: Vector, a: Vector, half: Scalar) -> LinkMotion:
-    """Return U = skew(zd) + skew(z) skew(w) and the acceleration a of a link as a `LinkMotion`.
+    """Return the accelerations a + U r of a link as a `LinkMotion`, U = skew(zd) + skew(z) skew(w).
 
     The antisymmetric part of U replaces wd, the symmetric part replaces w w', and the differences
     of the diagonal of U replace DW.

@@ -1,4 +1,4 @@
-"""Exact arithmetic in a prime field F_p, at random states of random geometries of a robot.
+"""Exact arithmetic modulo a prime p (field F_p), at random states and geometries of a robot.
 
 The class `Draw` is a domain of graph nodes. p < 2**31, so products fit in int64. p = 3 (mod 4), so
 1 + t**2 is never 0, and every t gives an angle, the point ((1 - t**2)/(1 + t**2), 2t/(1 + t**2)) of
@@ -65,7 +65,7 @@ KEY, OPAQUE_POWER = 40_503, 479_001_599  # of functions that F_p does not have; 
 
 
 class Fp:
-    """An array of elements of the finite field F_p, stored as int64, with + - * modulo p."""
+    """An array of elements of the field F_p (integers modulo p), with the operators + - *."""
 
     __array_ufunc__ = None
     __slots__ = ("p", "x")
@@ -110,7 +110,7 @@ Point = tuple[Array, Array]  # (cos, sin) over F_p
 
 
 class Draw:
-    """A random geometry of a robot and `samples` random states, with values in F_p.
+    """A random geometry of a robot and `samples` random states, with exact values in F_p.
 
     It is a domain for `interpret`. `geometry` gives residues, shape (count, 1), for constants by
     name, for numbers and square roots, and for half-angle tangents of the unit angles; this makes
@@ -144,7 +144,7 @@ class Draw:
     # --- a domain ---
 
     def symbol(self, symbol: Symbol) -> Scalar:
-        """Return the residues of an input, such as q1 or a length.
+        """Return the values in F_p of an input, such as q1 or a length.
 
         A state variable has one residue per state; a constant has one, or one per geometry.
         """
@@ -159,11 +159,11 @@ class Draw:
         return self._fp(self._state(symbol))
 
     def number(self, c: Fraction) -> Fp:
-        """Return the residue of a rational number."""
+        """Return the value in F_p of a rational number."""
         return self._fp(np.array([c.numerator * pow(c.denominator, -1, self.p) % self.p]))
 
     def function(self, node: Node, x: list[Fp]) -> Fp:
-        """Apply the function of a node, such as cos, sqrt, 1/x or sign, to the residues x."""
+        """Apply the function of a node, such as cos, 1/x or sign, to values x in F_p."""
         if isinstance(node.value, Angle):
             return self._fp(self._angle(node.value)[node.op == SIN])
         match node.op:
@@ -185,16 +185,16 @@ class Draw:
     # --- constants ---
 
     def constant(self, e: Expression) -> Scalar:
-        """Return the residues of a constant expression, such as a length."""
+        """Return the values in F_p of a constant expression, such as a length."""
         (value,) = interpret([self._algebra.constant(e)], self)
         return value
 
     def residues(self, value: Scalar) -> Array:
-        """Return the residues of a scalar as an array: one, or one per geometry or state."""
+        """Return the values in F_p of a scalar as an array: one, or one per geometry or state."""
         return value.x if isinstance(value, Fp) else np.array([value % self.p])
 
     def spread(self, value: Scalar) -> Array:
-        """Return the residues of a scalar at all geometries and states, in the shape `shape`."""
+        """Return the values in F_p of a scalar at all geometries and states, with shape `shape`."""
         return np.broadcast_to(self.residues(value), self.shape)
 
     def _fp(self, x: Array) -> Fp:
@@ -205,13 +205,13 @@ class Draw:
         return (np.frombuffer(digest, dtype="<u8") % (self.p - 1) + 1).astype(np.int64)
 
     def _of_geometry(self, key: str | Call) -> Array:
-        """Return the residues of a constant, of pi or of a square root, given or random."""
+        """Return the given values in F_p of a constant, pi or a square root, or a random value."""
         if key not in self._geometry:
             self._geometry[key] = self._random(str(key), 1)
         return self._geometry[key]
 
     def _state(self, key: object) -> Array:
-        """Return a random residue of a quantity for each state."""
+        """Return a random value in F_p of a quantity for each state."""
         if key not in self._residues:
             self._residues[key] = self._random(key, self.samples)
         return self._residues[key]
@@ -227,7 +227,7 @@ class Draw:
         return (a[0] * b[0] - a[1] * b[1] % p) % p, (a[0] * b[1] + a[1] * b[0] % p) % p
 
     def _multiple(self, a: Point, n: int) -> Point:
-        """Return the point (cos, sin) of the angle n times the angle of point a."""
+        """Return cosine and sine of the angle n a in F_p, from cosine and sine of the angle a."""
         if n < 0:
             a, n = (a[0], -a[1] % self.p), -n
         if n == 1:
@@ -241,13 +241,13 @@ class Draw:
         return result
 
     def _joint(self, j: int) -> Point:
-        """Return the points (cos, sin) of the joint angle q_j/parts at each state."""
+        """Return cosine and sine in F_p of the angle q_j/D at each state; D is `closure.parts`."""
         if j not in self._points:
             self._points[j] = self._point_at(self._random(("angle", j), self.samples))
         return self._points[j]
 
     def _unit(self, unit: Unit) -> Point:
-        """Return the point (cos, sin) of a unit angle.
+        """Return cosine and sine in F_p of a unit angle, such as pi/D.
 
         For pi/D the point is a root of unity of order 2D; for any other unit angle it is random,
         unless the geometry gives it.
@@ -263,7 +263,10 @@ class Draw:
 
     @cached_property
     def half_turn(self) -> Point:
-        """Point (cos, sin) of the angle pi/D: a root of unity of order 2D, with pi/2 at (0, 1)."""
+        """Cosine and sine of the angle pi/D in F_p, a root of unity of order 2D.
+
+        Its multiple pi/2 has the cosine 0 and the sine 1.
+        """
         order = 2 * self.units.D
         rng = np.random.default_rng([self.seed, 1])
         while True:
@@ -278,7 +281,7 @@ class Draw:
                 return root
 
     def _angle(self, angle: Angle) -> Point:
-        """Return the point (cos, sin) of a constant angle, or of an angle with joint positions."""
+        """Return cosine and sine in F_p of a constant angle, or an angle with joint positions."""
         turns, rest = quarter_turns(angle.offset)
         quarter = ((1, 0), (0, 1), (-1, 0), (0, -1))[turns % 4]
         point: Point = (np.array([quarter[0] % self.p]), np.array([quarter[1] % self.p]))
@@ -291,7 +294,7 @@ class Draw:
         return point
 
     def _sqrt(self, root: Expression) -> Array:
-        """Return the square root of a number, or a random residue for any other square root.
+        """Return the square root of a number in F_p; for the root of a symbol, a random value.
 
         The head of this module has the formulas.
         """
@@ -305,7 +308,7 @@ class Draw:
         return power(self.number(c).x, (self.p + 1) // 4, self.p)
 
     def _sqrt_of_prime(self, l: int) -> Array:
-        """Return sqrt(l) of a small prime l as a sum of cosines or sines."""
+        """Return the square root in F_p of a small prime l, as a sum of cosines or sines."""
         D = self.units.D
         if l == 2:
             return 2 * self._multiple(self.half_turn, D // 4)[0] % self.p
@@ -319,7 +322,7 @@ class Draw:
     # --- laws ---
 
     def forward(self, node: Node, rate: Fp) -> Fp:
-        """Return the variable b of the velocity in a sign or positive part: sign = 2b - 1.
+        """Return the variable b in F_p that replaces the direction of a velocity: sign = 2b - 1.
 
         b is 1 for a forward motion and 0 for a backward motion. Proportional velocities share one
         b.
@@ -337,7 +340,7 @@ class Draw:
         return b if lead.value(self.robot.constants) > 0 else 1 - b
 
     def _opaque(self, op: str, x: list[Fp]) -> Fp:
-        """Return values in place of a function that F_p does not have, such as exp or tanh.
+        """Return values in F_p in place of a function that F_p does not have, such as exp.
 
         Equal operands give equal values. The head of this module has the formula.
         """
@@ -347,7 +350,7 @@ class Draw:
 
 @lru_cache
 def primes_for(robot: Robot, count: int, seed: int | None = None) -> tuple[int, ...]:
-    """Return `count` primes over which the fixed angles and square roots of a robot exist.
+    """Return `count` primes p for which the fixed angles and square roots of a robot exist in F_p.
 
     p < 2**31, and p = -1 modulo 4 and 2D. Without a seed they are the largest such primes; with a
     seed, the largest below a random number. Raises SymgenError if there are too few.
@@ -362,10 +365,10 @@ def primes_for(robot: Robot, count: int, seed: int | None = None) -> tuple[int, 
 
 
 def candidates(robot: Robot, seed: int | None = None) -> Iterator[int]:
-    """Yield, in descending order, the primes over which angles and square roots of a robot exist.
+    """Yield primes p for which the fixed angles and square roots of a robot exist in F_p.
 
-    p = -1 modulo 4 and 2D, and the large numbers under square roots are squares in F_p. The order
-    starts below 2**31, or below a random number if a seed is given.
+    p = -1 modulo 4 and 2D, and the large numbers under square roots are squares in F_p. The primes
+    are in descending order, from 2**31, or from a random number if a seed is given.
     """
     step = lcm(4, 2 * units_of(numbered(robot)).D)
     top = 2**31 if seed is None else int(np.random.default_rng(seed).integers(2**30, 2**31))

@@ -1,4 +1,4 @@
-"""Values of graph nodes in floating point: NumPy arrays, or symbols of a package such as CasADi."""
+"""Evaluation of the expression graph in floating point, by NumPy or a package such as CasADi."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LETTERS = {"q": "q", "qd": "QP", "qdd": "QDP"}
 
 
 class Floats:
-    """Values of the constants and states of a robot, with which `interpret` evaluates nodes.
+    """The constants and states of a robot, as values for evaluating its formulas.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class Floats:
 
 
 def states_of(**states: Mapping[int, Any]) -> dict[Symbol, Any]:
-    """Return {input: value} from the values of q, qd and qdd, each given by joint number."""
+    """Return {input: value} from the values of q, qd and qdd, each a mapping by joint number."""
     return {
         Symbol(kind, f"{LETTERS[kind]}{j}"): x
         for kind, by_joint in states.items()

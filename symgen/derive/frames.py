@@ -107,7 +107,7 @@ class Frames:
         return result
 
     def _depth(self, j: int) -> int:
-        """Return the number of carriers (see `derive.geometry`) between frame j and the base."""
+        """Return the number of rotations from the base to frame j, parallel axes counted as one."""
         depth = 0
         while j:
             j, depth = self.geometry.carrier[j].m, depth + 1
@@ -127,8 +127,7 @@ class Frames:
         return Rotation(None, *self.geometry.algebra.cos_sin(*self._between(j, i)))
 
     def _between(self, j: int, i: int) -> tuple[Turn, Expression]:
-        """Return the angle from frame i to frame j about their common z axis: joint part, constant.
-        """
+        """Return the angle of frame j relative to frame i about z: joint multiples and constant."""
         (turn, offset), (other, other_offset) = self.geometry.turn[j], self.geometry.turn[i]
         return summed((*turn, *((k, -n) for k, n in other))), offset - other_offset
 

@@ -50,7 +50,7 @@ class Rotation:
     s: Scalar
 
     def up(self, v: Vector) -> Vector:
-        """Transform v from the outer frame j to the inner frame i: return A Rot(z, theta) v."""
+        """Transform a vector v from outer frame j to inner frame i: A Rot(z, theta) v."""
         u = (
             sub(mul(self.c, v[0]), mul(self.s, v[1])),
             add(mul(self.s, v[0]), mul(self.c, v[1])),
@@ -59,7 +59,7 @@ class Rotation:
         return u if self.A is None else apply(self.A, u)
 
     def down(self, v: Vector) -> Vector:
-        """Transform v from the inner frame i to the outer frame j: return (A Rot(z, theta))' v."""
+        """Transform a vector v from inner frame i to outer frame j: (A Rot(z, theta))' v."""
         u = v if self.A is None else apply_transposed(self.A, v)
         return (
             add(mul(self.c, u[0]), mul(self.s, u[1])),
@@ -70,7 +70,7 @@ class Rotation:
 
 @dataclass(frozen=True)
 class Carrier:
-    """The frame m from which one rotation leads to frame j, and this rotation.
+    """The frame m before a series of parallel joint axes, and the one rotation from m to frame j.
 
     All joint axes after frame m, up to joint j, are parallel, so that their angles add up.
 
@@ -104,7 +104,7 @@ def displacement(A: Matrix, b: Scalar, d: Scalar, r: Scalar) -> Vector:
 
 
 class Geometry:
-    """Rotations, positions and carriers of the frames of a robot, as nodes of a graph.
+    """Rotations and positions of the frames of a robot, as nodes of the expression graph.
 
     If `root` is not the base, only the frames mounted on frame `root` are included.
     """
@@ -166,12 +166,12 @@ class Geometry:
         )
 
     def from_carrier(self, j: int, v: Vector) -> Vector:
-        """Transform a vector from the carrier of frame j (see `Carrier`) to frame j."""
+        """Transform a vector to frame j from the frame before the parallel axes, see `Carrier`."""
         return v if is_zero(v) else self.carrier[j].rotation.down(v)
 
 
 def summed(turn: Turn) -> Turn:
-    """Add up the multiples n_j of each joint in `turn`, sort by joint, and leave out zeros."""
+    """Add up the multiples of each joint angle in `turn`, sorted by joint, without zero sums."""
     total: dict[int, int | Fraction] = {}
     for j, n in turn:
         total[j] = total.get(j, 0) + n

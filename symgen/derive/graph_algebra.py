@@ -91,7 +91,7 @@ class GraphAlgebra:
         return self.graph.call(function, x, of=of)
 
     def cos_sin(self, turn: Turn, offset: Expression) -> tuple[Scalar | int, Scalar | int]:
-        """Return the cosine and sine of the angle sum_j n_j q_j + offset, (j, n_j) in `turn`."""
+        """Return cosine and sine of sum_j n_j q_j + offset, for the pairs (j, n_j) of `turn`."""
         if not turn:
             return self.constant(call("cos", offset)), self.constant(call("sin", offset))
         quarters, rest = quarter_turns(offset)
@@ -122,15 +122,15 @@ class GraphAlgebra:
         return text
 
     def q(self, j: int) -> Scalar:
-        """Position of joint j."""
+        """Return the node of the position of joint j."""
         return self.graph.symbol(Symbol("q", f"q{j}"))
 
     def qd(self, j: int) -> Scalar:
-        """Velocity of joint j."""
+        """Return the node of the velocity of joint j."""
         return self.graph.symbol(Symbol("qd", f"QP{j}"))
 
     def qdd(self, j: int) -> Scalar:
-        """Acceleration of joint j."""
+        """Return the node of the acceleration of joint j."""
         return self.graph.symbol(Symbol("qdd", f"QDP{j}"))
 
     def channel(self, name: str) -> Scalar:
@@ -145,7 +145,7 @@ class GraphAlgebra:
         return self.graph.symbol(Symbol("rate", self.named("G", u, i)))
 
     def sign(self, rate: Scalar, row: ActiveRow) -> Scalar:
-        """Return sign(sd) of the velocity sd = G qd; `rate` is its scalar sd, `row` is G."""
+        """Return sign(sd) of a velocity sd = G qd, given sd as `rate` and G as `row`."""
         return self.graph.call(SIGN, rate, of=Velocity(row))
 
     def one_sided(self, rate: Scalar, row: ActiveRow, when: str) -> tuple[Scalar, Scalar]:
@@ -160,7 +160,7 @@ class GraphAlgebra:
         return -self.graph.call(POS, -direction), -backward
 
     def function(self, op: str, *operands: Scalar | Fraction | int) -> Scalar:
-        """Return a function of scalars, such as exp or pow (table of `description.expression`)."""
+        """Return a node that applies a function, such as exp or pow, to scalars."""
         return self.graph.call(op, *map(self.graph.lift, operands))
 
     def name(self, value: Scalar | int, name: str) -> Scalar | int:

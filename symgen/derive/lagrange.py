@@ -91,7 +91,7 @@ def _screw(axis: int, angle: SX, shift: SX) -> SX:
 def poses(
     robot: Robot, q: Mapping[int, SX], constants: Mapping[str, SX], root: int = 0
 ) -> dict[int, SX]:
-    """Return {j: rTj}: the pose, in frame r = `root`, of each frame j mounted on frame r.
+    """Return {j: rTj}: the poses, in frame r = `root`, of frame r and all frames j that follow.
 
     The positions q are given by joint number; a missing joint has position 0.
     """
@@ -205,7 +205,7 @@ class Lagrange:
         return D
 
     def _element(self, e: Element, j: int, q: Array, qd: Array, qdd: Array) -> Array:
-        """Return the torques of one element parameter set to 1, shape (..., n).
+        """Return the joint torques of an element whose parameter is 1, shape (..., n).
 
         j is the number in the name of the parameter, for instance 2 for FV2.
         """
@@ -231,9 +231,10 @@ class Lagrange:
         return G
 
     def _form(self, e: Element, j: int) -> Array:
-        """Return the matrix B, shape (n, n), of an element parameter; B = G'G along a row G.
+        """Return the matrix B, shape (n, n), of an element with torque c B q, c B qd or c B qdd.
 
-        j is the number in the name of the parameter.
+        B is G'G if the element acts along a row G. j is the number in the name of the parameter c,
+        for instance 2 for FV2.
         """
         G, moving = self._row(e, j), self.robot.moving
         B = np.outer(G, G)
@@ -395,7 +396,7 @@ def _axial(W: Array) -> Array:
 
 @lru_cache(maxsize=8)
 def _functions(robot: Robot) -> dict[str, Any]:
-    """Return the CasADi functions of a robot by name, such as poses, slopes and loop.
+    """Return the CasADi functions of a robot by name, such as the poses and their derivatives.
 
     Their arguments are q, qd, qdd of all moving joints, as far as needed, then the constants with
     one more number at the end.
@@ -476,7 +477,7 @@ def _start(robot: Robot, q: SX, constants: Mapping[str, SX]) -> tuple[SX, SX]:
 def _law(
     robot: Robot, e: Element, j: int, q: SX, qd: SX, constants: Mapping[str, SX]
 ) -> tuple[SX, SX]:
-    """Return the joint torques, shape (n,), of one element parameter set to 1, and its energy.
+    """Return the joint torques, shape (n,), and the energy of an element whose parameter is 1.
 
     j is the number in the name of the parameter. CasADi differentiates an energy U to the torque
     dU/dq.
@@ -529,10 +530,10 @@ class Sample:
 
 
 def _leverage(robot: Robot, constants: Mapping[str, float]) -> Array:
-    """Return, for each actuated joint, its largest coefficient in element rows of several joints.
+    """Return each actuated joint's largest coefficient in elements that act on several joints.
 
-    The coefficient is 101.25 for q5 in the row q4 + 101.25 q5, and 1 if there is no such row. Shape
-    (n,).
+    For instance 101.25 for q5 in friction along q4 + 101.25 q5; 1 if there is no such element.
+    Shape (n,).
     """
     closure = close(robot)
     rows = [dict(closure.in_independent(r)) for e in robot.elements for r in e.along.values()]

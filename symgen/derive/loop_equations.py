@@ -65,29 +65,29 @@ class LoopSystem:
 
     @property
     def tied(self) -> slice:
-        """Slice of the tied joints in an array of the independent joints."""
+        """Slice of the joints given by closure equations, in an array of the independent joints."""
         return slice(len(self.robot.joints), len(self.closure.independent))
 
     @cached_property
     def rows(self) -> list[Scalar]:
-        """All entries of `residuals`, six for each loop, as graph scalars."""
+        """All residuals of the loops, six for each loop, as nodes of the graph."""
         geometry = self.derivation.geometry
         return residuals(geometry.robot, geometry.algebra, geometry.closure)
 
     @cached_property
     def residual(self) -> list[Scalar]:
-        """The closure residuals r(q), one for each tied joint, as graph scalars."""
+        """The closure residuals r(q), one for each tied joint, as nodes of the graph."""
         return [self.rows[k] for k in self.equations]
 
     @cached_property
     def jacobian(self) -> list[list[Scalar]]:
-        """Jacobian dr/dq as graph scalars: a row per equation, a column per independent joint."""
+        """Jacobian dr/dq in graph nodes: rows for equations, columns for independent joints."""
         columns = [rates(self.rows, {Symbol("q", f"q{i}"): 1}) for i in self.closure.independent]
         return [[column[k] for column in columns] for k in self.equations]
 
     @cached_property
     def curvature(self) -> list[Scalar]:
-        """Second time derivative Jd qd of the residuals at constant qd, as graph scalars."""
+        """The term Jd qd of the second time derivative of the residuals, as nodes of the graph."""
         qd = self.derivation.algebra.qd
         along = {Symbol("q", f"q{i}"): qd(i) for i in self.closure.independent}
         return rates(rates(self.residual, along), along)
@@ -108,7 +108,7 @@ class LoopSystem:
         ]
 
     def floats(self, outputs: Sequence[Scalar], q: Array, qd: Array | None = None) -> Array:
-        """Evaluate nodes at states q (..., independent joints) and qd; shape (..., outputs)."""
+        """Return the values of graph nodes at given q and qd, shape (..., outputs)."""
         states = {"q": q} | ({} if qd is None else {"qd": qd})
         by_joint = {
             kind: dict(zip(self.closure.independent, np.moveaxis(x, -1, 0), strict=True))
@@ -135,8 +135,7 @@ class LoopSystem:
         return newton(self.residual_floats, q, self.tied, steps=steps, tolerance=tolerance)
 
     def mode(self) -> float:
-        """Return the sign of det J_u at the start configuration, J_u the Jacobian of the tied
-        joints.
+        """Return the sign of det J_u at the start configuration; J_u is dr/dq of the tied joints.
 
         It stays the same until the mechanism passes a dead point, hence within one assembly mode.
         """
@@ -154,7 +153,7 @@ class LoopSystem:
         return 1e-13 if self.robot.longest > IN_METRES else 1e-16
 
     def pace(self) -> float:
-        """Return a step of the actuated joints that moves no tied joint far.
+        """Return a step size of the actuated joints for which no tied joint moves far.
 
         It is computed from the rates at the start configuration (PACE); in rad, or as a fraction of
         the longest length if prismatic.
@@ -166,7 +165,7 @@ class LoopSystem:
         return float(min(PACE[0], PACE[1] / np.abs(G).max()))
 
     def turn(self) -> tuple[int, ...] | None:
-        """Return the whole turns of each tied joint during one turn of the actuated joint.
+        """Return the whole turns of each tied joint during one full turn of the actuated joint.
 
         None if the actuated joint cannot turn fully, is prismatic, or is not the only one.
         """

@@ -1,4 +1,4 @@
-"""Relations of the passive joints: declared relations are checked, linear ones derived and proved.
+"""Relations of the passive joints in closed loops: declared relations, and proved linear ones.
 
 Loop: frame `cut` (one branch) and frame `twin` (sigma 2, other branch) coincide, 0T_cut = 0T_twin.
 At a closed configuration the passive rates are G = -J_u^+ J_a. If G has the same whole numbers
@@ -6,7 +6,7 @@ along a motion, the relation q_u = G q_a + c is linear, and its constant c is se
 fixed angles or lengths of the loops (`_offset`). The relation is then *proved*: the two frames must
 coincide identically over F_p, with random lengths, so equal lengths must be equal symbols. The
 second branch of a parallelogram (anti-parallelogram) is not linear, and is never accepted as
-linear. The mobility of the mechanism is checked too.
+linear. Declared relations and the mobility of the mechanism are checked too.
 """
 
 from __future__ import annotations
@@ -112,8 +112,7 @@ def _configurations(assembly: Assembly) -> Iterator[Array]:
 
 
 def _nearest(assembly: Assembly, wanted: Mapping[int, float]) -> Array | None:
-    """Return the closed configuration nearest to the joint positions of `start`; None if none
-    closes.
+    """Return the closed configuration nearest to `start`, or None if no configuration closes.
 
     Joints that are not in `start` begin at several positions. Passive joints in `start` begin near
     it. Whole turns of a hinge do not count as a distance.
@@ -141,7 +140,7 @@ def _nearest(assembly: Assembly, wanted: Mapping[int, float]) -> Array | None:
 
 
 def _general(assembly: Assembly, q: Array) -> Closure:
-    """Return the closure of general loops, with configuration q as its start.
+    """Return the joint relations of general (not linear) loops, with q as the start configuration.
 
     It has the declared relations and the sums of angles that planar loops fix. All other passive
     joints are tied: only the closure equations give them.
@@ -192,7 +191,7 @@ def _angle_sum(
 
 
 def _linear(assembly: Assembly, q: Array) -> Closure | None:
-    """Return the closure with linear relations of all passive joints, or None if there is none.
+    """Return linear relations for all passive joints, or None if the loops are not linear.
 
     The rates of the passive joints must be constant whole numbers near configuration q, the
     constants must be sums of fixed angles or lengths, and the relations must be proved over F_p.
@@ -219,7 +218,7 @@ def _linear(assembly: Assembly, q: Array) -> Closure | None:
 def _closure(
     assembly: Assembly, relations: Mapping[int, Relation], start: Mapping[int, float]
 ) -> Closure:
-    """Return the closure from the found relations and the declared ones.
+    """Combine the found and the declared joint relations to a closure of the robot.
 
     Passive joints without a relation are tied: only the closure equations give them.
     """
@@ -242,10 +241,11 @@ def _closure(
 
 
 def _samples(assembly: Assembly, q: Array) -> list[Sample]:
-    """Return pairs (constants, closed configuration): those of the file, and changed constants.
+    """Return the constants of the file and changed constants, each with a closed configuration.
 
     At the changed constants, equal values of different symbols differ. The list is empty if the
-    loops do not close there, and has only the pair of the file if an expression has no value there.
+    loops do not close there, and has only the constants of the file if an expression has no value
+    there.
     """
     rng, robot = np.random.default_rng(7), assembly.robot
     angles = {s for f in robot.frames for e in (f.gamma, f.alpha, f.theta0) for s in e.symbols}

@@ -67,7 +67,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Values:
-    """The entries of one model as nodes of a graph of their own, with the angles and headings."""
+    """The entries of one model, as nodes of a graph made for this model."""
 
     entries: tuple[Entry, ...]
     algebra: GraphAlgebra
@@ -250,7 +250,7 @@ def equations(d: Derivation) -> tuple[int, ...]:
 
 
 def rewriting(d: Derivation, request: Request) -> Rewrite:
-    """Return a new graph with the substitutions that all models of a request share.
+    """Return a new graph in which parameters, gravity and inputs are replaced as requested.
 
     Standard parameters become the symbols of the request or zero, gravity becomes that of the
     robot, and the inputs of the request become their values.

@@ -47,7 +47,10 @@ def _still(d: Derivation, *kinds: str, tied: bool = True) -> dict[Symbol, Input]
 def _without(
     d: Derivation, kept: Callable[[Element], bool], links: bool = True
 ) -> dict[Symbol, Input]:
-    """Return replacements that set parameters to zero: of elements not `kept`, perhaps of links."""
+    """Return replacements that set parameters to zero: those of elements that are not `kept`.
+
+    The inertial parameters are zero too if `links` is false.
+    """
     elements = element_names(d.robot)
     return {
         Symbol("parameter", name): ZERO

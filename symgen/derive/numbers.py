@@ -35,7 +35,7 @@ LARGEST_WHOLE = 12  # whole numbers up to here are counts (2, 4) rather than len
 
 @lru_cache(maxsize=64)
 def numbered(robot: Robot) -> Robot:
-    """Replace the decimal numbers of a robot by `Number` atoms, which formulas keep as written.
+    """Replace each decimal number of a robot by a symbol, so that formulas keep it as written.
 
     The numbers are those of its lengths, gravity, joint relations, element rows and angles. If one
     relation between joints is put into another, the ratios stay numbers, because the angles of the
@@ -50,9 +50,10 @@ def numbered(robot: Robot) -> Robot:
 
 
 def keep_rationals(e: Expression) -> Expression:
-    """Replace the rational coefficients of a polynomial by atoms, also inside square roots and 1/x.
+    """Replace the rational coefficients of a polynomial by symbols that have these values.
 
-    Whole numbers up to LARGEST_WHOLE stay numbers.
+    Coefficients inside square roots and inverses are replaced too. Whole numbers up to
+    LARGEST_WHOLE stay numbers.
     """
     total = Expression()
     for m, c in e.terms.items():
@@ -71,7 +72,7 @@ def keep_rationals(e: Expression) -> Expression:
 
 
 def kept_angle(e: Expression) -> Expression:
-    """Replace the decimal numbers of an angle by atoms, and fractions with a large denominator.
+    """Replace decimal numbers in an angle, and fractions with a large denominator, by symbols.
 
     Quarter turns and the multiples of a joint angle stay numbers.
     """
@@ -87,7 +88,7 @@ def kept_angle(e: Expression) -> Expression:
 
 
 def number_atom(c: Fraction) -> Expression:
-    """Return a positive number as an atom: an expression of one symbol that has this value."""
+    """Return a positive number as an expression that consists of one symbol with this value."""
     return Expression({((Number(c), 1),): Fraction(1)})
 
 
@@ -98,5 +99,5 @@ def _atom(c: Fraction) -> Expression:
 
 
 def numbers_of(robot: Robot) -> tuple[Number, ...]:
-    """Return the `Number` atoms in lengths, gravity, relations and element rows, each once."""
+    """Return the number symbols in lengths, gravity, relations and element rows, each once."""
     return tuple(dict.fromkeys(a for a in atoms_of(robot) if isinstance(a, Number)))

@@ -90,7 +90,7 @@ def unit_wrench(m: LinkMotion, parameter: str) -> tuple[Vector, Vector]:
 
 
 class Axes:
-    """The axes of all joints before each link, in the frame of the link.
+    """The axis of every joint i, and the velocity of every link j per unit rate of joint i.
 
     z_ij is the axis of joint i in frame j, v_ij the velocity of origin O_j per unit rate of joint
     i.

@@ -120,7 +120,7 @@ class Rewrite:
         return image
 
     def _name(self, node: Node, image: Scalar, *, merged: bool) -> None:
-        """Give the copy of a node the name of the node.
+        """Give a copied node the name of its original.
 
         A node merged with an earlier one gets no name of a RECURSIVE family. Otherwise U = DV - WP,
         if it equals a product in WP = DV - product, would turn the recursion around.
@@ -190,7 +190,7 @@ class Rewrite:
     # --- values over F_p ---
 
     def _merged(self, image: Scalar) -> Scalar | int:
-        """Return the earlier number or node that has the same value, or else `image` itself."""
+        """Return an earlier number or node with the same value, or else the new node `image`."""
         node = image.node
         if node.index not in self._same:
             self._same[node.index] = self._first_of(node)

@@ -84,7 +84,7 @@ def substituted(e: Expression, values: Mapping[str, Expression]) -> Expression:
 
 
 def mapped(robot: Robot, length: Change, angle: Change = lambda e: e) -> Robot:
-    """Return `robot` with `length` applied to its lengths and `angle` applied to its angles.
+    """Return `robot` with the function `length` applied to its lengths, and `angle` to its angles.
 
     `length` is also applied to gravity and to the coefficients of elements. A constraint on a
     prismatic joint counts as a length, a constraint on a revolute joint as an angle.

@@ -52,9 +52,9 @@ def khalil_values(robot: Robot) -> dict[str, float]:
 
 
 def _transport(alpha: float, d: float) -> Array:
-    """Build the matrix, shape (10, 10), that converts inertial parameters to Khalil's frame.
+    """Build the matrix (10, 10) that converts parameters of a link from its end to Khalil's frame.
 
-    The parameters are given in the frame at the end of the link.
+    The ten parameters are first given in the frame at the end of the link.
     """
     c, s = np.cos(alpha), np.sin(alpha)
     R = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])

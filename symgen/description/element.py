@@ -77,7 +77,7 @@ def _law(text: str | None, declared: Any) -> Expression | None:
 
 
 def _scalar(name: str, given: Any) -> LawScalar:
-    """Make a LawScalar from an entry of KINDS: a fixed number, or a table with bounds and start."""
+    """Make a LawScalar from a default in the table KINDS: a fixed number, or bounds and a start."""
     if not isinstance(given, Mapping):
         return LawScalar((float(given), float(given)))
     lower, upper = map(float, given["bounds"])
@@ -147,9 +147,9 @@ class Element:
 
     @property
     def constants(self) -> dict[str, float]:
-        """Start values of the fitted scalars, by name and key, for instance vs3.
+        """Start values of the fitted scalars of the law, by scalar and frame, for instance vs3.
 
-        If the law depends on the transmitted torque, the mapping also has its name for each key,
+        If the law depends on the transmitted torque, the mapping also has its name for each frame,
         such as tau_model3, with the value 0.
         """
         values = {name: x.value for name, x in self.scalars.items() if not x.fixed}
@@ -158,7 +158,7 @@ class Element:
         return {parameter(name, j): x for name, x in values.items() for j in self.keys}
 
     def _of_key(self, law: Expression, j: int) -> Expression:
-        """Replace fitted scalars in `law` by symbols of key j (vs3 for vs), fixed ones by numbers.
+        """Replace fitted scalars in `law` by symbols of frame j (vs3 for vs), fixed by numbers.
 
         The transmitted torque tau_model becomes channel.tau_model3.
         """
@@ -174,24 +174,27 @@ class Element:
         )
 
     def channels(self, j: int) -> list[str]:
-        """List the functions of time in the law of key j by name, for instance T for channel.T."""
+        """List the functions of time in the law for frame j, for instance T for channel.T."""
         names = self.law(j).symbols if j in self.along else ()
         return sorted(name.removeprefix(CHANNEL) for name in names if name.startswith(CHANNEL))
 
     def law(self, j: int) -> Expression:
-        """Return the torque along s of key j for the parameter value 1; zero for an energy law."""
+        """Return the torque along s = G q for frame j and the parameter value 1.
+
+        It is zero if the law is an energy.
+        """
         return self._of_key(self.torque or KINDS[self.kind].torque, j)
 
     def potential(self, j: int) -> Expression:
-        """Return the energy of key j for the parameter value 1; zero for a law that is a torque."""
+        """Return the energy for frame j and the parameter value 1; zero if the law is a torque."""
         return self._of_key(self.energy or ZERO, j)
 
     def laws(self, j: int) -> tuple[Expression, dict[int, Expression]]:
-        """Return the torques of key j for the parameter value 1: along s, and at joints in U.
+        """Return the torques for frame j and the parameter value 1: along s, and at joints in U.
 
-        With the torque x along s and the energy U, Gamma = G' x + dU/dq_i. The torque x includes
-        the derivative of U with respect to s. The second result maps each joint i that U names to
-        dU/dq_i.
+        U is the energy. With the torque x along s = G q, Gamma = G' x + dU/dq_i. The torque x
+        includes the derivative of U with respect to s. The second result maps each joint i that U
+        names to dU/dq_i.
         """
         law, U = self.law(j), self.potential(j)
         joints = sorted(int(match[2]) for n in U.symbols if (match := STATE.match(n)) and match[2])
@@ -215,7 +218,7 @@ class Element:
 
     @property
     def symbols(self) -> set[str]:
-        """Names of the symbols in the laws and energies of all keys."""
+        """Names of the symbols in the torque and energy laws of the element."""
         return set().union(*((self.law(j) + self.potential(j)).symbols for j in self.keys))
 
     @property
@@ -225,7 +228,7 @@ class Element:
 
     @property
     def keys(self) -> tuple[int, ...]:
-        """Keys of the tables `along` and `form` (frame numbers), in ascending order."""
+        """Numbers of the frames for which `along` or `form` has an entry, in ascending order."""
         return tuple(sorted({*self.along, *self.form}))
 
 

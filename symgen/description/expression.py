@@ -204,7 +204,7 @@ class Expression:
 
     @property
     def symbols(self) -> set[str]:
-        """Names of all symbols, those inside calls included; `pi` is not a symbol."""
+        """Names of all symbols, including symbols inside functions; `pi` is not a symbol."""
         names: set[str] = set()
         for a in self.atoms:
             for e in a.operands if isinstance(a, Call) else ():

@@ -59,7 +59,7 @@ def located(file: str, line: Callable[[Path], int] = lambda _: 1) -> Iterator[No
 
 @dataclass
 class Declared:
-    """Names that a robot file declares, and other facts that are needed to read its tables.
+    """The facts needed to read tables of a robot file: declared names, number of rows, convention.
 
     Attributes
     ----------
@@ -93,7 +93,10 @@ class Given:
 
 
 class Written:
-    """Annotation of a field: its type `form` in a file, and `turn`, which converts its value."""
+    """Annotation of a field: its type in a file (`form`), and the function that converts it.
+
+    The function `turn` makes the value that the Robot stores.
+    """
 
     def __init__(
         self, form: Any, turn: Callable[[Any, Declared], Any] = lambda value, _: value

@@ -1,10 +1,11 @@
 """Reader of MJCF files by MuJoCo's own compiler (extra `mjcf`): bodies and joints become a tree.
 
 The tree is then converted to a table of Khalil frames. A body with joints 1 .. k, applied one after
-the other about the points p_i, is a chain of k links, all but the last without mass:
+the other about the points p_i, is a chain of k links, all but the last without mass. Its pose iTb
+is Trans, Rot of the body, times for each joint
 
-    iTb = Trans, Rot of the body;  then for each joint  Trans(p) Rot(axis, q - ref) Trans(-p)  or
-    Trans(axis (q - ref))
+    hinge:    Trans(p) Rot(axis, q - ref) Trans(-p)
+    slide:    Trans(axis (q - ref))
 
 Along each joint,
 
@@ -126,9 +127,7 @@ def _tree(mjcf: Mjcf, angles: Angles, *, sites: bool) -> Tree:
 
 
 def _joint_names(model: Any) -> list[str]:
-    """List the names of the joints, all different; a joint without name is called joint and its
-    number.
-    """
+    """List the names of the joints, all different; an unnamed joint is named by its number."""
     given = {model.joint(k).name for k in range(model.njnt)}
     names = []
     for k in range(model.njnt):
@@ -180,8 +179,7 @@ def _turned(position: Array, quaternion: Array, what: str, angles: Angles) -> Ar
 
 
 def _body(growing: _Growing, b: int) -> None:
-    """Add the links of body b to the tree: a link for each of its joints, or one on a fixed joint.
-    """
+    """Add the links of body b to the tree: one link per joint of the body, or one fixed link."""
     model = growing.mjcf.model
     name = _new(growing, model.body(b).name or f"body{b}")
     link, pose = growing.place[int(model.body_parentid[b])]
@@ -211,10 +209,9 @@ def _body(growing: _Growing, b: int) -> None:
 
 
 def _joint(growing: _Growing, k: int, parent: str, child: str, pose: Array) -> tuple[Joint, Array]:
-    """Make joint k between the links `parent` and `child`.
+    """Make joint k between links `parent` and `child`; return it and the body's pose in its frame.
 
-    `pose` is the pose of the body in the frame of `parent` at q = ref. Return the joint, and the
-    pose of the body in the joint frame.
+    `pose` is the pose of the body in the frame of `parent` at q = ref.
     """
     model, line = growing.mjcf.model, growing.mjcf.joints[k]
     name, kind = growing.names[k], int(model.jnt_type[k])
@@ -295,10 +292,10 @@ def _left_out(model: Any) -> list[str]:
 
 
 def _relations(growing: _Growing) -> dict[str, Expression]:
-    """Solve the linear relations between joints for joints without an actuator, in exact
-    arithmetic.
+    """Solve the linear relations between joints for joints without actuator.
 
-    The result has, for each solved joint, its position as an expression in the other joints.
+    The arithmetic is exact. The result has, for each solved joint, its position as an expression in
+    the other joints.
     """
     model, names = growing.mjcf.model, growing.names
     relations: dict[str, Expression] = {}

@@ -220,8 +220,7 @@ def _spec(root: XmlElement) -> tuple[Any, list[int]]:
 
 
 def _errors_with_lines(act: Callable[[], Any], lines: Sequence[int]) -> Any:
-    """Call the MuJoCo function `act`; its errors become DescriptionErrors with the line of the
-    file.
+    """Call the MuJoCo function `act`; convert its errors to errors with the line of the file.
 
     MuJoCo's warnings on the simulation are dropped.
     """
@@ -267,8 +266,7 @@ def _take_out_meshes(
 
 
 def _no_mesh(geom: Any) -> bool:
-    """Replace a geom that is a mesh by a sphere without mass; return whether the geom was a mesh.
-    """
+    """Replace a geom that is a mesh by a massless sphere; return whether it was a mesh."""
     import mujoco
 
     is_mesh = bool(geom.meshname or geom.hfieldname)

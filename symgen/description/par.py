@@ -105,8 +105,7 @@ class _Par:
     notes: list[str] = field(default_factory=list)
 
     def line(self, path: Path) -> int:
-        """Find the line of the file that gives the field `path` of the Robot, for error messages.
-        """
+        """Find the line of the file that gives the Robot field `path`, for error messages."""
         key = KEYS.get(str(path[-1]).lower() if path else "", "ant")
         items = self.lists.get(key) or [("", 1)]
         j = path[1] if len(path) > 1 and isinstance(path[1], int) else 1

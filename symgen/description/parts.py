@@ -132,10 +132,10 @@ def rows(texts: Mapping[int, str] | str, declared: Declared) -> Mapping[int, Row
 def reduced(
     reduce: Callable[[Expression, tuple[int, ...]], Any], texts: Any, declared: Declared
 ) -> dict[int, Any]:
-    """Parse each text of a table {j: text}, and convert it by `reduce` to a row or a quadratic
-    form.
+    """Parse each text of a table {j: text} to a row of coefficients or a quadratic form.
 
-    A joint number, or a list of joint numbers, means a row for each joint with its coefficient 1.
+    The function `reduce` makes the row or the form from an expression. A joint number, or a list of
+    joint numbers, means a row for each joint with its coefficient 1.
     """
     joints = tuple(f.j for f in declared.frames if f.sigma != FIXED)
     result: dict[int, Any] = {}
@@ -154,9 +154,7 @@ PLANES = {"xy": ("XZ", "YZ", "MZ"), "xz": ("XY", "YZ", "MY"), "yz": ("XY", "XZ",
 
 
 def assumed(table: Mapping[str, str], declared: Declared) -> frozenset[str]:
-    """Find the standard parameters that the file assumes to be zero, by name or by symmetry of a
-    link.
-    """
+    """Find the standard parameters that a file assumes to be zero, by name or by link symmetry."""
     names: set[str] = set()
     for key, text in table.items():
         link, plane = re.fullmatch(r"link ([1-9][0-9]*)", key), text.removeprefix("symmetric ")
@@ -327,7 +325,7 @@ def moves(c: Expression) -> bool:
 
 
 def determinant(matrix: tuple[tuple[float, ...], ...]) -> Fraction:
-    """Exact determinant of a square matrix of floats."""
+    """Compute the exact determinant of a square matrix of floats."""
     a = [[Fraction(x) for x in row] for row in matrix]
     det = Fraction(1)
     for k in range(len(a)):

@@ -279,8 +279,7 @@ class Robot:
 
     @cached_property
     def start(self) -> dict[int, float]:
-        """Joint positions, rad or m, that select the assembly mode of the loops, by joint number.
-        """
+        """Joint positions, rad or m, by joint number, that select the assembly mode of loops."""
         return {j: x for loop in self.loops for j, x in loop.start.items()}
 
     @cached_property
@@ -307,7 +306,7 @@ class Robot:
 
     @cached_property
     def parameters(self) -> tuple[str, ...]:
-        """Names of the standard parameters: link by link, then of further elements in file order.
+        """Names of the standard parameters: link by link, then of other elements in file order.
 
         For each link, the order is that of eq. (4): XX .. ZZ, MX, MY, MZ, M, then Ia, FV, FS and
         OFFSET, as far as the robot has them.
@@ -329,16 +328,14 @@ class Robot:
 
     @cached_property
     def channels(self) -> dict[str, tuple[str, ...]]:
-        """For each channel (a constant that varies with time): the parameters whose laws depend on
-        it.
-        """
+        """For each channel (a constant that varies with time): parameters whose laws contain it."""
         read = [(c, parameter(e.family, j)) for e in self.elements for j in e.keys
                 for c in e.channels(j)]  # fmt: skip
         return {c: tuple(name for own, name in read if own == c) for c, _ in read}
 
     @property
     def loaded(self) -> tuple[str, ...]:
-        """Parameters of friction laws that depend on the torque that the joint transmits.
+        """Parameters of laws, such as load-dependent friction, that depend on transmitted torque.
 
         A robot with such parameters has no forward dynamics.
         """
@@ -363,8 +360,7 @@ class Robot:
 
 
 def one_joint_parameters(robot: Robot, families: Collection[str]) -> set[str]:
-    """Find the parameters of `families`, such as FV, that a format with one number per joint can
-    hold.
+    """Find the parameters of `families` that a file with one number per joint can hold.
 
     Such a parameter acts on one joint alone, and equally in both directions of motion.
     """

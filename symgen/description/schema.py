@@ -73,8 +73,7 @@ def robot_of(data: Mapping[str, Any], file: str, sha256: str) -> Robot:
 
 
 def _with_columns(data: dict[str, Any]) -> dict[str, Any]:
-    """Move the table `columns` of a robot file into its `elements`, because columns are elements.
-    """
+    """Move the table `columns` of a robot file into `elements`: each column is an element."""
     columns, elements = data.pop("columns", {}), data.get("elements", {})
     if not columns:
         return data

@@ -159,8 +159,9 @@ def rotation(rpy: Sequence[float], what: str, angles: Angles) -> Array:
 
 
 def transform(row: Sequence[float]) -> Array:
-    """Compute the pose iTj, shape (4, 4), from a row gamma, b, alpha, d, theta, r of the frame
-    table.
+    """Compute the pose iTj, shape (4, 4), from a row gamma, b, alpha, d, theta, r of a table.
+
+    The pose is
 
         iTj = Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r)
     """
@@ -263,7 +264,7 @@ def _require_independent(tree: Tree, name: str) -> None:
 
 
 def _hold(tree: Tree, positions: Mapping[str, float]) -> Tree:
-    """Hold the joints at `positions`, and the joints whose positions these determine completely."""
+    """Hold the joints named in `positions`, and the joints that follow only held joints."""
     exact = {name: Expression.number(repr(x)) for name, x in positions.items()}
     relations = {
         name: e.substitute(exact) for name, e in tree.relations.items() if name not in positions

@@ -165,9 +165,7 @@ def _add(table: Table, ant: int, joint: Joint, parent: Array) -> int:
 
 
 def _nearly_parallel(axis: Array) -> bool:
-    """Whether `axis` is almost parallel to z, so that their common normal is too far away to be
-    used.
-    """
+    """Whether `axis` is almost parallel to z: their common normal is then too far away."""
     return SAME < math.hypot(axis[0], axis[1]) < STEEP
 
 
@@ -214,7 +212,10 @@ def _angle(x: float) -> tuple[float, Expression]:
 def _row(
     table: Table, ant: int, sigma: int, before: Sequence[float], theta: float = 0.0, r: float = 0.0
 ) -> tuple[Array, int]:
-    """Append a frame; return its pose in its antecedent at q = 0, shape (4, 4), and its number."""
+    """Append a frame to the table; return its pose in its antecedent at q = 0 and its number.
+
+    The pose has the shape (4, 4).
+    """
     j = len(table.frames) + 1
     gamma, b, alpha, d = before = _numbered(before)
     q = Expression.symbol(f"q{j}")

@@ -172,8 +172,7 @@ def _robot(table: Table, file: str, sha256: str) -> Robot:
 
 
 def _labels(table: Table) -> dict[int, str]:
-    """Return the labels of the frames: names in the file of joints and of links kept as fixed
-    frames.
+    """Return labels of the frames: the names of joints and of links kept as fixed frames.
 
     A name is left out if it is not allowed as a label or is already used.
     """
@@ -210,8 +209,7 @@ def _gravity(
 
 
 def _constraints(table: Table) -> dict[int, Expression]:
-    """Express the position q_j of each joint that follows others by the positions of these joints.
-    """
+    """Express the position q_j of each follower joint by the positions of the joints it follows."""
     positions = {joint.name: Expression.symbol(f"q{j}") for j, joint in table.joint.items()}
     relations = table.tree.relations
     return {
@@ -236,9 +234,7 @@ def _keys(table: Table, family: str, actuated: list[int]) -> list[int]:
 def _limits(
     table: Table, actuated: list[int]
 ) -> dict[str, tuple[float, ...] | tuple[tuple[float, float], ...]]:
-    """Collect the limits that all actuated joints have; other kinds of limits are left out and
-    noted.
-    """
+    """Collect the limits that all actuated joints have; a note lists the omitted kinds."""
     rows = [table.joint[j] for j in actuated]
     limits: dict[str, tuple[float, ...] | tuple[tuple[float, float], ...]] = {}
     bounds = tuple(
@@ -260,7 +256,7 @@ def _limits(
 
 
 def _values(table: Table, actuated: list[int]) -> tuple[dict[str, float], frozenset[int]]:
-    """Return the standard parameters by name, and the numbers of the frames without mass.
+    """Return the standard parameters by name, and the frames without inertial parameters.
 
     There are no standard parameters if no link of the file has an inertia.
     """

@@ -117,8 +117,7 @@ def _left_out(root: XmlElement) -> Iterator[str]:
 
 
 def _relations(joints: list[Joint], mimics: dict[str, Mimic]) -> dict[str, Expression]:
-    """Express the position of each mimic joint by the position of the joint that it finally
-    follows.
+    """Express the position of each mimic joint by that of the joint that it finally follows.
 
         q = multiplier q_leader + offset
 
@@ -144,8 +143,9 @@ def _relations(joints: list[Joint], mimics: dict[str, Mimic]) -> dict[str, Expre
 
 
 def _pose(holder: XmlElement, what: str, angles: Angles) -> Array:
-    """Read the <origin> of a link or joint as a pose, shape (4, 4), with R = Rz(yaw) Ry(pitch)
-    Rx(roll).
+    """Read the <origin> of a link or joint as a pose, shape (4, 4).
+
+    Its rotation is R = Rz(yaw) Ry(pitch) Rx(roll).
     """
     T, e = np.eye(4), holder.find("origin")
     if e is None:
@@ -241,8 +241,10 @@ def _joint(e: XmlElement, angles: Angles) -> Joint:
 
 
 def _root(links: dict[str, Inertial | None], joints: list[Joint], line: int) -> str:
-    """Find the base, which is the only link without a parent; check that joints and links form a
-    tree.
+    """Find the base, the only link without a parent, and check the joints.
+
+    Raises DescriptionError if a joint names a link that does not exist, or if a link has two
+    parents.
     """
     parent: dict[str, str] = {}
     names: set[str] = set()

@@ -61,10 +61,7 @@ def values_of_csv(content: bytes, file: str) -> dict[str, float]:
 
 
 def with_values(robot: Robot, values: Mapping[str, float]) -> Robot:
-    """Return a copy of `robot` with these values of standard parameters added to those of its file.
-
-    A new value replaces the value of the file.
-    """
+    """Return a copy of `robot` in which `values` replace or extend its standard parameters."""
     return replace(robot, values={**robot.values, **values})
 
 

@@ -1,5 +1,4 @@
-"""Reader of XML files: elements with line numbers; constructs that a robot does not need are
-refused.
+"""Reader of XML files; it numbers the lines of elements and refuses unsafe constructs.
 
 The file is read by expat alone. A document type (hence entities, internal or external) is refused
 where it starts, depth and number of elements are limited during reading, and no file that the text
@@ -35,7 +34,7 @@ class XmlElement(ElementTree.Element):
         def find(self, path: str, namespaces: Any = None) -> XmlElement | None: ...
 
     def own(self, *tags: str) -> Iterator[XmlElement]:
-        """Yield the children with these tags, also those inside <frame> elements of an MJCF."""
+        """Yield the child elements with these tags, also inside <frame> elements of an MJCF."""
         for child in self:
             if child.tag in tags:
                 yield child
@@ -43,8 +42,9 @@ class XmlElement(ElementTree.Element):
                 yield from child.own(*tags)
 
     def word(self, name: str, default: str | None = None) -> str:
-        """Return the attribute `name` as text, or `default`; raise DescriptionError if both are
-        missing.
+        """Return the attribute `name` as text, by default `default`.
+
+        Raises DescriptionError if both are missing.
         """
         value = self.attrib.get(name, default)
         if value is None:
@@ -74,8 +74,9 @@ class XmlElement(ElementTree.Element):
 
 
 def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> XmlElement:
-    """Parse an XML file and return its root element; DescriptionError names the line that is
-    refused.
+    """Parse an XML file and return its root element.
+
+    DescriptionError names the line if the file is not plain XML.
     """
     if len(content) > MAX_BYTES:
         raise DescriptionError(

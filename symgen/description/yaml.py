@@ -163,9 +163,7 @@ def _scalar(node: ScalarNode, line: int) -> Any:
 
 
 def tables_of(robot: Robot) -> dict[str, Any]:
-    """Return the tables of the robot file of `robot` by key; expressions are not yet converted to
-    text.
-    """
+    """Return the tables of the robot file of `robot` by key; expressions are not yet text."""
     drives = robot.drives
     return {
         "symgen": SCHEMA,
@@ -203,8 +201,7 @@ def tables_of(robot: Robot) -> dict[str, Any]:
 
 
 def write_yaml(robot: Robot, *, comments: Sequence[str] = ()) -> str:
-    """Return the text of the robot file of `robot`; `comments` are its first lines, each after a #.
-    """
+    """Return the robot file of `robot` as text; `comments` are its first lines, after a #."""
     lines = [f"# {line}" for line in comments]
     for key, table in tables_of(robot).items():
         if key in BY_ROW and table:
@@ -217,8 +214,7 @@ def write_yaml(robot: Robot, *, comments: Sequence[str] = ()) -> str:
 
 
 def flow(value: Any) -> str:
-    """Write a value on one line of YAML; reserved words such as yes and no are put between quotes.
-    """
+    """Write a value on one line of YAML; reserved words such as yes and no get quotes."""
     if isinstance(value, Mapping):
         return f"{{{', '.join(f'{flow(key)}: {flow(x)}' for key, x in value.items())}}}"
     if isinstance(value, tuple | list):

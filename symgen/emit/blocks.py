@@ -1,4 +1,4 @@
-"""Functions of a robot as source text, for any language whose steps are assignments.
+"""Functions of a robot, such as its inverse dynamics, as source text in any language.
 
 For each function: its arguments, its lines, and the entries of its result.
 """
@@ -17,7 +17,7 @@ from symgen.emit.spec import STATES, Function, ModuleSpec
 
 @dataclass(frozen=True)
 class Block:
-    """One function as source text: its arguments, its lines, and the array that it fills.
+    """One function, such as the inverse dynamics, as source text: arguments, lines, result array.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Block:
     constants: tuple[str, ...]
 
     def results(self, target: Callable[[Sequence[int]], str]) -> list[Section]:
-        """Write the assignments of the computed entries, grouped under headings.
+        """Write the assignments of the computed entries of the result array, grouped by headings.
 
         `target` turns an array index into the left side of an assignment, such as `A[0, 1]`.
         """
@@ -68,9 +68,9 @@ Call = Callable[[Sequence[str], Sequence[str]], list[str]]
 def blocks_of(
     spec: ModuleSpec, language: Language, component: Callable[[str, int], str] = "{}[{}]".format
 ) -> dict[str, Block]:
-    """Write every function of a robot in a language, independent of the other functions.
+    """Write every function of a robot in a programming language, without steps shared by functions.
 
-    component : gives the text of entry k of a state or of X, such as `q[0]`.
+    `component` gives the text of entry k of a state or of X, such as `q[0]`.
     """
 
     def inputs(source: str, wanted: Sequence[tuple[int, str]], count: int) -> list[str]:
@@ -84,7 +84,7 @@ def blocks_of(
 
 
 class FunctionPrinter:
-    """Printer of functions that share one expression graph and one set of local names.
+    """Printer of several functions of a robot that are computed from one common expression graph.
 
     Parameters
     ----------
@@ -121,21 +121,21 @@ class FunctionPrinter:
 
     @property
     def given(self) -> list[str]:
-        """Names of the shared steps whose values the functions need for their own lines."""
+        """Names of the shared intermediate variables that the functions use."""
         read = {n.index for f in self.functions for n in self._read(f)}
         return [self.text.called[k] for k in sorted(read & self.shared & self.text.named)]
 
     @property
     def motion(self) -> Block:
-        """Block of the steps that all functions share: the motion of the links."""
+        """Source text of the intermediate variables that all functions share: the link motion."""
         own = [n for n in self.functions[0].nodes if n.index in self.shared]
         operands = {x.node.index for n in own for x in n.operands}
         return self._block(self.functions[0], own, [n for n in own if n.index in operands], ())
 
     def block(self, f: Function, call: Call = lambda names, arguments: []) -> Block:
-        """Write one function as a block.
+        """Write one function as source text, without the intermediate variables that it shares.
 
-        `call` writes the lines that get the shared values from the block `motion`.
+        `call` writes the lines that get the shared variables from the block `motion`.
         """
         own = [n for n in f.nodes if n.index not in self.shared]
         names = {self.text.called.get(n.index, "") for n in self._read(f)}
@@ -144,7 +144,7 @@ class FunctionPrinter:
         return self._block(f, own, self._read(f), lines)
 
     def _read(self, f: Function) -> list[Node]:
-        """List the nodes that the own lines of a function use or compute."""
+        """List the nodes of the expression graph that the lines of a function use or compute."""
         read = {o.node.index for o in f.values.outputs if isinstance(o, Scalar)}
         for node in f.nodes:
             if node.index not in self.shared:
@@ -154,7 +154,7 @@ class FunctionPrinter:
     def _block(
         self, f: Function, own: Sequence[Node], read: Sequence[Node], call: Sequence[str]
     ) -> Block:
-        """Make a block whose lines compute the nodes `own`.
+        """Write the lines that compute the nodes `own` of the expression graph, with their inputs.
 
         `read` are the nodes that these lines use. The lines `call` stand before the steps and
         provide the shared values.
@@ -193,13 +193,13 @@ class FunctionPrinter:
 
 
 def label(f: Function, entry: Entry) -> str:
-    """Return the name of an entry for comments, such as DG1ZZ2, GAM3 or A12."""
+    """Return the name of a result entry for use in comments, such as DG1ZZ2, GAM3 or A12."""
     name = entry.comment.partition(",")[0]
     return name or f"{f.model.result}{''.join(str(k + 1) for k in entry.place)}"
 
 
 def aligned(lines: Sequence[str], language: Language) -> tuple[str, ...]:
-    """Align the comments of code lines in one column, at most column 64.
+    """Align the comments at the end of code lines in one column, at most column 64.
 
     Each given line has its comment after a tab.
     """

@@ -17,7 +17,7 @@ Titled = tuple[str, Sequence[str]]  # lines that belong together, under a title
 
 @dataclass(frozen=True)
 class Part:
-    """One part of a long C function body: its lines over `lanes` samples, and all words in them."""
+    """One part of a long C function body: its lines, and all words that occur in the lines."""
 
     sections: tuple[Section, ...]
     read: frozenset[str]
@@ -55,12 +55,12 @@ def in_parts(
 
 
 def words(lines: Sequence[str]) -> frozenset[str]:
-    """Collect the names in lines of C, without those in comments."""
+    """Collect the names that occur in lines of C code, except in comments."""
     return frozenset(word for line in lines for word in re.findall(r"\w+", line.partition("/*")[0]))
 
 
 def read_by(read: frozenset[str], steps: Sequence[str]) -> list[str]:
-    """Select the steps that compute the names in `read`, and the steps that these depend on.
+    """Select the lines of C that compute the names in `read`, and the lines that these depend on.
 
     Each step has the form `const real x = ...;`.
     """

@@ -1,4 +1,4 @@
-"""Printer of C: writes the steps of an expression graph as `const real` declarations.
+"""Printer of C: writes the intermediate variables of a model as `const real` declarations.
 
 Names and sections are the same as in the NumPy module.
 
@@ -57,7 +57,7 @@ C = Language(
 
 
 class CText(Text):
-    """The lines of C that compute one function over a tile of samples.
+    """The lines of C that compute one function for a tile, a group of samples computed together.
 
     They run in this order: `fixed` (the same for all samples), `angles`, `trigonometry_of` (sines
     and cosines of the angles), `sections`, and `expression` for each output.
@@ -98,7 +98,7 @@ class CText(Text):
 
 
 def _needed(outputs: Iterable[Node]) -> Iterator[int]:
-    """Yield the indices of the nodes that a loop over the samples needs.
+    """Yield the indices of the graph nodes that a loop over the samples must compute or load.
 
     Operands of sines and cosines are left out, because another loop computes them; so are operands
     of values that are computed before the loops.

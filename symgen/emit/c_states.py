@@ -41,7 +41,7 @@ class CStates:
         return ["s"] if self.closed else [*states]
 
     def parameters(self, *states: str) -> list[str]:
-        """Return the C declarations of these arguments, such as `const real *q`."""
+        """Return the C declarations of the state arguments, such as `const real *q`."""
         kind = f"{self.robot}_state" if self.closed else "real"
         return [f"const {kind} *{x}" for x in self.arguments(*states)]
 
@@ -50,10 +50,10 @@ class CStates:
         return f"s->{state}" if self.closed else state
 
     def load(self, state: str) -> str:
-        """Return two arguments of the C function that copies a state of many samples into a tile.
+        """Return C arguments that locate a state: distance between samples, and start address.
 
-        They are the distance from one sample to the next, in numbers, and a pointer to the first
-        sample of the tile.
+        The distance, in numbers, is from one sample to the next. The address is the address of the
+        first sample of a tile, a group of samples computed together.
         """
         if self.closed:
             return f"sizeof *s/sizeof(real), s[start].{state}"

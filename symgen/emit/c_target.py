@@ -1,4 +1,4 @@
-"""Contents of an emitted C file, as data for the template that only lays them out.
+"""Data for the template of a C file: lines, tables and signatures of all functions of a robot.
 
 The body of each function is written once, as a loop over `lanes` samples. The compiler makes two
 versions of it, one for a single state and one for a tile, a group of samples that are computed
@@ -46,7 +46,7 @@ RESULTS = (
 
 
 def render(spec: ModuleSpec, *, command: str | None = None) -> str:
-    """Return the text of the C file of a robot.
+    """Return the text of the C file with all functions of a robot.
 
     The same robot file and the same version give the same bytes.
     """
@@ -63,7 +63,7 @@ def render_header(spec: ModuleSpec, *, command: str | None = None) -> str:
 
 @lru_cache(maxsize=1)
 def _context(spec: ModuleSpec, command: str | None) -> dict[str, Any]:
-    """Collect the values that the templates of the C file and of its header file use."""
+    """Collect the values that fill the templates of the C file and of its header file."""
     robot, free = spec.robot, spec.regrouping.constants
     names, states = spec.names(is_word), CStates.of(spec)
     kernels = [
@@ -112,7 +112,7 @@ def _context(spec: ModuleSpec, command: str | None) -> dict[str, Any]:
 def _loops(
     spec: ModuleSpec, states: CStates, closing: Sequence[Mapping[str, Any]]
 ) -> dict[str, Any]:
-    """Collect the values that the template needs to write the closure of loops in C.
+    """Collect the values for the C code that closes kinematic loops by Newton's method.
 
     These are start configuration, units, tolerance, step size and signatures for Newton's method.
     """
@@ -190,7 +190,7 @@ def _comment(text: str) -> str:
 
 
 def _kernel(spec: ModuleSpec, states: CStates, f: Function, names: Namespace) -> dict[str, Any]:
-    """Collect all that the template needs to write one function in C.
+    """Collect all lines, tables and signatures of one function in C, such as the regressor.
 
     These are the lines before the loops, the loops for sines and cosines, the main loop over a tile
     of samples, the table {row of the result, number of the value, sign}, and the C signatures.
@@ -295,7 +295,7 @@ def _kernel(spec: ModuleSpec, states: CStates, f: Function, names: Namespace) ->
 
 
 def _row(place: Sequence[int], shape: Sequence[int]) -> int:
-    """Return the position of an entry in an array that is stored in C order, last index fastest."""
+    """Return the position of an array entry in memory, in C order (last index fastest)."""
     row = 0
     for k, size in zip(place, shape, strict=True):
         row = row * size + k
@@ -307,7 +307,7 @@ def _input(name: str, state: str, k: int) -> str:
 
 
 def _result(result: str, k: int, expression: str, comment: str) -> list[str]:
-    """Write the C line that stores a result of a tile, with its comment.
+    """Write the C line that stores one entry of a result, with its comment.
 
     The comment gets a line of its own, before the other, if both together are too long.
     """
@@ -344,9 +344,9 @@ def _header(spec: ModuleSpec, states: CStates, kernels: Sequence[Mapping[str, An
 def _signatures(
     states: CStates, f: Function, laid: Mapping[str, Any], needs: Sequence[str]
 ) -> dict[str, object]:
-    """Make the C signatures and calls of one function.
+    """Make the C signatures and calls of one function, for one state and for many samples.
 
-    `needs` names X, the constants, both or none, whichever its lines use.
+    `needs` lists which of X and the constants the lines of the function use.
     """
     model, result, name = f.model, laid["result"], states.robot
     used, computed, calls = laid["used"], laid["computed"], laid["calls"]

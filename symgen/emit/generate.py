@@ -45,7 +45,7 @@ def generate_files(
     regrouping: Regrouping | None = None,
     options: Sequence[str] = (),
 ) -> dict[str, str]:
-    """Return the source texts of the files of a robot.
+    """Return the source texts of a robot's files for the given targets, such as numpy or c.
 
     Parameters
     ----------

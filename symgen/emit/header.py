@@ -24,10 +24,10 @@ COLUMNS = ("j", "ant", "mu", "sigma", "gamma", "b", "alpha", "d", "theta", "r")
 
 
 def header(spec: ModuleSpec, texts: Mapping[str, Text], formulas: bool) -> list[str]:
-    """Write the header of an emitted file: frames, gravity, elements, base parameters and costs.
+    """Write the header comment of an emitted file: frames, gravity, base parameters, operations.
 
-    texts : the printed models, by name. formulas : whether the header lists the regrouping
-    formulas.
+    `texts` are the printed models by name. `formulas` decides whether the regrouping formulas are
+    listed.
     """
     robot, regrouping = spec.robot, spec.regrouping
     gravity = ", ".join(str(e) for e in robot.gravity)
@@ -98,7 +98,7 @@ def header(spec: ModuleSpec, texts: Mapping[str, Text], formulas: bool) -> list[
 
 
 def line_of(title: str, text: str) -> list[str]:
-    """Write an entry of the header: a title in the first column, then a text, wrapped."""
+    """Write a header line: a title in the first column, then a text, wrapped if it is long."""
     return wrap_text(f"{title:<11} {text}", "", " " * 12)
 
 
@@ -108,7 +108,7 @@ def grouped(regrouping: Regrouping) -> dict[str, str]:
 
 
 def one_sided_friction_that_absorbs(regrouping: Regrouping) -> list[str]:
-    """List the base parameters of one-sided Coulomb friction that contain a constant force too.
+    """List the base parameters of one-sided Coulomb friction that also contain a constant force.
 
     D_FSP - D_FSN = 1 in motion, as for a constant force, but 0 at rest.
     """
@@ -121,7 +121,7 @@ def one_sided_friction_that_absorbs(regrouping: Regrouping) -> list[str]:
 
 
 def frame_table(robot: Robot) -> list[str]:
-    """Write the rows of the frame table as aligned text.
+    """Write the table of frames, with Khalil's geometric parameters, as aligned lines of text.
 
     The columns mu, gamma and b are left out if they contain no information.
     """
@@ -142,7 +142,7 @@ def frame_table(robot: Robot) -> list[str]:
 
 
 def informative_columns(robot: Robot) -> tuple[str, ...]:
-    """Select the columns of the frame table to print.
+    """Select the columns of the frame table that contain information and are printed.
 
     j, ant, sigma, alpha, d, theta and r are always printed, gamma and b if an entry is not zero, mu
     if a joint is passive.
@@ -156,7 +156,7 @@ def informative_columns(robot: Robot) -> tuple[str, ...]:
 
 
 def element_lines(robot: Robot) -> list[str]:
-    """Describe each family of elements, such as friction or springs: its kind and where it acts.
+    """Describe each family of elements (friction, springs, actuator inertia) and where it acts.
 
     An element acts along a linear combination of joint motions, or in a quadratic form of them.
     """
@@ -178,9 +178,9 @@ def element_lines(robot: Robot) -> list[str]:
 
 
 def channel_lines(robot: Robot) -> list[str]:
-    """Describe the constants of the robot that may be functions of time.
+    """Describe which constants of the robot may be functions of time.
 
-    Some of them are torques at a joint that the caller computes from the other parameters.
+    Such a constant may be a torque at a joint that the caller computes from the other parameters.
     """
     own = [c for c in robot.channels if not c.startswith(TRANSMITTED)]
     torques = [c for c in robot.channels if c not in own]
@@ -193,9 +193,9 @@ def channel_lines(robot: Robot) -> list[str]:
 
 
 def _law_text(e: Element) -> str:
-    """Write the torque or energy law of an element, with its constants.
+    """Write the torque law or energy law of an element, such as a nonlinear friction.
 
-    The text is empty for elements with a standard law: inertia, linear friction, offset and spring.
+    The text is empty for the standard laws: inertia, linear friction, offset and spring.
     """
     if not e.is_own:
         return ""
@@ -294,7 +294,7 @@ def scalars(robot: Robot) -> dict[str, tuple[tuple[float, float], int, str]]:
 
 
 def channels(regrouping: Regrouping) -> dict[str, tuple[str, ...]]:
-    """Find for each constant that is a function of time the base parameters that depend on it."""
+    """Find the base parameters that depend on each constant that is a function of time."""
     return {
         c: tuple(b.name for b in regrouping.base if b.own in read)
         for c, read in regrouping.robot.channels.items()
@@ -328,7 +328,7 @@ def _structure(spec: ModuleSpec) -> list[str]:
 
 
 def names(name: str, values: Sequence[str]) -> list[str]:
-    """Write the source `name = (...)` of a tuple of words.
+    """Write Python source that assigns a tuple of words to a name: `name = (...)`.
 
     A long tuple is written as one text that `split` divides, because this is shorter.
     """
@@ -339,7 +339,7 @@ def names(name: str, values: Sequence[str]) -> list[str]:
 
 
 def by_line(name: str, values: Mapping[str, str]) -> list[str]:
-    """Write the source `name = {...}` of a dict of texts: one entry per line, long texts split."""
+    """Write Python source that assigns a dict of texts to a name, one entry per line."""
     lines = []
     for key, value in values.items():
         first, *more = wrap(value, WIDTH - 20, break_long_words=False) or [""]
@@ -350,7 +350,7 @@ def by_line(name: str, values: Mapping[str, str]) -> list[str]:
 
 
 def literal(name: str, value: Any) -> list[str]:
-    """Write the source `name = value`, with line breaks between entries if it is too long."""
+    """Write Python source that assigns a value to a name, broken between entries if long."""
     return _literal(f"{name} = ", value, "")
 
 

@@ -1,4 +1,4 @@
-"""Printer: writes the nodes of an expression graph as lines of source text.
+"""Printer: turns the nodes of an expression graph into lines of source text.
 
 A node gets a line of its own if it has a name or is used more than once. A node without a name gets
 one from its hint, from its factors (C4DV23 = C4*DV23), or from the quantity that it is a part of
@@ -45,7 +45,7 @@ def number(c: Fraction) -> str:
 
 @dataclass(frozen=True)
 class Language:
-    """Rules by which a programming language writes operations, steps and entries.
+    """Rules by which a programming language writes operations, assignments and comments.
 
     Attributes
     ----------
@@ -82,12 +82,12 @@ class Language:
     is_word: Callable[[str], bool] = lambda name: False
 
     def expression(self, e: Expression) -> str:
-        """Write an expression of constants, or one that is linear in joint positions."""
+        """Write an expression of constants, or one linear in joint positions, in this language."""
         text = re.sub(r"\b(cos|sin|sqrt)\(", lambda name: f"{self.calls[name[1]]}(", str(e))
         return re.sub(r"\bpi\b", self.pi, text)
 
     def entries(self, targets: Sequence[str], value: str, remark: str) -> list[str]:
-        """Write the lines that assign a value to all places of an entry; a remark follows a tab."""
+        """Write the lines that assign a value to entries of an array; a remark follows a tab."""
         targets = [" = ".join(targets)] if self.chained else targets
         return [f"{self.entry.format(target, value)}\t{remark}" for target in targets]
 
@@ -110,7 +110,7 @@ PLAIN = Language(
 
 @dataclass(frozen=True)
 class Section:
-    """A heading and the lines under it."""
+    """A heading in source text, and the lines under it."""
 
     title: str
     lines: tuple[str, ...]
@@ -138,7 +138,7 @@ class Text:
     names : Namespace
         Names in use in the function.
     labels : sequence of str
-        Name of each output; parts of it that are shared are named after it.
+        Name of each output; its shared parts are named after the output.
     """
 
     language: Language = PYTHON
@@ -173,13 +173,13 @@ class Text:
 
     @property
     def given(self) -> set[str]:
-        """Names of the inputs, and names that the derivation gave to steps."""
+        """Names of the inputs, and names that the derivation gave to intermediate variables."""
         named = [n for n in self.nodes if n.index in self.named and (n.name or n.hint)]
         return {self.called[n.index] for n in named} | self.inputs
 
     @property
     def inputs(self) -> set[str]:
-        """Names of the symbols that the outputs depend on, as the derivation writes them."""
+        """Names of the inputs on which the outputs depend, as the derivation writes them."""
         return {str(node.value) for node in self.nodes if node.op == SYM}
 
     def _symbol(self, node: Node) -> str:
@@ -209,9 +209,10 @@ class Text:
                 self.called[node.index] = self._made_of(node) or self._part_of(node, whole)
 
     def _wholes(self, outputs: Sequence[Scalar | int], labels: Sequence[str]) -> dict[int, str]:
-        """Find for each node the quantity that the node is a part of, to derive a name from it.
+        """Find for each graph node the named quantity that contains the node: N16 for node N16a.
 
-        This is the first named quantity that uses the node, or else the first output.
+        This is the first named quantity that uses the node, or else the first output. An unnamed
+        node gets a name from it.
         """
         whole: dict[int, str] = {}
         for o, label in zip(outputs, labels, strict=bool(labels)):
@@ -224,7 +225,7 @@ class Text:
         return whole
 
     def _made_of(self, node: Node) -> str:
-        """Name a product after its factors, such as C4DV23 = C4*DV23.
+        """Name an intermediate variable after its factors, such as C4DV23 = C4*DV23.
 
         The name is empty if the node is not a product of at most three named factors. The sign of
         the node is chosen such that its line starts without a minus.
@@ -259,7 +260,7 @@ class Text:
         return sign
 
     def _part_of(self, node: Node, whole: Mapping[int, str]) -> str:
-        """Name a node after the quantity that it is a part of: N16a is a part of N16."""
+        """Name an intermediate variable after the quantity that contains it: N16a after N16."""
         of = whole.get(node.index, "K").rstrip(ascii_lowercase + "_") or "K"
         for k in range(len(self.nodes)):
             letters = ascii_lowercase[k % 26] * (k // 26 + 1)
@@ -270,7 +271,7 @@ class Text:
     # --- lines ---
 
     def sections_of(self, nodes: Collection[int]) -> tuple[Section, ...]:
-        """Write the lines of the given nodes, grouped under their headings."""
+        """Write the lines that compute the given graph nodes, grouped under headings."""
         circular = [self._positive(n) for n in self.nodes if n.op in (COS, SIN)]
         trigonometry = {n.index for n in reachable(circular)}
 
@@ -285,7 +286,7 @@ class Text:
         return under_titles((title(n), self._line(n)) for n in named)
 
     def _title(self, node: Node) -> str:
-        """Return the heading under which the derivation made a node."""
+        """Return the heading under which the derivation made a node of the expression graph."""
         return self._marks[bisect_right(self._marks, node.index, key=itemgetter(0)) - 1][1]
 
     def _line(self, node: Node) -> str:
@@ -341,10 +342,7 @@ class Text:
         )
 
     def _addends(self, s: Scalar) -> list[Scalar]:
-        """List the terms of a sum.
-
-        An inner sum that has no line of its own is replaced by its terms.
-        """
+        """List the terms of a sum; inner sums without a line of their own are split too."""
         terms: list[Scalar] = []
         for x in s.node.operands:
             x = x if s.sign > 0 else -x

@@ -123,7 +123,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
 
 
 def _blocks(spec: ModuleSpec) -> tuple[dict[str, Block], dict[str, Any] | None]:
-    """Make the blocks of all functions, and the motion of the links that two of them share.
+    """Write all functions of the Python module, and the link motion that two of them share.
 
     The motion is None if the regressor and the inverse dynamics share only few values.
     """
@@ -179,7 +179,7 @@ def _laid_out(spec: ModuleSpec, block: Block) -> dict[str, object]:
 def _filled_at_once(
     steps: Sequence[Section], results: Sequence[Section]
 ) -> tuple[list[Section], list[Section]]:
-    """Merge assignments: a result entry that equals a step is assigned in the line of the step.
+    """Merge assignments: a result entry equal to an intermediate variable is set in its line.
 
     Entries with the same value are assigned in one line; entries with a remark are not merged.
     Return the sections of the steps, and the sections of the results that remain.
@@ -240,7 +240,7 @@ def _outputs(spec: ModuleSpec, models: Iterable[Model]) -> list[str]:
 
 
 def _constant_entries(f: Function, result: str) -> list[str]:
-    """Write the assignments of the entries that are constant numbers other than zero.
+    """Write the assignments of result entries that are constant numbers other than zero.
 
     Entries with the same number are assigned together.
     """
@@ -260,7 +260,7 @@ def _constant_entries(f: Function, result: str) -> list[str]:
 
 
 def _loop_tables(spec: ModuleSpec, slides: bool) -> Iterator[str]:
-    """Yield the source lines of start configuration, assembly mode and units of the tied joints.
+    """Yield the source lines of the data that close the loops: start, assembly mode, units.
 
     A unit is a typical motion of an independent joint: 1 rad, or the longest length of the robot
     file if the joint is prismatic. Units are written only if `slides` is true.
@@ -293,7 +293,7 @@ class Heads:
         returns: str = "Array",
         optional: bool = False,
     ) -> str:
-        """Write the first line of a function whose `arguments` are arrays.
+        """Write the `def` line of a public function whose `arguments` are arrays.
 
         If `optional`, all arguments except the first may be None.
         """
@@ -306,7 +306,7 @@ class Heads:
 
 
 def hint(kind: str) -> str:
-    """Return a type hint, in quotes if it names arrays, because these may be of any package."""
+    """Return a type hint, in quotes if it names arrays, because arrays may be of any package."""
     return f'"{kind}"' if "Array" in kind else kind
 
 

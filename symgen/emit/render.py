@@ -31,7 +31,7 @@ def laid_out(template: str, context: Mapping[str, object]) -> str:
 
 
 def _lines_that_fit(lines: Iterable[str], in_c: bool) -> Iterator[str]:
-    """Yield the lines, with each line longer than WIDTH columns broken at a space.
+    """Yield the lines of a text, with lines longer than 100 columns broken at a space.
 
     A line stays long if it has no space at which the language allows a break.
     """
@@ -48,7 +48,7 @@ def _lines_that_fit(lines: Iterable[str], in_c: bool) -> Iterator[str]:
 
 
 def _end(line: str, in_text: bool) -> int:
-    """Find the column at which a line may be broken: its last space within WIDTH columns.
+    """Find the column at which to break a line: its last suitable space within 100 columns.
 
     In code, only spaces inside brackets and outside strings count. The result is 0 without such a
     space.

@@ -27,7 +27,7 @@ STATES = {"q": "q", "qd": "QP", "qdd": "QDP", "qdr": "QPR", "qddr": "QDPR"}
 
 @dataclass(frozen=True)
 class Function:
-    """One function of the emitted code: a model of the robot over its base parameters.
+    """One function of the emitted code, such as the inverse dynamics, over the base parameters.
 
     Attributes
     ----------
@@ -46,12 +46,12 @@ class Function:
 
     @cached_property
     def nodes(self) -> list[Node]:
-        """Nodes of the expression graph that the entries depend on: inputs and operations."""
+        """Nodes of the expression graph on which the result depends: inputs and operations."""
         return reachable(self.values.outputs)
 
     @cached_property
     def inputs(self) -> set[Symbol]:
-        """Symbols that the entries depend on: states, parameters and constants."""
+        """Symbols on which the result depends: states, parameters and constants."""
         return {node.value for node in self.nodes if node.op == SYM}
 
     def reads(self, kind: str) -> bool:
@@ -59,9 +59,10 @@ class Function:
 
     @property
     def states(self) -> tuple[str, ...]:
-        """States that the function depends on, among q, qd, qdd, qdr, qddr and G.
+        """States on which the function depends, such as q and qd.
 
-        G holds the derivatives of the tied joint positions by the actuated joint positions.
+        They are among q, qd, qdd, qdr, qddr and G, the derivatives of the tied joint positions by
+        the actuated joint positions.
         """
         kinds = {**{state: state for state in STATES}, "G": "rate"}
         return tuple(state for state, kind in kinds.items() if self.reads(kind))
@@ -72,10 +73,9 @@ class Function:
         return tuple(name for name in free if name in read)
 
     def places(self, entry: Entry) -> tuple[Place, ...]:
-        """List the indices at which an entry stands in the result array.
+        """List the indices of an entry in the result array: (i, k) and (k, i) if it is symmetric.
 
-        An entry off the diagonal of a symmetric matrix stands at two, (i, k) and (k, i). In a model
-        that is stored column by column the indices are reversed.
+        In a model that is stored column by column the indices are reversed.
         """
         mirrored = entry.place[::-1]
         if self.model.by_columns:
@@ -86,24 +86,24 @@ class Function:
 
     @property
     def by_place(self) -> list[tuple[Place, Entry]]:
-        """Pairs of array index and entry, sorted by index."""
+        """Pairs of array index and entry for the whole result, sorted by index."""
         pairs = [(place, entry) for entry in self.values.entries for place in self.places(entry)]
         return sorted(pairs, key=lambda pair: pair[0])
 
     @property
     def preset(self) -> list[tuple[Place, float]]:
-        """Array index and value of each entry that is a constant number other than zero."""
+        """Array index and value of each result entry that is a constant number other than zero."""
         return [
             (p, float(e.value)) for p, e in self.by_place if isinstance(e.value, int) and e.value
         ]
 
     @property
     def computed(self) -> list[Entry]:
-        """Entries that the code must compute because they are not constant numbers."""
+        """Result entries that the code must compute because they are not constant numbers."""
         return [entry for entry in self.values.entries if isinstance(entry.value, Scalar)]
 
     def count(self, op: str) -> int:
-        """Count the operations of kind `op` that depend on the sample.
+        """Count the operations of one kind, such as multiplications, that depend on the sample.
 
         Operations on constants and parameters alone are not counted.
         """
@@ -125,7 +125,7 @@ class Function:
 
 @dataclass(frozen=True)
 class Signals:
-    """The distinct entries of a function; x and -x count as the same entry.
+    """The distinct entries of a function's result; x and -x count as the same entry.
 
     Attributes
     ----------
@@ -142,7 +142,7 @@ class Signals:
 
 
 def signals(f: Function, entries: Sequence[Entry]) -> Signals:
-    """Collect the distinct values of some entries of a function; x and -x count as one value.
+    """Collect the distinct values among entries of a result; x and -x count as one value.
 
     Entries that are plain numbers must be 0, 1 or -1.
     """
@@ -184,7 +184,7 @@ class ModuleSpec:
 
     @cached_property
     def structure(self) -> tuple[tuple[bool, ...], ...]:
-        """Table structure[k][row]: whether base parameter k can act on the actuated joint row.
+        """Table of booleans structure[k][row]: whether base parameter k can act on joint `row`.
 
         It can act if the entry of the regressor D is not identically zero.
         """
@@ -218,7 +218,7 @@ SHARING = ("regressor", "inverse_dynamics")
 
 
 def module_spec(regrouping: Regrouping, options: Sequence[str] = ()) -> ModuleSpec:
-    """Make all functions of the emitted code of a robot, over the base parameters of `regrouping`.
+    """Make all functions of the emitted code of a robot, over its base parameters.
 
     Models on request are included if `options` names them.
     """
@@ -245,7 +245,7 @@ def function(
     only: Callable[[str], bool] = lambda own: True,
     graph: Rewrite | None = None,
 ) -> Function:
-    """Make one function: a model over the base parameters.
+    """Make one function of the emitted code: a model, such as the regressor, over base parameters.
 
     Only base parameters named after a standard parameter for which `only` is true take part.
     `graph` is an expression graph that several models share; it needs all parameters.
@@ -267,7 +267,7 @@ def shape_of(model: Model, d: Derivation, parameters: tuple[str, ...]) -> tuple[
 
 @lru_cache(maxsize=2)
 def spec_of(robot: Robot, options: tuple[str, ...] = ()) -> ModuleSpec:
-    """Make all functions of the emitted code of a robot, with a cache.
+    """Make all functions of the emitted code of a robot; the results are cached.
 
     The cache saves time if the Python module and the C file of a robot are made one after the
     other.

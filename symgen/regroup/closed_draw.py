@@ -1,4 +1,4 @@
-"""Random closed states of a mechanism with loops, exact over the finite field F_p.
+"""Random closed states of a mechanism with loops, computed exactly modulo a prime p.
 
 The tied joints are algebraic functions of the actuated ones. The method serves loops whose
 orientations agree by construction (sums of angles), so that the closure equations r = 0 are
@@ -11,12 +11,16 @@ points of
 
 each as likely as any other. V is linear in the lengths, a bundle of linear spaces over the torus of
 the angles, hence irreducible: an identity that holds at random points of V holds on all of V, for
-every geometry and in every assembly mode. Rates and accelerations of the tied joints follow from J
-qd = 0, J qdd + Jd qd = 0, by linear equations.
+every geometry and in every assembly mode. Rates and accelerations of the tied joints follow from
+linear equations:
+
+    J qd = 0 ,   J qdd + Jd qd = 0 .
 
 If lengths are equal, the roots may always lie in F_p, and the closure splits into branches, such as
-the parallelogram and the antiparallelogram. The branch of the robot file is found by a relation q_u
-= sum n_i q_i + k pi/2 that holds on one branch and not on the other.
+the parallelogram and the antiparallelogram. The branch of the robot file is found by a relation
+that holds on one branch and not on the other:
+
+    q_u = sum n_i q_i + k pi/2 .
 """
 
 from __future__ import annotations
@@ -46,10 +50,10 @@ ON_BRANCH = 1e-6  # rad
 
 
 class ClosedDraw(Draw):
-    """Random closed states over F_p: `samples` states at each of `count` random geometries.
+    """Random closed states modulo a prime p: `samples` states at each of `count` geometries.
 
-    `geometry` gives the residues of the quantities that vary, shape (count, 1). By default these
-    are all lengths; with `at_numbers`, lengths that are numbers in the robot file have their
+    `geometry` gives the values modulo p of the quantities that vary, shape (count, 1). By default
+    these are all lengths; with `at_numbers`, lengths that are numbers in the robot file have their
     values.
 
     `wide` times as many states as usual are drawn, because not all of them close. ArithmeticError
@@ -103,7 +107,7 @@ class ClosedDraw(Draw):
         return self._array(value).reshape(self.shape)
 
     def _close(self) -> Array:
-        """Close loop after loop by two tied joints each.
+        """Solve the closure equations loop by loop, each loop for two joints, modulo p.
 
         Return which samples could be closed, shape (samples,).
         """
@@ -127,7 +131,7 @@ class ClosedDraw(Draw):
         return closed
 
     def _dyad(self, rows: list[int], u: int, v: int, around: set[int]) -> Array:
-        """Solve the two closure equations of a loop for joint u and hinge v, over F_p.
+        """Solve the two closure equations of a loop for joint u and hinge v, modulo p.
 
         Return which samples have a solution in F_p. The equations have the form
 
@@ -157,7 +161,7 @@ class ClosedDraw(Draw):
         R[:, 1:] -= R[:, :1]
 
         def place(x: Array) -> Array:
-            """Set joint u to the half-angle tangent x, or to the stroke x if u slides.
+            """Set joint u to the half-angle tangent x, or to the stroke x if joint u slides.
 
             Return y = (1, cos q_u, sin q_u), or (1, x, x**2) if u slides.
             """
@@ -168,8 +172,7 @@ class ClosedDraw(Draw):
             return np.stack([whole, *self._points[u]])
 
         def tip(y: Array) -> tuple[Point, Array]:
-            """Compute the (cos v, sin v) that closes the loop, and the determinant of the
-            equations.
+            """Compute (cos v, sin v) that closes the loop, and the determinant of the equations.
 
             The point need not lie on the unit circle.
             """
@@ -209,10 +212,10 @@ class ClosedDraw(Draw):
         return np.asarray(square)
 
     def _branch(self, j: int, first: Point, second: Point, around: set[int]) -> Array:
-        """Whether the solution `first` lies on the branch of the robot file, shape (samples,).
+        """Whether the first of two loop solutions is on the robot file's branch, for each sample.
 
         `first` and `second` are the two solutions for hinge j. The test is needed if the closure
-        splits into two branches.
+        splits into two branches; the result has shape (samples,).
         """
         hinges = [
             i for i in self.robot.joints if i in around and self.robot.frame(i).sigma == REVOLUTE
@@ -246,7 +249,7 @@ class ClosedDraw(Draw):
         )
 
     def _take(self, closed: Array) -> None:
-        """Select the first samples of each geometry that close, and drop the other samples.
+        """Select samples whose loops close, the same number for each geometry; drop the others.
 
         `closed` marks the samples that close, shape (geometries, samples).
         """
@@ -264,7 +267,7 @@ class ClosedDraw(Draw):
         self.samples = len(places)
 
     def _move(self) -> None:
-        """Compute rates and accelerations of the tied joints from the actuated joints."""
+        """Compute velocities and accelerations of the tied joints from the actuated joints."""
         joints = self.robot.joints
         n = len(joints)
         named = self.system.derivation.algebra.named
@@ -284,7 +287,7 @@ class ClosedDraw(Draw):
             self._residues[Symbol("qdd", f"QDP{u}")] = (along + bend) % self.p
 
     def _solved(self, A: Array, b: Array) -> Array:
-        """Solve A x = b sample by sample over F_p; A has shape (m, m, samples).
+        """Solve A x = b modulo p, sample by sample; A has shape (m, m, samples).
 
         A singular sample raises ArithmeticError.
         """
@@ -296,7 +299,7 @@ class ClosedDraw(Draw):
 
 
 def closed_draw(robot: Robot, seed: int, samples: int, **given: Any) -> ClosedDraw:
-    """Draw random closed states over F_p; repeat the draw if it fails by chance.
+    """Draw random closed states modulo p; repeat the draw if it fails by chance.
 
     A draw fails if it is singular, or if too few states close at one of the geometries. Each
     repetition draws more samples.

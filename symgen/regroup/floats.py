@@ -1,8 +1,8 @@
 """Base columns and coefficients in floating point, for the constants of the robot file.
 
-They are used for coefficients that are not recognised over F_p, and for general loops, of which F_p
-gives no closed states at one geometry. Dependent columns are found at random states, which Newton's
-method closes near the start configuration of the loops.
+They are used for coefficients that are not recognised modulo primes, and for loops that cannot be
+closed exactly modulo a prime, such as spatial loops. Dependent columns are found at random states,
+which Newton's method closes near the start configuration of the loops.
 """
 
 from __future__ import annotations
@@ -33,9 +33,10 @@ Relations = dict[str, dict[str, Expression]]  # {dependent: {base column: coeffi
 
 
 def float_relations(robot: Robot, names: Sequence[str]) -> tuple[tuple[str, ...], Relations]:
-    """Choose base columns among `names`, in order of preference, and express the other columns.
+    """Find base columns of the regressor numerically, and the coefficients of the other columns.
 
-    Return the base columns and {dependent column: {base column: coefficient}}.
+    `names` are the columns in order of preference. Return the base columns and {dependent column:
+    {base column: coefficient}}.
     """
     pivots, K = float_base(float_regressor(robot, names))
     base = tuple(names[c] for c in pivots)
@@ -47,7 +48,7 @@ def float_relations(robot: Robot, names: Sequence[str]) -> tuple[tuple[str, ...]
 
 
 def numeric_coefficients(robot: Robot, name: str, support: Sequence[str]) -> list[Expression]:
-    """Compute beta in D_name = sum_k beta_k D_support,k as numbers, by least squares."""
+    """Compute beta of the regressor column D_name = sum_k beta_k D_support,k by least squares."""
     W = float_regressor(robot, (*support, name))
     size = np.linalg.norm(W[:, :-1], axis=0)
     beta = np.linalg.lstsq(W[:, :-1] / size, W[:, -1], rcond=None)[0] / size
@@ -124,7 +125,7 @@ def sampled_columns(floats: Floats, names: Sequence[str], count: int) -> Array:
 def _columns_near_start(
     system: LoopSystem, names: Sequence[str], count: int, rng: np.random.Generator
 ) -> Array:
-    """Compute the columns `names` at random closed states near the start of the loops.
+    """Compute regressor columns at random closed states near the start configuration.
 
     `count` states are tried; states that do not close are dropped. The result has shape (joints,
     states, columns).

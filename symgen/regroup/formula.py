@@ -52,10 +52,10 @@ class Formula:
         return _sum(terms)
 
     def groups(self) -> list[tuple[Expression, list[Signed]]]:
-        """Group the parameters by their coefficients, as in eq. (27).
+        """Group the parameters of the formula by equal coefficients.
 
-        Return each coefficient with its parameters. Parameters with the opposite coefficient are in
-        the same group, marked as subtracted.
+        Return each coefficient with its parameters, as in eq. (27). Parameters with the opposite
+        coefficient are in the same group, marked as subtracted.
         """
         groups: dict[Expression, list[Signed]] = {}
         for name, c in self.combination.items():

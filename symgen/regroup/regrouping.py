@@ -69,7 +69,7 @@ class BaseParameter:
 
 @dataclass(frozen=True)
 class Regrouping:
-    """The base parameters of a robot, with the moves that led to them.
+    """The base parameters of a robot with their formulas, and how these were derived.
 
     Attributes
     ----------
@@ -102,10 +102,10 @@ class Regrouping:
 
     @property
     def constants(self) -> Mapping[str, float]:
-        """Constants of the robot that may have other values than in the robot file.
+        """Constants of the robot whose values may change without a new derivation.
 
         If coefficients are numbers, only channels may change (constants that are functions of
-        time), because the numbers hold for the constants of the file.
+        time), because the numbers hold for the constants of the robot file.
         """
         every, channels = self.robot.constants, self.robot.channels
         return every if self.method == EXACT else {c: every[c] for c in every if c in channels}
@@ -195,7 +195,7 @@ def _regrouped(robot: Robot, seed: int) -> Regrouping:
 
 
 def _reason(missing: Mapping[str, str]) -> str:
-    """State why the coefficients of a column were not recognised.
+    """State why the coefficients of a regressor column were not found exactly.
 
     The sentence names the first column and counts the other columns in `missing`.
     """
@@ -210,7 +210,7 @@ regrouping = regroup  # its public name, symgen.regrouping: symgen.regroup is th
 
 
 def preference(robot: Robot, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Sort the columns by preference: earlier columns are chosen first as base parameters."""
+    """Sort regressor columns by preference: earlier columns are chosen first as base parameters."""
     inertial, elements = inertial_names(robot), element_names(robot)
 
     def rank(name: str) -> tuple[int, int, int]:
@@ -236,7 +236,7 @@ def _assemble(
     relations: Mapping[str, Mapping[str, Expression]],
     draw: Draw,
 ) -> Regrouping:
-    """Build the base parameters from the general rules and the relations of this robot alone.
+    """Build the base parameters from general rules and from relations of this robot alone.
 
     `relations` holds {dependent column: {base column: coefficient}}.
     """
@@ -265,9 +265,9 @@ def _assemble(
 
 
 def _vanishes(c: Expression, draw: Draw) -> bool:
-    """Whether a coefficient is zero, also if only sin**2 + cos**2 = 1 makes it zero.
+    """Whether a coefficient is zero, with sin**2 + cos**2 = 1 taken into account.
 
-    Its residues over F_p decide, because angles are exact there.
+    The values of the coefficient modulo a prime decide, because angles are exact there.
     """
     if all(isinstance(a, str) for a in c.atoms):
         return not c
@@ -277,8 +277,11 @@ def _vanishes(c: Expression, draw: Draw) -> bool:
 def sign_conditions(regrouping: Regrouping) -> list[tuple[str, Expression, int]]:
     """Find the base parameters whose formula holds only for one sign of a transmission ratio.
 
-    Such a formula adds the frictions of dependent joints. For qd2 = KR qd1, sign(qd2) = sign(KR)
-    sign(qd1), so that FS1 + KR FS2 holds only for the sign that KR has in the robot file.
+    Such a formula adds the frictions of dependent joints. For qd2 = KR qd1,
+
+        sign(qd2) = sign(KR) sign(qd1) ,
+
+    so that FS1 + KR FS2 holds only for the sign that KR has in the robot file.
 
     Return for each ratio: a base parameter, the ratio of the two joint rates, and its sign in the
     robot file.

@@ -1,4 +1,4 @@
-"""Columns of the standard regressor over the finite field F_p, at random states and geometries."""
+"""Columns of the standard regressor at random states and geometries, exact modulo a prime p."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ def draw_states(
     geometry: Mapping[Variable, Array] | None = None,
     count: int = 0,
 ) -> Draw:
-    """Draw `samples` random states over F_p, at one geometry or at each of `count` geometries.
+    """Draw `samples` random states modulo p, at one geometry or at each of `count` geometries.
 
     If closure equations tie joints, the states satisfy these equations. ArithmeticError is raised
-    for loops of which F_p gives no closed states at one geometry.
+    for loops that cannot be closed exactly modulo p, such as spatial loops.
     """
     if close(robot).tied:
         return closed_draw(robot, seed, samples, p=p, count=max(count, 1), geometry=geometry)
@@ -36,7 +36,7 @@ def draw_states(
 
 
 def sample(draw: Draw, names: tuple[str, ...]) -> Array:
-    """Compute the regressor columns `names` over F_p at the states of a draw.
+    """Compute the regressor columns `names` at the random states of `draw`, modulo p.
 
     The result has shape (..., n_active * samples, len(names)), int64 residues; the axis ... counts
     the geometries if the draw has several.
@@ -57,7 +57,7 @@ def sample(draw: Draw, names: tuple[str, ...]) -> Array:
 
 
 def states_for(robot: Robot, names: Sequence[str], spare: int = 4) -> int:
-    """Return how many random states show the rank of the columns `names`, with some to spare.
+    """Return how many random states are enough to show the rank of the regressor columns `names`.
 
     The columns that act only on the joints of a set S need |columns| <= states |S|. This is
     required for the set of every column, and for all joints. At least `spare` states are added.

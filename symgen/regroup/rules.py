@@ -1,8 +1,8 @@
 """General regrouping rules, exact for any geometry, applied from the tips to the base.
 
 The rules are identities between regressor columns. They hold for any motion of link i = ant(j) and
-any gravity [GK90, KB95], hence also in closed loops. For a revolute joint j, with a = A_j e3 and p
-= P_ij (both constant):
+any gravity [GK90, KB95], hence also in closed loops. For a revolute joint j, the vectors a = A_j e3
+and p = P_ij are constant, and
 
     D_YY = -D_XX + D_J_i( A diag(1,1,0) A' )
     D_MZ = D_MS_i(a) + D_J_i( 2 (p.a) E - p a' - a p' )
@@ -92,7 +92,7 @@ class Transfer:
         return total
 
     def _move(self, source: str, image: Combination) -> None:
-        """Remove the column `source`, which equals sum_k image_k column k of other columns.
+        """Remove the column `source`, which equals sum_k image_k D_k of other regressor columns.
 
         The other columns then stand for the parameters of `source` too.
         """
@@ -108,7 +108,7 @@ class Transfer:
 
 
 def link_relations(f: Frame) -> dict[str, dict[tuple[str, int], Expression]]:
-    """Return the relations that move parameters of link j to the link i before it.
+    """Return the rules that move parameters of link j to the link i before it, as coefficients.
 
     The result is {removed parameter of link j: {(parameter, 1 if of link i, else 0): coefficient}}.
     """

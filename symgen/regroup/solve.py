@@ -71,7 +71,7 @@ Supports = Mapping[
 def coefficients(
     robot: Robot, supports: Supports
 ) -> tuple[dict[str, list[Expression]], dict[str, str]]:
-    """Find the exact coefficients beta in D_dependent = sum_k beta_k D_support,k.
+    """Find exact beta in D_dependent = sum_k beta_k D_support,k, with D the regressor columns.
 
     Return the coefficients of each dependent column, and for columns without a fraction P/Q of
     moderate degree the reason.
@@ -87,10 +87,10 @@ def coefficients(
 
 
 class Pool:
-    """Residues of the coefficients at random geometries over one prime, the k-th.
+    """Coefficients of dependent columns modulo a prime, at a growing number of random geometries.
 
-    Geometries are added when they are needed. `free` names what may vary besides the constants:
-    "numbers" of the robot file, "pi" (fractions of pi), or both.
+    `k` is the number of the prime. `free` names what may vary besides the constants: "numbers" of
+    the robot file, "pi" (fractions of pi), or both.
     """
 
     def __init__(self, robot: Robot, supports: Supports, free: Sequence[str], k: int) -> None:
@@ -119,11 +119,11 @@ class Pool:
         self.values: dict[Expression, Array] = {}
 
     def random(self, count: int) -> dict[Variable, Array]:
-        """Draw `count` random geometries: residues of shape (count, 1) for each variable."""
+        """Draw `count` random geometries: integers modulo p, shape (count, 1), per variable."""
         return {v: self.rng.integers(2, self.p, (count, 1)) for v in self.variables}
 
     def solved(self, geometry: Mapping[Variable, Array], count: int) -> dict[str, Array | None]:
-        """Compute the residues of the coefficients of each dependent column.
+        """Compute the coefficients of each dependent column at the given geometries, modulo p.
 
         The shape is (count, support); the value is None if the column does not depend on its
         support at every geometry.
@@ -137,7 +137,7 @@ class Pool:
         }
 
     def grow(self, count: int) -> None:
-        """Add random geometries until there are at least `count`."""
+        """Draw more random geometries until there are at least `count`."""
         if count <= self.count:
             return
         more = max(count - self.count, self.count, FEWEST_GEOMETRIES)
@@ -151,7 +151,7 @@ class Pool:
         self.values.clear()
 
     def value(self, m: tuple[Expression, ...]) -> Array:
-        """Compute the residues of a product of expressions at all geometries."""
+        """Compute a product of expressions at all random geometries, modulo p."""
         total = np.ones(self.count, dtype=np.int64)
         for e in m:
             if e not in self.values:
@@ -161,7 +161,7 @@ class Pool:
         return total
 
     def vector(self, name: str, k: int, P: Products, Q: Products) -> dict[int, int] | None:
-        """Find a linear relation between products for P and beta times products for Q, over F_p.
+        """Find polynomials P, Q with beta = P/Q, as sums of the given products, modulo p.
 
         Return {index in [*Q, *P]: residue} of the first relation with a denominator (a product of
         Q), or None. There can be several relations, since cos(a) and cos(3 a) are related.
@@ -188,7 +188,7 @@ class Pool:
 
 @dataclass(frozen=True)
 class Dependence:
-    """The variables on which a coefficient depends.
+    """The variables, such as lengths, on which a coefficient depends.
 
     The coefficient depends on `free` in an unknown way; the variables in `powers` are mere factors
     with the given power.
@@ -202,7 +202,7 @@ class Dependence:
 
 
 class Recognition:
-    """Search for the expressions of coefficients whose residues over F_p are known.
+    """Search for the exact expressions of coefficients that are known modulo primes.
 
     `free` names what counts as a variable besides the constants, see `Pool`.
     """
@@ -215,7 +215,10 @@ class Recognition:
         self.work = 0  # multiplications, roughly
 
     def coefficients(self) -> dict[str, list[Expression]]:
-        """Return {dependent column: coefficients} for all columns that were recognised."""
+        """Return the exact coefficients of all dependent columns for which the search succeeds.
+
+        The form is {dependent column: coefficients}.
+        """
         result: dict[str, list[Expression]] = {}
         for name, matters in self._what_matters().items():
             each = (self._recognise(name, k, depends) for k, depends in enumerate(matters))
@@ -273,9 +276,9 @@ class Recognition:
         return result
 
     def _power(self, reference: int, scaled: Sequence[int]) -> int:
-        """Find the power n with which a coefficient scales with a variable; 0 if there is none.
+        """Find the power n with which a coefficient scales with one variable; 0 if there is none.
 
-        `scaled` holds the residues with the variable multiplied by each of SCALES.
+        `scaled` holds the coefficient modulo p with the variable multiplied by each of SCALES.
         """
         p = self.pools[0].p
         ratios = [int(x) * pow(int(reference), -1, p) % p for x in scaled] if reference else []
@@ -329,7 +332,7 @@ class Recognition:
     def _rationals(
         self, vector: dict[int, int], name: str, k: int, P: Products, Q: Products
     ) -> dict[int, Fraction] | None:
-        """Convert residues to rational numbers, or return None if they are not rational.
+        """Convert integers modulo p to rational numbers; return None if there are none.
 
         One prime is enough for small numerators and denominators. Otherwise primes are combined by
         the Chinese remainder theorem until one more prime agrees.
@@ -398,9 +401,10 @@ class Recognition:
 
 
 def _fraction(entries: Mapping[int, Fraction], P: Products, Q: Products) -> Expression | None:
-    """Make the expression P/Q from the coefficients of the products [*Q, *P]; None if Q is zero.
+    """Make the expression P/Q from the coefficients of its products; None if Q is zero.
 
-    Cosines and roots that have simple values are replaced by these values.
+    The products are [*Q, *P]. Cosines and roots that have simple values are replaced by these
+    values.
     """
     products = [*Q, *P]
     sides = [Expression(), Expression()]
@@ -417,7 +421,7 @@ def _fraction(entries: Mapping[int, Fraction], P: Products, Q: Products) -> Expr
 
 
 def _atom(a: str | Number | Call) -> Expression:
-    """Make the expression of one variable; cos(pi/6) is not replaced by its value."""
+    """Return one variable as an expression; cos(pi/6) is not replaced by its value."""
     return Expression({((a, 1),): Fraction(1)})
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import uvicorn
 from starlette.applications import Starlette
 from starlette.requests import Request
-from starlette.responses import Response, StreamingResponse
+from starlette.responses import FileResponse, Response, StreamingResponse
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
@@ -51,7 +51,15 @@ def application(server: Server, port: int, end: Callable[[], None]) -> Guard:
         Mount(f"/{name}", StaticFiles(directory=str(files("symgen").joinpath(place))))
         for name, place in {"static": "studio/static", "pages": "pages"}.items()
     ]
-    inner = [Route("/events", events), *mounts, *Pages(server).routes()]
+    async def ticks(request: Request) -> Response:
+        return FileResponse(str(files("runtime").joinpath("reporting/ticks.js")))
+
+    inner = [
+        Route("/events", events),
+        Route("/ticks.js", ticks),
+        *mounts,
+        *Pages(server).routes(),
+    ]
     app = Starlette(routes=[Mount(f"/{server.token}", routes=inner)], lifespan=lifespan)
     hosts = {f"{name}:{port}" for name in ("127.0.0.1", "localhost", "[::1]")}
     return Guard(app, server.token, hosts)

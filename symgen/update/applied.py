@@ -91,7 +91,10 @@ class Applied:
     lost: tuple[str, ...]
 
     def write(self, output: str | Path) -> Path:
-        """Write the new text completely or not at all, and return the path. An existing file is replaced."""
+        """Write the new text completely or not at all, and return the path of the file.
+
+        An existing file is replaced.
+        """
         path = Path(output).resolve()
         return write_all(path.parent, {path.name: self.content})[0]
 

@@ -51,7 +51,10 @@ TINY = 1e-15  # SI; an eigenvalue so little below zero is rounding
 
 @dataclass(frozen=True, eq=False)
 class Nearest:
-    """Numbers u, shape (p,), of links and joint elements that are nearest to those of the file.
+    """Result of `nearest`: the values of links and joints that are nearest to those of the file.
+
+    The numbers u, shape (p,), are mass, centre and tensor of each link, and the parameters of the
+    elements on the joints.
 
     Attributes
     ----------
@@ -84,7 +87,10 @@ class Nearest:
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """The unknowns of the optimisation: the numbers of the links and joint elements of a file.
+    """The unknowns of the optimisation in `nearest`: the values of links and joints of a file.
+
+    The values are mass, centre and tensor of each link, and the parameters of elements on the
+    joints.
 
     Attributes
     ----------
@@ -117,16 +123,16 @@ class Numbers:
         return Numbers(part, links, *(x[:count] for x in of_numbers))
 
     def chi(self, u: Array) -> Array:
-        """Compute the standard parameters, shape (p,), from the numbers u."""
+        """Compute the standard parameters, shape (p,), from the values u of links and joints."""
         chi = u.copy()
         for link, at in self.links:
             chi[at] = link.place.ten(u[at])
         return chi
 
     def slope(self, u: Array) -> Array:
-        """Compute d chi / d u, shape (p, p), by central differences.
+        """Compute the derivatives d chi / d u, shape (p, p), of the standard parameters.
 
-        The differences are exact, because chi is of second order in every number.
+        Central differences are exact, because chi is of second order in every number.
         """
         T = np.eye(len(u))
         for link, at in self.links:
@@ -138,7 +144,7 @@ class Numbers:
         return T
 
     def seen(self, u: Array) -> Array:
-        """Find the numbers on which a base parameter depends; bool, shape (p,)."""
+        """Find the values of links and joints that affect a base parameter; bool, shape (p,)."""
         A = self.physical.K @ self.slope(u) * self.size
         share = np.abs(A) > MISSED * np.linalg.norm(A, axis=1, keepdims=True)
         return np.asarray(np.any(share, axis=0))
@@ -152,8 +158,7 @@ def nearest(
     X: Array,
     absent: Collection[str] = (),
 ) -> Nearest:
-    """Find the numbers of links and joint elements that give X and are nearest to those of the
-    file.
+    """Find values of links and joints that give the base parameters X and are nearest to the file.
 
     Parameters
     ----------
@@ -218,12 +223,12 @@ def _of_file(
     values: Mapping[str, float],
     absent: Collection[str],
 ) -> tuple[Numbers, dict[str, int], list[int]]:
-    """Collect the numbers of the file as unknowns, in the order in which they may change.
+    """Collect the values of links and joints as unknowns, in the order in which they may change.
 
     Return the unknowns, the index of each element, and for each attempt how many numbers may
     change. The first attempt has the first link of each body, and the elements. The second adds
-    elements that the file does not have and that the links can replace; the third adds the other
-    links.
+    elements that the file does not have and that other parameters can replace; the third adds the
+    other links.
     """
     leading = {link.j: link for link in reversed(links)}
     led = [leading[j] for j in physical.links if j in leading]
@@ -285,7 +290,7 @@ def _sizes_of(x: Array) -> Array:
 
 
 def _spare(physical: PhysicalModel, own: Sequence[str], absent: Sequence[str]) -> list[str]:
-    """Find elements that the file lacks and whose effect on the base parameters others can give."""
+    """Find the elements that the file lacks and whose effect the other parameters can replace."""
     spare: list[str] = []
 
     def rank(names: Sequence[str]) -> int:
@@ -301,7 +306,7 @@ def _spare(physical: PhysicalModel, own: Sequence[str], absent: Sequence[str]) -
 
 
 def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple[Array | None, str]:
-    """Find numbers u of a physical robot with K chi(u) = rest.
+    """Find values u of a physical robot that give the base parameters: K chi(u) = rest.
 
     Return u and "", or None and the reason why no physical robot has these base parameters.
     """
@@ -334,16 +339,16 @@ def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple
 
 
 def _violated(part: Numbers, u: Array) -> bool:
-    """Whether the numbers that changed violate a condition of a physical robot."""
+    """Whether the values that changed violate a condition of a physical robot."""
     chi, moved = part.chi(u), u != part.u0
     conditions = [c for c in part.physical.conditions if moved[list(c.numbers)].any()]
     return any(c.smallest(chi) < -TINY for c in conditions)
 
 
 def _solve(part: Numbers, K: Array, rest: Array, start: Array, free: Array) -> Array | None:
-    """Find the numbers nearest to `start` with K chi(u) = rest, by Newton's method.
+    """Find the values u nearest to `start` with K chi(u) = rest, by Newton's method.
 
-    Only the numbers in `free` change. The result is None if the steps do not reach a solution.
+    Only the values in `free` change. The result is None if the steps do not reach a solution.
     """
     S, u = (part.size * part.ease)[free], start.copy()
     for _ in range(STEPS):
@@ -362,10 +367,10 @@ def _solve(part: Numbers, K: Array, rest: Array, start: Array, free: Array) -> A
 
 
 def _hold(part: Numbers, chi: Array) -> Array:
-    """Convert chi to numbers of the file; numbers without effect on base parameters keep their
-    value.
+    """Convert standard parameters chi to values of the file; values without effect do not change.
 
-    If these values violate a condition of a physical robot, the numbers in it are those of chi.
+    A value has no effect if no base parameter depends on it. If the unchanged values violate a
+    condition of a physical robot, the values in this condition are those of chi.
     """
     u = chi.copy()
     for link, at in part.links:

@@ -74,9 +74,7 @@ class Attributes:
 
     @property
     def order(self) -> list[int]:
-        """Indices in NUMBERS of the numbers of a link, in the order in which the format writes
-        them.
-        """
+        """Order of mass, centre and tensor elements in the file, as indices into NUMBERS."""
         return [k for row in self.inertial.values() for places in row.values() for k in places]
 
 
@@ -138,8 +136,9 @@ class LinkPlace:
         return self.attributes is MJCF and not full
 
     def numbers(self, ten: Array) -> Array:
-        """Convert ten inertial parameters in frame j to mass, centre and tensor of the file, shape
-        (10,).
+        """Convert ten inertial parameters in frame j to mass, centre and tensor of the file.
+
+        The argument has the order XX .. ZZ, MX, MY, MZ, M, the result the order of NUMBERS.
         """
         if not np.any(ten):
             return np.zeros(10)
@@ -151,8 +150,9 @@ class LinkPlace:
         return np.array([own.M, *(R.T @ (own.pose[:3, 3] - self.X[:3, 3])), *tensor])
 
     def ten(self, x: Array) -> Array:
-        """Convert mass, centre and tensor of the file to ten inertial parameters in frame j, shape
-        (10,).
+        """Convert mass, centre and tensor of the file to ten inertial parameters in frame j.
+
+        The argument and the result have the shape (10,).
         """
         pose, (xx, xy, xz, yy, yz, zz) = np.eye(4), x[4:]
         if self.principal or self.attributes is URDF:
@@ -252,16 +252,15 @@ class Places:
         return LinkPlace(self.attributes, link, e, X @ place, axes, of_file)
 
     def attribute(self, family: str, joint: Joint) -> str | None:
-        """Return the XML attribute for a parameter of a joint, such as damping; None if there is
-        none.
+        """Return the name of the XML attribute for a parameter of a joint, such as damping.
+
+        The result is None if the joint has no attribute for parameters of this family.
         """
         without = family in SPRING and not joint.stiffness
         return None if without else self.attributes.joint.get(family)
 
     def heed_inertials(self, edits: XmlEdits) -> None:
-        """Add the edit that makes MuJoCo use an inserted <inertial>: inertiafromgeom becomes
-        "auto".
-        """
+        """Set inertiafromgeom to "auto" in the file, so that MuJoCo uses an inserted <inertial>."""
         own = (e for body in self.links.values() for e in body.own("inertial"))
         ignored = next(own, None)
         if self.from_geoms and ignored is not None:
@@ -410,8 +409,7 @@ class RobotText:
 
     @property
     def links(self) -> list[FileLink]:
-        """Links with inertia on bodies that move, body by body, the link on the moving joint first.
-        """
+        """Links with inertia on moving bodies, body by body; the link on the joint comes first."""
         return [
             FileLink(name, j, ten_of(inertial, X), self.places.link(name, self.tree, X))
             for j in self.robot.links
@@ -420,21 +418,19 @@ class RobotText:
         ]
 
     def joint_values(self, j: int) -> dict[str, float]:
-        """Return the values in the file of the elements on joint j, by family: Ia, FV, FS, OFFSET,
-        K.
-        """
+        """Return the values of the elements on joint j in the file, by family: Ia, FV, FS ..."""
         return {family: value(self.table.joint[j]) for family, _, value in JOINT_TERMS}
 
     def attribute(self, family: str, j: int) -> str | None:
-        """Return the XML attribute for a parameter of joint j; None if the format has no such
-        attribute.
+        """Return the name of the XML attribute for a parameter of joint j, or None.
+
+        The result is None if the format has no attribute for parameters of this family.
         """
         return self.places.attribute(family, self.table.joint[j])
 
 
 def read_text(content: bytes, path: Path, exact: bool, part: TreePart) -> RobotText:
-    """Read a URDF or MJCF file as `read_robot` does, and find the places of its numbers in the
-    text.
+    """Read a URDF or MJCF file as `read_robot` does, and find its numbers in the text.
 
     Raises
     ------
@@ -456,8 +452,7 @@ def read_text(content: bytes, path: Path, exact: bool, part: TreePart) -> RobotT
 
 
 def require_same_frames(text: RobotText, robot: Robot, file: str) -> None:
-    """Check that the frames of `robot` are those of the file, because link parameters depend on
-    them.
+    """Check that `robot` has the same frames as the file, because link parameters depend on them.
 
     Raises DescriptionError if a frame differs.
     """

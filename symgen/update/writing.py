@@ -1,6 +1,4 @@
-"""Edits that write the identified values into a file, the list of changes, and a check of the new
-text.
-"""
+"""Edits that write identified values into a file, and a check of the new text."""
 
 from __future__ import annotations
 
@@ -57,9 +55,7 @@ class Writing:
         return rows
 
     def _link_rows(self, link: FileLink) -> list[Change]:
-        """Make a Change for each number of a link: old and new value, standard deviation, and
-        source.
-        """
+        """Make a Change for each number of a link: old and new value, sigma, and source."""
         rows, at = [], self.nearest.links[link.name]
         for k in link.place.attributes.order:
             name, label, unit = NUMBERS[k]
@@ -83,9 +79,7 @@ class Writing:
         return "record" if self.nearest.told[k] else "sum"
 
     def joints(self, edits: XmlEdits) -> list[Change]:
-        """Edit the joints, and return a Change for each parameter for which the format has an
-        attribute.
-        """
+        """Edit the joints, and return a Change for each parameter that the format can store."""
         rows = []
         for j, joint in self.text.table.joint.items():
             attributes = {
@@ -108,7 +102,7 @@ class Writing:
         return float(self.nearest.u[self.nearest.elements[name]])
 
     def sigma(self, k: int) -> float:
-        """Compute the standard deviation of number k."""
+        """Compute the standard deviation of value k of the links and joints."""
         return float(np.linalg.norm(self.nearest.gain[k] @ self.root))
 
     @property
@@ -122,8 +116,7 @@ class Writing:
         }
 
     def require_read_back(self, again: RobotText) -> None:
-        """Check that the written text, which was read again as `again`, gives the values to be
-        written.
+        """Check that the written text, read again as `again`, gives the intended values.
 
         Raises DescriptionError if it does not.
         """

@@ -57,8 +57,7 @@ class XmlEdits:
         values: Sequence[float],
         default: Sequence[float] | None = None,
     ) -> None:
-        """Replace the first numbers of the attribute `name` by `values`; equal numbers stay as
-        written.
+        """Replace the first numbers of attribute `name` by `values`; equal numbers stay as written.
 
         Parameters
         ----------
@@ -118,9 +117,7 @@ class XmlEdits:
         self.added.append(f"line {e.line}: {name} of <{e.tag}>")
 
     def _value(self, e: XmlElement, name: str) -> tuple[int, int] | None:
-        """Find the first and last byte of the value of an attribute, without quotes; None if it is
-        missing.
-        """
+        """Find the byte positions of an attribute value, without quotes; None if it is missing."""
         match = self._attributes(e).get(name.encode())
         return None if match is None else (match.start("quoted") + 1, match.end("quoted") - 1)
 

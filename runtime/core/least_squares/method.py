@@ -115,7 +115,10 @@ class Method:
     any_rank: bool = False
 
     def checked(self, settings: EstimateSettings) -> Any:
-        """Return the options of the settings; SettingsError if options or weights do not suit the method."""
+        """Check options and weights of the settings for this method, and return the options.
+
+        SettingsError if they do not suit.
+        """
         message = (
             f"{settings.weights!r} with method {settings.method}; expected "
             f"{' or '.join(self.weights)}: it has its own weights or none, others belong to "
@@ -171,7 +174,7 @@ def linear_estimate(
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Estimate:
-    """Estimate X of Y = W X + rho by one linear system; SettingsError for a method that is not linear.
+    """Estimate X of Y = W X + rho by one linear system; SettingsError for another method.
 
     Parameters
     ----------

@@ -221,7 +221,7 @@ class Observation:
         return float(max(max(self.rows) / BLOCKS, SHORTEST) / self.rate)
 
     def blocks(self, length: float | None = None) -> Array:
-        """Divide the records into intervals of `length` seconds; return the interval number of each row.
+        """Divide the records into intervals of `length` seconds; return the interval of each row.
 
         Shape (r,), numbers from 0. Such an interval is a block of residuals; no interval extends
         over two records.

@@ -117,7 +117,7 @@ class Prepared:
         return other
 
     def take_states(self, other: Prepared) -> None:
-        """Reuse the states of another preparation, if it has the same positions and signals."""
+        """Reuse the states of another Prepared, if it has the same positions and signals."""
         same = self.record.q is other.record.q and self.record.missing is other.record.missing
         same &= self.record.channels.get("qd") is other.record.channels.get("qd")
         same &= self.reader is other.reader and self.study.signals == other.study.signals

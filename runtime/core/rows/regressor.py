@@ -69,13 +69,13 @@ class Columns:
 
     @cached_property
     def entries(self) -> Entries:
-        """Table of the entries of these columns and of the distinct signals in them."""
+        """Table of the nonzero regressor entries of these columns; equal entries share one signal."""
         numbers = np.array(column_numbers(self.names, self.model.BASE_PARAMETERS), dtype=int)
         return distinct_entries(self.model, numbers)
 
     @cached_property
     def tape(self) -> Tape | None:
-        """Recorded operations for the distinct signals; None if the module must be called."""
+        """Recorded operations that compute the entries; None if the model itself must be called."""
         n = len(self.model.JOINTS)
         return recorded(self.model, [divmod(int(place), n) for place in self.entries.place])
 
@@ -100,9 +100,9 @@ class Columns:
         return store
 
     def signals(self, states: States, plan: Plan | None) -> Iterator[tuple[slice, Array]]:
-        """Yield slices of successive instants, with the decimated distinct signals there.
+        """Yield slices of successive instants, with the decimated distinct entries of W there.
 
-        The signals have shape (S, instants). Arrays are valid until the next ones are requested.
+        Their shape is (S, instants). Arrays are valid until the next ones are requested.
 
         plan : plan of the decimation; None keeps every sample.
         """
@@ -116,7 +116,7 @@ class Columns:
             yield slice(t0, t1), self._evaluated(states[t0:t1])
 
     def _evaluated(self, states: States) -> Array:
-        """Compute the distinct signals, shape (S, B), at states of shape (B, n).
+        """Compute the distinct entries of the regressor, shape (S, B), at states of shape (B, n).
 
         The array is valid until the next call.
         """
@@ -157,10 +157,10 @@ def in_time(model: GeneratedModel, states: States) -> dict[str, Any]:
 
 
 def distinct_entries(model: GeneratedModel, columns: Array | None = None) -> Entries:
-    """Group the nonzero entries of the regressor that are equal up to sign, at random states.
+    """Group the regressor entries that are equal up to sign, by their values at random states.
 
     The attribute STRUCTURE of the model marks the entries that are not identically zero. The
-    emitted text copies equal rows, so equal signals agree in every bit; different signals do not
+    emitted text copies equal rows, so equal entries agree in every bit; different entries do not
     agree at 64 random states. If random states are out of reach (loops that do not close), each
     entry is its own signal.
 

@@ -80,7 +80,7 @@ class Selection:
 
 @dataclass(frozen=True)
 class Instants:
-    """Window and decimated instants of a record.
+    """Window of a record, and the instants (samples) of the window that decimation keeps.
 
     Attributes
     ----------
@@ -125,7 +125,10 @@ EXCERPT = 2**16
 
 
 def excerpt(record: Record, rows: Rows) -> slice:
-    """Return the slice of the first EXCERPT samples in the window, for automatic settings."""
+    """Return the slice of the first samples in the window, to choose automatic settings.
+
+    It has EXCERPT samples at most.
+    """
     start, stop = window_of(record.t, rows.window, record.name)
     return slice(start, min(stop, start + EXCERPT))
 

@@ -1,4 +1,4 @@
-"""Recorded operations of an emitted regressor, of which only the needed ones are repeated.
+"""Recording of the operations by which an emitted module computes its regressor D.
 
     tape = recorded(model, [(k, j), ...])       # entries of D, column k, joint j
     tape.evaluate(q, qd, qdd, out)              # out, shape (S, B)
@@ -6,7 +6,7 @@
 An emitted module writes D by operations on whole rows. They are recorded once, by calling the
 module with rows that remember what is done to them. An operation that no wanted entry needs is left
 out, and a row is overwritten once no later operation uses it, so that all rows stay in the cache.
-The remaining operations are done in the order of the module: the results agree with its own in
+The remaining operations are repeated in the order of the module: the results agree with its own in
 every bit.
 """
 
@@ -30,7 +30,7 @@ POWERS = {2: np.square, 0.5: np.sqrt, -1: np.reciprocal}
 
 
 class NotRecordedError(Exception):
-    """The module does more than operations on rows, so it cannot be recorded."""
+    """Error: an emitted module does more than operations on rows, so it cannot be recorded."""
 
 
 @dataclass(eq=False)
@@ -82,7 +82,7 @@ class Row:
 
 
 class Functions:
-    """Replacement of the NumPy module that records functions of rows and computes those of numbers."""
+    """Replacement of NumPy: its functions record operations on rows, and compute with numbers."""
 
     def __getattr__(self, name: str) -> Any:
         function = getattr(np, name)

@@ -1,1 +1,1 @@
-"""Filters from measured positions to q, qd, qdd without phase shift, and decimation (chapter 2.2.2)."""
+"""Filters without phase shift, which compute q, qd, qdd from measured positions (chapter 2.2.2)."""

@@ -247,7 +247,7 @@ def recursion(a: Array, x: Array, drive: Array) -> None:
 
 
 def copy_overlap(u: Array, t0: int, window: Array, start: int) -> None:
-    """Copy into `window` (samples from `start` on) the samples that u (from t0 on) has in common."""
+    """Copy to `window` (samples from `start` on) the samples that it shares with u (from t0 on)."""
     a, b = max(t0, start), min(t0 + u.shape[1], start + window.shape[1])
     if a < b:
         window[:, a - start : b - start] = u[:, a - t0 : b - t0]
@@ -316,7 +316,7 @@ def _end(op: Operator, left: int, kept: int, pad: int) -> tuple[Array, Array]:
 
 
 def _output(op: Operator, factors: Array) -> Array:
-    """Write 2 Re c'(factors x) as a matrix that is applied to the pairs Re, Im of x, shape (k, 2 m).
+    """Write 2 Re c'(factors x) as a matrix on the pairs Re, Im of x, shape (k, 2 m).
 
     Factors complex, shape (m, k).
     """
@@ -330,5 +330,8 @@ def _pairs(C: Array) -> Array:
 
 
 def _transposed(*rows: Array) -> Array:
-    """Stack the rows and transpose them to contiguous memory, to multiply signals from the right."""
+    """Stack matrices and transpose the result, to multiply signals from the right.
+
+    The result is contiguous in memory.
+    """
     return np.ascontiguousarray(np.vstack(rows).T)

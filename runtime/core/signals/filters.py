@@ -243,16 +243,17 @@ def decimation_plan(
 
 
 def zero_phase(sos: Array, pad: int, x: Array, axis: int) -> Array:
-    """Filter x forward and backward along `axis`, each pass from the steady state of its first value.
+    """Filter x forward and backward along `axis`, so that the phase does not change.
 
-    `pad` reflected samples extend each end.
+    `pad` reflected samples extend each end; each pass starts in the steady state of its first
+    value.
     """
     require_longer(x.shape[axis], pad)
     return np.asarray(sosfiltfilt(sos, x, axis=axis, padtype="odd", padlen=pad))
 
 
 def require_longer(samples: int, pad: int) -> None:
-    """Raise InputError if there are not more samples than the `pad` samples that extend each end."""
+    """Raise InputError unless there are more samples than the `pad` samples added at each end."""
     if samples <= pad:
         raise InputError(
             f"{samples} samples; this zero-phase filter needs more than {pad}, use a longer record "

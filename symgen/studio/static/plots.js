@@ -40,11 +40,14 @@ class Plots {
       if (right > 260) root.append(svg("text", { x: right, y: 13, class: `legend c${i}`, "text-anchor": "end" }, name.slice(0, 24)));
       right -= 7.4 * Math.min(name.length, 24) + 12;
     }
-    for (const v of [y0 + 0.05 * (y1 - y0), (y0 + y1) / 2, y1 - 0.05 * (y1 - y0)]) {
+    for (const [v, label] of ticks(y0, y1, 4)) {
       root.append(svg("line", { x1: LEFT, x2: PLOT_WIDTH - RIGHT, y1: y(v), y2: y(v), class: "tick" }));
-      root.append(svg("text", { x: LEFT - 5, y: y(v) + 4, "text-anchor": "end" }, Number(v.toPrecision(3))));
+      root.append(svg("text", { x: LEFT - 5, y: y(v) + 4, "text-anchor": "end" }, label));
     }
-    for (const v of [x0, (x0 + x1) / 2, x1]) root.append(svg("text", { x: x(v), y: PLOT_HEIGHT - 5, "text-anchor": v === x0 ? "start" : v === x1 ? "end" : "middle" }, Number(v.toPrecision(3))));
+    for (const [v, label] of x1 > x0 ? ticks(x0, x1, 8) : [[x0, String(x0)]]) {
+      root.append(svg("line", { x1: x(v), x2: x(v), y1: TOP, y2: PLOT_HEIGHT - BOTTOM, class: "tick" }));
+      root.append(svg("text", { x: x(v), y: PLOT_HEIGHT - 5, "text-anchor": "middle" }, label));
+    }
     rows.forEach((row, i) => {
       let path = "", pen = "M";
       row.forEach((v, k) => {
