@@ -4,8 +4,8 @@ The tied joints are algebraic functions of the actuated ones. The method serves 
 orientations agree by construction (sums of angles), so that the closure equations r = 0 are
 equations of positions. Lengths and actuated joints are drawn at random, and each loop is closed by
 two tied joints. r is linear in (cos v, sin v) of a hinge v, so that cos(v)**2 + sin(v)**2 = 1 gives
-a quadratic equation for the other joint u. Its roots lie in F_p for every other draw. These are
-points of
+a quadratic equation for the other joint u. Its roots lie in F_p, the field of integers modulo p,
+for every other draw. These are points of
 
     V = {(lengths, configuration) : r = 0} ,
 
