@@ -242,10 +242,10 @@ def load_estimate(path: Path | str) -> Estimate:
 def load_whole_estimate(path: Path | str) -> Estimate:
     """Read the estimate of all base parameters from estimate.json, for a robot file or a program.
 
-    It is that of the set that is used, or, if the essential set is used, that of the physical
-    parameters (`whole_set`). Its fields names, X, sigma_corrected, relative_error and
-    details.standard are those of that set; the other fields, for instance the covariance, are those
-    of least squares. InputError as for `load_estimate`.
+    Its names, X, sigma_corrected, relative_error and details.standard are those of the set that is
+    used, or, if the essential set is used, those of the physical parameters (`whole_set`). The
+    other fields, for instance the covariance, are those of least squares. InputError as for
+    `load_estimate`.
     """
     fit, text = load_estimate(path), result_text(path)
     if not json.loads(text).get("sets"):
@@ -275,7 +275,7 @@ class ResultSchema(GenerateJsonSchema):
     """Generator of the JSON Schema of results, in which null means nan or infinity."""
 
     def float_schema(self, schema: core_schema.FloatSchema) -> dict[str, Any]:
-        """Return the JSON Schema of a number: a number or null."""
+        """Return the JSON Schema of a value that is a number or null."""
         return {"type": ["number", "null"]}
 
 

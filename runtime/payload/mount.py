@@ -62,7 +62,7 @@ class Mount:
         )
 
     def columns(self, physical: PhysicalModel) -> Array:
-        """Compute the derivative dX/dchi of X by the load's parameters at `frame`, shape (b, 10)."""
+        """Compute the derivative of X by the load's parameters at `frame`, shape (b, 10)."""
         own = physical.K[:, physical.link(self.link)]
         if self.frame == self.link:
             return own

@@ -34,7 +34,7 @@ from symgen.errors import DescriptionError, ExpressionError
 
 @dataclass(frozen=True, config=CONFIG)
 class LawScalar:
-    """A number inside a law that enters it nonlinearly; fixed where the bounds are equal."""
+    """A number on which a law depends nonlinearly; it is fixed if its two bounds are equal."""
 
     bounds: Annotated[
         tuple[float, float],
@@ -86,7 +86,7 @@ def _scalar(name: str, given: Any) -> LawScalar:
 
 @dataclass(frozen=True, config=CONFIG)
 class Element:
-    """Inertia, friction, offset, spring, or a column of the user's on the joint coordinates."""
+    """A torque on the joints besides the links: motor inertia, friction, offset, spring, or your own law."""
 
     family: Annotated[str, *UNWRITTEN]
     kind: Annotated[

@@ -1,9 +1,9 @@
 """Checks of the names in a robot file, and renaming of names that collide in a generated file.
 
 `check_names` refuses unsuitable names of constants, families and parameters before anything is
-derived, so that these names appear unchanged in generated files. A name of an intermediate variable
-or array that is already used, or a reserved word of the target language, gets an underscore at the
-end, and the header of the file says so.
+derived, so that generated files can use these names. A name that is a reserved word of the target language,
+or an intermediate variable or array whose name is already used, gets an underscore at the end, and
+the header of the file says so.
 """
 
 from __future__ import annotations

@@ -227,7 +227,7 @@ def _rows(value: list[Any], _: Declared) -> tuple[tuple[float, ...], ...]:
 
 @dataclass(frozen=True, config=CONFIG)
 class Drives:
-    """qm = ratio (q - offset), tau = ratio' (torque_constant * u)."""
+    """Relation of motors and joints: qm = ratio (q - offset), tau = ratio' (torque_constant * u)."""
 
     ratio: Annotated[
         tuple[tuple[float, ...], ...],

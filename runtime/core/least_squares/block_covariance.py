@@ -47,7 +47,7 @@ def block_covariance(blocks: Iterable[Array], X: Array, T: Array) -> Array:
 
 
 def deletions(blocks: Iterable[Array], X: Array, T: Array, into: Array) -> Array:
-    """Compute how X changes if each block of time is left out, scaled for the jackknife.
+    """Compute the change of X when each block of time alone is left out, for the jackknife.
 
     Row k is sqrt((K - 1)/K) into (1 - G_k)^-1 T'g_k, shape (K, b).
 
@@ -72,9 +72,10 @@ def deletions(blocks: Iterable[Array], X: Array, T: Array, into: Array) -> Array
 
 
 def _without_its_own(G: Array, g: Array, into: Array, size: Array) -> Array:
-    """Compute into (1 - G)^-1 g on the directions of X that other blocks determine too.
+    """Compute the effect of leaving out a block, on the directions that other blocks determine.
 
-    nan for a parameter that depends on another direction.
+    It is into (1 - G)^-1 g on these directions, and nan for a parameter that depends on another
+    direction.
     """
     share, V = np.linalg.eigh(G)
     others = share < 1 - LIMIT.BLOCK_ALONE
@@ -112,7 +113,7 @@ def drawn_again(
 def scatter(
     blocks: Iterable[Array], estimator: Callable[[Array], Array], runs: int, seed: int
 ) -> Array:
-    """Compute the standard deviation of X, shape (b,), over records of blocks drawn again.
+    """Compute the standard deviation of X, shape (b,), over records resampled by blocks.
 
     The records are those of `drawn_again`.
     """

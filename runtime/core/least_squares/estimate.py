@@ -213,8 +213,8 @@ class Estimate:
     def from_json(cls, text: str, *, file: str = "estimate.json") -> Estimate:
         """Read the Estimate that `to_json` wrote, with every bit.
 
-        Other keys of estimate.json are ignored. Raises InputError if the text is not JSON, has another
-        schema or is incomplete; `file` is the name in its message.
+        Other keys of estimate.json are ignored. Raises InputError if the text is not JSON, has
+        another schema or is incomplete; `file` is the name in its message.
         """
         return from_text(cls, text, SCHEMA, file)
 

@@ -28,7 +28,7 @@ from runtime.core.study import EstimateSettings
 
 
 class LinearOptions(Settings):
-    """estimate.options of ols and wls, and of the methods that start from them.
+    """Setting estimate.options of the methods ols and wls, and of methods that start from them.
 
     Attributes
     ----------

@@ -128,7 +128,7 @@ class Method:
         return structure(self.options, settings.options, OPTIONS)
 
     def system(self, observation: Observation, settings: EstimateSettings) -> System:
-        """Weigh the rows for the least squares from which the method starts."""
+        """Build the weighted rows of the least squares from which the method starts."""
         options = self.checked(settings)
         if not isinstance(options, LinearOptions):
             given = getattr(options, "linear", {})
@@ -144,7 +144,7 @@ LINEAR: Mapping[str, Method] = {
 
 
 def linear_system(observation: Observation, settings: EstimateSettings) -> System:
-    """Factor and weigh the rows for the linear method (ols or wls) of `settings`.
+    """Build the factored and weighted rows for the linear method (ols or wls) of `settings`.
 
     SettingsError for a method that is not one linear system.
     """
@@ -155,10 +155,10 @@ def linear_system(observation: Observation, settings: EstimateSettings) -> Syste
 
 
 def linear_companion(settings: EstimateSettings) -> EstimateSettings:
-    """Return settings of a linear method: `settings`, or least squares with the same weights.
+    """Return `settings` if its method is linear, else settings of least squares with its weights.
 
-    `settings` is returned if its method is linear; else the columns stay the same too. Essential
-    parameters and weak directions of a method that is not linear are those of its companion.
+    The columns stay the same too. Essential parameters and weak directions of a method that is not
+    linear are those of its companion.
     """
     if settings.method in LINEAR:
         return settings

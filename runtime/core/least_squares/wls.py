@@ -5,12 +5,11 @@
 s_j is a standard deviation in N m. The setting `weights` chooses how it is computed:
 
     joint       (default) s_j^2 = ||Y_j - W_j X_j||^2 / (N_j - b_j), X_j the least squares of joint
-                j alone, b_j = rank W_j. Exactly invariant
-                under scaling of Y and W of one joint.
+                j alone, b_j = rank W_j. Exactly invariant under scaling of Y and W of one joint.
     iterated    s_j^2 = ||Y_j - W_j X||^2 / (N_j (1 - b/r)) from the common solution, repeated until
                 every s_j changes by less than 1e-3.
     covariance  residuals E, shape (n, N), of ordinary least squares; Omega = E E'/(N - b/n); the n
-    rows of one instant times L^-1, L L' = Omega.
+                rows of one instant are multiplied by L^-1, L L' = Omega.
 
 The chapter leaves weights open; Gautier (1997) and BIRDy use the first and the last.
 """

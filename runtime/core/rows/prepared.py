@@ -7,8 +7,8 @@
     own.observation(model)                    Y = W X + rho
 
 A study that perturbs the positions (CESTAC) uses `selection` and `torque` of the measured record
-and repeats `observed_states` and `observation_from_states` with perturbed positions. Y and the
-choice of rows stay those of the record, so that noise never decides whether a row is used.
+and repeats the filters and `observation_of` with perturbed positions. Y and the choice of rows stay
+those of the record, so that noise never decides whether a row is used.
 """
 
 from __future__ import annotations

@@ -69,7 +69,7 @@ class Columns:
 
     @cached_property
     def entries(self) -> Entries:
-        """Table of the nonzero regressor entries of these columns; equal entries share one signal."""
+        """Table of the nonzero regressor entries of these columns, with equal entries marked."""
         numbers = np.array(column_numbers(self.names, self.model.BASE_PARAMETERS), dtype=int)
         return distinct_entries(self.model, numbers)
 

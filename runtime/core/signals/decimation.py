@@ -254,7 +254,7 @@ def copy_overlap(u: Array, t0: int, window: Array, start: int) -> None:
 
 
 def _forward(op: Operator, length: int) -> tuple[Array, Array]:
-    """Return the forward pass over `length` samples as two matrices that give its output f.
+    """Return the forward filter over `length` samples as two matrices that give its output f.
 
     One is applied to the samples, shape (length, length), the other to x at the first sample, shape
     (length, 2 m).
@@ -263,7 +263,7 @@ def _forward(op: Operator, length: int) -> tuple[Array, Array]:
 
 
 def _backward(op: Operator, length: int, kept: int) -> tuple[Array, Array]:
-    """Return the backward pass as two matrices that are applied to f, `length` samples.
+    """Return the backward filter as two matrices that are applied to f, the forward output.
 
     One gives f_0 + lambda w_0, complex, shape (m, length), the other y at the first `kept`
     instants, shape (kept, length).
@@ -274,7 +274,7 @@ def _backward(op: Operator, length: int, kept: int) -> tuple[Array, Array]:
 
 
 def _start(op: Operator, phase: int, pad: int) -> Array:
-    """Return the matrix that gives the state x at the first kept sample from the first samples.
+    """Return the matrix that maps the first samples to the filter state x at the first kept sample.
 
     Shape (T0, 2 m). The filter starts in the steady state of the first reflected sample; then it
     runs over the other reflected samples.
@@ -290,9 +290,9 @@ def _start(op: Operator, phase: int, pad: int) -> Array:
 
 
 def _end(op: Operator, left: int, kept: int, pad: int) -> tuple[Array, Array]:
-    """Return the two matrices that give v and y at the end of a record, after the last whole block.
+    """Return the two matrices for the end of a record, after the last whole block of samples.
 
-    v is the state before, and y the output at the last `kept` instants. One matrix is applied to
+    They give v before the last `kept` instants, and y at these instants. One matrix is applied to
     the last samples, shape (T, 2 m + kept), the other to x at the first of the `left` samples.
     """
     length, T = left + pad, max(left, pad + 1)

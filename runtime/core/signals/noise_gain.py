@@ -100,7 +100,10 @@ def _power(sos: Array, w: Array) -> Array:
 
 
 def _covariance(K: Array) -> Array:
-    """Average K K^* over all frequencies, from -pi to pi rad per sample, shape (3, 3)."""
+    """Compute the covariance, shape (3, 3), of three signals from their frequency responses K.
+
+    It is the mean of K K^* over all frequencies from -pi to pi rad per sample.
+    """
     ends = K[:, [0, -1]]
     return np.asarray(((K @ K.conj().T).real - (ends @ ends.conj().T).real / 2) / (K.shape[1] - 1))
 

@@ -33,7 +33,10 @@ class SignalReader:
     options: type[Settings] | None = None
 
     def checked(self, signals: Signals) -> dict[str, Any]:
-        """Return all options of the reader with defaults; SettingsError if they do not suit."""
+        """Check the options of the reader, and return all options with defaults.
+
+        SettingsError if they do not suit.
+        """
         path = ("signals", "options")
         if self.options is not None:
             return to_mapping(structure(self.options, signals.options, path))
