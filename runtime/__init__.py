@@ -1,4 +1,4 @@
-"""From a measured record to parameters, and how far to trust them.
+"""Identify the parameters of a robot from measured records, and judge how far to trust them.
 
     model = runtime.load_model("tx40")
             # an emitted module: by name, by path, or the module itself
@@ -8,9 +8,9 @@
     result.estimate, result.checklist
     runtime.report(result, "out")                   # the page and the files of `symgen identify -o`
 
-Names are loaded when they are first used, so that `import runtime` is light. NumPy, SciPy and
-pydantic serve Record, resample, observe, estimate, essential and cestac. Other packages are loaded
-when they are used:
+Names are imported when they are first used, so that `import runtime` is fast. NumPy, SciPy and
+pydantic are enough for Record, resample, observe, estimate, essential and cestac. Other packages
+are imported when they are needed:
 
     ruamel.yaml           study files                     clarabel   identify, method feasible
     casadi                simulate, excite, iv, didim     pint       units that no table holds
@@ -113,7 +113,7 @@ _MODULE_OF = {name: module for module, names in _MODULES.items() for name in nam
 
 
 def __getattr__(name: str) -> Any:
-    """A public name, from the module that defines it (PEP 562)."""
+    """Import a public name from the module that defines it, when it is first used (PEP 562)."""
     if name not in _MODULE_OF:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = globals()[name] = getattr(import_module(_MODULE_OF[name]), name)

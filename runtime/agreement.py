@@ -1,17 +1,19 @@
-"""Do several records of one robot give the same parameters?
+"""Compare the parameters of several records of one robot, each record fitted alone.
 
-Each record k is fitted alone, as `identify` fits it, with the same b columns: X_k and its
-deviations s_k. It is compared with the mean of the others, weighted by their deviations,
+Each record k is fitted alone, as `identify` fits it, with the same b columns. This gives X_k with
+standard deviations s_k. X_k is compared with the mean of the other records, weighted by their
+standard deviations,
 
     X_-k = s_-k^2 sum X_m/s_m^2,     s_-k^-2 = sum 1/s_m^2,     d = (X_k - X_-k)/sqrt(s_k^2 + s_-k^2)
 
-s_k is the corrected deviation, wider by the root of c where residuals remember for longer than a block
-(`runtime.core.residuals.unseen_by_blocks`). A parameter differs where |d| exceeds
-LIMIT.DIFFERS. That is a word, no test (benchmarks/truth.md). Differences up to
-LIMIT.RELEVANT_DIFFERENCE of the value do not change the verdict.
+s_k is the corrected standard deviation. It is multiplied by the root of a factor c if residuals
+stay correlated for longer than a block (`runtime.core.residuals.unseen_by_blocks`). A parameter
+differs if |d| exceeds LIMIT.DIFFERS. This limit is a convention, not a statistical test
+(benchmarks/truth.md). Differences up to LIMIT.RELEVANT_DIFFERENCE of the value do not change the
+verdict.
 
-Records differ where the robot changed (load, temperature, wear), where something in one record is
-wrong, or where the model leaves out what their motions do not share.
+Records differ if the robot changed (load, temperature, wear), if one record has an error, or if the
+model lacks an effect that appears in the motion of only some records.
 """
 
 from __future__ import annotations
@@ -41,17 +43,18 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Disagreement:
-    """A parameter of one record that the others contradict.
+    """One parameter whose value from one record contradicts the other records.
 
     Attributes
     ----------
     record, parameter : str
+        Names of the record and of the parameter.
     value, deviation : float, SI
-        By this record alone, and its corrected deviation.
+        Value from this record alone, and its corrected standard deviation.
     others : float, SI
-        By the other records.
+        Weighted mean of the values from the other records.
     z : float
-        Their difference in deviations s.
+        Difference of the two values, divided by the standard deviation of this difference.
     """
 
     record: str
@@ -63,22 +66,22 @@ class Disagreement:
 
     @property
     def difference(self) -> float:
-        """Difference in % of the larger value."""
+        """Difference between `value` and `others`, % of the larger of the two."""
         return 100 * abs(self.value - self.others) / max(abs(self.value), abs(self.others))
 
 
 @dataclass(frozen=True)
 class Homogeneity(Result, Part, keys="records parameters agree disagreements untested"):
-    """Whether records agree.
+    """Result of a comparison of records: whether they give the same parameters.
 
     Attributes
     ----------
     records, parameters : tuple of str
-        What was compared.
+        Names of the records and of the parameters that were compared.
     disagreements : tuple of Disagreement
-        Parameters that differ, the largest d first.
+        Parameters that differ between records, the largest |z| first.
     untested : tuple of str
-        Records left out, each with its reason.
+        Records that could not be compared, each with its reason.
     """
 
     records: tuple[str, ...]
@@ -92,20 +95,20 @@ class Homogeneity(Result, Part, keys="records parameters agree disagreements unt
 
     @property
     def agree(self) -> bool:
-        """Whether no parameter differs."""
+        """Whether no parameter differs between the records."""
         return not self.disagreements
 
     @property
     def records_differ(self) -> bool:
-        """Whether a parameter differs by more than LIMIT.RELEVANT_DIFFERENCE."""
+        """Whether one of the disagreements exceeds LIMIT.RELEVANT_DIFFERENCE, % of the value."""
         return any(d.difference > LIMIT.RELEVANT_DIFFERENCE for d in self.disagreements)
 
     def checks(self) -> tuple[Check, ...]:
-        """Whether the records agree."""
+        """Return the check that judges whether the records agree."""
         return (agreeing(self),)
 
     def text(self) -> str:
-        """One or two sentences."""
+        """Write one or two sentences that say whether the records agree."""
         left_out = "".join(f" Not compared: {reason}." for reason in self.untested)
         if len(self.records) < 2:
             return f"The records cannot be compared.{left_out}"
@@ -123,7 +126,7 @@ class Homogeneity(Result, Part, keys="records parameters agree disagreements unt
         return f"The records {names} differ. {where}.{left_out}"
 
     def tables(self) -> list[Table]:
-        """Parameters that differ."""
+        """Return a table of the parameters that differ; no table if none differs."""
         if not self.disagreements:
             return []
         rows = [
@@ -157,7 +160,7 @@ class Homogeneity(Result, Part, keys="records parameters agree disagreements unt
     "motion shows what the model leaves out",
 )
 def agreeing(found: Homogeneity) -> Answer:
-    """Whether several records give the same parameters."""
+    """Judge whether several records give the same parameters."""
     text = found.text().rstrip(".")
     if len(found.records) < 2:
         return Answer("open", text, "")
@@ -165,7 +168,11 @@ def agreeing(found: Homogeneity) -> Answer:
 
 
 def agreement(result: Identification) -> Homogeneity | None:
-    """Whether several records agree, those that are predicted too: in all parameters, or in the essential ones if one of the records does not determine all. None for one record."""
+    """Compare all records of an identification, fitted and predicted ones; None for a single record.
+
+    All parameters are compared. If one record does not determine all of them, only the essential
+    parameters are compared.
+    """
     records = [*result.records, *result.problem.unseen]
     if len(records) < 2:
         return None
@@ -189,18 +196,18 @@ def homogeneity(
     *,
     model: GeneratedModel | None = None,
 ) -> Homogeneity:
-    """Whether records agree.
+    """Fit each record alone, and compare its parameters with those of the other records.
 
     Parameters
     ----------
     parts : mapping of str to Observation
-        Rows of each record, by its name.
+        Rows of W and Y of each record, by the name of the record.
     names : sequence of str
-        The b columns.
+        The b base parameters that are fitted.
     settings : EstimateSettings, optional
-        Weights; a method that is not linear has its linear companion.
+        Method and weights; a method that is not linear is replaced by its linear companion.
     model : GeneratedModel, optional
-        Gives joint numbers.
+        Gives the joint numbers.
     """
     linear = linear_companion(settings or EstimateSettings())
     fits: dict[str, tuple[Estimate, Array]] = {}
@@ -232,7 +239,10 @@ def homogeneity(
 
 
 def _apart(record: str, fits: Mapping[str, tuple[Estimate, Array]]) -> list[Disagreement]:
-    """The parameters of a record against the mean of the other records."""
+    """Compare each parameter of one record with the weighted mean of the other records.
+
+    The list has every parameter, however small its difference.
+    """
     others = [fit for name, fit in fits.items() if name != record]
     if not others:
         return []

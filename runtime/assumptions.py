@@ -1,9 +1,10 @@
-"""Parameters that a robot file assumes to be zero, asked of a record.
+"""Test with a record whether parameters that the robot file assumes to be zero are zero.
 
-The model without the assumptions has X = K chi = K' y + K_p p, y all other parameters, those that
-are assumed among them. Generalised least squares with the covariance C of X, by blocks of time,
-gives p with its deviation; (p/sigma)**2 is chi2(1) by the assumption. Where K_p lies in the range
-of K', nothing shows p.
+The model without the assumptions has X = K chi = K' y + K_p p, with p one assumed parameter and y
+all other parameters, the other assumed ones among them. Generalised least squares with the
+covariance C of X, from blocks of time, gives p with its standard deviation sigma. If the assumption
+is true, (p/sigma)**2 has the distribution chi2(1). If K_p is in the range of K', no record can
+show p.
 """
 
 from __future__ import annotations
@@ -24,15 +25,15 @@ SMALL = 1e-8  # of a column of K: what the others leave of one that they span
 
 @dataclass(frozen=True)
 class Assumption:
-    """One parameter that is assumed to be zero.
+    """Test of one parameter that is assumed to be zero.
 
     Attributes
     ----------
     name : str
     value, sigma : float
-        What the record says instead; nan if it says nothing.
+        Value from the record and its standard deviation; nan if no record can show them.
     p_value : float
-        Of the assumption; nan if nothing shows it.
+        Probability of a value at least as large if the assumption is true; nan if it cannot be tested.
     """
 
     name: str
@@ -42,7 +43,7 @@ class Assumption:
 
     @property
     def text(self) -> str:
-        """One sentence."""
+        """Sentence that says whether the record contradicts the assumption."""
         if np.isnan(self.p_value):
             return f"{self.name} = 0 cannot be tested: its torque is one of other parameters"
         said = f"{self.value:.3g} ± {1.96 * self.sigma:.2g} (p = {self.p_value:.2g})"
@@ -54,14 +55,14 @@ class Assumption:
 def assumptions_asked(
     model: GeneratedModel, fit: Estimate, names: Sequence[str]
 ) -> tuple[Assumption, ...]:
-    """Every assumption, with all other parameters free.
+    """Test each assumption of the robot file, with all other parameters free.
 
     Parameters
     ----------
     model : GeneratedModel
         The module of the robot without `assume`.
     fit : Estimate
-        All its parameters, from the record.
+        Estimate of all parameters of this module from the record.
     names : sequence of str
         The parameters that are assumed to be zero.
     """

@@ -1,11 +1,12 @@
-"""What the package is made of, in four lists, and the calls of its users.
+"""The four lists of features of the package, and the functions that its users call.
 
-    STEPS      Problem -> Problem: what changes a problem before rows are made of it, in this order
+    STEPS      Problem -> Problem: changes of a problem before its rows are made, in this order
     READERS    Record, Signals -> States: signals.reader of a study
     METHODS    Observation -> rows of a least squares -> their fit: estimate.method of a study
-    EXTRAS     Identification -> Part: what else is asked of the records
+    EXTRAS     Identification -> Part: further analyses of the records
 
-Each call builds a Problem of model, records and study, prepares it by STEPS and hands it to one function of the package. A feature is one file and one line of a list.
+Each call builds a Problem from model, records and study, prepares it by STEPS and passes it to one
+function of the package. A feature is one file and one line of a list.
 """
 
 from __future__ import annotations
@@ -118,7 +119,10 @@ METHODS: dict[str, Method] = {
 
 
 def later(module: str, name: str) -> Callable[..., Any]:
-    """A function of a module that is loaded when it is first called: what is made on request costs nothing elsewhere."""
+    """Return a function that imports its module only when it is first called.
+
+    So an analysis on request does not slow down other calls.
+    """
 
     def called(*given: Any, **options: Any) -> Any:
         return getattr(import_module(module), name)(*given, **options)
@@ -160,7 +164,10 @@ Records = Record | Sequence[Record]
 
 
 def require_study(study: Study | None) -> Study:
-    """The study, by default Study(); InputError for anything else."""
+    """Check that the argument is a Study; None becomes Study(), the default settings.
+
+    InputError for anything else.
+    """
     study = Study() if study is None else study
     require_kind(
         study, Study, "study", "a Study: runtime.Study(), runtime.load_study('study.yaml')"
@@ -169,7 +176,10 @@ def require_study(study: Study | None) -> Study:
 
 
 def list_records(records: Records) -> tuple[Record, ...]:
-    """One record or several as several; InputError for anything else."""
+    """Return one record or several records as a tuple.
+
+    InputError for anything else.
+    """
     if isinstance(records, Record):
         return (records,)
     require_kind(records, Sequence, "records", RECORD_EXPECTED)
@@ -177,7 +187,10 @@ def list_records(records: Records) -> tuple[Record, ...]:
 
 
 def complete_study(study: Study) -> Study:
-    """The study with all options of its reader; SettingsError if its method or reader is not in the lists."""
+    """Check method and reader of a study, and complete the options of its reader.
+
+    SettingsError if the method or the reader is unknown.
+    """
     signals = study.signals
     for path, name, names in (
         (("estimate", "method"), study.estimate.method, METHODS),
@@ -200,7 +213,7 @@ def state_problem(
     unseen: Sequence[Record] = (),
     simulator: Simulator | None = None,
 ) -> Problem:
-    """The problem of model, records and study as it is stated, before any step."""
+    """Build the problem of model, records and study before any preparation step."""
     study = complete_study(require_study(study))
     methods: Mapping[str, Method] = METHODS
     if simulator is not None:
@@ -240,12 +253,12 @@ def problem(
     unseen : sequence of Record, optional
         Records that the parameters predict.
     simulator : Simulator, optional
-        The closed loop that iv and didim simulate; default: that of study.controller.
+        The closed loop that iv and didim simulate; default: the loop of study.controller.
 
     Raises
     ------
     InputError
-        A record, model or setting that a step cannot work with.
+        A record, model or setting that a step cannot use.
     """
     return prepared(state_problem(model, records, study, unseen, simulator), STEPS)
 
@@ -253,7 +266,7 @@ def problem(
 def records_of(
     settings: Sequence[RecordSettings], model: GeneratedModel, study: Study
 ) -> list[Record]:
-    """Records of a study, read from their files."""
+    """Read the records of a study from their files."""
     require_emitted(model)
     return read_records(settings, model, missing=study.signals.admits_missing)
 
@@ -266,7 +279,10 @@ def observe(
     *,
     simulator: Simulator | None = None,
 ) -> Observation:
-    """Observation Y = W X + rho, eqs. (6) and (14), of one or several records after filters, decimation and selection of rows."""
+    """Build the rows Y = W X + rho, eqs. (6) and (14), from one or several records.
+
+    The study specifies filters, decimation and selection of rows.
+    """
     return estimation.observe_rows(problem(model, records, study, simulator=simulator))
 
 
@@ -294,14 +310,14 @@ def estimate(
     Returns
     -------
     Estimate
-        X, deviations, rank and fit by joint, in SI units.
+        X, standard deviations, rank and fit by joint, in SI units.
 
     Raises
     ------
     InputError
         Records that give no row.
     SettingsError
-        A method that needs what the study or the records lack.
+        A method that needs settings or data that the study or the records lack.
     """
     return estimation.estimate(problem(model, records, study, simulator=simulator))
 
@@ -313,7 +329,10 @@ def estimate_of(
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Estimate:
-    """Parameters of rows Y = W X + rho that are there, by the method that `settings` names; default: ols."""
+    """Estimate the parameters of given rows Y = W X + rho by the method of `settings`.
+
+    The default method is ols.
+    """
     settings = settings or EstimateSettings()
     return estimation.estimate_of(
         observation, settings, METHODS, model=model, provenance=provenance
@@ -330,7 +349,8 @@ def essential(
 ) -> Essential:
     """Find the essential parameters (section 4.1.1) of one or several records.
 
-    The method is that of the study, or least squares with the same weights if that method is not linear.
+    The method of the study is used; a method that is not linear is replaced by least squares with the
+    same weights.
     """
     return estimation.essential(problem(model, records, study, simulator=simulator))
 
@@ -361,21 +381,25 @@ def identify(
     study : Study, optional
         Settings; default: Study().
     further : sequence of Record, optional
-        Records that the parameters predict; default: those of study.validate.record, read from their files.
+        Records that the parameters predict; default: the records of study.validate.record, read from
+        their files.
     loaded : sequence of Record, optional
-        Records with the load of study.payload; default: those of study.payload.record.
+        Records with the load of study.payload; default: the records of study.payload.record.
     simulator : Simulator, optional
-        The closed loop, which iv and didim need; default: that of study.controller.
+        The closed loop, which iv and didim need; default: the loop of study.controller.
     physical : bool
-        Whether a physical robot can have the parameters.
+        Whether to check that a physical robot can have the parameters.
     friction : bool
-        Curves of friction against velocity, joint by joint.
+        Whether to compute curves of friction against velocity, joint by joint.
     variants : GeneratedModel, optional
-        The module of `symgen.variants`: other tables of frames and directions of gravity are tried on the records.
+        The module of `symgen.variants`: other tables of frames and directions of gravity are tried on
+        the records.
     plausible : bool, optional
-        Whether record, study and robot file suit each other (`runtime.plausibility`); default: where `variants` is given.
+        Whether to check that record, study and robot file suit each other (`runtime.plausibility`);
+        default: if `variants` is given.
     provenance : mapping, optional
-        What else reproduces the result; names of the records, hashes and versions are added.
+        Further data that make the result reproducible; names of the records, hashes and versions are
+        added.
 
     Returns
     -------
@@ -384,7 +408,7 @@ def identify(
     Raises
     ------
     InputError
-        A record, setting or extra that does not suit what is asked for.
+        A record, setting or requested analysis that does not suit the others.
     """
     asked: dict[str, Mapping[str, Any]] = {}
     if physical:
@@ -408,10 +432,12 @@ def assess(
     provenance: Mapping[str, Any] | None = None,
     progress: Callable[[str], None] = lambda part: None,
 ) -> Identification:
-    """The identification with everything that EXTRAS hold, as far as records, study and installed packages allow (`symgen report`).
+    """Identify a robot and make every further analysis that the data allow (`symgen report`).
+
+    The analyses of EXTRAS are made as far as records, study and installed packages allow.
 
     encoder : steps of the encoders in use, rad or m.
-    progress : called with the name of each part before it is computed.
+    progress : called with the name of each part before the part is computed.
     """
     asked: dict[str, Mapping[str, Any]] = {
         extra.keyword: {} for extra in EXTRAS if isinstance(extra, OnRequest)
@@ -434,21 +460,23 @@ def compare(
     *,
     variants: GeneratedModel | None = None,
 ) -> Ranking:
-    """Identify with several studies and order these by their error on unseen data.
+    """Identify with several studies and order the studies by their error on unseen data.
 
     Parameters
     ----------
     model : GeneratedModel
         Emitted module.
     candidates : Study, (study, records, validation records), or mapping of str to them
-        By name of the treatment; a Study names its records. The validation records are the same instants. Of one alone the treatments that suggest themselves are compared.
+        By name of the treatment; a Study names its records. All validation records are of the same
+        instants. For a single candidate, treatments that its data suggest are compared.
     variants : GeneratedModel, optional
         The module of `symgen.variants`: the plausibility of the best treatment is then judged.
 
     Raises
     ------
     InputError
-        A candidate without validation records, or with others than the first; none that can be identified.
+        A candidate without validation records, or with other validation records than the first; no
+        candidate that can be identified.
     """
     from runtime import treatments as comparing
     from runtime.plausible.motion import speed_of_rest
@@ -476,9 +504,10 @@ def cestac(
     map: Callable[..., Iterable[Any]] = map,
     **options: Any,
 ) -> Cestac:
-    """Change of the estimate with coarser encoders and torque sensors, eqs. (15) to (22), (28).
+    """Compute how coarser encoders and torque sensors change the estimate, eqs. (15) to (22), (28).
 
-    map : as the built-in one; makes the runs, in processes (`runtime.parallel.processes.processes`) or on a Dask cluster (`runtime.parallel.cluster.cluster`).
+    map : like the built-in map; makes the runs, in processes (`runtime.parallel.processes.processes`)
+        or on a Dask cluster (`runtime.parallel.cluster.cluster`).
     options : columns, progress, checkpoint, provenance, as of `runtime.core.cestac.cestac.cestac`.
     """
     from runtime.core.cestac import cestac as resolution
@@ -498,7 +527,8 @@ def advise(
 ) -> Advice:
     """Predict the coarsest encoders that change the estimate by less than 1 % and by less than 5 %.
 
-    options : columns, asked, encoders, confirm, progress, provenance, readers, as of `runtime.advisor.advisor.advise`.
+    options : columns, asked, encoders, confirm, progress, provenance, readers, as of
+        `runtime.advisor.advisor.advise`.
     """
     from runtime.advisor import advisor
 
@@ -513,7 +543,10 @@ def plausibility(
     *,
     variants: GeneratedModel | None = None,
 ) -> Plausibility:
-    """Check whether record, study and robot file agree, and search single changes that explain the record better."""
+    """Check whether record, study and robot file agree with each other.
+
+    Also search for single changes of study or robot file that explain the record better.
+    """
     from runtime.plausible import plausibility as checks
 
     return checks.plausibility(problem(model, records, study), variants=variants)
@@ -525,7 +558,7 @@ def delay(
 ) -> Delay:
     """Estimate the time shift between positions and torques of a record, joint by joint.
 
-    options : longest, s, the largest delay looked for.
+    options : longest, the largest delay that is searched, s.
     """
     from runtime.plausible import delay as delays
 
@@ -536,7 +569,10 @@ def delay(
 def payload(
     model: GeneratedModel, records: Records, study: Study, *, loaded: Sequence[Record] | None = None
 ) -> PayloadStudy:
-    """The load of study.payload; loaded : records with it, default: those of study.payload.record."""
+    """Identify the load of study.payload from records with and without the load.
+
+    loaded : records with the load; default: the records of study.payload.record.
+    """
     whole = _with_loaded(model, records, study, (), loaded, None)
     note = whole.noted(LOADED)
     return payload_study(whole, () if note is None else note.result)
@@ -551,9 +587,10 @@ def excite(
     map: Callable[..., Iterable[Any]] = map,
     progress: Callable[[int, int], None] | None = None,
 ) -> Excitation:
-    """Search the motion with the smallest criterion over all starts of study.excitation, within the limits.
+    """Search an exciting motion: the smallest criterion of study.excitation, within the limits.
 
-    Without records, the values of the robot file serve as parameters.
+    The best motion over all starts of the search is returned. Without records, the values of the robot
+    file serve as parameters.
     """
     from runtime.excitation import search
 
@@ -565,9 +602,9 @@ def excite(
 def static_poses(
     model: GeneratedModel, records: Records = (), study: Study | None = None
 ) -> StaticPoses:
-    """Search poses at rest that, together with recorded poses, determine the gravity parameters best.
+    """Search static poses that, together with recorded poses, determine the gravity parameters best.
 
-    study.excitation.poses is their number, default 20. They keep the limits of q.
+    study.excitation.poses is the number of new poses, default 20. All poses respect the limits of q.
     """
     from runtime.excitation import poses
 
@@ -575,7 +612,10 @@ def static_poses(
 
 
 def extras(asked: Mapping[str, Mapping[str, Any]], attempted: bool = False) -> list[Extra]:
-    """EXTRAS with options for those that are requested by keyword, and substitutes for the others."""
+    """Select the analyses of EXTRAS to make, with the options of the requested analyses.
+
+    An analysis on request that is not in `asked` is replaced by its substitute, if it has one.
+    """
     chosen: list[Extra] = []
     for extra in EXTRAS:
         if not isinstance(extra, OnRequest):
@@ -606,18 +646,18 @@ def simulate(
     study : Study
         With a section `controller`.
     folder : str or Path, optional
-        Where file names of the study start; default: the current folder.
+        Folder to which file names of the study are relative; default: the current folder.
     ideal : bool
-        No noise, no steps of encoder and converter.
+        Whether to simulate without noise and without steps of encoder and converter.
     name : str, optional
-        Of the simulated record; its default says that nothing was measured.
+        Name of the simulated record; the default name says that nothing was measured.
 
     Raises
     ------
     InputError
         No section `controller`, or a reference outside the limits of the robot.
     SimulationError
-        An inertia that is not positive definite, or a loop that is not stable.
+        An inertia matrix that is not positive definite, or a loop that is not stable.
     """
     from runtime.loop import simulation
 
@@ -637,7 +677,10 @@ def simulate(
 
 
 def json_schema(of: str) -> dict[str, Any]:
-    """JSON Schema of study files ("study"), of estimate.json ("estimate"), or of cestac.json ("cestac")."""
+    """Return the JSON Schema of one kind of file.
+
+    of : "study" for study files, "estimate" for estimate.json, or "cestac" for cestac.json.
+    """
     from runtime.documents.estimates import result_schema
 
     if of != "study":
@@ -657,7 +700,10 @@ def _with_loaded(
     loaded: Sequence[Record] | None,
     simulator: Simulator | None,
 ) -> Problem:
-    """The prepared problem, with a note of the records with the load of study.payload, prepared by the same steps."""
+    """Prepare the problem, together with the records that have the load of study.payload.
+
+    The same steps prepare the records with the load, which are stored in a note of the problem.
+    """
     study = require_study(study)
     if unseen is None:
         unseen = records_of(study.validate.record, model, study)
@@ -673,7 +719,7 @@ def _with_loaded(
 
 
 def _candidate(model: GeneratedModel, candidate: Study | tuple[Study, Records, Records]) -> Problem:
-    """The problem of a treatment, as stated."""
+    """Build the problem of one treatment, before any preparation step."""
     if isinstance(candidate, Study):
         fitted = records_of(candidate.record, model, candidate)
         predicted = records_of(candidate.validate.record, model, candidate)

@@ -1,15 +1,19 @@
-"""Stiffness and damping of joints with an encoder before and one behind the gear (q and q_link).
+"""Identify stiffness and damping of gears that have an encoder on each side.
+
+With q of the encoder before the gear and q_l of the encoder behind it (channel q_link),
 
     K (q - q_l) + D (qd - qd_l) = tau - Ia qdd - FV qd - FS sign(qd) - OFFSET
 
-is the torque through the gear. The torque is the quieter side, and the difference of two encoders
-holds what they are apart in time, lag qd; so least squares of the difference, joint by joint,
+is the torque through the gear. The torque has less noise than the difference of the encoders, and
+this difference contains lag qd if the encoders are not sampled at the same time. So the difference
+is fitted by least squares, joint by joint,
 
     q - q_l = tau/K - (D/K) d/dt(q - q_l) - (Ia/K) qdd + (lag - FV/K) qd - (FS/K) sign(qd) + offset
 
-with Ia of the robot file if it has one. Deviations are those of blocks of time. A rigid model
-takes qdd for qdd_l: at f it errs by (f/f_j)^2 of the inertia torque, f_j = sqrt(K/A_jj)/(2 pi) with
-A_jj the inertia that the fit has at the middle of the motion, the rotor in it.
+with Ia of the robot file if it has a value there. Standard deviations are computed from blocks of
+time. A rigid model uses qdd in place of qdd_l: at the frequency f its error is (f/f_j)^2 of the
+inertia torque, f_j = sqrt(K/A_jj)/(2 pi). A_jj is the inertia about joint j, rotor included, that
+the fitted parameters give at the middle of the motion.
 """
 
 from __future__ import annotations
@@ -33,21 +37,22 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Elasticity(Result, Part):
-    """Gears of the joints with two encoders, shape (k,) each.
+    """Stiffness and damping of the gears with two encoders, shape (k,) each.
 
     Attributes
     ----------
     joints : tuple of str
+        Names of the joints.
     K, sigma_K : ndarray, N m/rad or N/m
-        Stiffness and its deviation; nan if the record does not determine it.
+        Stiffness and its standard deviation; nan if the record does not determine the stiffness.
     D, sigma_D : ndarray, N m s/rad or N s/m
-        Damping.
+        Damping and its standard deviation.
     lag : ndarray, s
-        By which the encoder behind the gear is late, less FV/K.
+        Delay of the encoder behind the gear, minus FV/K.
     resonance : ndarray, Hz
-        f_j; nan without K, or where the fit has no inertia above zero.
+        f_j; nan without K, or if the fitted inertia is not above zero.
     cutoff : float, Hz
-        Of the study: highest frequency of the rows.
+        Highest frequency of the rows, from the study.
     """
 
     joints: tuple[str, ...]
@@ -63,16 +68,16 @@ class Elasticity(Result, Part):
     title = "Gears with two encoders"
 
     def text(self) -> str:
-        """Each joint in words."""
+        """Write one sentence for each joint, one per line."""
         return "\n".join(self.sentences)
 
     def brief(self) -> str:
-        """The same."""
+        """Return the same text as `text`."""
         return self.text()
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """Each joint in words; where the rigid model is no longer enough."""
+        """One sentence for each joint: its gear, and whether a rigid model is accurate enough."""
         texts = []
         for j, K, s, D, d, lag, f in zip(
             self.joints,
@@ -101,16 +106,22 @@ class Elasticity(Result, Part):
 
 
 def elastic_gears(result: Identification) -> Elasticity | None:
-    """Stiffness of the transmissions whose motor and link are both measured; None if there is none, for poses at rest, or without all parameters."""
+    """Estimate the stiffness of the gears whose motor and link positions are both measured.
+
+    None if there is no such gear, if the records are poses at rest, or if not all parameters are
+    determined.
+    """
     if not result.determined or result.study.signals.reader == "static":
         return None
     return elasticity(result.problem, result.estimate.names, result.estimate.X)
 
 
 def elasticity(problem: Problem, names: Sequence[str], X: Array) -> Elasticity | None:
-    """Stiffness of the joints with two encoders, all records of a prepared problem together; None if there is none.
+    """Estimate the stiffness of the joints with two encoders, from all records of a prepared problem.
 
-    names, X : parameters of the rigid fit, for the inertia about each joint.
+    None if no record has link positions.
+
+    names, X : parameters of the rigid fit, which give the inertia about each joint.
     """
     model = problem.model
     both = [reading for reading in problem.prepared if "q_link" in reading.record.channels]
@@ -132,7 +143,10 @@ def elasticity(problem: Problem, names: Sequence[str], X: Array) -> Elasticity |
 
 
 def _gear(records: Sequence[Prepared], j: int, Ia: float | None) -> tuple[float, ...]:
-    """K, sigma, D, sigma, lag of one joint."""
+    """Fit the gear of joint j; return K, its sigma, D, its sigma, and the lag.
+
+    K and D are nan if the records do not determine the stiffness.
+    """
     rows, blocks = [], []
     for prepared in records:
         record = prepared.record
@@ -175,7 +189,10 @@ def _gear(records: Sequence[Prepared], j: int, Ia: float | None) -> tuple[float,
 
 
 def _inertia(model: GeneratedModel, q: Array, names: Sequence[str], X: Array) -> Array:
-    """A_jj at q of the parameters, shape (n,)."""
+    """Compute the inertia A_jj about each joint at q from the parameters X, shape (n,).
+
+    An inertia that is not positive becomes nan.
+    """
     n = len(q)
     at_rest = np.zeros((n + 1, n))
     kept = [list(model.BASE_PARAMETERS).index(k) for k in names]

@@ -1,30 +1,31 @@
-"""How far off are predictions of other motions likely to be?
+"""Estimate the likely error of predictions of other motions.
 
-Deviations of the parameters, and what encoders do to them, carried over to motions of the robot's
-own range.
+Standard deviations of the parameters, and the effect of encoder steps on them, are converted to
+torque errors of motions within the range of the robot.
 
     D       regressor in states of a reference motion: sines of every joint over a part of the range
-            and at a part of the speed of the robot file, or of the record where it has none
-    C       covariance of least squares with joints weighted by their residuals, wider by the median
-            of corrected over stated deviations, and by what blocks do not see of slow residuals
-    V       the same, knowing the values of the robot file to LIMIT.VALUES_KNOWN where the fit
-            does: (K'C^-1 K + S^-1)^-1 over the standard parameters, X = K chi, S diagonal; their
-            estimate is chi_V
+            and at a part of the speed of the robot file, or of the record if the file has no limits
+    C       covariance of least squares with joints weighted by their residuals, multiplied to
+            include slow residuals: by the median of corrected over stated standard deviations,
+            squared, and by a factor for correlations longer than a block
+    V       the same, if the fit uses the values of the robot file, known to LIMIT.VALUES_KNOWN:
+            (K'C^-1 K + S^-1)^-1 over the standard parameters, X = K chi, S diagonal; the estimate
+            of the standard parameters is then chi_V
     a       share of the accelerations that is an error of the encoder's steps
     D_0     D without accelerations
 
     expected^2 = tr(D K V K'D')/||D X||^2 + ||D (X - K chi_V)||^2/||D X||^2
                  + (a/(1 + a))^2 ||(D - D_0) X||^2/||D X||^2
 
-The first part is what the record leaves open, the second how far the fit is from what record and
-values say together, the third how much too small the steps make inertias (the record's own lattice:
-`runtime.counts.encoder_advice`). What the model leaves out is not in it, but as far as it is in
-the residuals of C.
+The first term is what the record leaves undetermined. The second is the difference between the fit
+and the joint estimate of record and values. The third is the amount by which the encoder steps make
+inertias too small (the encoder resolution of the record: `runtime.counts.encoder_advice`). Effects
+that the model lacks are included only as far as they are in the residuals of C.
 
-The square of the error that one record makes is a sum of b squares, of which a few weigh most:
-with M = K'D'D K V it scatters as chi^2/nu with nu = tr(M)^2/tr(M^2) degrees of freedom. The
-interval of the expected error has the first two parts times quantiles of that, and the third times
-LIMIT.STEPS_MOVE. Where one direction is open, nu is 1: 30 % expected may be 2 %.
+The squared error of one record is a sum of b squares, a few of which are large: with
+M = K'D'D K V it is distributed as chi^2/nu with nu = tr(M)^2/tr(M^2) degrees of freedom. The
+interval of the expected error has the first two terms times quantiles of this distribution, and the
+third times LIMIT.STEPS_MOVE. If one direction is undetermined, nu is 1: 30 % expected may be 2 %.
 
 Reference: Satterthwaite (1946) for nu.
 """
@@ -74,7 +75,7 @@ class Expected(NamedTuple):
     "positions (symgen excite; signals: {reader: counts})",
 )
 def expected_off(likely: Expected) -> Answer | None:
-    """Expected error of predictions, by its interval; None if it is not known."""
+    """Judge the expected error of predictions by its interval; None if the error is not known."""
     if np.isnan(likely.error):
         return None
     limit = LIMIT.EXPECTED_ERROR
@@ -102,12 +103,12 @@ class ExpectedError(Part):
 
     @property
     def expected_error(self) -> float:
-        """Expected error of motions over the range of the robot at up to half of its speed, %."""
+        """Expected error of predictions over the whole range, at up to half of the largest speed, %."""
         return self.expected.error
 
     @cached_property
     def expected(self) -> Expected:
-        """The error, and the interval in which it is likely, %."""
+        """Expected error of predictions, and the interval in which it is likely to be, %."""
         result = self.result
         if not result.usable:
             return Expected(*3 * (float("nan"),))
@@ -125,7 +126,7 @@ class ExpectedError(Part):
         )
 
     def checks(self) -> tuple[Check, ...]:
-        """The error by its interval, if it is known."""
+        """Return the check of the expected error; no check if the error is not known."""
         check = expected_off(self.expected)
         return () if check is None else (check,)
 
@@ -138,9 +139,10 @@ def expected_error(
     records: Sequence[Prepared],
     steps: float = 0.0,
 ) -> Expected:
-    """Expected error of predictions, at most LIMIT.LARGEST_EXPECTED.
+    """Compute the expected error of predictions, %, at most LIMIT.LARGEST_EXPECTED.
 
-    nan if neither the robot file nor the records give a range, or a loop does not close in it.
+    The error is nan if neither the robot file nor the records give a range, or if a loop cannot close
+    in the range.
 
     Parameters
     ----------
@@ -148,8 +150,9 @@ def expected_error(
     observation : Observation
         Rows of the records.
     settings : EstimateSettings
-        Method of the study; deviations are those of its linear companion, weighted by joint where
-        that has no weights: a slide of large forces says nothing of the noise of a wrist.
+        Method of the study. Standard deviations are those of its linear companion, weighted by joint if
+        the companion has no weights: residuals of a joint with large forces do not show the noise of a
+        wrist.
     fit : Estimate
         The parameters that are used.
     records : sequence of Prepared
@@ -204,9 +207,10 @@ def expected_error(
 
 
 def with_values(physical: PhysicalModel, K: Array, R: Array, y: Array) -> tuple[Array, Array]:
-    """Standard parameters chi of rows R K chi = y with errors of variance 1 and of the values of the robot file, and their covariance.
+    """Estimate standard parameters chi from rows R K chi = y and from the values of the robot file.
 
-    Those without a value are free.
+    The rows have errors of variance 1. Parameters without a value are free. Return chi and its
+    covariance.
     """
     known = np.array([physical.values.get(name, np.nan) for name in physical.standard])
     deviation = np.abs(known)
@@ -227,7 +231,10 @@ def with_values(physical: PhysicalModel, K: Array, R: Array, y: Array) -> tuple[
 
 
 def limits_of(model: GeneratedModel) -> tuple[Array, Array] | None:
-    """Ranges, shape (n, 2), and largest speeds, shape (n,), of the robot file; None if one is not finite."""
+    """Return joint ranges, shape (n, 2), and largest speeds, shape (n,), of the robot file.
+
+    None if a limit is missing or not finite.
+    """
     limits = dict(getattr(model, "LIMITS", {}) or {})
     n = len(model.JOINTS)
     span, speed = (np.asarray(limits.get(key, ()), dtype=float) for key in ("q", "qd"))
@@ -238,9 +245,9 @@ def limits_of(model: GeneratedModel) -> tuple[Array, Array] | None:
 def reference_states(
     model: GeneratedModel, records: Sequence[Prepared]
 ) -> tuple[Array, Array, Array] | None:
-    """q, qd, qdd of a motion over the range of the robot, shape (K, n) each.
+    """Make random states q, qd, qdd of sine motions in the range of the robot, shape (K, n) each.
 
-    None if no range is known.
+    None if neither the robot file nor a record gives a range.
     """
     n = len(model.JOINTS)
     limits = limits_of(model)

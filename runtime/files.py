@@ -1,4 +1,4 @@
-"""Results as files in a folder: the page, figures, tables, and everything that another program reads."""
+"""Write results into a folder: HTML page, figures, tables, and data files for other programs."""
 
 from __future__ import annotations
 
@@ -51,15 +51,15 @@ def report(
     ----------
     result : Identification, Ranking, Cestac, Advice, Simulation, Excitation or StaticPoses
     folder : str, Path or Results
-        Made where it is missing; or one that `runtime.reporting.result_files.results_in` gave.
+        Made if it is missing; or a Results object of `runtime.reporting.result_files.results_in`.
     study : Study, optional
         Settings of a Cestac, an Advice or a Simulation, for study.yaml; default: Study(). An
-        Identification holds its own.
+        Identification has its own study.
 
     Returns
     -------
     list of Path
-        The files.
+        Paths of the written files.
 
     Raises
     ------
@@ -74,7 +74,10 @@ def report(
 
 @singledispatch
 def files_of(result: object, folder: Path, study: Study) -> Files:
-    """Contents of `folder` by file name; InputError for a result without files."""
+    """Make the contents of all files of a result, by file name, for `folder`.
+
+    InputError for a result that has no files.
+    """
     raise InputError(
         f"{type(result).__name__} is no result that is written; expected an Identification, "
         "Ranking, Cestac, Advice, Simulation, Excitation or StaticPoses"
@@ -90,7 +93,10 @@ def identification_files(
     verdict: str = "",
     sections: Sequence[Section] = (),
 ) -> Files:
-    """Files of an identification; title, warning, verdict, sections : as for `identification_page`."""
+    """Make the files of an identification: page, estimate, parameters, arrays, study and figures.
+
+    title, warning, verdict, sections : as for `identification_page`.
+    """
     unit = result.torque_unit
     fit = result.model_estimate
     settings: Any = result.study
@@ -121,7 +127,7 @@ def _(result: Identification, folder: Path, study: Study) -> Files:
 
 @files_of.register
 def _(result: Ranking, folder: Path, study: Study) -> Files:
-    """The comparison, and the files of the best identification."""
+    """Make the files of a comparison and of its best identification."""
     section = Section(
         "Treatments compared", (result.verdict, *result.missing), tables=(result.table(),)
     )
@@ -153,7 +159,7 @@ def _(result: Advice, folder: Path, study: Study) -> Files:
 
 @files_of.register
 def _(result: Simulation, folder: Path, study: Study) -> Files:
-    """The record, a study that reads it back, figures of merit, the figure."""
+    """Make a simulated record, a study that reads this record, figures of merit and a figure."""
     figure = simulation_figure(joint_labels(result.model), result, result.units)
     record = RecordSettings(
         files=(str(folder / RECORD),), rate=result.rate, name=result.name, simulated=True
@@ -169,7 +175,7 @@ def _(result: Simulation, folder: Path, study: Study) -> Files:
 
 @files_of.register
 def _(result: Excitation, folder: Path, study: Study) -> Files:
-    """The motion as samples and by its coefficients, its figures of merit, the figure."""
+    """Make the files of an exciting motion: samples, coefficients, figures of merit and page."""
     return page_files(excitation_page(result)) | {
         "excitation.json": result.to_json(),
         "trajectory.csv": result.to_csv(),
@@ -179,7 +185,10 @@ def _(result: Excitation, folder: Path, study: Study) -> Files:
 
 @files_of.register
 def _(result: StaticPoses, folder: Path, study: Study) -> Files:
-    """The poses, with their numbers as t: torques beside them make a record of them."""
+    """Make a table of static poses whose column t numbers the poses, and their page.
+
+    With columns of measured torques added, the table is a record.
+    """
     page = Page("Poses at rest", "", [Section(result.model.NAME, listing=result.to_table())])
     t = np.arange(1.0, len(result.poses) + 1)
     texts = {"excitation.json": result.to_json(), "poses.csv": csv_text(t, q=result.poses)}
@@ -187,12 +196,12 @@ def _(result: StaticPoses, folder: Path, study: Study) -> Files:
 
 
 def page_files(page: Page) -> Files:
-    """Text of the page and its figures."""
+    """Make the HTML text of a page and the files of its figures."""
     return {"report.html": render(page), **page.files}
 
 
 def part_files(part: Part) -> Files:
-    """Files of a part next to the page."""
+    """Make the files that one part of a result adds to the folder of the page."""
     files: Files = dict(part.files())
     for stem, arrays in part.arrays().items():
         files |= array_files(stem, arrays)

@@ -1,4 +1,4 @@
-"""Torques measured behind the gears: the columns of the drives have no part in them."""
+"""Use torques that are measured behind the gears: parameters of the drives do not act on them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ OF_DRIVES = ("inertia", "viscous", "coulomb")
 
 
 def torques_of_links(problem: Problem) -> Problem:
-    """The step: all columns but those of the drives, where records name sensors behind the gears."""
+    """Leave the columns of the drives out if torques are measured behind the gears.
+
+    This is a step of the preparation of a problem. It acts only if estimate.columns is all.
+    """
     settings: Any = problem.settings
     if settings.estimate.columns != "all" or not _behind_gears(
         [*settings.record, *settings.validate.record]
@@ -30,9 +33,9 @@ def torques_of_links(problem: Problem) -> Problem:
 
 
 def _behind_gears(records: Sequence[Any]) -> bool:
-    """Whether the torques are those of sensors behind the gears, by the settings of the records.
+    """Whether the settings of the records say that torques are measured behind the gears.
 
-    SettingsError if those of one record are and those of another are not.
+    SettingsError if this is true for one record and false for another.
     """
     sides = {record.sides[1] == "link" for record in records}
     message = "link in one record and not in another; fit them in studies of their own"

@@ -1,12 +1,13 @@
-"""Whether a running median suits the torques of a record: `signals.torque_median: auto`.
+"""Decide whether a running median suits the torques of a record (`signals.torque_median: auto`).
 
-A controller that answers every count of an encoder drives in pulses. Their mean moves the robot,
-and a median cuts them off. With d what the median takes from the torque tau of a joint, and
-means over blocks of LIMIT.TORQUE_BLOCK,
+A controller that reacts to each count of an encoder drives the motor in pulses. The mean of these
+pulses moves the robot, but a median removes them. Let d be the change of the torque tau of a joint
+by the median. With means over blocks of LIMIT.TORQUE_BLOCK,
 
     d = a tau + b qd + c sign(qd) + rest       taken = ||d - rest|| / ||tau||
 
-Spikes, for which a median is there, and noise go with no motion. Measured: benchmarks/truth.md.
+Noise and spikes, which a median is meant to remove, do not depend on the motion. Measured values:
+benchmarks/truth.md.
 """
 
 from __future__ import annotations
@@ -25,9 +26,11 @@ Array = np.ndarray
 
 
 def share_taken(tau: Array, q: Array, rate: float, window: int) -> Array:
-    """Share of the torques tau, shape (N, n), that a median over `window` samples takes with the motion q, shape (N, n), shape (n,).
+    """Compute which share of the torque a median removes in time with the motion, shape (n,).
 
-    0 if most of what it takes goes with no motion.
+    The share of a joint is 0 if most of the removed torque does not depend on the motion.
+
+    tau, q : torques and positions, shape (N, n).   window : samples of the median.
     """
     block = max(1, round(LIMIT.TORQUE_BLOCK * rate))
     count, n = len(tau) // block, tau.shape[1]
@@ -49,7 +52,10 @@ def share_taken(tau: Array, q: Array, rate: float, window: int) -> Array:
 
 
 def torque_median(problem: Problem) -> Problem:
-    """The step: torques without a median where signals.torque_median is auto and it would take torque that goes with the motion."""
+    """Switch the median of the torques off if it would remove torque that depends on the motion.
+
+    This is a step of the preparation of a problem. It acts only if signals.torque_median is auto.
+    """
     signals = problem.settings.signals
     if signals.torque_median != "auto":
         return problem
@@ -67,6 +73,6 @@ def torque_median(problem: Problem) -> Problem:
 
 
 def _with_window(problem: Problem, window: int) -> Study:
-    """The settings with that window of the median on torques."""
+    """Return the settings with a median of `window` samples on the torques."""
     settings = problem.settings
     return replace(settings, signals=replace(settings.signals, torque_median=window))

@@ -1,6 +1,6 @@
-"""Poses at rest: each sample is a pose, qd = qdd = 0, with the mean of its torques.
+"""Records of static poses: each sample is a pose, qd = qdd = 0, with the mean of its torques.
 
-Inertias and friction have no torque in such rows; the step leaves their columns out.
+Inertias and friction cause no torque in such rows, so their columns are left out.
 """
 
 from __future__ import annotations
@@ -23,21 +23,23 @@ TEXT = "others (inertias, friction) are left out. Dry friction holds a joint wit
 
 
 def at_rest(record: Record, signals: Signals) -> States:
-    """Reader `static`: q as it is, qd = qdd = 0."""
+    """Return q unchanged with qd = qdd = 0: the reader `static`, for static poses."""
     require_positions(record.missing, "reader: static", record.name, COUNTS)
     rest = np.zeros_like(record.q)
     return States(record.q, rest, rest)
 
 
 def poses_at_rest(problem: Problem) -> Problem:
-    """The step: the columns that act in poses at rest; the problem itself if its records are of a motion.
+    """Keep only the base parameters that cause a torque in static poses.
+
+    This is a step of the preparation of a problem. A problem whose records are motions is not changed.
 
     Raises
     ------
     InputError
-        Every column vanishes.
+        No parameter causes a torque in the poses.
     SettingsError
-        A method that makes rows of its own, which needs a motion.
+        A method that simulates the closed loop, because it needs a motion.
     """
     settings = problem.settings
     if settings.signals.reader != "static" or not problem.records:

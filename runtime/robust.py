@@ -1,4 +1,4 @@
-"""Robust least squares by iterated weights: rows far off the model count less.
+"""Robust least squares by iterated weights: rows with a large residual get a small weight.
 
     u_i = e_i / (S_j sqrt(1 - h_i))          S_j = median |e - median e| / 0.6745 over the rows of
                                              joint j, h_i leverage
@@ -11,8 +11,8 @@
 
     C = (sum_j W_j'W_j / S_j^2)^-1  mean(psi^2) / mean(psi')^2  r / (r - b),    psi = w u
 
-Both constants give 95 % efficiency under normal noise. Where more than 5 % of the rows of a joint
-have w < 0.5 the model is wrong there; that is not a matter of outliers. options: loss, tuning (k or
+Both constants give 95 % efficiency under normal noise. If more than 5 % of the rows of a joint
+have w < 0.5, the model is wrong there, and these rows are not outliers. options: loss, tuning (k or
 c), passes, block, rank_tolerance.
 
 References: Huber and Ronchetti, Robust Statistics (2009), chapter 7; Maronna, Martin and Yohai,
@@ -41,14 +41,14 @@ TUNING = {"huber": 1.345, "tukey": 4.685}
 
 
 class IrlsOptions(LinearOptions):
-    """estimate.options of method irls.
+    """Options of the method irls, robust least squares (estimate.options of a study).
 
     Attributes
     ----------
     loss : str
         huber or tukey.
     tuning : float or None
-        k of huber or c of tukey; default: 1.345, 4.685.
+        Constant k of huber or c of tukey; default: 1.345 or 4.685.
     """
 
     loss: Literal["huber", "tukey"] = "huber"
@@ -57,7 +57,11 @@ class IrlsOptions(LinearOptions):
 
 @dataclass(frozen=True, eq=False)
 class Robust:
-    """State of the iteration: X, shape (b,), u and w, shape (r,), S, shape (n,), T with T T' = (sum_j W_j'W_j / S_j^2)^-1."""
+    """State of the iteration after one pass.
+
+    X are the parameters, shape (b,), u the scaled residuals and w the weights, shape (r,), and S the
+    scales of the joints, shape (n,). T fulfils T T' = (sum_j W_j'W_j / S_j^2)^-1.
+    """
 
     X: Array
     u: Array
@@ -69,7 +73,10 @@ class Robust:
 
 
 def fit(start: Beginning) -> Fitted:
-    """The robust fit; `details` holds the scales S_j and the share of down-weighted rows by joint."""
+    """Fit the parameters by robust least squares.
+
+    `details` of the result has the scales S_j, and the share of down-weighted rows of each joint.
+    """
     W, options = start.observation.W, start.options
     found = _iterated(start, W, start.solution.X, "huber")
     if options.loss == "tukey":
@@ -79,21 +86,21 @@ def fit(start: Beginning) -> Fitted:
 
 
 def weight(u: Array, loss: str, tuning: float) -> Array:
-    """w(u), shape of u."""
+    """Compute the weights w(u) of scaled residuals u, shape of u."""
     if loss == "huber":
         return np.asarray(np.minimum(1.0, tuning / np.maximum(np.abs(u), np.finfo(float).tiny)))
     return np.where(np.abs(u) < tuning, (1 - (u / tuning) ** 2) ** 2, 0.0)
 
 
 def slope(u: Array, loss: str, tuning: float) -> Array:
-    """psi'(u), psi = w u, shape of u."""
+    """Compute the derivative psi'(u) of psi = w u, shape of u."""
     inside = np.abs(u) < tuning
     v = (u / tuning) ** 2
     return np.where(inside, 1.0 if loss == "huber" else (1 - v) * (1 - 5 * v), 0.0)
 
 
 def _iterated(start: Beginning, W: Array, X: Array, loss: str) -> Robust:
-    """Weights and parameters in turn, from X."""
+    """Compute weights and parameters in turn, starting from X, until X stays the same."""
     observation, raw, options = start.observation, start.system.raw, start.options
     tuning = _tuning(options, loss)
     for done in range(1, options.passes + 1):
@@ -115,12 +122,12 @@ def _iterated(start: Beginning, W: Array, X: Array, loss: str) -> Robust:
 
 
 def _weighted(observation: Observation, W: Array, raw: Factor, root: Array) -> Factor:
-    """Factor of the rows multiplied by root, shape (r,)."""
+    """Factor the observation matrix W and Y after each row is multiplied by root, shape (r,)."""
     return factor(W * root[:, None], observation.Y * root, observation.rows, raw.names)
 
 
 def _scales(observation: Observation, raw: Factor, e: Array) -> Array:
-    """S_j, shape (n,), never below the rounding of Y_j."""
+    """Compute the residual scale S_j of each joint, shape (n,), at least the rounding error of Y_j."""
     by_joint = [e[observation.joint(j)] for j in range(observation.n)]
     S = np.array(
         [
@@ -132,7 +139,7 @@ def _scales(observation: Observation, raw: Factor, e: Array) -> Array:
 
 
 def _fit_of_last_pass(start: Beginning, W: Array, fit: Robust) -> Fitted:
-    """Result of the last pass, with the covariance of a robust estimate."""
+    """Build the result of the last pass, with the covariance of a robust estimate."""
     observation, options = start.observation, start.options
     r, b = W.shape
     loss, tuning = options.loss, _tuning(options, options.loss)
@@ -174,7 +181,7 @@ def _fit_of_last_pass(start: Beginning, W: Array, fit: Robust) -> Fitted:
 
 
 def _note_of_shares(shares: Mapping[str, float]) -> str:
-    """Shares of down-weighted rows in words."""
+    """Write a note on the share of down-weighted rows of each joint."""
     text = (
         f"Share of rows with a weight below {LIMIT.DOWN_WEIGHTED:g}: "
         + ", ".join(f"joint {joint} {100 * share:.1f} %" for joint, share in shares.items())
@@ -190,5 +197,8 @@ def _note_of_shares(shares: Mapping[str, float]) -> str:
 
 
 def _tuning(options: IrlsOptions, loss: str) -> float:
-    """k of Huber or c of Tukey; the start of Tukey by Huber keeps Huber's own k."""
+    """Return the constant k of Huber or c of Tukey for `loss`.
+
+    The option `tuning` is for the chosen loss only: a Huber fit that starts a Tukey fit uses k = 1.345.
+    """
     return options.tuning if options.tuning is not None and loss == options.loss else TUNING[loss]

@@ -1,17 +1,19 @@
-"""Velocities that were recorded with the positions, with the noise that each of them has.
+"""Combine recorded velocities with differentiated positions, to have the least noise.
 
     qd = v + L (dq/dt - v)          L = 1/(1 + (f/f_c)^2), zero phase
-    2 pi f_c = sigma_v/sigma_q      deviations of the white noise of v and of q
+    2 pi f_c = sigma_v/sigma_q      standard deviations of the white noise of v and of q
 
-Noise of a difference grows with the frequency, that of v does not: below f_c differences of q are
-quieter, above it v. L is the weight of least variance at every frequency, a Butterworth of first
-order forward and backward.
+v is the recorded velocity. The noise of a differentiated position grows with the frequency, the
+noise of v does not: below f_c differences of q have less noise, above f_c v has less noise. The
+weight L gives the least variance at every frequency. It is a Butterworth filter of first order,
+applied forward and backward.
 
-A drive's velocity may be filtered, late, or in another unit. On the motion itself,
+The velocity of a drive may be filtered, delayed, or in another unit. On the motion itself,
 
     v = gain (dq/dt - lag d2q/dt2) + rest,
 
-and v of a joint is left alone where gain and lag take more than LIMIT.SPEED_DISAGREES of it.
+and v of a joint is not used if the errors of gain and lag exceed LIMIT.SPEED_DISAGREES of the
+velocity.
 """
 
 from __future__ import annotations
@@ -33,9 +35,12 @@ Array = np.ndarray
 def crossings(
     records: Sequence[tuple[Array, Mapping[str, Array], float]], signals: Signals
 ) -> tuple[tuple[float, ...], str]:
-    """signals.velocity of records that are fitted together, Hz by joint, and what it is, in words; half the rate of the slowest record where v of a joint is not used.
+    """Find the frequency of each joint, Hz, above which its recorded velocity is used.
 
-    records : positions, channels with qd, and rate of each.
+    Return the frequencies (signals.velocity of a study) and a sentence on them. For a joint whose
+    recorded velocity is not used, the frequency is half the sampling rate of the slowest record.
+
+    records : positions, channels with qd, and sampling rate of each record; fitted together.
     """
     parts = [agreement(q, channels["qd"], rate, signals) for q, channels, rate in records]
     agrees = np.all([part.agrees for part in parts], axis=0)
@@ -52,7 +57,10 @@ def crossings(
 
 
 def recorded_speeds(problem: Problem) -> Problem:
-    """The step: signals.velocity as numbers where it is auto and every fitted record has velocities."""
+    """Replace `signals.velocity: auto` by frequencies in Hz if all fitted records have velocities.
+
+    This is a step of the preparation of a problem; it acts only with the reader lowpass.
+    """
     signals = problem.settings.signals
     if signals.velocity != "auto" or signals.reader != "lowpass" or not problem.records:
         return problem

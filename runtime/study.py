@@ -1,10 +1,11 @@
-"""Everything about an experiment that is not the robot: the study file, the sections of the chapter and those of features.
+"""The study file: all settings of an experiment except the robot itself.
 
     study = load_study("study.yaml")
     study = study_from_mapping({"signals": {"lowpass": {"cutoff": 100}}})
     study.signals.lowpass.order        # 4, the default
 
-Like `runtime.compose` this names features: a section of one is a field of Study.
+A Study has the sections of the chapter (`runtime.core.study`) and a section for each further
+feature, such as `payload` or `excitation`.
 """
 
 from __future__ import annotations
@@ -38,20 +39,20 @@ from runtime.reading.units import speed
 
 
 class Rows(chapter.Rows):
-    """Rows of W and Y that are used.
+    """Selection of the rows of W and Y that are used.
 
     Attributes
     ----------
     low_speed : float or tuple of float, rad/s or m/s
-        Rows of joint j with |qd_j| below it are left out: sign(qd) is noise in them. A text may
-        have another unit: 2 rpm.
+        Rows of joint j with |qd_j| below this speed are left out, because sign(qd) is noise in them. A
+        text may have another unit: 2 rpm.
     """
 
     low_speed: Annotated[PerJoint[NotNegative], BeforeValidator(speed)] = 0.0
 
 
 class ValidateSettings(chapter.ValidateSettings):
-    """Data that the parameters are fitted on, and data that they predict.
+    """Choice of the data that parameters are fitted to and of the data that they predict.
 
     Attributes
     ----------
@@ -63,7 +64,7 @@ class ValidateSettings(chapter.ValidateSettings):
 
 
 class PayloadSettings(load.PayloadSettings):
-    """Records with a load fixed to a link; the records of the study are those without it.
+    """Records with a load fixed to a link; the records of the study itself are without the load.
 
     Attributes
     ----------
@@ -75,7 +76,7 @@ class PayloadSettings(load.PayloadSettings):
 
 
 class Recorded(Settings):
-    """First part of a study file.
+    """First part of a study file: its version and its records.
 
     Attributes
     ----------
@@ -97,7 +98,7 @@ class Study(chapter.Study, Recorded):
     payload : PayloadSettings or None
         Records with a load.
     controller : Controller or None
-        Closed loop of simulation, IV and DIDIM.
+        Closed loop for simulation, IV and DIDIM.
     excitation : ExcitationSettings or None
         Search for an exciting motion.
     """
@@ -118,40 +119,49 @@ class Study(chapter.Study, Recorded):
 
 
 def study_from_mapping(mapping: Mapping[str, Any]) -> Study:
-    """The Study of a mapping as read from a study file.
+    """Build a Study from a mapping of settings, as read from a study file.
 
-    Raises SettingsError with the path of the offending key.
-
-    Numbers may be texts such as "2*pi/10000"; one value means a list of one (files, delta,
+    Numbers may be texts such as "2*pi/10000"; a single value means a list of one value (files, delta,
     record).
+
+    Raises SettingsError with the path of the wrong key.
     """
     require_kind(mapping, Mapping, "study", "a mapping, as read from a study file")
     return structure(Study, mapping)
 
 
 def study_schema() -> dict[str, Any]:
-    """JSON Schema of study files; methods and readers are texts there, whose lists `runtime.compose` holds."""
+    """Return the JSON Schema of study files.
+
+    Methods and readers are plain texts in it; `runtime.compose.json_schema` adds the lists of names.
+    """
     return TypeAdapter(Study).json_schema()
 
 
 def load_study(path: str | Path) -> Study:
-    """Read a study file; SettingsError with file, line and key for an invalid one."""
+    """Read a study file.
+
+    An invalid file raises SettingsError with file, line and key.
+    """
     require_kind(path, (str, Path), "study", "the name of a study file")
     return study_from_text(text_of(path), file=Path(path).name)
 
 
 def study_from_text(text: str, *, file: str = "study") -> Study:
-    """The Study of the text of a study file."""
+    """Build a Study from the text of a study file."""
     return settings_from_text(Study, text, file=file)
 
 
 def study_of(record: str | Path) -> tuple[Study, Path]:
-    """The Study that a name means, and the folder its files are relative to.
+    """Find the Study for the name of a dataset, a study file or a measured file.
+
+    Return the Study, and the folder to which its file names are relative.
 
     Parameters
     ----------
     record : str or Path
-        A dataset, a study file (.yaml, .yml), or a measured file whose columns are called t, q1 ..., tau1 ... (SI, joint side).
+        A dataset, a study file (.yaml, .yml), or a measured file whose columns are called t, q1 ...,
+        tau1 ... (SI, joint side).
     """
     require_kind(
         record, (str, Path), "record", "the name of a dataset, a study file or a measured file"
@@ -180,18 +190,23 @@ def read_record(
     Parameters
     ----------
     path : str, Path or RecordSettings
-        A measured file whose columns are called t, q1 ..., tau1 ... (SI, joint side), a study file, a dataset, or settings.
+        A measured file whose columns are called t, q1 ..., tau1 ... (SI, joint side), a study file, a
+        dataset, or settings.
     model : module, optional
-        Emitted model of the robot; needed if a side is "motor", which its drives convert, and checked for its number of joints.
+        Emitted model of the robot; needed if a side is "motor", because its drives convert the record.
+        The number of joints is checked against it.
     folder : str or Path
-        Where relative file names start; of a study file, those in it start where it is.
+        Folder to which file names are relative. File names in a study file are relative to the folder
+        of that file.
     missing : bool
-        Whether positions may be missing, nan or an empty field, as `signals.reader: counts` admits; a study file that names this reader says so itself.
+        Whether positions may be missing (nan or an empty field), as `signals.reader: counts` allows;
+        always true for a study file with this reader.
 
     Raises
     ------
     InputError
-        Files that cannot be read or hold something else, and several records, or one that `resample` splits.
+        Files that cannot be read or have other content, several records, or one record that `resample`
+        splits.
     """
     if isinstance(path, RecordSettings):
         settings: tuple[RecordSettings, ...] = (path,)
@@ -205,18 +220,22 @@ def read_record(
     if len(records) != 1:
         names = ", ".join(record.name for record in records)
         raise InputError(
-            f"{len(records)} records or pieces between gaps; read_records gives them all: {names}"
+            f"{len(records)} records or pieces between gaps; read_records returns them all: {names}"
         )
     return records[0]
 
 
 def suggested(study: Study, model: GeneratedModel) -> tuple[Study, list[str]]:
-    """The study with the remedy of each refusal in its records, and a sentence on each. Remedies are likely, by names and time stamps, not known: a person looks at them.
+    """Correct the settings of a study until all its records can be read.
+
+    An error in reading may name a remedy, which is then applied; angles that wrap at full turns are
+    unwrapped. Return the new study, and a sentence on each change. Remedies are guesses from names and
+    time stamps, so a person should check them.
 
     Raises
     ------
     InputError
-        A refusal that has no remedy, or whose remedy does not help.
+        An error that names no remedy, or whose remedy does not help.
     """
     sentences: list[str] = []
     while True:
@@ -246,7 +265,10 @@ def suggested(study: Study, model: GeneratedModel) -> tuple[Study, list[str]]:
 
 
 def _starts_anew(settings: RecordSettings, model: GeneratedModel, missing: bool) -> bool:
-    """Whether the largest steps between samples shrink to a fifth where angles are continued."""
+    """Whether the recorded angles wrap around at full turns.
+
+    They do if unwrapping makes the largest step between two samples more than five times smaller.
+    """
     jumps, moves = (
         np.max(
             [
@@ -261,20 +283,27 @@ def _starts_anew(settings: RecordSettings, model: GeneratedModel, missing: bool)
 
 
 def draft(study: Study, model: GeneratedModel) -> str:
-    """Text of a study to complete, from the column names of the first record; "" if they give nothing."""
+    """Write a study file with gaps for the user to fill, from the column names of the first record.
+
+    The text is "" if the column names show nothing.
+    """
     record = study.record[0]
     joints = tuple(getattr(model, "LABELS", {}).values())
     return drafts.draft(record, Path(record.files[0]), joints) if record.files else ""
 
 
 def located(study: Study, folder: Path) -> Study:
-    """The study with every file, until now relative to `folder`, relative to the current folder."""
+    """Return a study whose file names are relative to the current folder instead of to `folder`."""
     return _with_files(study, lambda file: str(folder / file))
 
 
 def study_text(study: Study, destination: Path, *, defaults: bool = True) -> str:
-    """The text of study.yaml in the folder `destination`; files relative to that folder. defaults :
-    every setting; else those that differ from their default, and the units of each record.
+    """Write the text of study.yaml for the folder `destination`.
+
+    File names are relative to that folder.
+
+    defaults : True: every setting; False: only settings that differ from their default, and the units
+        of each record.
     """
     mapping = to_mapping(
         _with_files(study, lambda file: Path(os.path.relpath(file, destination)).as_posix())
@@ -289,7 +318,7 @@ def study_text(study: Study, destination: Path, *, defaults: bool = True) -> str
 
 
 def _differing(mapping: Mapping[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:
-    """Entries that are not the usual ones, sections by entry."""
+    """Return the entries of a mapping that differ from their usual value, also inside sections."""
     return {
         key: _differing(value, usual[key])
         if isinstance(value, Mapping) and isinstance(usual.get(key), Mapping)
@@ -300,7 +329,7 @@ def _differing(mapping: Mapping[str, Any], usual: Mapping[str, Any]) -> dict[str
 
 
 def _with_files(study: Study, change: Callable[[str], str]) -> Study:
-    """The study with `change` of every file name; those of datasets stay."""
+    """Apply `change` to every file name of a study, except to the files of datasets."""
 
     def changed(records: tuple[RecordSettings, ...]) -> tuple[RecordSettings, ...]:
         return tuple(

@@ -1,4 +1,8 @@
-"""BLAS with one thread: several would fight for the cores, and their number could change the last bit of a sum."""
+"""Run numerical functions with one BLAS thread only.
+
+Several threads would compete for the processor cores, and their number could change the last bit
+of a sum.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +24,11 @@ BLAS_THREADS = (
 
 
 def single_threaded(function: Callable[P, R]) -> Callable[P, R]:
-    """The function with one BLAS thread while it runs: its matrices are small, and several threads wait for each other ten times as long as they compute."""
+    """Wrap a function so that it runs with one BLAS thread.
+
+    Its matrices are small, and several threads wait for each other ten times as long as they compute.
+    Without the package threadpoolctl the number of threads is not changed.
+    """
 
     @wraps(function)
     def limited(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -40,5 +48,8 @@ def alone(function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
 
 
 def alone_each(map: Callable[..., Iterable[R]]) -> Callable[..., Iterable[R]]:
-    """The map, of which each value is made with one BLAS thread, in whatever process."""
+    """Return a function like `map` that runs each call with one BLAS thread.
+
+    map : the built-in map, or a function like it that uses several processes.
+    """
     return lambda function, keys: map(partial(alone, function), keys)

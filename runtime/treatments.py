@@ -1,19 +1,20 @@
-"""Which of several treatments of the same records predicts best? One call for "with all rows or
-without rest, with the counterbalance known or not".
+"""Find which of several treatments of the same records predicts validation records best.
 
-Every candidate is identified on its own terms; of its sets of parameters
-(`runtime.core.parameter_sets`) the one that predicts the validation records best stands for it, the
-essential one too. All of them are then judged on the same rows: those of every candidate's filters
-and rows in turn, so that none wins by leaving out what it cannot explain,
+A treatment is a choice of settings, for instance with all rows or without rows at rest, with the
+counterbalance torque known or not. Every candidate is identified with its own settings. Of its sets
+of parameters (`runtime.core.parameter_sets`), the essential set included, the set that predicts the
+validation records best is used. All candidates are then judged on the same rows, made by the
+filters and row selection of every candidate in turn, so that no candidate wins because it leaves
+out rows that it cannot explain,
 
     e_ck = 100 ||Y_k - W_k X_c|| / ||tau_k||
             residual of candidate c on the validation records treated as by candidate k, of the
             measured torque
 
-known torques included in what is measured, so that those who know them have no advantage by the
-norm. Order: the geometric mean over k. A candidate whose estimator did not end well comes after all
-others. The winner of many candidates is chosen by the validation records, which are then no unseen
-data for it.
+The measured torque includes known torques, so that a candidate with known torques gets no smaller
+error from the norm. The order is that of the geometric mean over k. A candidate whose estimator did
+not end well comes after all others. The validation records choose the winner, so they are no longer
+unseen data for it.
 """
 
 from __future__ import annotations
@@ -41,16 +42,16 @@ STATED = "as stated"
 
 @dataclass(frozen=True, eq=False)
 class Ranking:
-    """Treatments in the order in which they predict.
+    """Result of a comparison: treatments in the order of their prediction error, the best first.
 
     Attributes
     ----------
     results : mapping of str to Identification
         By name of the candidate, the best first.
     errors : mapping of str to mapping of str to float, %
-        e_ck, by candidate, then by the treatment that it is judged in.
+        e_ck, by candidate, then by the treatment whose rows are used.
     standing : mapping of str to (str, Estimate)
-        The set of parameters that is used for each candidate, and its name.
+        Name and estimate of the set of parameters that is used for each candidate.
     missing : tuple of str
         Candidates that could not be identified, each with its reason.
     """
@@ -62,12 +63,12 @@ class Ranking:
 
     @property
     def best(self) -> Identification:
-        """The identification that predicts best."""
+        """Identification of the treatment that predicts best."""
         return next(iter(self.results.values()))
 
     @property
     def mean_errors(self) -> dict[str, float]:
-        """Geometric mean of e_ck over k, %, by candidate."""
+        """Geometric mean of the prediction errors e_ck over the treatments k, %, by candidate."""
         return {
             name: float(np.exp(np.mean(np.log(list(own.values())))))
             for name, own in self.errors.items()
@@ -84,7 +85,7 @@ class Ranking:
         return f"Predicts {self.best.unseen} best: {first}{then} of the measured torques."
 
     def table(self) -> Table:
-        """One line by candidate."""
+        """Return a table with one line for each treatment."""
         header = (
             "treatment",
             "parameters",
@@ -115,7 +116,7 @@ class Ranking:
         )
 
     def summary(self) -> dict[str, Any]:
-        """The ranking as a mapping for JSON."""
+        """Return the ranking as a mapping for JSON."""
         treatments = [
             {
                 "name": name,
@@ -144,21 +145,22 @@ class Ranking:
 def compare(
     problems: Mapping[str, Problem], extras: Sequence[Extra], of_the_best: Sequence[Extra] = ()
 ) -> Ranking:
-    """Identify with several studies and order these by their error on unseen data.
+    """Identify with several studies and order the studies by their error on unseen data.
 
     Parameters
     ----------
     problems : mapping of str to Problem
-        Prepared, by name of the treatment; their unseen records are the same instants.
+        Prepared, by name of the treatment; their unseen records are of the same instants.
     extras : sequence of Extra
-        What else is asked of every treatment.
+        Further analyses of every treatment.
     of_the_best : sequence of Extra
-        What is asked of the best one besides.
+        Additional analyses of the best treatment.
 
     Raises
     ------
     InputError
-        A treatment without validation records, or with others than the first; none that can be identified.
+        A treatment without validation records, or with other validation records than the first; no
+        treatment that can be identified.
     """
     first = next(iter(problems.values())).unseen
     for name, problem in problems.items():
@@ -198,11 +200,13 @@ def treatments(
     steps: Sequence[Step],
     speed_of_rest: Callable[[Problem], float | tuple[float, ...] | None],
 ) -> dict[str, Problem]:
-    """Variants of a problem that differ: as stated, without the rows of resting joints, without known torques.
+    """Make up to three variants of a problem that differ in the treatment of the records.
 
-    All steps are applied to each.
+    The variants are: as stated, without the rows of resting joints, and without known torques. All
+    steps are applied to each.
 
-    speed_of_rest : rows.low_speed of a prepared problem that leaves out the rows of joints that rest; None if few do.
+    speed_of_rest : function that returns rows.low_speed of a prepared problem to leave out the rows of
+        resting joints; None if few joints rest.
     """
     stated = prepared(problem, steps)
     found = {STATED: stated}
@@ -222,7 +226,7 @@ def treatments(
 
 
 def standing_set(result: Identification) -> tuple[SetName, Estimate]:
-    """The set of parameters that predicts data it has not seen best (`best_set`, the essential one among them), and its name."""
+    """Find the set of parameters that predicts unseen data best; return its name and its estimate."""
     name = best_set(result.set_errors, essential=True) if result.set_errors else "all"
     fit = result.sets.get(name, result.estimate)
     if name == "essential" and not result.sets:  # of a method that is not linear
@@ -232,7 +236,7 @@ def standing_set(result: Identification) -> tuple[SetName, Estimate]:
 
 
 def columns_text(name: SetName, fit: Estimate) -> str:
-    """A set of parameters, and their number."""
+    """Write the name of a set of parameters and their number, such as "all parameters, 58"."""
     return f"{name} parameters, {len(fit.names)}"
 
 
@@ -259,7 +263,10 @@ def _require_alike(name: str, further: Sequence[Record], first: Sequence[Record]
 
 
 def _error(problem: Problem, fit: Estimate, treatment: Problem) -> float:
-    """Residual of an estimate on its validation records as another problem treats them, % of the measured torque."""
+    """Compute the error of an estimate on its validation records, treated as another problem does.
+
+    The error is the norm of the residual, % of the norm of the measured torque.
+    """
     rows, signals = treatment.settings.rows, treatment.settings.signals
     settings = replace(problem.settings, rows=rows, signals=signals)
     treated = problem.changed(settings=settings, reader=treatment.reader)

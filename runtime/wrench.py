@@ -1,20 +1,23 @@
-"""Force sensors as six rows more each, in addition to the joint torques or instead of them.
+"""Use force sensors: each sensor adds six rows per sample, besides or instead of joint torques.
 
-A sensor ahead of link j measures the wrench by which it moves link j and those behind it, in the
-axes of frame j about its origin: the torques of six joints between the links that stay at zero, as
-the base wrench is that of a floating base. So the model with a sensor has six joints more, which
-do not move,
+A sensor before link j measures the wrench (force and moment) that moves link j and the links behind
+it, in the axes of frame j about its origin. This wrench equals the torques of six additional joints
+that stay at zero, as the base wrench is that of a floating base. So the model with a sensor has six
+more joints, which do not move,
 
     [Y ]   [D K]         [0]
     [  ] = [   ] chi  +  [ ] b ,        w = WS(q, qd, qdd) chi + b
     [w ]   [WS ]         [1]
 
-chi standard parameters, X = K chi those of the joint torques, b the offset of the sensor, WS the
-columns of `base_wrench_regressor` of these links, moved from the origin of frame 0 to frame j. A
-wrench knows parameters that no joint torque depends on, and none of the drives: the rotor's own
-moment on the base, its inertia by the gear ratio once, is left out. The base parameters are others
-than those of the module: columns that do not depend on those before them, at random states, and
-what they take in (Gautier 1991, in numbers and for the constants of the robot file).
+chi are the standard parameters, X = K chi the base parameters of the joint torques, and b the
+offset of the sensor. WS has the columns of `base_wrench_regressor` of these links, moved from the
+origin of frame 0 to frame j. A wrench depends on parameters that no joint torque depends on, but on
+no parameter of the drives: the moment of the rotor itself on the base (its inertia times the gear
+ratio, once) is neglected.
+
+The base parameters differ from those of the module. They are found numerically, for the constants
+of the robot file: the columns that do not depend on the columns before them, at random states, and
+the linear combinations of standard parameters that belong to these columns (Gautier 1991).
 """
 
 from __future__ import annotations
@@ -47,14 +50,21 @@ READ_SAMPLE_BY_SAMPLE = ("lowpass", "static")
 
 
 def force_sensors(problem: Problem) -> Problem:
-    """The step: model and records with six joints more for each force sensor; the problem itself without sensors.
+    """Add six joints that do not move to model and records for each force sensor.
 
-    Sensors are the channels wrench0, wrench7 ..., shape (N, 6), N and N m: below the robot, ahead of link 7. Joint torques that are zero throughout, in all records that are fitted, were not measured: they are no rows. Rows of each joint and axis get a weight of their own where the settings say ols.
+    This is a step of the preparation of a problem. A problem without force sensors is not changed.
+
+    Sensors are the channels wrench0, wrench7 ..., shape (N, 6), N and N m: wrench0 is below the robot,
+    wrench7 before link 7. Joint torques that are zero in all fitted records count as not measured and
+    give no rows. If the method is ols, it becomes wls with a weight for each joint and axis, because
+    N and N m cannot be added.
 
     Raises
     ------
     InputError
-        A module without the function base_wrench_regressor or the frame, a robot with loops and a sensor that is not below it, records without or with other sensors, and a reader of encoders.
+        A module without the function base_wrench_regressor or without the frame of a sensor, a robot
+        with loops and a sensor that is not below it, a record without one of the sensors, and a reader
+        of encoder counts.
     """
     records = (*problem.records, *problem.unseen)
     channels = sorted({c for r in records for c in r.measured if re.fullmatch(rf"{WRENCH}\d+", c)})
@@ -90,7 +100,7 @@ def force_sensors(problem: Problem) -> Problem:
 
 
 def _record(record: Record, channels: Sequence[str]) -> Record:
-    """The record with six joints at rest for each sensor, whose torques are its wrench."""
+    """Add six joints at rest to a record for each sensor; their torques are the measured wrench."""
     rest = np.zeros((len(record), 6 * len(channels)))
     others = {
         c: np.hstack([x, rest * (np.nan if c == "q_link" else 0)]) if c in JOINT_CHANNELS else x
@@ -109,16 +119,18 @@ def _record(record: Record, channels: Sequence[str]) -> Record:
 
 
 class WrenchModel:
-    """A model with six joints more for each sensor: they do not move, their torques are its wrench.
+    """A robot model with six additional joints, which do not move, for each force sensor.
+
+    The torques of these joints are the wrench that the sensor measures.
 
     Parameters
     ----------
     model : GeneratedModel
         Emitted with the function base_wrench_regressor.
     sensors : sequence of int
-        Frames.
+        Numbers of the frames in which the sensors measure; 0 is the base.
     torques : bool
-        Whether joint torques are measured too, which tells what the base parameters are.
+        Whether joint torques are measured too. The base parameters depend on this.
     """
 
     DRIVES = None
@@ -179,18 +191,18 @@ class WrenchModel:
         return self.elements() if name == "ELEMENTS" else getattr(self._model, name)
 
     def elements(self, **constants: float) -> dict[str, Any]:
-        """ELEMENTS of the model, and the offsets of the sensors."""
+        """Return the ELEMENTS of the model together with the offsets of the sensors."""
         offsets = {f"B{row}": ("offset", "both", {row: 1.0}) for row in self.JOINTS[self._n :]}
         return {**elements_of(self._model, constants), **offsets}
 
     def store(self, N: int) -> Array:
-        """Workspace of shape (b, n, N)."""
+        """Return an array of zeros, shape (b, n, N), as a workspace for the regressor."""
         return np.zeros((len(self.BASE_PARAMETERS), len(self.JOINTS), N))
 
     def regressor(
         self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: Any
     ) -> Array:
-        """D, shape (N, n, b)."""
+        """Compute the regressor D of joint torques and wrenches, shape (N, n, b)."""
         D = self._standard(q, qd, qdd, constants)[..., self._columns]
         if out is not None:
             out[...] = D.transpose(2, 1, 0)
@@ -199,24 +211,28 @@ class WrenchModel:
     def observation_matrix(
         self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: Any
     ) -> Array:
-        """W, shape (n*N, b)."""
+        """Compute the observation matrix W, shape (n*N, b), with the rows of joint 1 first."""
         D = self.regressor(q, qd, qdd, out=out, **constants)
         return D.transpose(1, 0, 2).reshape(-1, D.shape[2])
 
     def inverse_dynamics(
         self, q: Array, qd: Array, qdd: Array, X: Array, **constants: Any
     ) -> Array:
-        """Torques and wrenches, shape (N, n)."""
+        """Compute joint torques and wrenches from the parameters X, shape (N, n)."""
         return np.asarray(self.regressor(q, qd, qdd, **constants) @ X)
 
     def base_parameters(self, standard: Any, **constants: Any) -> Array:
-        """X of standard parameters: a vector, a matrix of columns, or by name, where an offset that is not named is zero."""
+        """Compute the base parameters X from standard parameters.
+
+        standard : a vector, a matrix of columns, or a mapping of name to value, in which a missing name
+            means zero.
+        """
         if isinstance(standard, Mapping):
             standard = np.array([standard.get(name, 0.0) for name in self.STANDARD_PARAMETERS])
         return np.asarray(self._regrouped(constants) @ standard)
 
     def _standard(self, q: Array, qd: Array, qdd: Array, constants: Mapping[str, Any]) -> Array:
-        """Columns of the standard parameters and of the offsets, shape (N, n, p)."""
+        """Compute the regressor of the standard parameters and sensor offsets, shape (N, n, p)."""
         model = cast(Any, BoundModel(self._model, constants))
         q, qd, qdd = (x[:, : self._n] for x in (q, qd, qdd))
         base = model.base_parameters(np.eye(len(self.STANDARD_PARAMETERS) - 6 * len(self._behind)))
@@ -234,7 +250,7 @@ class WrenchModel:
         return np.concatenate([D, np.broadcast_to(offsets, (len(D), *offsets.shape))], axis=2)
 
     def _probed(self, constants: Mapping[str, Any]) -> Array:
-        """The same at random states."""
+        """Compute the regressor of `_standard` at random states."""
         rng = np.random.default_rng(0)
         q, qd, qdd = rng.uniform(-np.pi, np.pi, (3, PROBED_STATES, self._n))
         timed = {c: rng.uniform(0.5, 2, PROBED_STATES) for c in channels_of(self._model)}
@@ -244,7 +260,7 @@ class WrenchModel:
             raise InputError(f"{self._model.NAME} with a wrench: {e} in random states") from None
 
     def _regrouped(self, constants: Mapping[str, Any]) -> Array:
-        """K, shape (b, p), of X = K (chi, b)."""
+        """Compute K, shape (b, p), with X = K (chi, b): base from standard parameters and offsets."""
         A = self._probed(constants)[:, self._used]
         A = A.reshape(-1, A.shape[2])
         K = np.linalg.lstsq(A[:, self._columns], A, rcond=None)[0]
@@ -252,7 +268,7 @@ class WrenchModel:
 
 
 def _independent(A: Array, order: Sequence[int]) -> list[int]:
-    """Columns of A that do not depend on those before them in `order`."""
+    """Find the columns of A that do not depend linearly on the columns before them in `order`."""
     Q: Array = np.zeros((len(A), 0))
     columns: list[int] = []
     for k in order:

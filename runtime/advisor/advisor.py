@@ -158,7 +158,7 @@ def advise(
     """
     if any(is_axis(joint) for joint in problem.model.JOINTS):
         raise InputError(
-            "force sensors: the advisor judges encoders at every joint, and the axes of a sensor have none; leave the wrench out"
+            "the advisor judges the encoder of every joint, and a force sensor has none; leave the wrench out"
         )
     settings = problem.settings
     sought = replace(settings.cestac, delta=())  # steps are what is sought

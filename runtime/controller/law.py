@@ -105,13 +105,13 @@ def torque_law(controller: Controller | None, n: int, limits: Mapping[str, Any])
     gains = law.gains(n)
     if np.any(gains["K"]):
         raise SettingsError(
-            f"{law.ki} is not taken here: a record does not hold the state of an integral, so the "
+            f"{law.ki} is not supported here: a record does not hold the state of an integral, so the "
             "torque can be computed from kp and kd alone; leave ki out",
             path=("controller", "law", "ki"),
         )
     if np.any(law.ca):
         raise SettingsError(
-            f"{law.ca} is not taken here; name the column of the feed-forward torque in "
+            f"{law.ca} is not supported here; name the column of the feed-forward torque in "
             "record.columns.tau_ff",
             path=("controller", "law", "ca"),
         )

@@ -108,4 +108,4 @@ def from_text(kind: type[T], text: str, schema: str, file: str) -> T:
 
 
 def _refuse_constant(name: str) -> NoReturn:
-    raise ValueError(f"{name} is no number of JSON")
+    raise ValueError(f"{name} is not a number that JSON allows")

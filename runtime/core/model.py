@@ -204,13 +204,12 @@ def require(model: GeneratedModel, *functions: str) -> None:
     missing = [name for name in functions if not callable(getattr(model, name, None))]
     if "forward_dynamics" in missing and any(c.startswith(TRANSMITTED) for c in channels_of(model)):
         raise ModelError(
-            "no forward_dynamics: laws read tau_model, the torque that it would change",
+            "no forward_dynamics: friction laws depend on tau_model, which depends on the accelerations",
             file=model.NAME,
         )
     if missing == ["casadi"]:
         raise ModelError(
-            "no casadi(): its loops are closed by iteration, which no expression says, or another "
-            "version emitted the module; emit it again",
+            "no casadi(): its loops are closed by iteration, which no CasADi expression can hold, or another version emitted the module; emit it again",
             file=model.NAME,
         )
     if missing:
@@ -257,7 +256,7 @@ def require_no_channels(model: GeneratedModel, what: str) -> None:
         names = sorted({name for own in channels.values() for name in own})
         raise InputError(
             f"{what} does not have {', '.join(channels)}, which {', '.join(names)} of "
-            f"{model.NAME} read at every sample; take these laws out of the robot file for it"
+            f"{model.NAME} need at every sample; remove these laws from the robot file"
         )
 
 
@@ -304,7 +303,7 @@ def elements_of(
     if not hasattr(model, table):
         raise ModelError(
             (
-                f"no {table}, which say what friction acts along; emit it again with this version "
+                f"no {table}, the directions along which friction acts; emit it again with this version "
                 "of symgen"
             ),
             file=model.NAME,

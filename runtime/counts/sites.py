@@ -192,7 +192,7 @@ class Counts:
             boxes, read = self.first(replace(read.errors, count=count))
         if not boxes.agrees(read):
             raise InputError(
-                f"no motion goes with the counts, even if each were off by {sizes[-1]:g} steps; "
+                f"no motion fits the counts, even with errors of {sizes[-1]:g} steps; "
                 "read them by the low-pass (signals: reader: lowpass)"
             )
         return boxes, read

@@ -259,7 +259,7 @@ def load_whole_estimate(path: Path | str) -> Estimate:
         or not len(whole.X) == len(whole.sigma_corrected) == len(fit.X)
     ):
         raise InputError(
-            "its sets are not those of its parameters; the file was changed", file=str(path)
+            "its sets and its parameters do not match; the file was changed", file=str(path)
         )
     return replace(
         fit,

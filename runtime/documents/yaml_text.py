@@ -119,7 +119,7 @@ def _value(node: Node, path: Path, lines: dict[Path, int], file: str) -> Any:
         line = key.start_mark.line + 1
         if not isinstance(key, ScalarNode) or key.value == "<<":
             raise SettingsError(
-                "a key that is no name; merge keys (<<) and lists as keys are not read",
+                "this key is not a name; use a plain word (merge keys << and lists as keys are not supported)",
                 path=path,
                 file=file,
                 line=line,

@@ -52,7 +52,7 @@ class Checkpoint:
         for path in (self.file, self.file.with_name(FILE + UNFINISHED)):
             if path.is_symlink() or (path.exists() and not path.is_file()):
                 raise InputError(
-                    "a link, a folder, a pipe or a device is where runs are kept; remove it, or "
+                    "the runs are saved under this name, which is a link, a folder, a pipe or a device; remove it, or "
                     "choose another folder",
                     file=str(path),
                 )

@@ -88,8 +88,7 @@ def _pieces(
     _require_shapes(columns, signals, first, last)
     if model is not None and n != len(model.JOINTS):
         raise InputError(
-            f"{n} joints; {model.NAME} has {len(model.JOINTS)}, {model.JOINTS}; where others are "
-            "held, name the columns of these in a study (record.columns.q, tau)",
+            f"{n} joints; {model.NAME} has {len(model.JOINTS)}, {model.JOINTS}; if the record has further joints, name the columns of these in a study (record.columns.q, tau)",
             file=", ".join(hashes),
         )
     drives = None if model is None else drives_of(model)

@@ -146,7 +146,7 @@ def resampled(
     wanted = settings.rate or rate or mean_rate
     if wanted < LOWEST * mean_rate:
         raise InputError(
-            f"record.resample.rate {wanted:g} Hz, below the {mean_rate:g} Hz of the record: what is faster than {wanted / 2:g} Hz would be folded; resample at its rate or above, signals.decimate lowers it afterwards",
+            f"record.resample.rate {wanted:g} Hz, below the {mean_rate:g} Hz of the record: frequencies above {wanted / 2:g} Hz would be aliased; resample at its rate or above, signals.decimate lowers it afterwards",
             file=file,
         )
     cuts = [0, *sorted(s.sample for s in (*stamps.gaps, *stamps.resets)), len(t)]
@@ -188,7 +188,7 @@ def _counted(t: Array, signals: Sequence[Array], rate: float, file: str) -> Stre
     last = float(t[-1] - t[0])
     if abs(last * rate - (N - 1)) > 1 + DRIFT * N:
         raise InputError(
-            f"{N} samples from t = {t[0]:g} s on last {(N - 1) / rate:.6g} s at {rate:.6g} Hz, their stamps {last:.6g} s: the rate is another, or samples are missing; state record.rate, or cut at shorter gaps by record.resample.longest",
+            f"{N} samples from t = {t[0]:g} s on last {(N - 1) / rate:.6g} s at {rate:.6g} Hz, their stamps {last:.6g} s: the rate is different, or samples are missing; state record.rate, or cut at shorter gaps by record.resample.longest",
             file=file,
         )
     return Stretch(t[0] + np.arange(N) / rate, tuple(signals))

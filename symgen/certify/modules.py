@@ -97,8 +97,7 @@ def require_valid(certificate: Certificate) -> None:
         wrong = [text for holds, text in certificate.checks if not holds]
         reasons = [t for t in certificate.failures if not t.startswith(("column", "rank"))]
         raise CertificateError(
-            f"{certificate.name}: the certificate does not hold ({[*reasons, *wrong][0]}); nothing "
-            "leaves; `symgen check` prints every check",
+            f"{certificate.name}: the certificate does not hold ({[*reasons, *wrong][0]}); nothing is written; `symgen check` prints every check",
             certificate,
         )
 

@@ -241,7 +241,7 @@ def _beside(tree: Tree, base: str, tip: str) -> dict[str, float]:
         link = holding[link].parent
     if link != base or all(joint.kind == FIXED_TYPE for joint in between):
         raise DescriptionError(
-            f"link {tip!a:.60} does not hang on {base!a:.60} by a joint that moves; a chain goes "
+            f"link {tip!a:.60} is not connected to {base!a:.60} by a joint that moves; a chain goes "
             "from base to tip, outward"
         )
     kept = {joint.name for joint in between}
@@ -290,7 +290,8 @@ def _motion(joint: Joint, q: float) -> Array:
     T = np.eye(4)
     if joint.kind == FREE_TYPE and q:
         raise DescriptionError(
-            f"free joint {joint.name!a:.60} is held where the file has it, at 0", line=joint.line
+            f"free joint {joint.name!a:.60} is fixed at its pose in the file; its value must be 0",
+            line=joint.line,
         )
     if joint.kind == "prismatic":
         T[:3, 3] = q * joint.axis

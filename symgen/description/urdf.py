@@ -82,7 +82,7 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
         carried |= further
     if lost := sorted(links.keys() - carried):
         raise DescriptionError(
-            f"links {', '.join(lost[:5])} do not hang on {base!r}; their joints form a cycle",
+            f"links {', '.join(lost[:5])} are not connected to {base!r}; their joints form a cycle",
             line=root.line,
         )
     angles_text, snapped = angles.report(file)

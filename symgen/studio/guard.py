@@ -59,9 +59,7 @@ class Guard:
             message = await receive()
             left -= len(message.get("body", b""))
             if left < 0:
-                raise ValueError(
-                    f"what was sent is larger than {limit // 2**20} MB, the most that is taken"
-                )
+                raise ValueError(f"the data sent are larger than {limit // 2**20} MB, the limit")
             return message
 
         async def sent(message: Message) -> None:

@@ -51,6 +51,7 @@ def application(server: Server, port: int, end: Callable[[], None]) -> Guard:
         Mount(f"/{name}", StaticFiles(directory=str(files("symgen").joinpath(place))))
         for name, place in {"static": "studio/static", "pages": "pages"}.items()
     ]
+
     async def ticks(request: Request) -> Response:
         return FileResponse(str(files("runtime").joinpath("reporting/ticks.js")))
 

@@ -93,7 +93,7 @@ class SymbolicRobot:
         robot = self.source.robot
         if (of is not None or frame) and not SYMBOLIC[name].of_frames:
             raise SymgenError(
-                f"{name} is of no frame; leave out of and frame (they are for "
+                f"{name} has no frame; leave out `of` and `frame` (they are for "
                 f"{', '.join(name for name, m in SYMBOLIC.items() if m.of_frames)})"
             )
         if rows is not None and name != "determinant":

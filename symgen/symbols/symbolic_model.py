@@ -285,9 +285,7 @@ class SymbolicModel:
         Raises SymgenError if the model has no recursion.
         """
         if self.model.cases is None:
-            raise SymgenError(
-                f"{self.model.name} has no recursion; what works is {self.model.instead}"
-            )
+            raise SymgenError(f"{self.model.name} has no recursion; use {self.model.instead}")
         values = self.model.values(self.source.derivation, self.request)
         by_place = {entry.place: entry.value for entry in values.entries}
         outputs = {place: by_place[place] for place in self.places if place in by_place}

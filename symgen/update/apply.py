@@ -84,7 +84,8 @@ def apply(
     links = text.links
     if not links:
         raise DescriptionError(
-            "no link that moves has an inertial; values need one to go into", file=path.name
+            "no moving link has an <inertial>; add one, so that values can be written into it",
+            file=path.name,
         )
     families = one_joint_parameters(described, UNITS)
     own = {
@@ -172,8 +173,7 @@ def _require_same_joints(result: Estimate, robot: Robot, of: str) -> None:
         ours = robot.labels.get(int(q[1:])) if q[1:].isdigit() else None
         raise DescriptionError(
             f"{q} of the estimate is {theirs.get(q, 'no joint with a name')!s:.60}, of {of} "
-            f"{ours or 'no joint with a name'}: say --chain and --lock as when the robot was "
-            "converted, or name the robot file that was identified (--robot)"
+            f"{ours or 'no joint with a name'}: give --chain and --lock as for the conversion of the robot, or name the robot file that was identified (--robot)"
         )
 
 

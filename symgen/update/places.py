@@ -143,7 +143,9 @@ class LinkPlace:
         if not np.any(ten):
             return np.zeros(10)
         if ten[-1] <= 0:
-            raise DescriptionError(f"a mass of {ten[-1]:.4g} kg comes out; no link has it")
+            raise DescriptionError(
+                f"a mass of {ten[-1]:.4g} kg would result, which no link can have"
+            )
         own, R = inertial_of(ten), self.X[:3, :3]
         turned = R @ (self.axes if self.principal or self.attributes is URDF else np.eye(3))
         tensor = (turned.T @ own.I @ turned)[np.triu_indices(3)]
@@ -265,8 +267,7 @@ class Places:
         ignored = next(own, None)
         if self.from_geoms and ignored is not None:
             raise DescriptionError(
-                "inertiafromgeom is true and this <inertial> without effect; remove the one or the "
-                "other",
+                "inertiafromgeom is true so this <inertial> has no effect; remove one of the two",
                 line=ignored.line,
             )
         for e in self.from_geoms:
@@ -296,8 +297,7 @@ class Places:
             K, offset = (values.get(family, before[family]) for family in SPRING)
             if K <= 0:
                 raise DescriptionError(
-                    f"joint {joint.name!a:.60}: a stiffness of {K:.4g} comes out; MuJoCo takes "
-                    "positive ones",
+                    f"joint {joint.name!a:.60}: a stiffness of {K:.4g} would result; MuJoCo needs a positive one",
                     line=e.line,
                 )
             turns = self.degrees and joint.kind != "prismatic"
@@ -468,6 +468,5 @@ def require_same_frames(text: RobotText, robot: Robot, file: str) -> None:
     if different:
         raise DescriptionError(
             f"{file} and {text.file} have other frames {', '.join(map(str, sorted(different)))}: "
-            "say --chain, --lock and --exact as when the one was "
-            "converted from the other"
+            "give --chain, --lock and --exact as for the conversion of one from the other"
         )

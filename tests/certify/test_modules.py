@@ -131,7 +131,7 @@ def test_nothing_is_generated_where_the_module_is_wrong(monkeypatch, cache) -> N
             CertificateError,
             match=(
                 r"^scara: the certificate does not hold \(regressor of scara.py .*\); "
-                r"nothing leaves"
+                r"nothing is written"
             ),
         ) as error:
             act(load_robot("scara"))

@@ -250,7 +250,7 @@ def test_a_file_a_study_and_a_dataset_are_read_by_name(tmp_path, monkeypatch, em
         "record: [{files: [run.csv]}, {files: [run.csv], name: b}]\n"
     )
     with pytest.raises(
-        InputError, match="2 records or pieces between gaps; read_records gives them all: run, b"
+        InputError, match="2 records or pieces between gaps; read_records returns them all: run, b"
     ):
         read_record("two.yaml")
 

@@ -205,7 +205,7 @@ def test_counted_samples_stay_as_they_are():
 def test_counted_samples_must_fill_their_time():
     for t, rate in ((np.delete(T, range(0, 2000, 100)), RATE), (T, 510.0)):
         with pytest.raises(
-            InputError, match="the rate is another, or samples are missing; state record"
+            InputError, match="the rate is different, or samples are missing; state record"
         ):
             resampled(t, [signal(t)], time_stamps(t), Resample(method="count"), rate, file="x")
 
@@ -254,7 +254,7 @@ def test_a_record_with_a_gap_becomes_two(tmp_path):
     with pytest.raises(
         InputError,
         match=(
-            "2 records or pieces between gaps; read_records gives them all: a (1 of 2), a (2 of 2)"
+            "2 records or pieces between gaps; read_records returns them all: a (1 of 2), a (2 of 2)"
         )
         .replace("(", r"\(")
         .replace(")", r"\)"),
@@ -426,7 +426,7 @@ def test_resample():
         ((t[::-1], signal(t)), "never goes forward"),
         ((t + (t > 3), signal(t), 500), "one Record for each piece"),
         ((t, signal(t) * np.nan), "nan"),
-        ((t, signal(t), 50), "would be folded"),
+        ((t, signal(t), 50), "would be aliased"),
     ):
         with pytest.raises(InputError, match=match):
             resample(*wrong, longest=6)

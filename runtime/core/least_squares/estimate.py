@@ -166,7 +166,7 @@ class Estimate:
         ):
             array = np.array(getattr(self, name), dtype=float)
             if array.shape != shape:
-                raise ValueError(f"{name} has shape {array.shape}; {b} names ask for {shape}")
+                raise ValueError(f"{name} has shape {array.shape}; expected {shape} for {b} names")
             array.flags.writeable = False
             object.__setattr__(self, name, array)
 

@@ -182,8 +182,8 @@ def factor(W: Array, Y: Array, rows: Sequence[int], names: Sequence[str]) -> Fac
     r, b = W.shape
     if Y.shape != (r,) or sum(rows) != r or len(names) != b:
         raise ValueError(
-            f"W has shape {W.shape}; got Y of shape {Y.shape}, {sum(rows)} rows over the joints "
-            f"and {len(names)} names"
+            f"W {W.shape}, Y {Y.shape}, {sum(rows)} rows of the joints and {len(names)} names do not "
+            "fit together; expected W (r, b), Y (r,), r rows and b names"
         )
     return Factor.of(names, *joint_factors(W, Y, rows, np.zeros(r, dtype=int)))
 
