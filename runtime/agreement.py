@@ -4,7 +4,7 @@ Each record k is fitted alone, as `identify` fits it, with the same b columns. T
 standard deviations s_k. X_k is compared with the mean of the other records, weighted by their
 standard deviations,
 
-    X_-k = s_-k^2 sum X_m/s_m^2,     s_-k^-2 = sum 1/s_m^2,     d = (X_k - X_-k)/sqrt(s_k^2 + s_-k^2)
+    X_-k = s_-k^2 sum X_m/s_m^2,    s_-k^-2 = sum 1/s_m^2,    d = (X_k - X_-k)/sqrt(s_k^2 + s_-k^2)
 
 s_k is the corrected standard deviation. It is multiplied by the root of a factor c if residuals
 stay correlated for longer than a block (`runtime.core.residuals.unseen_by_blocks`). A parameter
@@ -168,7 +168,7 @@ def agreeing(found: Homogeneity) -> Answer:
 
 
 def agreement(result: Identification) -> Homogeneity | None:
-    """Compare all records of an identification, fitted and predicted ones; None for a single record.
+    """Compare all records of an identification, fitted and predicted; None for a single record.
 
     All parameters are compared. If one record does not determine all of them, only the essential
     parameters are compared.

@@ -33,7 +33,8 @@ class Assumption:
     value, sigma : float
         Value from the record and its standard deviation; nan if no record can show them.
     p_value : float
-        Probability of a value at least as large if the assumption is true; nan if it cannot be tested.
+        Probability of a value at least as large if the assumption is true; nan if it cannot be
+        tested.
     """
 
     name: str

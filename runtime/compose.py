@@ -294,7 +294,7 @@ def estimate(
     *,
     simulator: Simulator | None = None,
 ) -> Estimate:
-    """Estimate all parameters from one or several records by the method of the study, eqs. (7) to (11).
+    """Estimate all parameters from the records by the method of the study, eqs. (7) to (11).
 
     Parameters
     ----------
@@ -349,8 +349,8 @@ def essential(
 ) -> Essential:
     """Find the essential parameters (section 4.1.1) of one or several records.
 
-    The method of the study is used; a method that is not linear is replaced by least squares with the
-    same weights.
+    The method of the study is used; a method that is not linear is replaced by least squares with
+    the same weights.
     """
     return estimation.essential(problem(model, records, study, simulator=simulator))
 
@@ -381,8 +381,8 @@ def identify(
     study : Study, optional
         Settings; default: Study().
     further : sequence of Record, optional
-        Records that the parameters predict; default: the records of study.validate.record, read from
-        their files.
+        Records that the parameters predict; default: the records of study.validate.record, read
+        from their files.
     loaded : sequence of Record, optional
         Records with the load of study.payload; default: the records of study.payload.record.
     simulator : Simulator, optional
@@ -392,14 +392,14 @@ def identify(
     friction : bool
         Whether to compute curves of friction against velocity, joint by joint.
     variants : GeneratedModel, optional
-        The module of `symgen.variants`: other tables of frames and directions of gravity are tried on
-        the records.
+        The module of `symgen.variants`: other tables of frames and directions of gravity are tried
+        on the records.
     plausible : bool, optional
         Whether to check that record, study and robot file suit each other (`runtime.plausibility`);
         default: if `variants` is given.
     provenance : mapping, optional
-        Further data that make the result reproducible; names of the records, hashes and versions are
-        added.
+        Further data that make the result reproducible; names of the records, hashes and versions
+        are added.
 
     Returns
     -------
@@ -506,8 +506,9 @@ def cestac(
 ) -> Cestac:
     """Compute how coarser encoders and torque sensors change the estimate, eqs. (15) to (22), (28).
 
-    map : like the built-in map; makes the runs, in processes (`runtime.parallel.processes.processes`)
-        or on a Dask cluster (`runtime.parallel.cluster.cluster`).
+    map : like the built-in map; makes the runs, in processes
+        (`runtime.parallel.processes.processes`) or on a Dask cluster
+        (`runtime.parallel.cluster.cluster`).
     options : columns, progress, checkpoint, provenance, as of `runtime.core.cestac.cestac.cestac`.
     """
     from runtime.core.cestac import cestac as resolution
@@ -589,8 +590,8 @@ def excite(
 ) -> Excitation:
     """Search an exciting motion: the smallest criterion of study.excitation, within the limits.
 
-    The best motion over all starts of the search is returned. Without records, the values of the robot
-    file serve as parameters.
+    The best motion over all starts of the search is returned. Without records, the values of the
+    robot file serve as parameters.
     """
     from runtime.excitation import search
 
@@ -602,9 +603,10 @@ def excite(
 def static_poses(
     model: GeneratedModel, records: Records = (), study: Study | None = None
 ) -> StaticPoses:
-    """Search static poses that, together with recorded poses, determine the gravity parameters best.
+    """Search static poses that, with recorded poses, determine the gravity parameters best.
 
-    study.excitation.poses is the number of new poses, default 20. All poses respect the limits of q.
+    study.excitation.poses is the number of new poses, default 20. All poses respect the limits of
+    q.
     """
     from runtime.excitation import poses
 

@@ -117,9 +117,9 @@ def elastic_gears(result: Identification) -> Elasticity | None:
 
 
 def elasticity(problem: Problem, names: Sequence[str], X: Array) -> Elasticity | None:
-    """Estimate the stiffness of the joints with two encoders, from all records of a prepared problem.
+    """Estimate the stiffness of the joints with two encoders from all records of a problem.
 
-    None if no record has link positions.
+    The problem must be prepared. None if no record has link positions.
 
     names, X : parameters of the rigid fit, which give the inertia about each joint.
     """

@@ -103,7 +103,7 @@ class ExpectedError(Part):
 
     @property
     def expected_error(self) -> float:
-        """Expected error of predictions over the whole range, at up to half of the largest speed, %."""
+        """Expected error of predictions over the whole range at up to half speed, %."""
         return self.expected.error
 
     @cached_property
@@ -141,8 +141,8 @@ def expected_error(
 ) -> Expected:
     """Compute the expected error of predictions, %, at most LIMIT.LARGEST_EXPECTED.
 
-    The error is nan if neither the robot file nor the records give a range, or if a loop cannot close
-    in the range.
+    The error is nan if neither the robot file nor the records give a range, or if a loop cannot
+    close in the range.
 
     Parameters
     ----------
@@ -150,9 +150,9 @@ def expected_error(
     observation : Observation
         Rows of the records.
     settings : EstimateSettings
-        Method of the study. Standard deviations are those of its linear companion, weighted by joint if
-        the companion has no weights: residuals of a joint with large forces do not show the noise of a
-        wrist.
+        Method of the study. Standard deviations are those of its linear companion, weighted by
+        joint if the companion has no weights: residuals of a joint with large forces do not show
+        the noise of a wrist.
     fit : Estimate
         The parameters that are used.
     records : sequence of Prepared

@@ -59,8 +59,8 @@ class IrlsOptions(LinearOptions):
 class Robust:
     """State of the iteration after one pass.
 
-    X are the parameters, shape (b,), u the scaled residuals and w the weights, shape (r,), and S the
-    scales of the joints, shape (n,). T fulfils T T' = (sum_j W_j'W_j / S_j^2)^-1.
+    X are the parameters, shape (b,), u the scaled residuals and w the weights, shape (r,), and S
+    the scales of the joints, shape (n,). T fulfils T T' = (sum_j W_j'W_j / S_j^2)^-1.
     """
 
     X: Array
@@ -127,7 +127,7 @@ def _weighted(observation: Observation, W: Array, raw: Factor, root: Array) -> F
 
 
 def _scales(observation: Observation, raw: Factor, e: Array) -> Array:
-    """Compute the residual scale S_j of each joint, shape (n,), at least the rounding error of Y_j."""
+    """Compute the residual scale S_j of each joint, shape (n,), never below rounding of Y_j."""
     by_joint = [e[observation.joint(j)] for j in range(observation.n)]
     S = np.array(
         [
@@ -199,6 +199,7 @@ def _note_of_shares(shares: Mapping[str, float]) -> str:
 def _tuning(options: IrlsOptions, loss: str) -> float:
     """Return the constant k of Huber or c of Tukey for `loss`.
 
-    The option `tuning` is for the chosen loss only: a Huber fit that starts a Tukey fit uses k = 1.345.
+    The option `tuning` is for the chosen loss only: a Huber fit that starts a Tukey fit uses k =
+    1.345.
     """
     return options.tuning if options.tuning is not None and loss == options.loss else TUNING[loss]

@@ -44,8 +44,8 @@ class Rows(chapter.Rows):
     Attributes
     ----------
     low_speed : float or tuple of float, rad/s or m/s
-        Rows of joint j with |qd_j| below this speed are left out, because sign(qd) is noise in them. A
-        text may have another unit: 2 rpm.
+        Rows of joint j with |qd_j| below this speed are left out, because sign(qd) is noise in
+        them. A text may have another unit: 2 rpm.
     """
 
     low_speed: Annotated[PerJoint[NotNegative], BeforeValidator(speed)] = 0.0
@@ -121,8 +121,8 @@ class Study(chapter.Study, Recorded):
 def study_from_mapping(mapping: Mapping[str, Any]) -> Study:
     """Build a Study from a mapping of settings, as read from a study file.
 
-    Numbers may be texts such as "2*pi/10000"; a single value means a list of one value (files, delta,
-    record).
+    Numbers may be texts such as "2*pi/10000"; a single value means a list of one value (files,
+    delta, record).
 
     Raises SettingsError with the path of the wrong key.
     """
@@ -133,7 +133,8 @@ def study_from_mapping(mapping: Mapping[str, Any]) -> Study:
 def study_schema() -> dict[str, Any]:
     """Return the JSON Schema of study files.
 
-    Methods and readers are plain texts in it; `runtime.compose.json_schema` adds the lists of names.
+    Methods and readers are plain texts in it; `runtime.compose.json_schema` adds the lists of
+    names.
     """
     return TypeAdapter(Study).json_schema()
 
@@ -160,8 +161,8 @@ def study_of(record: str | Path) -> tuple[Study, Path]:
     Parameters
     ----------
     record : str or Path
-        A dataset, a study file (.yaml, .yml), or a measured file whose columns are called t, q1 ...,
-        tau1 ... (SI, joint side).
+        A dataset, a study file (.yaml, .yml), or a measured file whose columns are called t, q1
+        ..., tau1 ... (SI, joint side).
     """
     require_kind(
         record, (str, Path), "record", "the name of a dataset, a study file or a measured file"
@@ -190,23 +191,23 @@ def read_record(
     Parameters
     ----------
     path : str, Path or RecordSettings
-        A measured file whose columns are called t, q1 ..., tau1 ... (SI, joint side), a study file, a
-        dataset, or settings.
+        A measured file whose columns are called t, q1 ..., tau1 ... (SI, joint side), a study file,
+        a dataset, or settings.
     model : module, optional
-        Emitted model of the robot; needed if a side is "motor", because its drives convert the record.
-        The number of joints is checked against it.
+        Emitted model of the robot; needed if a side is "motor", because its drives convert the
+        record. The number of joints is checked against it.
     folder : str or Path
-        Folder to which file names are relative. File names in a study file are relative to the folder
-        of that file.
+        Folder to which file names are relative. File names in a study file are relative to the
+        folder of that file.
     missing : bool
-        Whether positions may be missing (nan or an empty field), as `signals.reader: counts` allows;
-        always true for a study file with this reader.
+        Whether positions may be missing (nan or an empty field), as `signals.reader: counts`
+        allows; always true for a study file with this reader.
 
     Raises
     ------
     InputError
-        Files that cannot be read or have other content, several records, or one record that `resample`
-        splits.
+        Files that cannot be read or have other content, several records, or one record that
+        `resample` splits.
     """
     if isinstance(path, RecordSettings):
         settings: tuple[RecordSettings, ...] = (path,)
@@ -229,8 +230,8 @@ def suggested(study: Study, model: GeneratedModel) -> tuple[Study, list[str]]:
     """Correct the settings of a study until all its records can be read.
 
     An error in reading may name a remedy, which is then applied; angles that wrap at full turns are
-    unwrapped. Return the new study, and a sentence on each change. Remedies are guesses from names and
-    time stamps, so a person should check them.
+    unwrapped. Return the new study, and a sentence on each change. Remedies are guesses from names
+    and time stamps, so a person should check them.
 
     Raises
     ------
@@ -302,8 +303,8 @@ def study_text(study: Study, destination: Path, *, defaults: bool = True) -> str
 
     File names are relative to that folder.
 
-    defaults : True: every setting; False: only settings that differ from their default, and the units
-        of each record.
+    defaults : True: every setting; False: only settings that differ from their default, and the
+        units of each record.
     """
     mapping = to_mapping(
         _with_files(study, lambda file: Path(os.path.relpath(file, destination)).as_posix())

@@ -205,8 +205,8 @@ def treatments(
     The variants are: as stated, without the rows of resting joints, and without known torques. All
     steps are applied to each.
 
-    speed_of_rest : function that returns rows.low_speed of a prepared problem to leave out the rows of
-        resting joints; None if few joints rest.
+    speed_of_rest : function that returns rows.low_speed of a prepared problem to leave out the rows
+        of resting joints; None if few joints rest.
     """
     stated = prepared(problem, steps)
     found = {STATED: stated}
@@ -226,7 +226,7 @@ def treatments(
 
 
 def standing_set(result: Identification) -> tuple[SetName, Estimate]:
-    """Find the set of parameters that predicts unseen data best; return its name and its estimate."""
+    """Find the set of parameters that predicts unseen data best: its name and its estimate."""
     name = best_set(result.set_errors, essential=True) if result.set_errors else "all"
     fit = result.sets.get(name, result.estimate)
     if name == "essential" and not result.sets:  # of a method that is not linear

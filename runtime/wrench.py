@@ -54,17 +54,17 @@ def force_sensors(problem: Problem) -> Problem:
 
     This is a step of the preparation of a problem. A problem without force sensors is not changed.
 
-    Sensors are the channels wrench0, wrench7 ..., shape (N, 6), N and N m: wrench0 is below the robot,
-    wrench7 before link 7. Joint torques that are zero in all fitted records count as not measured and
-    give no rows. If the method is ols, it becomes wls with a weight for each joint and axis, because
-    N and N m cannot be added.
+    Sensors are the channels wrench0, wrench7 ..., shape (N, 6), N and N m: wrench0 is below the
+    robot, wrench7 before link 7. Joint torques that are zero in all fitted records count as not
+    measured and give no rows. If the method is ols, it becomes wls with a weight for each joint and
+    axis, because N and N m cannot be added.
 
     Raises
     ------
     InputError
-        A module without the function base_wrench_regressor or without the frame of a sensor, a robot
-        with loops and a sensor that is not below it, a record without one of the sensors, and a reader
-        of encoder counts.
+        A module without the function base_wrench_regressor or without the frame of a sensor, a
+        robot with loops and a sensor that is not below it, a record without one of the sensors, and
+        a reader of encoder counts.
     """
     records = (*problem.records, *problem.unseen)
     channels = sorted({c for r in records for c in r.measured if re.fullmatch(rf"{WRENCH}\d+", c)})
@@ -224,8 +224,8 @@ class WrenchModel:
     def base_parameters(self, standard: Any, **constants: Any) -> Array:
         """Compute the base parameters X from standard parameters.
 
-        standard : a vector, a matrix of columns, or a mapping of name to value, in which a missing name
-            means zero.
+        standard : a vector, a matrix of columns, or a mapping of name to value, in which a missing
+            name means zero.
         """
         if isinstance(standard, Mapping):
             standard = np.array([standard.get(name, 0.0) for name in self.STANDARD_PARAMETERS])
@@ -260,7 +260,7 @@ class WrenchModel:
             raise InputError(f"{self._model.NAME} with a wrench: {e} in random states") from None
 
     def _regrouped(self, constants: Mapping[str, Any]) -> Array:
-        """Compute K, shape (b, p), with X = K (chi, b): base from standard parameters and offsets."""
+        """Compute K, shape (b, p), in X = K (chi, b): base from standard parameters and offsets."""
         A = self._probed(constants)[:, self._used]
         A = A.reshape(-1, A.shape[2])
         K = np.linalg.lstsq(A[:, self._columns], A, rcond=None)[0]

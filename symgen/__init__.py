@@ -1,16 +1,16 @@
-"""From a robot file to base parameters with their formulas, and to a module that evaluates its models.
+"""Derive base parameters and their formulas from a robot file, and generate its dynamic models.
 
     model = symgen.model("arm.urdf")
             # the module: derived, emitted, certified, imported
     base = symgen.regrouping(symgen.load_robot("tx40"))   # base parameters, each with its formula
     symgen.certificate(base).valid                    # exact formulas; the module by other dynamics
-    symgen.apply("results", "arm.urdf").write("new.urdf")  # identified values into the user's own
-    URDF or MJCF
+    symgen.apply("results", "arm.urdf").write("new.urdf")
+            # identified values into the user's own URDF or MJCF
     symgen.symbolic("tx40").inertia_matrix()          # any model as SymPy objects
     symgen.variants("arm.urdf")
             # the module with its table of frames as constants
 
-Names are loaded when they are first used.
+Names are imported when they are first used.
 """
 
 from importlib import import_module

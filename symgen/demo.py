@@ -1,13 +1,14 @@
-"""The main job of the chapter end to end, on top of what the verbs do: the Staubli TX40 identified
-from its public record, or from a simulated one if that cannot be had, and the resolution of its
-encoders, beside the published Tables 2, 3, 4 and Figure 4.
+"""Demonstration of the chapter: identify the Staubli TX40 and judge its encoder resolution.
+
+The record is the public one, or a simulated one if that cannot be fetched. Results are compared
+with the published Tables 2, 3, 4 and Figure 4.
 
     prepared = prepare(quick=False)             # model, study, record
     demo = demonstrate(prepared, quick=False)   # identification and resolution
     demo.verdict, demo.files(folder)
 
-Settings are those of the dataset and of design defaults, chosen before the published tables were
-looked at; nothing is tuned to them.
+Settings are those of the dataset and design defaults. They were chosen before the comparison with
+the published tables; nothing is tuned to the tables.
 
 Source: Experimental Identification of the Inverse Dynamic Model: Minimal Encoder Resolution Needed,
 Application to an Industrial Robot Arm and a Haptic Interface, in Robot Manipulators, M. Ceccarelli
@@ -117,17 +118,17 @@ COLOURED = ("ZZ1R", "MX2R", "FV1", "FS1", "Ia3", "FS5")
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """Start of a demonstration: robot, record and study.
+    """Data with which a demonstration starts: robot model, study and record.
 
     Attributes
     ----------
     model : module
         Emitted module.
     study : Study
-        Files relative to the output folder.
+        Its file names are relative to the output folder.
     record : Record
     note : str
-        Why the record is simulated; "" of a measured one.
+        Reason why the record is simulated; "" for a measured record.
     files : mapping of str to bytes
         The simulated record, by file name.
     """
@@ -149,10 +150,13 @@ def simulated_record(
     encoder: float = ENCODER,
     noise: float = 0.02,
 ) -> Prepared:
-    """The record of a motion, written as a .csv.gz file q1..qn,tau1..taun of the motor side and read from it like any other.
+    """Simulate the record of a motion, with encoder steps and torque noise, through a file.
 
-    study : settings except for the record. encoder : rad on the motor. noise : standard deviation, of
-    the largest torque of each motor.
+    The file is a .csv.gz of q1..qn,tau1..taun on the motor side; the record is then read from it
+    like any measured record.
+
+    study : settings except for the record.   encoder : step, rad on the motor.   noise : standard
+    deviation, relative to the largest torque of each motor.
     """
     n = len(model.JOINTS)
     drives = Drives.from_mapping(model.DRIVES or {"ratio": np.eye(n)})
@@ -181,7 +185,10 @@ def simulated_record(
 
 
 def prepare(*, quick: bool) -> Prepared:
-    """Model, study and measured record; where the record cannot be had, a simulated one."""
+    """Load model, study and measured record of the TX40.
+
+    If the record cannot be fetched, a record is simulated.
+    """
     model, study = symgen.model(DATASET), study_from_mapping(dataset_study(DATASET))
     try:
         return Prepared(model, study, runtime.read_record(study.record[0], model))
@@ -200,7 +207,11 @@ def prepare(*, quick: bool) -> Prepared:
 def demonstrate(
     prepared: Prepared, *, quick: bool, progress: Callable[[str], None] = lambda step: None
 ) -> Demonstration:
-    """The computations. progress : called with the name of each before it begins."""
+    """Identify the robot and study its encoder and torque resolution.
+
+    quick : whether to make two runs per step and to leave further studies out.   progress : called with
+    the name of each computation before it begins.
+    """
     model, record, runs = prepared.model, prepared.record, 2 if quick else CestacSettings().runs
     study = replace(prepared.study, cestac=CestacSettings(delta=DELTA, runs=runs))
     progress("identification")
@@ -227,26 +238,29 @@ def demonstrate(
 
 
 def recorded_step(record: Record) -> float:
-    """The coarsest step of the recorded positions, rad: of every joint the smallest change between two samples that is none of rounding."""
+    """Find the coarsest step of the recorded positions over all joints, rad.
+
+    The step of a joint is the smallest change between two samples that is not a rounding error.
+    """
     changes = np.abs(np.diff(record.q, axis=0))
     return float(max(column[column > ROUNDING].min() for column in changes.T))
 
 
 def changed(study: Study, section: str, **settings: Any) -> Study:
-    """The study with some settings of a section replaced."""
+    """Return the study with some settings of one section replaced."""
     return replace(study, **{section: replace(getattr(study, section), **settings)})
 
 
 @dataclass(frozen=True, eq=False)
 class Demonstration:
-    """Everything the report shows.
+    """All results that the report of the demonstration shows.
 
     Attributes
     ----------
     prepared : Prepared
     result : Identification
     resolution : Cestac
-        At the steps of Table 3.
+        At the encoder steps of Table 3.
     curve, torque : Cestac or None
         At more position steps, and with the torque steps of Table 4; None in the quick form.
     """
@@ -259,7 +273,7 @@ class Demonstration:
 
     @property
     def verdict(self) -> str:
-        """One sentence."""
+        """Sentences on the fit, its prediction error, and the effect of each encoder step."""
         result, names = self.result, self.result.essential.names
         words = {
             "unbiased": "leave them as they are",
@@ -287,7 +301,7 @@ class Demonstration:
         )
 
     def files(self, folder: Path) -> Files:
-        """Contents of the output folder, by file name."""
+        """Make the contents of all files for the output folder, by file name."""
         simulated = bool(self.prepared.note)
         settings: Any = self.result.study
         kind = "SIMULATED record, nothing measured" if simulated else "public measured record"
@@ -307,7 +321,10 @@ class Demonstration:
 
 
 def sections(demo: Demonstration) -> list[Section]:
-    """Table 2, Table 3 with the curve, Table 4, contradictions."""
+    """Build the sections of the report: Tables 2 to 4 beside our values, and contradictions.
+
+    Contradictions are statements of the chapter that do not agree with each other.
+    """
     sections = [_table_2(demo), _table_3(demo)]
     title = "Encoder resolution: %e, residual and verdict"
     sections.append(resolution_section(demo.resolution, title, curve=demo.curve, names=COLOURED))
@@ -318,18 +335,21 @@ def sections(demo: Demonstration) -> list[Section]:
 
 
 def differences(demo: Demonstration) -> dict[str, float]:
-    """Difference from Table 2 in %, of the parameters of Table 2 that stay essential."""
+    """Compute the difference from Table 2, %, of each of its parameters that stays essential."""
     fit = demo.result.essential.estimate
     return {n: percent(fit[n], value) for n, value in TABLE_2.items() if n in fit.names}
 
 
 def percent(value: float, reference: float) -> float:
-    """100 (value/reference - 1)."""
+    """Compute the difference of a value from a reference, %: 100 (value/reference - 1)."""
     return 100 * (value / reference - 1)
 
 
 def _fit_cells(fit: Estimate, name: str) -> tuple[str, str, str]:
-    """Value, difference from Table 2 in % and %sigma; of a parameter that was removed, so."""
+    """Write the value of a parameter, its difference from Table 2, %, and its %sigma.
+
+    A parameter that is not in the fit gives "removed".
+    """
     if name not in fit.names:
         return "removed", "-", "-"
     x, sigma = fit[name], fit.relative_sigma[fit.names.index(name)]
@@ -337,7 +357,10 @@ def _fit_cells(fit: Estimate, name: str) -> tuple[str, str, str]:
 
 
 def _table_2(demo: Demonstration) -> Section:
-    """Least squares: the chapter's values, ours from the essential and from all parameters."""
+    """Build the section of Table 2: least squares values of the chapter beside our values.
+
+    Our values are those of the essential fit and of the fit of all parameters.
+    """
     fits = (demo.result.essential.estimate, demo.result.estimate)
     rows = [
         (
@@ -377,7 +400,7 @@ def _table_2(demo: Demonstration) -> Section:
 
 
 def _table_3(demo: Demonstration) -> Section:
-    """Mean values by resolution: chapter, ours, difference."""
+    """Build the section of Table 3: mean estimates for each encoder step, chapter beside ours."""
     levels = demo.resolution.levels
     labels = [(f"Table 3, {level.level.label}", "ours") for level in levels]
     table = _compared(
@@ -398,7 +421,7 @@ def _table_3(demo: Demonstration) -> Section:
 
 
 def _table_4(result: Cestac) -> Section:
-    """Torque steps alone, and with the first position step."""
+    """Build the section of Table 4: torque steps alone, and together with the first position step."""
     torque = [r for r in result.levels if r.level.torque]
     alone, both = (
         [r for r in torque if bool(r.level.delta) is rounded] for rounded in (False, True)
@@ -438,7 +461,10 @@ def _compared(
     caption: str,
     residual: Sequence[tuple[str, str]],
 ) -> Table:
-    """Published mean, ours and their difference in % at every level; the residual at the end."""
+    """Make a table of published mean, our mean and their difference, %, for each step.
+
+    The last row is the residual.
+    """
     rows: list[tuple[str, ...]] = []
     for name in (n for n in published if n in result.names):
         means = [float(level.mean[result.names.index(name)]) for level in levels]

@@ -1,7 +1,7 @@
-"""One root for every error symgen raises on purpose.
+"""The errors that symgen raises on purpose; all of them are SymgenError.
 
-A message says what was given, what was expected, where, and what to do; the offending values are
-attributes.
+A message says which input was given, which was expected, where, and what to do; the wrong values
+are attributes.
 """
 
 from __future__ import annotations
@@ -13,18 +13,25 @@ LONGEST = 2000  # characters of a message: a file may hold names of any length
 
 
 class SymgenError(Exception):
-    """Base of all errors for bad input and for a derivation that cannot be completed."""
+    """Base class of all errors for bad input and for a derivation that cannot be completed."""
 
     def __init__(self, message: str = "") -> None:
         super().__init__(printable(message))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Without __init__: the classes below take more than the message."""
+        """Return what pickle needs to rebuild the error without a call of __init__.
+
+        The subclasses have an __init__ with more arguments than the message.
+        """
         return copyreg.__newobj__, (type(self), *self.args), vars(self)  # type: ignore[attr-defined]
 
 
 def printable(text: str) -> str:
-    """`text` as a terminal may show it: what controls one (escape sequences, changes of direction) spelled out, the middle of a long one left out."""
+    r"""Make a text safe to print on a terminal.
+
+    Control characters (escape sequences, changes of direction) are written as codes such as \x1b,
+    and the middle of a long text is left out.
+    """
     for _ in range(2):  # spelled out, a text may be too long again
         if len(text) > LONGEST:
             text = f"{text[: LONGEST - 400]} ... {text[-300:]}"
@@ -34,12 +41,12 @@ def printable(text: str) -> str:
 
 
 class CertificateError(SymgenError):
-    """A certificate that does not hold: the robot is one, the verdict on it is negative.
+    """A certificate that does not hold: the robot file is valid, but a check of its formulas failed.
 
     Parameters
     ----------
     message : str
-        Which check does not hold.
+        Which check failed.
     certificate : object
         The Certificate.
     """
@@ -57,12 +64,12 @@ class DescriptionError(SymgenError):
     message : str
         What was given, what was expected and what to do.
     path : tuple of str or int
-        Keys that lead to the offending field, e.g. ("frames", 4, "sigma"); a file reader turns them
+        Keys that lead to the wrong field, e.g. ("frames", 4, "sigma"); a file reader turns them
         into a line.
     file : str, optional
         Name of the file.
     line : int, optional
-        Its line, from 1.
+        Line of the error in the file, from 1.
     """
 
     def __init__(
@@ -88,9 +95,9 @@ class ExpressionError(SymgenError):
     text : str
         The whole expression.
     column : int, optional
-        Where in it, from 1.
+        Column of the error in the expression, from 1.
     advice : str
-        What to write instead; ends the message.
+        What to write instead; it ends the message.
     """
 
     def __init__(

@@ -1,4 +1,7 @@
-"""A limit on the processor time of a derivation: whatever a robot file holds, a command ends with a result or with one sentence."""
+"""Limit the processor time of a derivation.
+
+So for any robot file, a command ends with a result or with one sentence.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +20,9 @@ _end: ContextVar[tuple[float, str]] = ContextVar("_end", default=(math.inf, ""))
 
 @contextmanager
 def limited(what: str) -> Iterator[None]:
-    """Let `require_time` raise after SECONDS of processor time. what : what is being done, "the
-    regrouping of tx40".
+    """Limit the processor time of the block to SECONDS, as checked by `require_time`.
+
+    what : name of the task for the message, such as "the regrouping of tx40".
     """
     token = _end.set((time.process_time() + SECONDS, what))
     try:
@@ -28,7 +32,7 @@ def limited(what: str) -> Iterator[None]:
 
 
 def require_time() -> None:
-    """Raise SymgenError if the time of what is being done has passed."""
+    """Raise SymgenError if the processor time of the present task is over."""
     end, what = _end.get()
     if time.process_time() > end:
         raise SymgenError(

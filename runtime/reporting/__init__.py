@@ -1,1 +1,1 @@
-"""Figures and the self-contained report."""
+"""Figures and the HTML page of a report."""

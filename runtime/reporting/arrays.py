@@ -1,5 +1,4 @@
-"""Results for other programs: an Estimate and a resolution study as named arrays, in NPZ, MAT and
-CSV.
+"""Write results for other programs: named arrays of an Estimate or a resolution study.
 
     arrays = estimate_arrays(fit)
             # names as text arrays, X, sigma ..., joints, figures of the fit
@@ -7,7 +6,7 @@ CSV.
     load estimate.mat
             # MATLAB, Octave: names as cell arrays, value.ZZ1R beside X
 
-Same result, same bytes: neither file holds the time at which it was written.
+Equal results give equal bytes: no file contains the time at which it was written.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ HEADER = b"MATLAB 5.0 MAT-file, written by symgen"
 
 
 def estimate_arrays(fit: Estimate) -> dict[str, Array]:
-    """Names, numbers and texts of an Estimate; shapes (b,), (b, b) and per joint (n,)."""
+    """Convert an Estimate into named arrays of shape (b,), (b, b), and (n,) for values per joint."""
     joints = fit.per_joint
     return {
         "names": _texts(fit.names),
@@ -81,12 +80,12 @@ def estimate_arrays(fit: Estimate) -> dict[str, Array]:
 
 
 def array_files(stem: str, arrays: Mapping[str, Array]) -> dict[str, str | bytes]:
-    """The arrays as stem.npz and stem.mat."""
+    """Write the arrays as the two files stem.npz and stem.mat."""
     return {f"{stem}.npz": npz(arrays), f"{stem}.mat": mat(arrays)}
 
 
 def npz(arrays: Mapping[str, Array]) -> bytes:
-    """A NumPy archive that loads without pickles."""
+    """Write the arrays as a NumPy archive that loads without pickles."""
     for name, array in arrays.items():
         if array.dtype.hasobject:
             raise TypeError(f"{name} holds Python objects; an archive holds numbers and texts")
@@ -97,8 +96,9 @@ def npz(arrays: Mapping[str, Array]) -> bytes:
 
 
 def mat(arrays: Mapping[str, Array]) -> bytes:
-    """A MATLAB file (version 5): vectors as columns, texts as cell arrays, and `value`, a structure
-    of X (or X_LS) by name.
+    """Write the arrays as a MATLAB file (version 5).
+
+    Vectors are columns, texts are cell arrays, and `value` is a structure of X (or X_LS) by name.
     """
     values = arrays.get("X", arrays.get("X_LS", np.empty(0)))
     fields = dict(zip(matlab_names(map(str, arrays["names"])), values.tolist(), strict=True))
@@ -110,8 +110,9 @@ def mat(arrays: Mapping[str, Array]) -> bytes:
 
 
 def matlab_names(names: Iterable[str]) -> tuple[str, ...]:
-    """Each name as MATLAB allows it: a letter, then letters, digits and _, at most 63, no keyword,
-    none twice.
+    """Change names so that MATLAB accepts them, all different.
+
+    A name has a letter first, then letters, digits and _, at most 63 characters; it is no keyword.
     """
     allowed: list[str] = []
     for name in names:
@@ -130,7 +131,10 @@ def _texts(texts: Iterable[str]) -> Array:
 
 
 def _cells(array: Array) -> Array | str | Sequence[str]:
-    """Texts as MATLAB has them: one as characters, several as a cell array."""
+    """Convert an array of texts to the MATLAB form; other arrays are not changed.
+
+    A single text becomes a character string, several texts become a cell array.
+    """
     if array.dtype.kind != "U":
         return array
     return str(array) if not array.ndim else np.array(array.tolist(), dtype=object)

@@ -1,8 +1,8 @@
-"""Figures of a report. matplotlib only here, through its object interface: no global state, no
-window, same data same bytes.
+"""Draw the figures of a report with matplotlib.
 
-Colours are those of Okabe and Ito, distinct with any colour vision; line styles and widths differ
-too, so that a grey print can be read.
+Only this module and its users load matplotlib, through its object interface: no global state and no
+window. Equal data give equal bytes. The colours are those of Okabe and Ito, which differ for any
+colour vision. Line styles and widths differ too, so that a grey print can be read.
 """
 
 from __future__ import annotations
@@ -50,8 +50,9 @@ RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 def draw_figure(
     caption: str, figure: Figure, alt: str, name: str = "", series: Series | None = None
 ) -> Image:
-    """The figure for a page.   name : of its files beside the page, PNG and SVG; none: the page
-    alone has it.
+    """Turn a matplotlib figure into the image of a page.
+
+    name : name of the files, PNG and SVG, that are written beside the page; "": no files.
     """
     picture = svg(figure)
     return Image(
@@ -64,17 +65,18 @@ def draw_figure(
 
 
 def svg(figure: Figure) -> bytes:
-    """The figure as SVG, letters as outlines."""
+    """Write the figure as SVG, with letters as outlines."""
     return _rendered(figure, "svg")
 
 
 def png(figure: Figure) -> bytes:
-    """The figure as PNG, 150 dots per inch."""
+    """Write the figure as PNG, 150 dots per inch."""
     return _rendered(figure, "png")
 
 
 def joint_overlay(joint: JointComparison, unit: str = "N m", source: str = "measured") -> Figure:
-    """Measured and predicted torque of one joint, and their difference below (chapter, Fig. 4).
+    """Draw measured and predicted torque of one joint, with the error below (chapter, Fig. 4).
+
     source : "measured" or "simulated".
     """
     with mpl.rc_context(STYLE):
@@ -91,7 +93,7 @@ def joint_overlay(joint: JointComparison, unit: str = "N m", source: str = "meas
 def torque_overlay(
     comparison: Sequence[JointComparison], unit: str = "N m", source: str = "measured"
 ) -> Figure:
-    """Fig. 4 of the chapter: every joint in a panel of its own."""
+    """Draw measured and predicted torque and the error, one panel for each joint (chapter, Fig. 4)."""
 
     def draw(ax: Axes, joint: JointComparison) -> None:
         _torques(ax, ax, joint, source)
@@ -101,7 +103,10 @@ def torque_overlay(
 
 
 def residual_histogram(comparison: Sequence[JointComparison], unit: str = "N m") -> Figure:
-    """Residuals of every joint, each beside the normal law of the same deviation."""
+    """Draw histograms of the residuals of every joint, scaled by their standard deviation.
+
+    The line is the normal distribution.
+    """
     x = np.linspace(-4, 4, 161)
     normal = np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi)
 
@@ -120,8 +125,9 @@ def residual_histogram(comparison: Sequence[JointComparison], unit: str = "N m")
 def spectra_figure(
     joints: Sequence[Whiteness], unit: str = "N m", cutoff: float | None = None
 ) -> Figure:
-    """Spectral density of the residuals joint by joint, and the level of white residuals of the
-    same power.
+    """Draw the spectral density of the residuals of each joint, over frequency.
+
+    A line shows the density of white residuals with the same power.
     """
 
     def draw(ax: Axes, w: Whiteness) -> None:
@@ -143,8 +149,9 @@ def spectra_figure(
 
 
 def _torques(upper: Axes, lower: Axes, joint: JointComparison, source: str) -> None:
-    """Lines of as many instants as show, which break where rows were left out or another record
-    starts.
+    """Plot measured torque, predicted torque and error of one joint, thinned to the instants shown.
+
+    Lines break where rows were left out or another record starts.
     """
     thinned = series(joint, "", "")
     upper.plot(thinned.t, thinned.first, label=source, **MEASURED)
@@ -167,20 +174,20 @@ def panels(
     legend: int = 0,
     letters: float = STYLE["font.size"],
 ) -> Figure:
-    """A figure with a panel for each item, row by row.
+    """Draw a figure with one panel for each item, row by row.
 
     Parameters
     ----------
     draw : function of Axes and an item
         Fills a panel.
     columns : int
-        Largest number of panels beside each other.
+        Largest number of panels in a row.
     cell : (float, float), inch
-        Width and height of a panel; `extra` is added to the height of all, and the whole is at
+        Width and height of a panel; `extra` is added to the total height, and the figure is at
         least `least` wide.
     legend : int
-        Columns of the one legend above the figure, every label once, in letters of `letters`
-        points; 0: none.
+        Columns of the common legend above the figure, which has every label once, in letters of
+        `letters` points; 0: no legend.
     """
     columns = max(1, min(columns, len(items)))
     rows = -(-len(items) // columns)
@@ -200,7 +207,7 @@ def panels(
 
 
 def of_part(figure: PartFigure) -> Image:
-    """The figure of a part, for a page."""
+    """Draw the figure of a part of a result, as an image of the page."""
 
     def draw(ax: Axes, fill: Callable[[Axes], None]) -> None:
         if figure.logarithmic:
@@ -223,13 +230,16 @@ def of_part(figure: PartFigure) -> Image:
 
 
 def legend_above(ax: Axes, **style: Any) -> None:
-    """The legend of a panel in two columns, above its left edge."""
+    """Place the legend of a panel above its left edge, in two columns."""
     place: Any = {"loc": "lower left", "bbox_to_anchor": (-0.02, 1.0), "borderaxespad": 0.2}
     ax.legend(ncols=2, **place, **style)
 
 
 def logarithmic(ax: Axes, axes: str = "xy") -> None:
-    """Logarithmic axes of a panel: 0.01, 1, 100, 10⁴; no ticks between the powers of ten."""
+    """Make the axes of a panel logarithmic, with the labels 0.01, 1, 100, 10⁴.
+
+    There are no ticks between the powers of ten.
+    """
     for name in axes:
         ax.set(**{f"{name}scale": "log"})
         axis = getattr(ax, f"{name}axis")
@@ -248,7 +258,7 @@ def empty_figure(size: tuple[float, float]) -> Figure:
 
 
 def _rendered(figure: Figure, form: str) -> bytes:
-    """The figure in one form."""
+    """Write the figure in a file format, "svg" or "png"."""
     stream = BytesIO()
     with mpl.rc_context(STYLE):
         figure.savefig(

@@ -1,4 +1,4 @@
-"""Figures of motions, and the page of an exciting one."""
+"""Draw exciting and simulated motions, and build the page of an exciting motion."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ LINES = ("-", "--", ":", "-.")
 
 
 def motion_figure(excitation: Excitation) -> Figure:
-    """q, qd, qdd of every joint as a share of its limits, and the torques."""
+    """Draw q, qd and qdd of every joint as shares of their limits, and the torques, over time."""
     (t, q, qd, qdd, tau), limits = excitation.sampled(), excitation.limits
     middle, half = (limits.lower + limits.upper) / 2, (limits.upper - limits.lower) / 2
     limited = bool(np.all(np.isfinite(limits.tau)))
@@ -59,8 +59,9 @@ def motion_figure(excitation: Excitation) -> Figure:
 def simulation_figure(
     joints: Sequence[str], simulation: Simulation, units: Sequence[tuple[str, str]]
 ) -> Figure:
-    """A row per joint: position and reference, tracking error, torque. units : of position and
-    torque, by joint.
+    """Draw a simulation: position with reference, tracking error and torque, one row for each joint.
+
+    units : units of position and torque of each joint.
     """
     s, cells = simulation, []
     for k, (j, (position, torque)) in enumerate(zip(joints, units, strict=True)):
@@ -89,7 +90,7 @@ def simulation_figure(
 
 
 def excitation_page(excitation: Excitation) -> Page:
-    """The report of a search."""
+    """Build the page of an exciting motion."""
     shown = (
         "position, velocity, acceleration of every joint as a share of its limits, and "
         "torques, over time"

@@ -1,11 +1,12 @@
-"""A report as one HTML file that opens anywhere: images, style and script inside, no request to
-anyone. jinja2 only here.
+"""Write a report as one HTML file that any browser can open: images, style and script are inside.
 
-A Page is plain values; the template holds the layout. Everything that comes from a file or a user
-is escaped, by the template or by `markup.element`; numbers for the script are JSON in which <, >
-and & are escapes. The content security policy allows this script and this style sheet by their
-hashes, hence nothing else. Without scripts, and in print, figures are the images and tables stand
-as they were written.
+The page requests nothing from other files or servers. Only this module of the package uses jinja2.
+
+A Page has plain values; the template has the layout. All text from a file or a user is escaped, by
+the template or by `markup.element`; numbers for the script are JSON in which <, > and & are
+escapes. The content security policy allows only this script and this style sheet, by their hashes.
+Without scripts, and in print, figures are the images, and the rows of tables have their written
+order.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ class Matrix:
     ----------
     caption : str
     names : sequence of str
-        Of the rows and of the columns.
+        Names of the rows, which are also those of the columns.
     values : sequence of sequences of float
     """
 
@@ -49,7 +50,7 @@ class Matrix:
 
     @property
     def cells(self) -> list[list[tuple[str, int]]]:
-        """(text, shade from 0 to 4) by row; what rounds to nothing is 0."""
+        """Text and shade, from 0 to 4, of each cell, by row; a number that rounds to zero is "0"."""
         return [
             [
                 (f"{x:+.2f}".replace("-", "−") if abs(x) >= 0.005 else "0", min(4, int(5 * abs(x))))
@@ -61,16 +62,16 @@ class Matrix:
 
 @dataclass(frozen=True)
 class Image:
-    """A figure.
+    """A figure of a page.
 
     Attributes
     ----------
     caption : str
     svg : bytes
     alt : str
-        What the figure shows, for those who do not see it.
+        Description of the figure for readers who cannot see it.
     series : Series or None
-        What a script draws in its place.
+        Data from which a script draws the figure instead of the image.
     files : mapping of str to bytes
         The figure in every format that is written beside the page, by file name.
     """
@@ -83,13 +84,16 @@ class Image:
 
     @property
     def data(self) -> str:
-        """Base64 of the SVG, for a data: address."""
+        """The SVG in base64, for a data: address."""
         return b64encode(self.svg).decode("ascii")
 
 
 @dataclass(frozen=True)
 class Section:
-    """A heading, paragraphs, then figures, tables and a listing.   folded : opens on demand."""
+    """A section of a page: a heading, paragraphs, then figures, tables and a listing.
+
+    folded : whether the section is closed until the reader opens it.
+    """
 
     title: str
     text: Sequence[str] = ()
@@ -102,7 +106,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Number:
-    """One of the figures that stand under the verdict."""
+    """One of the numbers that are shown below the verdict, with its label."""
 
     label: str
     value: str
@@ -120,16 +124,16 @@ class Page:
         One sentence.
     sections : sequence of Section
     warning : str
-        What must not be overlooked, such as simulated data.
+        Text that must not be overlooked, for instance that data are simulated.
     footer : str
     state : State
-        Of the verdict.
+        State of the verdict.
     question, answer : str
-        What the verdict answers, and the answer in a word or two.
+        The question that the verdict answers, and the answer in one or two words.
     remarks : sequence of (str, str)
-        Subject and sentence, after the verdict.
+        Subject and sentence of each remark after the verdict.
     numbers : sequence of Number
-        The figures under the verdict.
+        The numbers below the verdict.
     """
 
     title: str
@@ -155,14 +159,14 @@ class Page:
 
 
 def state_mark(state: State) -> Markup:
-    """A state as sign and word, coloured besides."""
+    """Write a state as a coloured sign and word, such as "✓ good"."""
     return element(
         "span", f"{SIGNS[state]} {WORDS[state]}" if state else "", class_=f"state {state}"
     )
 
 
 def render(page: Page) -> str:
-    """The HTML text of a page. Same page, same bytes."""
+    """Write the HTML text of a page. Equal pages give equal bytes."""
     images = [
         image for section in page.sections for image in section.images if image.series is not None
     ]
@@ -188,7 +192,10 @@ def render(page: Page) -> str:
 
 
 def embedded(value: Any) -> Markup:
-    """JSON that neither ends a script element nor opens a comment in one."""
+    """Write a value as JSON that can be placed inside a script element.
+
+    The characters <, > and & are escaped, so that no text can end the element or open a comment.
+    """
     text = json.dumps(value, allow_nan=False, separators=(",", ":"))
     return Markup(text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
 

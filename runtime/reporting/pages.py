@@ -1,4 +1,8 @@
-"""Pages of results: verdict, figure and values of an identification, then the rest, folded."""
+"""Build the HTML pages of results.
+
+The page of an identification shows verdict, figures and parameter values first; the other sections
+are folded.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +36,7 @@ def identification_page(
     verdict: str = "",
     sections: Sequence[Section] = (),
 ) -> Page:
-    """The page of an identification.
+    """Build the page of an identification.
 
     Parameters
     ----------
@@ -40,9 +44,9 @@ def identification_page(
     study : str
         Text of study.yaml.
     title, verdict : str
-        In place of those of the identification.
+        Replace the title and the verdict of the identification.
     warning : str
-        Before the warning on simulated data.
+        Precedes the warning on simulated data.
     sections : sequence of Section
         Further sections, after the parameters.
     """
@@ -73,7 +77,10 @@ def identification_page(
 
 
 def resolution_page(result: Cestac, study: str) -> Page:
-    """The page of a resolution study; study : text of study.yaml."""
+    """Build the page of a study of the encoder resolution.
+
+    study : text of study.yaml.
+    """
     page = Page(
         title=f"{_robot(result.provenance)}: encoder resolution on {_records(result.provenance)}",
         verdict=result.message,
@@ -94,7 +101,10 @@ def resolution_page(result: Cestac, study: str) -> Page:
 def part_page(
     part: Part, subject: str, verdict: str, provenance: Mapping[str, Any], study: str
 ) -> Page:
-    """The page of one part; subject : what the title says of it.   study : text of study.yaml."""
+    """Build a page for one part of a result.
+
+    subject : words of the title between the robot and the records.   study : text of study.yaml.
+    """
     return Page(
         title=f"{_robot(provenance)}: {subject} {_records(provenance)}",
         verdict=verdict,
@@ -103,7 +113,10 @@ def part_page(
 
 
 def checks_section(checklist: Checklist) -> Section:
-    """Question, answer, limit, remedy where there is one; what is not good first."""
+    """Build the folded section of the checks: question, answer, limit, and remedy if there is one.
+
+    Checks that are not good have a table of their own, which is the first.
+    """
     order = ("no", "doubtful", "open", "good")
     ordered = sorted(checklist.checks, key=lambda check: order.index(check.state))
     header = ("question", "answer", "found", "good within", "what to do")
@@ -120,7 +133,10 @@ def checks_section(checklist: Checklist) -> Section:
 
 
 def settings_section(study: str) -> Section:
-    """Every setting that is set, folded; study : text of study.yaml."""
+    """Build the folded section that lists every setting with a value.
+
+    study : text of study.yaml.
+    """
     lines = [line for line in study.splitlines() if not line.endswith(": null")]
     return Section(
         "Settings",
@@ -133,7 +149,7 @@ def settings_section(study: str) -> Section:
 
 
 def provenance_section(result: Identification) -> Section:
-    """Hashes and versions that reproduce the result."""
+    """Build the section with the file hashes and versions that are needed to reproduce the result."""
     provenance = result.estimate.provenance
     rows = [("robot file", provenance["robot"], f"SHA-256 {provenance['robot_sha256']}")]
     rows += [

@@ -1,5 +1,7 @@
-"""Parameters on a page and in files: those that are used; all of them beside the robot file, with
-what they are made of; those that trade.
+"""Show the parameters of an identification on a page and in parameters.csv.
+
+The page has the parameters that are used, all base parameters with their formulas and the values of
+the robot file, and the parameters that are strongly correlated.
 """
 
 from __future__ import annotations
@@ -21,8 +23,9 @@ from runtime.reporting.page import Matrix, Section
 
 
 def cad_values(model: GeneratedModel) -> dict[str, float]:
-    """Base parameters from the values of the robot file, X = K chi, where those that enter are all
-    given.
+    """Compute base parameters X = K chi from the standard parameters chi of the robot file.
+
+    Only base parameters whose standard parameters all have values are returned.
     """
     values: Mapping[str, float] = getattr(model, "VALUES", None) or {}
     if not values or not hasattr(model, "base_parameters"):
@@ -40,7 +43,7 @@ def cad_values(model: GeneratedModel) -> dict[str, float]:
 
 
 def parameter_section(result: Identification) -> Section:
-    """The parameters that are used: value, interval, unit."""
+    """Build the section of the parameters that are used: value, 95 % interval, unit."""
     fit = result.model_estimate
     rows = [
         (symbol(name), *_with_interval(fit, name), unit(fit.units.get(name, "")))
@@ -57,7 +60,7 @@ def parameter_section(result: Identification) -> Section:
 
 
 def every_section(result: Identification) -> Section:
-    """All base parameters: used, fitted together, from the robot file, and what each is made of."""
+    """Build the section of all base parameters: values, values of the robot file, and formulas."""
     fit, estimate, cad = result.model_estimate, result.estimate, cad_values(result.model)
     formulas: Mapping[str, str] = getattr(result.model, "FORMULAS", {})
     columns: list[tuple[str, list[str]]] = [
@@ -100,14 +103,17 @@ def every_section(result: Identification) -> Section:
 
 
 def _columns(head: str, fit: Estimate, names: Sequence[str]) -> list[tuple[str, list[str]]]:
-    """Values and intervals of some parameters, empty for those that are not in the fit."""
+    """Make the two columns with values and intervals of the named parameters.
+
+    Cells of parameters that are not in the fit are empty. head : start of both column titles.
+    """
     cells = [_with_interval(fit, name) if name in fit.names else ("", "") for name in names]
     values, halves = map(list, zip(*cells, strict=True))
     return [(f"{head}value", values), (f"{head}± 95 %", halves)]
 
 
 def _with_interval(fit: Estimate, name: str) -> tuple[str, str]:
-    """A value and half of its 95 % interval."""
+    """Write the value of a parameter and half the width of its 95 % interval."""
     half = _half(fit, name)
     return interval(fit[name], half) if math.isfinite(half) else (number(fit[name]), "-")
 
@@ -117,9 +123,10 @@ def _half(fit: Estimate, name: str) -> float:
 
 
 def _difference(fit: Estimate, name: str, given: float) -> str:
-    """Difference of a value from that of the robot file, in % of the latter.
+    """Write the difference of a fitted value from the value of the robot file, % of the latter.
 
-    Empty if the value of the robot file is within the interval of zero.
+    The text is empty if the value of the robot file is smaller than half the 95 % interval of the
+    fit.
     """
     if name not in fit.names or not abs(given) > (half := _half(fit, name)):
         return ""
@@ -128,7 +135,7 @@ def _difference(fit: Estimate, name: str, given: float) -> str:
 
 
 def _made_of(name: str, formulas: Mapping[str, str]) -> str:
-    """The formula of a base parameter, which opens on demand."""
+    """Write the formula of a base parameter as an HTML element that the reader can open."""
     made = formulas.get(name, name)
     if made == name:
         return "itself"
@@ -141,8 +148,10 @@ def _made_of(name: str, formulas: Mapping[str, str]) -> str:
 
 
 def correlation_section(result: Identification) -> Section:
-    """Groups and pairs of all parameters, then the most correlated of those that carry the
-    model.
+    """Build the section of correlated parameters: groups and pairs, and a table of correlations.
+
+    Groups and pairs are those of all parameters; the table has the most correlated of the used
+    ones.
     """
     correlations = result.correlations
     groups = "; ".join(", ".join(group) for group in correlations.groups) or "none"
@@ -163,8 +172,9 @@ def correlation_section(result: Identification) -> Section:
 
 
 def correlation_matrix(fit: Estimate, most: int = LIMIT.CORRELATIONS_SHOWN) -> Matrix | None:
-    """Correlations, eq. (10), among the parameters with the strongest ones, in column order; None
-    of a single parameter, or without covariance.
+    """Select the most correlated parameters and their correlations, eq. (10), in column order.
+
+    None for a single parameter, or if the estimate has no covariance.
     """
     deviation = np.sqrt(np.diag(fit.covariance))
     if len(fit.names) < 2 or not np.all(deviation > 0):
@@ -181,8 +191,10 @@ def correlation_matrix(fit: Estimate, most: int = LIMIT.CORRELATIONS_SHOWN) -> M
 
 
 def parameters_csv(result: Identification) -> str:
-    """parameters.csv: name, value, sigma, %sigma, corrected sigma, unit; then value and %sigma of
-    the essential fit, empty where removed.
+    """Write parameters.csv: name, value, sigma, %sigma, corrected sigma and unit of each parameter.
+
+    Two further columns have value and %sigma of the essential fit; they are empty for removed
+    parameters.
     """
     fit, essential = result.estimate, result.essential.estimate
     columns = ("X", "sigma", "relative_sigma", "sigma_corrected")

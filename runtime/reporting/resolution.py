@@ -1,4 +1,4 @@
-"""A resolution study on a page of its own: its part under another title and with a longer curve."""
+"""Build the report of a study of the encoder resolution: its section and the numbers at its head."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ def resolution_section(
     curve: Cestac | None = None,
     names: Sequence[str] = (),
 ) -> Section:
-    """Table 3 of the chapter with %e and %sigma, both readings of %e(rho), and the curve of %e
-    against Delta.
+    """Build the section with %e, %sigma and %e(rho) of each step, and the curve of %e against Delta.
 
-    curve : study with more steps, for the figure.   names : parameters that it draws in colour.
+    This is Table 3 of the chapter, with both definitions of %e(rho).
+
+    curve : study with more steps, for the figure.   names : parameters that are coloured in the figure.
     """
     shown = curve or result
     figures = [error_against_resolution(shown, names)] if shown.figures() else []
@@ -30,8 +31,9 @@ def resolution_section(
 
 
 def level_numbers(result: Cestac) -> list[Number]:
-    """The verdict of every step, in counts per turn and bits, with what changes most, for the head
-    of a page.
+    """Write the verdict of each encoder or torque step, with the parameter that changes most.
+
+    Encoder steps are given in counts per turn and bits too. The numbers are for the head of a page.
     """
     states: dict[str, State] = {"unbiased": "good", "doubtful": "doubtful", "biased": "no"}
     turns = not {*result.reference.units.values()} & {"N*s/m", "kg"}

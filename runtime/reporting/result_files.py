@@ -1,15 +1,16 @@
-"""Results of one command in one folder: every file whole, the set of one run, never of two,
-whatever interrupts.
+"""Write all result files of one command into a folder, or none of them.
 
-    FOLDER/.symgen-unfinished-*/    files being written; what a killed run left is deleted by the
-                                    next one
-    FOLDER/.symgen-finished/        all of them written and on disk, being moved up; what a killed
-                                    run left is moved by the next one
+Even an interrupted command leaves only whole files, all of the same run.
 
-The set becomes valid by one act, the renaming of .symgen-unfinished-* to .symgen-finished: a run
-killed before it has changed nothing, one killed after it is completed by the next command that
-writes into FOLDER. Other files in FOLDER are never touched. Of two commands that write at once, one
-may have to be repeated.
+    FOLDER/.symgen-unfinished-*/    files being written; if a run was killed, the next run deletes
+                                    this folder
+    FOLDER/.symgen-finished/        all files, written to disk and being moved up; if a run was
+                                    killed, the next run moves the rest
+
+The files become valid by one act, the renaming of .symgen-unfinished-* to .symgen-finished: a run
+that is killed before has changed nothing, and a run that is killed later is completed by the next
+command that writes into FOLDER. Other files in FOLDER are never changed. If two commands write at
+the same time, one of them may have to be repeated.
 """
 
 from __future__ import annotations
@@ -42,18 +43,19 @@ ADVICE = {
 
 
 class OutputError(InputError):
-    """Results that cannot be written: where, why, what to do."""
+    """Results cannot be written; the message says where, why, and what to do."""
 
 
 class Results:
-    """A folder for results; made by `results_in`."""
+    """A folder into which a command writes its results; made by `results_in`."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
     def write_all(self, contents: Mapping[str, str | bytes]) -> list[Path]:
-        """Write every file, or none; raises OutputError where one cannot be written, FOLDER being
-        as it was.
+        """Write every file into the folder, or none; return their paths.
+
+        If a file cannot be written, OutputError is raised and the folder is as before.
         """
         with _clear_errors(self.folder):
             self.recover()
@@ -70,7 +72,7 @@ class Results:
         return [self.folder / name for name in contents]
 
     def recover(self) -> None:
-        """Move up what is finished, delete what is not."""
+        """Complete what earlier commands left: move finished files up, delete unfinished files."""
         for unfinished in self.folder.glob(f"{UNFINISHED}*"):
             if unfinished.is_dir() and not unfinished.is_symlink():  # rmtree waits for a pipe
                 shutil.rmtree(unfinished, ignore_errors=True)
@@ -85,7 +87,7 @@ class Results:
                 finished.rmdir()
 
     def _finish(self, contents: Mapping[str, str | bytes]) -> None:
-        """All files in one folder, on disk, that is then called FINISHED."""
+        """Write all files to disk in a new folder, then rename this folder to FINISHED."""
         unfinished = Path(mkdtemp(prefix=UNFINISHED, dir=self.folder))
         try:
             for name, content in contents.items():
@@ -100,16 +102,16 @@ class Results:
 
 
 def write_all(folder: str | Path, contents: Mapping[str, str | bytes]) -> list[Path]:
-    """Write every file into `folder`, or none; their paths."""
+    """Write every file into `folder`, or none; return their paths."""
     with results_in(folder) as results:
         return results.write_all(contents)  # type: ignore[no-any-return]
 
 
 @contextmanager
 def results_in(folder: str | Path | None) -> Iterator[Any]:
-    """The folder, made where it is missing, as `Results`; None, where nothing is to be written.
+    """Yield the folder as a Results object, made if it is missing; None if no folder is given.
 
-    Raises OutputError where nothing can be written there.
+    Raises OutputError if nothing can be written there.
     """
     if folder is None:
         yield None
@@ -123,7 +125,7 @@ def results_in(folder: str | Path | None) -> Iterator[Any]:
 
 
 def _require_plain(path: Path) -> None:
-    """OutputError where something else than a file has the name of one that is to be written."""
+    """Raise OutputError if `path` exists but is a link, a folder, a pipe or a device."""
     if path.is_symlink():
         what = "a link"
     elif path.is_dir():
@@ -139,7 +141,10 @@ def _require_plain(path: Path) -> None:
 
 @contextmanager
 def _new_folder(folder: Path) -> Iterator[None]:
-    """The folder is there; if it was not before and nothing was written, it is not afterwards."""
+    """Make the folder if it is missing for the duration of the block; delete it after if it is empty.
+
+    Only folders that were missing before the block are deleted.
+    """
     with _clear_errors(folder):
         made = [path for path in (folder, *folder.parents) if not path.exists()]
         folder.mkdir(parents=True, exist_ok=True)
@@ -159,7 +164,7 @@ def _write_durably(path: Path, data: bytes) -> None:
 
 
 def _keep_rights(path: Path, replaced: Path) -> None:
-    """Mode and owner of the file that `path` is going to replace, where there is one."""
+    """Give `path` the mode and the owner of the file that it will replace, if that file exists."""
     with suppress(OSError):
         found = replaced.stat()
         with suppress(OSError):  # an owner that this user cannot give
@@ -168,7 +173,7 @@ def _keep_rights(path: Path, replaced: Path) -> None:
 
 
 def _sync(folder: Path) -> None:
-    """The names in `folder` on disk, where the system can do that."""
+    """Make the names of the files in `folder` durable on disk, if the system can do that."""
     with suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY)
         try:
@@ -179,7 +184,7 @@ def _sync(folder: Path) -> None:
 
 @contextmanager
 def _clear_errors(folder: Path) -> Iterator[None]:
-    """Turn errors of the file system into messages with the folder and what to do."""
+    """Turn errors of the file system inside the block into messages with the folder and advice."""
     try:
         yield
     except OSError as e:

@@ -1,6 +1,4 @@
-"""Sections of an identification report: values in, tables and figures out. No robot is special
-here.
-"""
+"""Build the sections of an identification report: tables and figures from the values of a result."""
 
 from __future__ import annotations
 
@@ -22,7 +20,7 @@ FIGURES_SHOWN = 8  # of joints, before the table of parameters
 
 
 def detail_sections(result: Identification) -> list[Section]:
-    """Folded sections with the details behind the parameters that are used."""
+    """Build the folded sections with the details behind the parameters that are used."""
     trust = result.uncertainty
     sections = [
         *other_torques_section(result),
@@ -42,9 +40,10 @@ def detail_sections(result: Identification) -> list[Section]:
 
 
 def torque_section(result: Identification) -> Section:
-    """Figure 4 of the chapter for each joint; of many joints, for those with the largest errors.
+    """Build the section of measured and predicted torques: Figure 4 of the chapter for each joint.
 
-    A script on the page lets the reader zoom.
+    If there are many joints, only the joints with the largest errors are shown. A script on the
+    page lets the reader zoom.
     """
     shown = _joints_shown(result)
     section = _torque_figures(result, shown, f"{result.source.capitalize()} and predicted torques")
@@ -55,14 +54,20 @@ def torque_section(result: Identification) -> Section:
 
 
 def other_torques_section(result: Identification) -> list[Section]:
-    """Figures of the joints that `torque_section` leaves out, as one section; none if it shows all."""
+    """Build the section with the torque figures of the joints that `torque_section` does not show.
+
+    The list is empty if all joints are shown there.
+    """
     shown = _joints_shown(result)
     others = [joint for joint in result.comparison if joint not in shown]
     return [_torque_figures(result, others, "Torques of the other joints")] if others else []
 
 
 def _joints_shown(result: Identification) -> list[JointComparison]:
-    """Joints whose figures stand before the parameters, in the order of the robot."""
+    """Select the joints whose torque figures come before the parameters, in the order of the robot.
+
+    If there are many joints, these are the joints with the largest errors.
+    """
     joints = result.comparison
     if len(joints) <= FIGURES_SHOWN:
         return list(joints)
@@ -73,7 +78,7 @@ def _joints_shown(result: Identification) -> list[JointComparison]:
 def _torque_figures(
     result: Identification, joints: Sequence[JointComparison], title: str
 ) -> Section:
-    """Section with a figure of measured torque, predicted torque and error for each joint."""
+    """Build a section with a figure of measured torque, predicted torque and error for each joint."""
     unit = result.torque_unit
     columns = {"essential": "the essential", "feasible": "the physical", "all": "all"}[
         result.model_columns
@@ -107,7 +112,7 @@ def _torque_figures(
 
 
 def joint_section(result: Identification) -> Section:
-    """Errors in total and per joint."""
+    """Build the section of the fit errors, in total and for each joint."""
     header = (
         "joint",
         "rows",
@@ -151,7 +156,7 @@ def joint_section(result: Identification) -> Section:
 
 
 def record_section(result: Identification) -> Section:
-    """Errors of each of several records, and what their time stamps were like."""
+    """Build the section with the errors of each record and the description of its time stamps."""
     header = (
         "record",
         "rows",
@@ -172,7 +177,7 @@ def record_section(result: Identification) -> Section:
 
 
 def motion_section(result: Identification) -> Section:
-    """Whether the simulated loop follows the record."""
+    """Build the section that shows whether the simulated control loop follows the record."""
     text = (
         (
             "The control loop of the study, simulated with the parameters found, compared with the "
@@ -183,7 +188,10 @@ def motion_section(result: Identification) -> Section:
 
 
 def trail_section(result: Identification) -> Section:
-    """How the essential parameters were found, and whether the removals tell."""
+    """Build the section on the essential parameters: the removals and their F-tests.
+
+    The table lists each removed parameter, in order, with the ratio of sigma_rho after its removal.
+    """
     essential, trust = result.essential, result.uncertainty
     first, tests = len(result.estimate.names), trust.f_tests
     header = ["removed", "left", "%sigma before", "sigma_rho ratio after"]
@@ -211,17 +219,17 @@ def trail_section(result: Identification) -> Section:
 
 
 def percent_sigma(percent: float) -> str:
-    """A relative deviation; empty where zero is within the interval of 1.96 deviations."""
+    """Write a relative standard deviation, %; "" if the 95 % interval contains zero."""
     return f"{percent:.2g}" if 1.96 * percent < 100 else ""
 
 
 def probability(p: float) -> str:
-    """A probability, small ones by their bound."""
+    """Write a probability; below 0.0001 only the bound "< 0.0001"."""
     return f"{p:.2g}" if p >= 1e-4 else "< 0.0001"
 
 
 def validation_section(result: Identification) -> Section:
-    """One part of the data predicts the others."""
+    """Build the section of the cross-validation: one part of the data predicts the other parts."""
     tables = [part.table(".2f") for part in result.validation]
     text = (
         (
@@ -234,7 +242,10 @@ def validation_section(result: Identification) -> Section:
 
 
 def residual_section(result: Identification, unit: str = "N m") -> Section:
-    """Spectra with the cut-off of the decimation, histograms with the normal law."""
+    """Build the section of the residuals: spectra with the cut-off of the decimation, and histograms.
+
+    The histograms are compared with the normal distribution.
+    """
     joints = result.uncertainty.whiteness
     if not joints:
         return Section("Residuals: spectrum and distribution")
@@ -268,20 +279,20 @@ def residual_section(result: Identification, unit: str = "N m") -> Section:
 
 
 def decimation_cutoff(result: Identification) -> float | None:
-    """Where the filter of the parallel decimation ends, Hz; None without one."""
+    """Return the cut-off frequency of the filter of the parallel decimation, Hz; None without a filter."""
     if result.study.signals.decimate is None or result.observation.settings.get("factor") == 1:
         return None
     return CUTOFF * result.observation.rate / 2
 
 
 def part_sections(result: Identification) -> list[Section]:
-    """Make a section of every part that has something to show."""
+    """Build a section for every part of a result that has text, figures or tables."""
     sections = map(part_section, result.parts)
     return [one for one in sections if one.text or one.images or one.tables]
 
 
 def part_section(part: Part) -> Section:
-    """Warnings, text, figures and tables of a part."""
+    """Build the section of one part of a result: warnings, text, figures and tables."""
     text = [*part.warnings(), *filter(None, part.text().splitlines())]
     images = [plots.of_part(figure) for figure in part.figures()]
     return Section(part.title, text, images, part.tables())

@@ -1,5 +1,6 @@
-"""Numbers of a figure for the script of a page: extremes kept, the rest left out, float32 in
-base64.
+"""Prepare the data of a torque figure for the script of a page.
+
+Extreme values are kept and other samples are left out; numbers are float32 in base64.
 """
 
 from __future__ import annotations
@@ -19,18 +20,18 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Two lines over time with their difference.
+    """Two lines over time, such as measured and predicted torque, for a figure with their difference.
 
     Attributes
     ----------
     t : ndarray, shape (N,), s
     first, second : ndarray, shape (N,), unit
-        The lines; nan breaks them.
+        Values of the lines; nan breaks a line.
     labels : (str, str)
-        Of the lines.
+        Names of the lines.
     unit : str
     total : int
-        Instants before thinning.
+        Number of instants before thinning.
     """
 
     t: Array
@@ -42,7 +43,7 @@ class Series:
 
     @property
     def data(self) -> Mapping[str, Any]:
-        """For JSON. Times are counted from `start`, s; nan breaks a line."""
+        """The lines for JSON; times are counted from `start`, s, and nan breaks a line."""
         start = float(np.nanmin(self.t)) if len(self.t) else 0.0
         arrays = {"t": self.t - start, "first": self.first, "second": self.second}
         return {
@@ -56,7 +57,7 @@ class Series:
 def series(
     joint: JointComparison, unit: str, source: str, most: int = LIMIT.INSTANTS_SHOWN
 ) -> Series:
-    """Measured and predicted torque of one joint, broken where rows are missing."""
+    """Make the lines of measured and predicted torque of one joint, broken where rows are missing."""
     kept = extremes(np.array([joint.measured, joint.predicted, joint.error]), most)
     piece = np.searchsorted(gaps(joint.t), kept, side="right")
     holes = np.flatnonzero(np.diff(piece)) + 1
@@ -68,8 +69,10 @@ def series(
 
 
 def extremes(values: Array, most: int) -> Array:
-    """Numbers of at most `most` columns of `values`, shape (m, N): first, last, and the smallest
-    and largest of every row in stretches of equal length.
+    """Select at most `most` columns of `values`, shape (m, N), that show its extremes.
+
+    Return the indices of the first and last column, and of the smallest and largest value of every
+    row in each of several intervals of equal length.
     """
     m, N = values.shape
     if most >= N:
@@ -84,8 +87,9 @@ def extremes(values: Array, most: int) -> Array:
 
 
 def gaps(t: Array) -> Array:
-    """Numbers of the rows before which a line breaks: rows left out, or time going back to another
-    record.
+    """Find the indices of the rows before which a line must break.
+
+    A line breaks if rows are left out, or if time goes back because another record starts.
     """
     steps = np.diff(t)
     usual = float(np.median(np.abs(steps))) if len(steps) else 0.0

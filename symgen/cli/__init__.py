@@ -1,1 +1,4 @@
-"""The command line: one module per verb; the only place that imports both symgen and runtime."""
+"""The command line, with one module for each command.
+
+Only this package imports both symgen and runtime.
+"""

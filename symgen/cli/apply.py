@@ -1,4 +1,4 @@
-"""`symgen apply RESULTS MODEL`: identified values into the user's own URDF or MJCF file."""
+"""The command `symgen apply RESULTS MODEL`: write identified values into a URDF or MJCF file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`symgen cestac ROBOT RECORD`: what would a coarser encoder (or torque sensor) have done to the estimate?"""
+"""The command `symgen cestac ROBOT RECORD`: the estimate with coarser encoders or torque sensors."""
 
 from __future__ import annotations
 

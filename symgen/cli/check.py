@@ -1,4 +1,4 @@
-"""`symgen check ROBOT`: the certificate of the formulas and of the emitted module."""
+"""The command `symgen check ROBOT`: certificate of the formulas and of the emitted module."""
 
 from __future__ import annotations
 

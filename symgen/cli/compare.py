@@ -1,4 +1,4 @@
-"""`symgen compare ROBOT STUDY ...`: which treatment of the records, and which set of parameters, predicts a validation record best."""
+"""The command `symgen compare ROBOT STUDY ...`: rank treatments of records by prediction error."""
 
 from __future__ import annotations
 

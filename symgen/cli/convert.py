@@ -1,4 +1,7 @@
-"""`symgen convert IN OUT`: a robot from one format into another, with a report of what the target cannot carry."""
+"""The command `symgen convert IN OUT`: convert a robot file to another format.
+
+A report lists what the new format cannot represent.
+"""
 
 from __future__ import annotations
 

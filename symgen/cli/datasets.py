@@ -1,4 +1,4 @@
-"""`symgen datasets`: the measured records this program knows, and where their files lie."""
+"""The command `symgen datasets`: list the known measured records and the places of their files."""
 
 from __future__ import annotations
 

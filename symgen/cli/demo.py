@@ -1,4 +1,4 @@
-"""`symgen demo`: the main job end to end, from a robot file of the chapter to a report."""
+"""The command `symgen demo`: identify the TX40 of the chapter from end to end, with a report."""
 
 from __future__ import annotations
 

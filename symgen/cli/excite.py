@@ -1,4 +1,4 @@
-"""`symgen excite ROBOT [RECORD]`: a motion that lets the parameters be identified as well as the limits of the robot allow."""
+"""The command `symgen excite ROBOT [RECORD]`: search an exciting motion within the limits."""
 
 from __future__ import annotations
 

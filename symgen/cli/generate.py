@@ -1,6 +1,6 @@
-"""`symgen generate ROBOT...`: derive, regroup, emit.
+"""The command `symgen generate ROBOT...`: derive the models of robots and write modules.
 
-`--check` compares with the files that are there.
+With `--check`, compare with the existing files instead.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def generate(
 
 
 def _among(known: Collection[str], what: str, text: str) -> tuple[str, ...]:
-    """The words of a list as one writes them; a wrong one ends the program with those there are."""
+    """Split an option at commas into words; an unknown word ends the program with a list of known words."""
     words = tuple(dict.fromkeys(map(str.strip, text.split(","))))
     if unknown := [word for word in words if word not in known]:
         fail(f"{what} {', '.join(map(repr, unknown))}; there is {', '.join(known)}")
@@ -88,7 +88,10 @@ def emitted(
     at_values: bool = False,
     exact: bool = False,
 ) -> dict[str, str]:
-    """{file name: text} of every robot and target. Raises SymgenError before any is written."""
+    """Generate the modules of every robot and target; return their texts by file name.
+
+    Raises SymgenError before any file is written.
+    """
     from symgen.certify.modules import certified_files
     from symgen.derive.loops import close
     from symgen.description import packaged_robots
@@ -122,9 +125,9 @@ def emitted(
 
 
 def report_differences(output: Path, modules: dict[str, str]) -> None:
-    """Print a unified diff of every module that differs from what would be written, certificates aside.
+    """Print the differences between the existing modules and those that would be written.
 
-    Exit code 1 if there is one.
+    Certificates are not compared. Exit code 1 if a module differs or is missing.
     """
     from symgen.certify.importing import without_certificate
 

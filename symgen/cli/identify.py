@@ -1,4 +1,4 @@
-"""`symgen identify ROBOT RECORD`: parameters of a robot from a record, with an honest statement of how far to trust them."""
+"""The command `symgen identify ROBOT RECORD`: identify parameters and judge how far to trust them."""
 
 from __future__ import annotations
 

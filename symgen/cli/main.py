@@ -1,5 +1,6 @@
-"""The `symgen` command. Verbs are loaded when they are called, so that `symgen --help` starts at
-once.
+"""The `symgen` command line.
+
+Each command is imported only when it is called, so that `symgen --help` starts fast.
 """
 
 from __future__ import annotations
@@ -56,9 +57,10 @@ WENT = {
 
 
 class Verbs(TyperGroup):
-    """A group whose commands are modules symgen/cli/VERB.py with a function of that name.
+    """The group of all `symgen` commands.
 
-    Help needs none of them.
+    A command VERB is the function of that name in the module symgen/cli/VERB.py. The list of
+    commands in the help text is shown without importing these modules.
     """
 
     listing = False
@@ -126,7 +128,7 @@ def symgen(
 
 
 def main() -> None:
-    """Entry point of the command line."""
+    """Run the `symgen` command line."""
     gc.set_threshold(ALLOCATIONS, 50, 100)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # cleans up as Ctrl-C does
     _open_streams()
@@ -140,7 +142,11 @@ def main() -> None:
 
 
 def _open_streams() -> None:
-    """Descriptors 0 to 2 are open, if on nothing: else a file of ours gets the number of a closed one, and what a library prints."""
+    """Make sure that the file descriptors 0 to 2 are open, if need be on os.devnull.
+
+    Otherwise a file that the program opens could get the number of a closed stream, and receive the
+    text that a library prints.
+    """
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
     os.close(descriptor)

@@ -1,4 +1,4 @@
-"""`symgen new FILE`: a skeleton robot file to fill in."""
+"""The command `symgen new FILE`: write a skeleton of a robot file for the user to fill in."""
 
 from __future__ import annotations
 

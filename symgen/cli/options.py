@@ -1,4 +1,4 @@
-"""Arguments and options of the verbs, those that several have or whose help is long."""
+"""Arguments and options of the commands that several commands share or whose help is long."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Text = str | None
 
 
 def folder(files: str) -> Any:
-    """The option -o of a verb that writes these files."""
+    """Make the option -o of a command that writes these files."""
     return typer.Option("-o", "--output", help=f"Folder for {files}.")
 
 

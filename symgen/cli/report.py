@@ -1,4 +1,4 @@
-"""`symgen report ROBOT RECORD`: everything one record says about a robot, in one folder with one page."""
+"""The command `symgen report ROBOT RECORD`: identify with all analyses, and write one page."""
 
 from __future__ import annotations
 

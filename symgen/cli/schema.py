@@ -1,4 +1,7 @@
-"""`symgen schema`: the JSON Schema of robot files, for editors, and of study files and results, for programs that read them."""
+"""The command `symgen schema`: print the JSON Schema of robot files, study files or results.
+
+Editors use the schema of robot files, programs that read results use the other schemas.
+"""
 
 from __future__ import annotations
 

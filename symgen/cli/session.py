@@ -1,4 +1,7 @@
-"""What the verbs share: the model of a ROBOT argument, the study of RECORD arguments, errors as one line and exit code 2."""
+"""Functions that the commands share: model and study from the arguments, error messages, output.
+
+Errors become one line and exit code 2.
+"""
 
 from __future__ import annotations
 
@@ -28,8 +31,9 @@ BROKEN_PIPE, INTERRUPTED = 141, 130  # as shells have them: 128 + SIGPIPE, 128 +
 
 
 def single_thread() -> None:
-    """One BLAS thread unless the user set another number: matrices here are small and results then agree in every bit.
-    Before numpy loads.
+    """Set one BLAS thread, unless the user set another number.
+
+    Matrices here are small, and results then agree in every bit. Call it before numpy is imported.
     """
     from runtime.threads import BLAS_THREADS
 
@@ -39,10 +43,11 @@ def single_thread() -> None:
 
 @contextmanager
 def reported_errors() -> Iterator[None]:
-    """Run a command with one BLAS thread and turn its errors into messages.
+    """Turn errors of a command inside the block into messages, with one BLAS thread.
 
-    Bad input as one message on the error stream and exit code 2, a false certificate with exit code
-    1, never a traceback; angles that are read otherwise than written as a note.
+    Bad input gives one message on the error stream and exit code 2, a false certificate exit code
+    1, never a traceback. A note is printed for each angle whose value differs from the text of the
+    file.
     """
     from runtime.core.errors import DataUnavailableError, InputError
     from symgen.errors import CertificateError, SymgenError
@@ -88,7 +93,7 @@ def _noted_angles() -> Iterator[None]:
 
 @contextmanager
 def results_in(output: Path | None) -> Iterator[Any]:
-    """Like `reported_errors`; the context gives the folder as `Results`, or None."""
+    """Yield the output folder as a Results object, or None, with the errors of `reported_errors`."""
     with reported_errors():
         from runtime.reporting import result_files
 
@@ -99,8 +104,8 @@ def results_in(output: Path | None) -> Iterator[Any]:
 def fail(message: str, *, lines: bool = False, code: int = BAD_INPUT) -> NoReturn:
     """End the command with `message` on the error stream and an exit code.
 
-    lines : whether line ends of the message are kept; else they are printed as backslash n, since a
-        name in it may hold any character.
+    lines : whether line ends of the message are kept. Otherwise they are printed as backslash n,
+        because a name in the message may contain any character.
     """
     from symgen.errors import printable
 
@@ -110,15 +115,17 @@ def fail(message: str, *, lines: bool = False, code: int = BAD_INPUT) -> NoRetur
 
 
 def say(text: str) -> None:
-    """A line of progress on the error stream."""
+    """Print a line of progress on the error stream."""
     typer.echo(f"  {text}", err=True)
 
 
 def show(
     text: str, results: Results | None = None, *, json: bool = False, verdict: Any = None
 ) -> None:
-    """Print a result, and on the error stream where its report is. On a terminal lines are wrapped
-    at its width, and the answer of the `verdict` (a checklist) has its colour.
+    """Print a result, and the path of its report on the error stream.
+
+    On a terminal, lines are wrapped at its width, and the answer of `verdict` (a checklist) has a
+    colour.
     """
     from runtime.core.errors import encodable
 
@@ -131,7 +138,7 @@ def show(
 
 
 def on_terminal(text: str, width: int, verdict: Any = None) -> str:
-    """A text whose lines end between words, where the terminal does, and whose answer has its colour."""
+    """Wrap a text between words at the width of a terminal, and colour the answer of the verdict."""
     text = "\n".join(_wrapped(line, width) for line in text.split("\n"))
     if verdict is None:
         return text
@@ -140,7 +147,7 @@ def on_terminal(text: str, width: int, verdict: Any = None) -> str:
 
 
 def _wrapped(line: str, width: int) -> str:
-    """A line of words, broken between them where the terminal ends."""
+    """Wrap a line between words if it is longer than the terminal is wide."""
     lines = wrap(
         line, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
     )
@@ -148,7 +155,7 @@ def _wrapped(line: str, width: int) -> str:
 
 
 def end(*, good: bool) -> None:
-    """Exit code 1 if the answer of a verb is negative."""
+    """End the command with exit code 1 if its answer is negative."""
     if not good:
         raise typer.Exit(NEGATIVE)
 
@@ -160,8 +167,11 @@ def model_of(
     exact: bool = False,
     records: Sequence[str] = (),
 ) -> GeneratedModel:
-    """The model of a ROBOT argument. trust : run a module that was not emitted here. exact : as of
-    `load_robot`. records : RECORD arguments; where they name wrenches the model has their columns.
+    """Load the model of a ROBOT argument.
+
+    trust : whether to run a module that was not emitted on this machine.
+    exact : as for `load_robot`.
+    records : RECORD arguments; if they name wrenches, the model has the columns of force sensors.
     """
     import symgen
     from runtime.core.model import load_model
@@ -183,9 +193,9 @@ def model_of(
 
 
 def described_robot(source: str, at_values: bool = False, exact: bool = False) -> Robot:
-    """The robot of a name or file, at the values of its constants where asked.
+    """Load a robot from a name or a file; print notes on it to the error stream.
 
-    Notes on it go to the error stream.
+    at_values : whether to replace its constants by their values.
     """
     from symgen.derive.doubts import doubts
     from symgen.description import load_robot
@@ -198,9 +208,9 @@ def described_robot(source: str, at_values: bool = False, exact: bool = False) -
 
 
 def variants_of(robot: str, *, exact: bool = False) -> GeneratedModel | None:
-    """The module of a ROBOT argument with its table of frames free.
+    """Load the module of a ROBOT argument whose frame table can be varied.
 
-    None of a generated module, which has no robot file.
+    None for a generated module, which has no robot file.
     """
     import symgen
     from runtime.core.model import load_model
@@ -213,7 +223,10 @@ def variants_of(robot: str, *, exact: bool = False) -> GeneratedModel | None:
 
 
 def assumptions_of(robot: str, records: Any, study: Study, *, exact: bool = False) -> list[str]:
-    """A sentence on each parameter that the file of a ROBOT argument assumes to be zero."""
+    """Write a sentence on each parameter that the robot file assumes to be zero.
+
+    It says whether the records contradict the assumption.
+    """
     from dataclasses import replace
 
     import runtime
@@ -232,11 +245,12 @@ def assumptions_of(robot: str, records: Any, study: Study, *, exact: bool = Fals
 
 
 def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Study:
-    """The study that RECORD arguments mean, files relative to the current folder.
+    """Build the study of RECORD arguments, with file names relative to the current folder.
 
-    The first says how they are read: a study file, a dataset or a measured file; each further one
-    is a measured file like it, a record of its own.
-    recorded : whether the study has to name a record.
+    The first argument is a study file, a dataset or a measured file. Each further argument is a
+    measured file with the same columns, units and side, and is a separate record.
+
+    recorded : whether the study must name a record.
     """
     from runtime import compose
     from runtime.core.errors import InputError
@@ -271,7 +285,10 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
 
 
 def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
-    """The study with what is likely to cure each refusal of its records, written to `path`."""
+    """Correct the settings that prevent reading the records, and write the new study to `path`.
+
+    If this fails, write a draft of the study from the column names, if they show enough.
+    """
     from runtime.core.errors import InputError
     from runtime.reporting.result_files import write_all
     from runtime.study import draft, study_text, suggested
@@ -296,7 +313,7 @@ def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
 
 
 def require_record(study: Study, file: str) -> None:
-    """InputError if the study of that file names no record."""
+    """Raise InputError if the study of `file` names no record."""
     from runtime.core.errors import InputError
 
     if not study.record:
@@ -307,7 +324,7 @@ def require_record(study: Study, file: str) -> None:
 
 
 def changed(study: Study, **sections: Mapping[str, Any]) -> Study:
-    """The study with some settings replaced, checked like those of a file; None: as it is."""
+    """Replace some settings of a study, checked like those of a file; None: the setting stays."""
     from runtime.core.settings import to_mapping
     from runtime.study import study_from_mapping
 
@@ -319,13 +336,16 @@ def changed(study: Study, **sections: Mapping[str, Any]) -> Study:
 
 
 def names_of(text: str | None) -> str | list[str] | None:
-    """Names separated by commas as a list; essential and all as they are."""
+    """Split names at commas into a list; the words essential and all stay as they are."""
     return text if text in (None, "essential", "all") else text.split(",")
 
 
 @contextmanager
 def map_of(workers: int, scheduler: str | None = None) -> Iterator[Any]:
-    """The map of --workers, or of --scheduler."""
+    """Yield the map function of --workers or of --scheduler.
+
+    It runs in processes of this machine or on a Dask cluster.
+    """
     from runtime.core.errors import InputError
     from runtime.parallel.cluster import cluster
     from runtime.parallel.processes import processes
@@ -337,7 +357,7 @@ def map_of(workers: int, scheduler: str | None = None) -> Iterator[Any]:
 
 
 def stopped(checkpoint: Checkpoint | None) -> NoReturn:
-    """Ctrl-C says what is left of a study and ends with code 130."""
+    """End the command after Ctrl-C with exit code 130; say how many runs of a study are saved."""
     rest = (
         f"{checkpoint.written} runs are in {checkpoint.file}: the same command goes on"
         if checkpoint and checkpoint.written
@@ -349,7 +369,7 @@ def stopped(checkpoint: Checkpoint | None) -> NoReturn:
 
 @contextmanager
 def progress_lines(after: float = 2.0) -> Iterator[None]:
-    """Report long work on the error stream, one line for each stage, after `after` seconds."""
+    """Print one line for each stage of long work, after `after` seconds, for the duration of the block."""
     import logging
     from time import monotonic
 
@@ -370,9 +390,10 @@ def progress_lines(after: float = 2.0) -> Iterator[None]:
 
 @contextmanager
 def progress_bar(what: str) -> Iterator[Any]:
-    """A bar of `what` on the error stream.
+    """Show a progress bar of `what` on the error stream for the duration of the block.
 
-    The context gives what long work calls with the number done and their total.
+    Yield a function of the number of finished steps and the number of all steps, which updates the
+    bar.
     """
     from rich import progress as rich
     from rich.console import Console

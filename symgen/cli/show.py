@@ -1,4 +1,4 @@
-"""`symgen show ROBOT`: base parameters with their regrouping formulas, any model in symbols, or a page to look at."""
+"""The command `symgen show ROBOT`: print base parameters or symbolic models, or write a page."""
 
 from __future__ import annotations
 
@@ -140,7 +140,10 @@ def show(
 
 
 def regrouping_of(robot: Robot, *, decimals: bool) -> Regrouping:
-    """The base parameters of a robot; decimals : coefficients without a symbol as decimals."""
+    """Compute the base parameters of a robot.
+
+    decimals : whether to write coefficients without symbols as decimal numbers.
+    """
     from symgen.regroup.regrouping import regroup
 
     regrouping = regroup(robot)
@@ -152,7 +155,7 @@ def regrouping_of(robot: Robot, *, decimals: bool) -> Regrouping:
 
 
 def page_file(regrouping: Regrouping, output: Path | None) -> Path:
-    """Path of the page of a robot, written to `output` or to <name>.html."""
+    """Write the page of a robot to `output`, by default <name>.html; return its path."""
     from symgen.pages.page import robot_page
 
     path = output or Path(f"{regrouping.robot.name}.html")
@@ -160,7 +163,10 @@ def page_file(regrouping: Regrouping, output: Path | None) -> Path:
 
 
 def model_text(robot: Robot, model: str, kind: str, asked: Mapping[str, Any]) -> str:
-    """A model of a robot in one of FORMATS; `asked` are the options of --model that were given."""
+    """Print a symbolic model of a robot in one of FORMATS.
+
+    asked : options of --model that the user gave.
+    """
     from symgen.symbols.symbolic import symbolic
 
     given = dict(asked)
@@ -172,7 +178,7 @@ def model_text(robot: Robot, model: str, kind: str, asked: Mapping[str, Any]) ->
 
 
 def _values(given: list[str]) -> dict[str, str]:
-    """{symbol: value} of texts such as q3=pi/2."""
+    """Convert texts such as q3=pi/2 to a mapping of symbol to value."""
     values = {}
     for text in given:
         name, equals, value = (part.strip() for part in text.partition("="))
@@ -183,7 +189,7 @@ def _values(given: list[str]) -> dict[str, str]:
 
 
 def _numbers(rows: str) -> tuple[int, ...]:
-    """Rows such as 1,2."""
+    """Convert a text such as 1,2 to the numbers of rows."""
     parts = [part.strip() for part in rows.split(",")]
     if not all(part.isascii() and part.isdigit() and len(part) < 3 for part in parts):
         fail(f"--rows {rows!r}; expected numbers of rows, 1 to 6, e.g. --rows 1,2")

@@ -1,4 +1,4 @@
-"""`symgen simulate ROBOT STUDY`: the closed loop of a study file, from a reference to a record."""
+"""The command `symgen simulate ROBOT STUDY`: simulate a closed loop and write its record."""
 
 from __future__ import annotations
 

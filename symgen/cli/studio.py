@@ -1,4 +1,4 @@
-"""`symgen studio [ROBOT] [RECORD]`: a local page on which one works."""
+"""The command `symgen studio [ROBOT] [RECORD]`: serve a local page for the whole work."""
 
 from __future__ import annotations
 

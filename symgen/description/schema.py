@@ -195,7 +195,7 @@ def _advice(path: Path, given: Any, message: str) -> str:
     if path[:1] == ("constants",) and isinstance(given, int):
         return "; a decimal comma? write 0.06, not 0,06"
     if path[:1] == ("constants",) and "undeclared symbol" in message:
-        return "; a constant is one number; write a sum of constants where it is used"
+        return "; a constant is one number; write an expression of constants where it is used"
     return ""
 
 

@@ -1,15 +1,14 @@
-"""What each standard parameter does: its link, the base parameters and joint torques it enters, or
-why it enters none.
+"""Explain the effect of each standard parameter on the base parameters and joint torques.
 
-A parameter acts through its energy, E + U of its link if it alone were 1 (Gautier and Khalil, IEEE
-T-RA 6(3), 1990):
+A parameter acts through its energy, E + U of its link if only this parameter were 1 (Gautier and
+Khalil, IEEE T-RA 6(3), 1990):
 
     XX w1**2/2   XY w1 w2   XZ w1 w3   YY w2**2/2   YZ w2 w3   ZZ w3**2/2
     MX w3 v2 - w2 v3 - g1   MY w1 v3 - w3 v1 - g2   MZ w2 v1 - w1 v2 - g3   M v.v/2 - g.P
 
-w, v: angular velocity and velocity of the origin, g: acceleration of gravity, all in the link
-frame, P: position of the origin. A parameter whose energy never changes has no effect; the reason
-names the factors that are zero in every motion.
+w and v are the angular velocity and the velocity of the origin, g the acceleration of gravity, all
+in the link frame, and P is the position of the origin. A parameter whose energy never changes has
+no effect; the reason names the factors that are zero in every motion.
 """
 
 from __future__ import annotations
@@ -29,22 +28,22 @@ AXES = "xyz"
 
 @dataclass(frozen=True)
 class Effect:
-    """A standard parameter: its meaning, and what becomes of it.
+    """Meaning of one standard parameter, and the base parameters and joints that it acts on.
 
     Attributes
     ----------
     name, meaning, unit : str
-        The parameter, in words, and its unit.
+        The parameter, its meaning in words, and its unit.
     place : str
         Such as "link 2" or "joint 2".
     link : int
         Number of that link or joint.
     base : tuple of str
-        Base parameters that take it in.
+        Base parameters whose formulas contain the parameter.
     joints : tuple of int
-        Joints on whose torques those act.
+        Joints whose torques depend on these base parameters.
     why : str
-        The reason where it has no effect.
+        Reason why the parameter has no effect; "" if it has one.
     """
 
     name: str
@@ -58,7 +57,7 @@ class Effect:
 
 
 def effects(spec: ModuleSpec) -> tuple[Effect, ...]:
-    """The effect of every standard parameter of a module, in the order of eq. (4)."""
+    """Find the effect of every standard parameter of a module, in the order of eq. (4)."""
     robot = spec.robot
     into: dict[str, list[int]] = {name: [] for name in robot.parameters}
     for k, b in enumerate(spec.regrouping.base):
@@ -94,7 +93,10 @@ def effects(spec: ModuleSpec) -> tuple[Effect, ...]:
 
 
 def inertial_meaning(family: str, j: int) -> str:
-    """Describe the parameters XX .. M of link j in words."""
+    """Describe in words one of the parameters XX .. M of link j.
+
+    family : name of the parameter without its number.
+    """
     if family == "M":
         return f"mass of link {j}"
     a, b = family[0].lower(), family[1].lower()
@@ -109,7 +111,10 @@ def inertial_meaning(family: str, j: int) -> str:
 
 
 class Reasons:
-    """Which components of motion and gravity are zero in every motion of a link."""
+    """Finder of reasons why standard parameters have no effect.
+
+    It uses the components of motion and gravity that are zero in every motion of a link.
+    """
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
@@ -124,7 +129,10 @@ class Reasons:
         self.gravity = any(robot.gravity)
 
     def inertial(self, family: str, j: int) -> str:
-        """Why the parameter `family` of link j has no effect."""
+        """Say why an inertial parameter of link j has no effect.
+
+        family : name of the parameter without its number, such as XX.
+        """
         if family == "M":
             return (
                 f"the energy of a mass at the origin of frame {j} is the same in every motion"
@@ -173,5 +181,5 @@ def _zero(x: Scalar) -> bool:
 
 
 def _constant(x: Scalar) -> bool:
-    """Whether a scalar of the graph stays the same in every motion."""
+    """Whether a scalar of the expression graph has the same value in every motion."""
     return not isinstance(x, Node) or bool(x.node.fixed)

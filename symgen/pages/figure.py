@@ -1,5 +1,6 @@
-"""The numbers of the drawing: frame table, positions of the passive joints, range of the sliders.
-The page computes the geometry itself.
+"""Prepare the numbers of the robot drawing: frame table, passive joints, ranges of the sliders.
+
+The script of the page computes the geometry itself.
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ from symgen.description.robot import PRISMATIC, Robot
 
 
 def figure(robot: Robot, closure: Closure) -> dict[str, Any]:
-    """Plain values for JSON, SI and rad: `theta` and `r` without the joint position, `follows` as
+    """Collect the numbers of the drawing as plain values for JSON, SI and rad.
+
+    `theta` and `r` are without the joint position. `follows` gives each passive joint as
     q_j = offset + sum_i of_i q_i.
     """
     follows = {
@@ -42,8 +45,10 @@ def figure(robot: Robot, closure: Closure) -> dict[str, Any]:
 
 
 def joint_ranges(robot: Robot, closure: Closure, size: float) -> list[dict[str, Any]]:
-    """Slider of every actuated joint: its limits, else half a turn or half the size of the robot to
-    either side; start at 0 if that is inside.
+    """Set the range and the start of the slider of every actuated joint.
+
+    The range is that of the joint limits. Without limits it is half a turn to either side, or half
+    of `size`, the size of the robot, for a prismatic joint. The start is 0 if 0 is in the range.
     """
     ranges = []
     for row, j in enumerate(robot.joints):
@@ -64,7 +69,7 @@ def joint_ranges(robot: Robot, closure: Closure, size: float) -> list[dict[str, 
 
 
 def passive_text(robot: Robot, closure: Closure) -> dict[int, str]:
-    """How each passive joint gets its position, in words."""
+    """Say in words how each passive joint gets its position."""
     words = {True: "declared", False: "found from the loop"}
     return {
         j: "solved from the loop" if j in closure.tied else words[j in robot.constraints]

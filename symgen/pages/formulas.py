@@ -1,5 +1,6 @@
-"""The regrouping of a robot as `symgen show` prints it: text, LaTeX, link by link, and plain values
-for JSON.
+"""Print the base parameters of a robot with their regrouping formulas, as `symgen show` does.
+
+The forms are text, LaTeX, link by link, and plain values for JSON.
 """
 
 from __future__ import annotations
@@ -18,10 +19,10 @@ from symgen.regroup.regrouping import BaseParameter, Regrouping
 
 
 def printed(regrouping: Regrouping, form: str, only: str | None = None) -> str:
-    """The formulas as text, latex, json, or recursive (link by link).
+    """Print the formulas of the base parameters as text, latex, json or recursive (link by link).
 
-    only : name of one base parameter; its formula alone. Raises SymgenError where there is none of
-    that name.
+    only : name of one base parameter, to print its formula alone. Raises SymgenError if no base
+        parameter has this name.
     """
     if form == "json":
         return json.dumps(mapping(regrouping, only), indent=2, ensure_ascii=False)
@@ -43,8 +44,11 @@ def printed(regrouping: Regrouping, form: str, only: str | None = None) -> str:
 
 
 def _page(regrouping: Regrouping, formulas: list[str]) -> list[str]:
-    """Aligned formulas as eq. (27), parameters that absorb nothing in one list, those without
-    effect, their counts; names of the joints and relations of passive ones where there are any.
+    """Arrange the text of `symgen show`: counts, formulas, and two lists of parameters.
+
+    The formulas are aligned as in eq. (27). The lists are parameters without regrouping and
+    parameters without effect. Joint names and relations of passive joints are included if there are
+    any.
     """
     robot = regrouping.robot
     alone = " ".join(b.name for b in regrouping.base if b.name == b.own)
@@ -69,7 +73,7 @@ def _page(regrouping: Regrouping, formulas: list[str]) -> list[str]:
 
 
 def mapping(regrouping: Regrouping, only: str | None = None) -> dict[str, Any]:
-    """Plain values of the formulas, and the operations of the models."""
+    """Return the formulas as plain values, with the operation counts of the models."""
     return {
         "name": regrouping.robot.name,
         "count": len(regrouping),
@@ -84,8 +88,9 @@ def mapping(regrouping: Regrouping, only: str | None = None) -> dict[str, Any]:
 
 
 def selected(regrouping: Regrouping, only: str | None) -> list[BaseParameter]:
-    """All base parameters, or the one that is called `only`. Raises SymgenError, with names like
-    it, where there is none.
+    """Return all base parameters, or only the one with the name `only`.
+
+    Raises SymgenError, which suggests similar names, if no base parameter has this name.
     """
     base = [b for b in regrouping.base if only is None or b.name == only]
     if only is not None and not base:
@@ -102,8 +107,9 @@ def selected(regrouping: Regrouping, only: str | None) -> list[BaseParameter]:
 
 
 def recursive_formulas(regrouping: Regrouping) -> list[tuple[str, Formula]]:
-    """(name, formula) per parameter that receives others, in terms of what those had already
-    received: XXR_i = XX_i + YYR_j + ...
+    """Return name and formula of each regrouped parameter, link by link: XXR_i = XX_i + YYR_j + ...
+
+    Each formula uses parameters that have themselves been regrouped, not their full formulas.
     """
     received: dict[str, dict[str, Expression]] = {}
     for source, target, coefficient in regrouping.steps:
@@ -121,8 +127,9 @@ def recursive_formulas(regrouping: Regrouping) -> list[tuple[str, Formula]]:
 
 
 def operations(regrouping: Regrouping) -> dict[str, dict[str, int]]:
-    """Multiplications and additions of the emitted text per sample, of all base columns and of the
-    inertial (and Ia) ones alone.
+    """Count multiplications and additions per sample of the emitted regressor and inverse dynamics.
+
+    The counts are for all base parameters, and for the inertial ones (and Ia) alone.
     """
     robot = regrouping.robot
     counted = {

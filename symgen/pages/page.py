@@ -1,9 +1,10 @@
-"""The page of a robot as one HTML file that opens anywhere: one script and one style sheet inside,
-no request to anyone.
+"""Write the page of a robot as one HTML file that any browser can open.
+
+One script and one style sheet are inside; the page requests nothing from other files or servers.
 
 Names, titles and expressions are escaped by the template or by `symbols.printers`; numbers for the
-script are JSON in which <, > and & are written as escapes; the content security policy allows this
-script and this style sheet by their hashes, hence nothing else.
+script are JSON in which <, > and & are written as escapes. The content security policy allows only
+this script and this style sheet, by their hashes.
 """
 
 from __future__ import annotations
@@ -42,7 +43,9 @@ KINDS_OF_JOINT = ("revolute", "prismatic", "fixed")
 
 
 def robot_page(regrouping: Regrouping) -> str:
-    """HTML text of the page of a robot. Same robot file, same version: same bytes.
+    """Write the HTML text of the page of a robot.
+
+    The same robot file and version give the same bytes.
 
     Raises
     ------
@@ -93,7 +96,10 @@ def _parameter(name: str) -> MathML:
 
 
 def embedded(value: Any) -> Markup:
-    """JSON that neither ends a script element nor opens a comment in one."""
+    """Write a value as JSON that can be placed inside a script element.
+
+    The characters <, > and & are escaped, so that no text can end the element or open a comment.
+    """
     text = json.dumps(value, allow_nan=False, separators=(",", ":"))
     return Markup(text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
 
@@ -134,7 +140,7 @@ def _frame_rows(robot: Robot) -> dict[str, Any]:
 
 
 def _relation(closure: Closure, j: int) -> MathML:
-    """Formula of a passive joint, or its name alone where Newton's method finds it."""
+    """Write the formula of a passive joint; only its name if Newton's method computes the joint."""
     shown = expressions.symbol(f"q{j}")
     if j not in closure.tied:
         shown = expressions.equation(shown, expressions.expression(closure.formula(j)))
@@ -142,7 +148,10 @@ def _relation(closure: Closure, j: int) -> MathML:
 
 
 def _element_row(e: Element) -> dict[str, Any]:
-    """Each parameter of a family with the coordinate s = G q or the form it acts along."""
+    """Describe a family of joint elements, such as FV, for its row on the page.
+
+    Each parameter has its coordinate s = G q, or the form in the joint positions on which it acts.
+    """
 
     def coordinate(j: int) -> Expression:
         weights = {(i,): g for i, g in e.along[j].items()} if j in e.along else e.form[j]
@@ -176,12 +185,15 @@ def _formulas(spec: ModuleSpec) -> list[dict[str, Any]]:
 
 
 def printed(text: str) -> str:
-    """kg*m**2 as kg m²."""
+    """Write a unit for the page: kg*m**2 as kg m²."""
     return text.replace("**2", "²").replace("*", " ")
 
 
 def _places(parameters: Sequence[Effect]) -> dict[str, list[dict[str, Any]]]:
-    """Standard parameters by link or joint, with what becomes of each."""
+    """Group the standard parameters by link or joint, with the fate of each.
+
+    The fate is none (no effect), alone or regrouped.
+    """
     places: dict[str, list[dict[str, Any]]] = {}
     for e in parameters:
         fate = "none" if not e.base else "alone" if e.base == (e.name,) else "regrouped"
@@ -192,7 +204,10 @@ def _places(parameters: Sequence[Effect]) -> dict[str, list[dict[str, Any]]]:
 
 
 def _without_effect(parameters: Sequence[Effect]) -> list[tuple[list[MathML], str]]:
-    """(parameters, the reason they share)."""
+    """Group the standard parameters without effect by the reason.
+
+    Return pairs of the parameters and the reason that they share.
+    """
     reasons: dict[str, list[MathML]] = {}
     for e in parameters:
         if e.why:
@@ -203,7 +218,7 @@ def _without_effect(parameters: Sequence[Effect]) -> list[tuple[list[MathML], st
 def _pointed_at(
     spec: ModuleSpec, parameters: Sequence[Effect], absorbed: Sequence[Absorption]
 ) -> Mapping[str, Any]:
-    """Texts that the page shows for the parameter under the pointer, by name."""
+    """Collect the texts that the page shows when the pointer is on a parameter, by name."""
     robot = spec.robot
     by_name = {e.name: e for e in parameters}
     entries = {e.name: _entry(e, e.meaning, e.base, e.joints, e.why) for e in parameters}

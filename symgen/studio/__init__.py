@@ -1,3 +1,4 @@
-"""The page where one works: a local server whose every button is one command of `symgen` in a work
-folder of ordinary files.
+"""A local web page for the whole work: robot, record, check, identification and results.
+
+Every button of the page runs one `symgen` command in a work folder of ordinary files.
 """

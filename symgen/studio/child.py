@@ -1,4 +1,7 @@
-"""What runs beside the server: commands and views in processes that end with it, within limits."""
+"""Run commands and views of the studio in separate processes, with limits of memory and time.
+
+These processes end when the server ends.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,10 @@ MOST_SECONDS = 3600  # processor time of one command
 
 
 def watched() -> None:
-    """End this process and those it started when standard input closes, as its holder has then ended."""
+    """End this process and its child processes when standard input closes.
+
+    Standard input closes when the server has ended. Memory and processor time are limited too.
+    """
     limited(MOST_SECONDS)
     threading.Thread(target=_end_with_input, daemon=True).start()
 
@@ -31,7 +37,10 @@ def _end_with_input() -> None:
 
 
 def limited(seconds: int = 10**9) -> None:
-    """Limit memory and processor time of this process, if the system allows it."""
+    """Limit memory and processor time of this process, if the system allows it.
+
+    seconds : processor time.
+    """
     with suppress(ImportError, OSError, ValueError):
         import resource
 
@@ -41,7 +50,7 @@ def limited(seconds: int = 10**9) -> None:
 
 
 class ViewProcess:
-    """A spawned process that computes views; a new one where it was ended."""
+    """A child process that computes views for the pages; it is started again after it was ended."""
 
     def __init__(self) -> None:
         self.pool: ProcessPoolExecutor | None = None
@@ -57,11 +66,11 @@ class ViewProcess:
         return self.pool
 
     def submit(self, view: Callable[..., Any], *args: Any) -> Future[Any]:
-        """Ask for a view; it is computed once those before are done."""
+        """Compute a view in the child process, after the views that were submitted before."""
         return self.start().submit(view, *args)
 
     def end(self) -> None:
-        """End the process at once, whatever it does."""
+        """Kill the child process at once, even during a computation."""
         if self.pool is not None:
             with suppress(BrokenProcessPool, ProcessLookupError):
                 os.kill(self.number.result(), signal.SIGKILL)
@@ -70,7 +79,7 @@ class ViewProcess:
 
 
 def _of_parent() -> None:
-    """Limits of memory; Ctrl-C is for the server, whose end is that of this process."""
+    """Prepare the child process: limit its memory, ignore Ctrl-C, and end it with the server."""
     limited()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()

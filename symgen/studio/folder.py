@@ -1,14 +1,13 @@
-"""The work folder of the studio: ordinary files under names of our own, so that none comes from the
-browser.
+"""The work folder of the studio: ordinary files, whose names never come from the browser.
 
     robot.urdf, .xml, .par    the user's own file
-    robot.yaml                the table of frames, once it has been edited; it then is the robot
-    robot.draft.yaml          an edit that describes no robot yet
+    robot.yaml                the table of frames, after an edit; it then is the robot
+    robot.draft.yaml          an edit that does not describe a robot yet
     record.csv, validation.csv, ...    measured files
-    study.yaml                what the record means, and how it is evaluated
+    study.yaml                meaning of the record, and settings of its evaluation
     proof.json, check.json    the certificate and the findings
     study-NN-name.yaml, runs/NN-name/    settings and results of one command
-    history/robot/NNNN/, history/study/NNNN/    what a change has replaced, the last one highest
+    history/robot/NNNN/, history/study/NNNN/    files that a change has replaced, newest: largest NNNN
     history/undone/NNNN/      robots that undo has replaced
 """
 
@@ -41,12 +40,12 @@ RESULT_FILES = ("estimate.json", "cestac.json", "advice.json")  # of a run that 
 
 
 class WorkFolder:
-    """The folder that holds one robot, its records and its results.
+    """The folder of one robot with its records and results.
 
     Parameters
     ----------
     folder : Path
-        Made where it is missing; what it holds is opened again.
+        Made if it is missing; existing files are used again.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -67,26 +66,29 @@ class WorkFolder:
 
     @property
     def robot(self) -> Path | None:
-        """The robot file that commands use."""
+        """Path of the robot file that commands use; None if there is none."""
         return self.first(ROBOT_ENDINGS)
 
     def first(self, endings: tuple[str, ...]) -> Path | None:
-        """The first existing robot file with one of these endings; with those of TREES it is the user's own."""
+        """Return the first existing robot file with one of these endings; None if there is none.
+
+        With the endings of TREES, it is the user's own file.
+        """
         found = (self.path / f"robot{ending}" for ending in endings)
         return next((path for path in found if path.is_file()), None)
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the robot file, or of its draft; "" without robot."""
+        """SHA-256 of the robot file, or of its draft; "" without a robot."""
         path = self.path / DRAFT if self.read(DRAFT) else self.robot
         return sha256(path.read_bytes()).hexdigest() if path else ""
 
     def kept(self, history: str) -> list[Path]:
-        """Folders of one history, the oldest first."""
+        """List the folders of one history, such as "robot" or "study", the oldest first."""
         return sorted((self.path / "history" / history).glob("[0-9]*"), key=lambda p: int(p.name))
 
     def keep(self, kind: str, history: str = "") -> None:
-        """Copy robot or study as they are to the end of a history."""
+        """Copy the present robot or study to the end of a history."""
         place, before = self.path / "history" / (history or kind), self.kept(history or kind)
         own = [path for path in self.path.glob(f"{kind}.*") if path.is_file()]
         if own:
@@ -98,9 +100,9 @@ class WorkFolder:
             remove(old)
 
     def bring_back(self, history: str = "robot", other: str = "undone") -> None:
-        """Swap the present robot with the last one of a history.
+        """Replace the present robot by the last robot of a history.
 
-        The present one goes to the other history; InputError if the history is empty.
+        The present robot is added to the history `other`. InputError if the history is empty.
         """
         if not (before := self.kept(history)):
             raise InputError("nothing to undo; reload the page")
@@ -115,7 +117,10 @@ class WorkFolder:
             (self.path / name).unlink(missing_ok=True)
 
     def take_robot(self, name: str, content: bytes) -> None:
-        """Make a file the robot; the robot before goes to its history, results and record stay."""
+        """Use the content of a file as the new robot; results and record stay.
+
+        The present robot is added to the history. name : original name of the file.
+        """
         self._keep_robot()
         self._remove_robot()
         self.write(robot_file(name), content)
@@ -125,7 +130,10 @@ class WorkFolder:
         remove(self.path / "history" / "undone")
 
     def take_robot_of(self, source: str) -> None:
-        """A packaged robot, or the path of the command line; SymgenError where it is none."""
+        """Use a packaged robot or a robot file as the new robot.
+
+        source : name or path from the command line. SymgenError if it is no robot.
+        """
         with warnings.catch_warnings(action="ignore"):  # the page tells them
             load_robot(source)
         packaged = files("symgen.description") / "robots" / f"{source}.yaml"
@@ -135,9 +143,9 @@ class WorkFolder:
             self.take_robot(source, content_of(Path(source)))
 
     def edit_robot(self, text: str, *, draft: bool) -> None:
-        """Save a text of the table: as a draft if it describes no robot, otherwise as the robot file.
+        """Save an edited text of the table: as a draft if it describes no robot, else as the robot file.
 
-        The history holds whole robots only.
+        Drafts do not enter the history.
         """
         if not self.read(DRAFT):
             self._keep_robot()
@@ -146,13 +154,16 @@ class WorkFolder:
             (self.path / DRAFT).unlink(missing_ok=True)
 
     def measured(self, kind: str) -> Path | None:
-        """The file of the record, or of its validation."""
+        """Return the file of the record or of the validation record; None if there is none.
+
+        kind : "record" or "validation".
+        """
         return next((p for p in sorted(self.path.glob(f"{kind}.*")) if is_measured(p)), None)
 
     def take_measured(self, kind: str, name: str, part: Path) -> None:
-        """Make a file that has arrived, called `name` by its owner, the record or the validation.
+        """Use an uploaded file as the record or the validation record.
 
-        A record starts a new study.
+        A new record starts a new study.   name : original name of the file.   part : the uploaded file.
         """
         ending = "".join(s for s in map(str.lower, Path(name).suffixes) if s in (*endings(), ".gz"))
         if not name.lower().endswith(ending) or ending.removesuffix(".gz") not in endings():
@@ -167,7 +178,10 @@ class WorkFolder:
             (self.path / "study.yaml").unlink(missing_ok=True)
 
     def take_record_of(self, source: str) -> None:
-        """A dataset, a study file or a measured file of the command line."""
+        """Use a dataset, a study file or a measured file as the record.
+
+        source : name or path from the command line.
+        """
         study, base = study_of(source)
         path, part = Path(source), self.path / "command.part"
         if source in DATASETS or not is_measured(path):
@@ -182,13 +196,14 @@ class WorkFolder:
 
     @property
     def study_digest(self) -> str:
-        """SHA-256 of study.yaml; "" where there is none."""
+        """SHA-256 of study.yaml; "" if there is no study."""
         text = self.read("study.yaml")
         return sha256(text.encode()).hexdigest() if text else ""
 
     def study(self) -> dict[str, Any]:
-        """The plain values of study.yaml with a list of records, {} where it holds none; InputError
-        where it is no YAML.
+        """Read study.yaml as plain values, with the records as a list; {} if it is empty.
+
+        InputError if it is not valid YAML.
         """
         values = yaml_values(self.read("study.yaml"), file="study.yaml")[0]
         values = values if isinstance(values, dict) else {}
@@ -196,8 +211,10 @@ class WorkFolder:
         return values | {"record": [values["record"]]} if single else values
 
     def checked_study(self, given: Any) -> str:
-        """Text of a study by its text or its values; InputError where it is none, or names a file
-        of another folder that study.yaml did not name before.
+        """Check a study, given as text or as values, and return its text.
+
+        InputError if it is no valid study, or if it names a file of another folder that study.yaml
+        did not name before.
         """
         text = given if isinstance(given, str) else yaml_text(given)
         study = to_mapping(study_from_text(text, file="study.yaml"))
@@ -210,18 +227,18 @@ class WorkFolder:
         return text
 
     def results(self) -> list[Path]:
-        """Folders of complete results, in their order."""
+        """List the folders of complete results, in the order of their names."""
         return sorted(path for path in (self.path / "runs").iterdir() if result_of(path))
 
     def run(self, name: str) -> Path:
-        """The folder of that run; InputError where there is none."""
+        """Return the results folder of the run `name`; InputError if there is none."""
         found = {path.name: path for path in self.results()}
         if name not in found:
             raise InputError("no such run; reload the page")
         return found[name]
 
     def about(self, run: Path) -> dict[str, Any]:
-        """Summary of one run for the pages."""
+        """Summarise one run for the pages."""
         kind = result_of(run)
         data = json_of(run / kind)
         parts = [p for part in data.get("validation") or [] for p in part.get("predictions", [])]
@@ -242,7 +259,10 @@ class WorkFolder:
 
 
 def robot_file(name: str) -> str:
-    """Our name of a robot file that its owner calls `name`; InputError where it is none."""
+    """Return the file name in the work folder for a robot file, such as robot.urdf for arm.urdf.
+
+    InputError if `name` has no ending of a robot file.
+    """
     ending = OTHER_ENDINGS.get(suffix := Path(name).suffix.lower(), suffix)
     if ending not in ROBOT_ENDINGS:
         raise InputError(
@@ -252,17 +272,17 @@ def robot_file(name: str) -> str:
 
 
 def result_of(run: Path) -> str:
-    """Name of the result of a run; "" where it has not ended with one."""
+    """Return the name of the result file of a run; "" if the run is not complete."""
     return next((name for name in RESULT_FILES if (run / name).is_file()), "")
 
 
 def remove(path: Path) -> None:
-    """Remove a file or folder of that name, if there is one."""
+    """Remove a file or a folder, if it exists."""
     shutil.rmtree(path, ignore_errors=True) if path.is_dir() else path.unlink(missing_ok=True)
 
 
 def json_of(path: Path) -> dict[str, Any]:
-    """Read a mapping from a JSON file; empty if it does not exist."""
+    """Read a mapping from a JSON file; {} if it is missing or not valid."""
     try:
         return dict(json.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):
@@ -270,7 +290,7 @@ def json_of(path: Path) -> dict[str, Any]:
 
 
 def files_named(settings: Any, key: str = "") -> list[str]:
-    """Measured files that the settings of a study name, whatever their section."""
+    """List the measured files that the settings of a study name, in all sections."""
     if isinstance(settings, str):
         return [settings] if key in ("files", "also", "file") else []
     parts = settings.items() if isinstance(settings, dict) else ()

@@ -1,10 +1,10 @@
-"""Who may ask the server: pages of its own address that hold its token. An ASGI layer.
+"""Admit only requests from the server's own pages to the studio (an ASGI layer).
 
-Host          127.0.0.1, localhost or [::1] with the port of the server: no other name leads
-              here (DNS rebinding)
-/TOKEN/...    128 random bits ahead of every path; without them there is nothing
-Origin        where it is given, and wherever something changes: the server's own (CSRF)
-size          of a body: that of its kind, counted as it arrives
+Host          127.0.0.1, localhost or [::1] with the port of the server; other names are refused
+              (DNS rebinding)
+/TOKEN/...    128 random bits at the start of every path; without them nothing is found
+Origin        if it is given, and for every change: it must be the server's own (CSRF)
+size          of a body: at most the limit for its kind, counted as it arrives
 """
 
 from __future__ import annotations
@@ -34,14 +34,16 @@ SECURITY_HEADERS = {
 
 
 class Guard:
-    """Answers 4xx to whatever is not a page of this server, before anything reads it.
+    """A layer that refuses, with status 4xx, every request that is not from a page of this server.
+
+    Refused requests do not reach the application.
 
     Parameters
     ----------
     app : ASGI application
     token : str
     hosts : set of str
-        The values of `Host` that are the server's.
+        The values of `Host` that belong to the server.
     """
 
     def __init__(self, app: App, token: str, hosts: set[str]) -> None:
@@ -76,7 +78,7 @@ class Guard:
         await sent({"type": "http.response.body", "body": reason[1].encode()})
 
     def refusal(self, scope: Message, limit: int) -> tuple[int, str] | None:
-        """Status and sentence with which a request is refused; None for a request of our own pages."""
+        """Return the status and the sentence that refuse a request; None if the request is allowed."""
         headers: dict[str, list[str]] = {}
         for name, value in scope["headers"]:
             headers.setdefault(name.decode("latin-1").lower(), []).append(value.decode("latin-1"))

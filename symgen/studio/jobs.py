@@ -1,7 +1,7 @@
-"""Commands of `symgen` in processes of their own, one at a time, the others in a queue.
+"""Run `symgen` commands in separate processes, one at a time; the other commands wait in a queue.
 
 A command that is cancelled, or whose server ends, leaves no process and no file: its process group
-is interrupted, then killed; its folder of results goes unless it is complete.
+is interrupted, then killed. Its folder of results is deleted unless it is complete.
 """
 
 from __future__ import annotations
@@ -37,21 +37,22 @@ class Job:
     ----------
     number : int
     title : str
-        What it does, for the eye; of commands with one title only the last counts.
+        Name of its task on the page; among commands with the same title only the last counts.
     words : tuple of str
         The command line.
     result : str
-        Name of the file that it writes, in the work folder; without it, it has failed.
+        Name of the file that it writes in the work folder; the command failed if the file is
+        missing.
     run : str
-        Name of its folder of results; "" without.
+        Name of its folder of results; "" if it has none.
     state : str
         waiting, running, done, failed or cancelled.
     code : int or None
         Its exit code.
     progress, output : str
-        What it said on the error stream, and what it printed.
+        Text of its error stream and of its standard output.
     started : float
-        When it was started.
+        Time of its start, on the monotonic clock, s.
     """
 
     number: int
@@ -68,34 +69,34 @@ class Job:
 
     @property
     def command(self) -> str:
-        """The command line as a terminal takes it."""
+        """The command line, quoted for a terminal."""
         return shlex.join(self.words)
 
     @property
     def open(self) -> bool:
-        """Whether it waits or runs."""
+        """Whether the command waits or runs."""
         return self.state in (WAITING, RUNNING)
 
     @property
     def said(self) -> list[str]:
-        """Lines of the error stream, without control sequences."""
+        """Lines of the error stream of the command, without control sequences."""
         lines = re.split(r"[\r\n]+", CONTROL_CODES.sub(" ", self.progress))
         return [" ".join(line.split()) for line in lines if line.strip()]
 
     @property
     def counted(self) -> list[str]:
-        """Done and total, from the last line of the progress bar; empty without a bar."""
+        """Numbers of finished steps and of all steps, from the progress bar; empty without a bar."""
         return re.findall(r"\d+(?=/\d)|(?<=\d/)\d+", "".join(self.said[-1:]))[:2]
 
     @property
     def last(self) -> str:
-        """The last command with that title."""
+        """Last error message of the command, or else its last line of text."""
         errors = [line for line in self.said if line.startswith("error: ")]
         words = (errors or self.said or [f"exit code {self.code}"])[-1]
         return words.removeprefix("error: ")
 
     def signal(self, number: signal.Signals) -> None:
-        """Send a signal to the process and to those that it started, if they still run."""
+        """Send a signal to the process of the command and to its child processes, if they still run."""
         if self.process is not None:
             with suppress(ProcessLookupError, PermissionError):
                 os.killpg(self.process.pid, number)
@@ -107,11 +108,11 @@ class Jobs:
     Parameters
     ----------
     folder : Path
-        Where commands run.
+        Folder in which commands run.
     programs : mapping of str to list of str
-        What the first word of a command stands for.
+        Program and arguments that replace the first word of a command.
     changed : callable
-        Called without arguments whenever something has changed.
+        Called without arguments after every change.
     """
 
     def __init__(
@@ -122,7 +123,7 @@ class Jobs:
         self.wake = asyncio.Event()
 
     def add(self, title: str, words: Sequence[str], result: str, *, run: str = "") -> None:
-        """Queue a command; an open one with the same title is cancelled."""
+        """Queue a command; a waiting or running command with the same title is cancelled."""
         for job in self.all:
             if job.title == title:
                 self.cancel(job)
@@ -136,7 +137,7 @@ class Jobs:
         self.changed()
 
     def last(self, title: str) -> Job | None:
-        """The last command of that title."""
+        """Return the last command with the title `title`; None if there is none."""
         return next((job for job in reversed(self.all) if job.title == title), None)
 
     def cancel(self, job: Job) -> None:
@@ -150,7 +151,7 @@ class Jobs:
             self.changed()
 
     async def work(self) -> None:
-        """Run what is queued, for ever; cancelled, it ends the process that runs."""
+        """Run the queued commands, without end; if this task is cancelled, the running process is ended."""
         while True:
             job = next((j for j in self.all if j.state == WAITING), None)
             if job is None:
@@ -197,12 +198,12 @@ class Jobs:
             job.state = DONE if told else FAILED
 
     def _written(self, job: Job) -> int:
-        """When the result was written, ns; 0 if it was not."""
+        """Return the time at which the result of a command was written, ns; 0 if the file is missing."""
         path = self.folder / job.result
         return path.stat().st_mtime_ns if path.is_file() else 0
 
     async def _listen(self, job: Job, name: str, stream: Any) -> None:
-        """Keep the end of what a process says."""
+        """Read a stream of a process to its end, and store the last part of its text."""
         while part := await stream.read(2**16):
             setattr(
                 job, name, (getattr(job, name) + part.decode("utf-8", "replace"))[-OUTPUT_KEPT:]
@@ -210,7 +211,7 @@ class Jobs:
             self.changed()
 
     def _tidy(self, job: Job) -> None:
-        """Delete the temporary files of a command that has ended; only its result stays."""
+        """Delete the temporary files of a command that has ended, and its results if it is not done."""
         if job.process is None and not any(j.state == RUNNING for j in self.all):
             shutil.rmtree(self.folder / ".tmp", ignore_errors=True)
         if job.run and job.state != DONE:

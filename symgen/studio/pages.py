@@ -1,6 +1,7 @@
-"""Handlers of the studio: Robot, Record, Check, Solve, Results. Each changes files of the work
-folder, or asks for a command, and answers with a page or a part of one
-(pip install symgen[studio]).
+"""Handlers of the studio pages Robot, Record, Check, Solve and Results.
+
+Each handler changes files of the work folder, or queues a command, and answers with a page or a
+part of a page (pip install symgen[studio]).
 """
 
 from __future__ import annotations
@@ -53,17 +54,17 @@ ESTIMATORS = {
 
 
 class Pages:
-    """The handlers of one server.
+    """The request handlers of one studio server.
 
-    Those of GET answer. Those of POST change something and return the name of the part of a page
-    that shows it, "" for the whole page.
+    Handlers of GET answer with a page. Handlers of POST change something and return the name of the
+    part of the page to show again, "" for the whole page.
     """
 
     def __init__(self, server: Server) -> None:
         self.server, self.folder, self.jobs = server, server.folder, server.jobs
 
     def routes(self) -> list[Route]:
-        """All routes of the pages; those under /do/ accept POST only."""
+        """Return the routes of all pages; those under /do/ are for POST only, except /do/upload."""
         gets = {
             "/{name}": self._show,
             "/view/{name}": self._view,
@@ -107,7 +108,7 @@ class Pages:
         return await self._part(name, request.query_params.get("run"))
 
     async def _part(self, name: str, asked: str | None = None) -> Response:
-        """A template with all that pages show, but for what `_view` derives."""
+        """Render a page or a part of a page, with all data that it shows except the views of `_view`."""
         folder, version, shown = self.folder, self.server.version, await self.server.robot()
         runs = [folder.about(run) for run in folder.results()]
         record, validation = folder.measured("record"), folder.measured("validation")
@@ -156,7 +157,10 @@ class Pages:
         )
 
     def _proof(self) -> dict[str, Any]:
-        """The certificate and its state: none, stale, running, failed, valid, invalid or draft."""
+        """Return the certificate of the robot with its state.
+
+        The state is none, stale, running, failed, valid, invalid or draft.
+        """
         claim, job = json_of(self.folder.path / "proof.json"), self.jobs.last("certificate")
         state = "valid" if claim.get("valid") else "invalid"
         if claim.get("source_sha256") != self.folder.digest:
@@ -172,7 +176,7 @@ class Pages:
         return self.folder.robot
 
     def _is_checked(self) -> bool:
-        """Whether the findings are of this robot and this study."""
+        """Whether check.json holds the findings for the present robot and study."""
         now = views.digest_of(self.folder.robot or Path(), self.folder.path / "study.yaml")
         return bool(json_of(self.folder.path / "check.json").get("of") == now)
 
@@ -199,7 +203,7 @@ class Pages:
         return page(name, value=value, asked=asked, file=path.name)
 
     async def _file(self, request: Request) -> Response:
-        """A file of ours, or one of a run; its pages in a sandbox of their own."""
+        """Answer with a file of the work folder or of one run; HTML pages open in a sandbox."""
         name, run = request.path_params["name"], request.path_params.get("run")
         folder, robot = self.folder, self.folder.robot or Path()
         own = [folder.path / "study.yaml", *folder.path.glob("applied-*.*"), robot]
@@ -214,8 +218,10 @@ class Pages:
         return FileResponse(path, media_type=kind or "application/octet-stream", headers=headers)
 
     async def _upload(self, request: Request) -> Response:
-        """A file as the body, its kind and the name that its owner gave it in the address; a robot is
-        read before it takes the place of the one that is there.
+        """Receive a file from the browser: a robot, a record or a validation record.
+
+        The address has the kind and the original name of the file, the body has its content. A
+        robot is read for errors before it replaces the present robot.
         """
         kind, name = (request.query_params.get(key, "") for key in ("kind", "name"))
         if kind not in ("robot", "record", "validation"):
@@ -249,7 +255,7 @@ class Pages:
         return ""
 
     async def _edit(self, form: dict[str, str]) -> str:
-        """An edit of the table, cell by cell or as a text."""
+        """Change the robot by an edit of its table, given as cells or as a text."""
         text = (await self.server.robot()).get("text", "")
         self._of_this_robot(form)
         if not self.folder.read(DRAFT):
@@ -261,7 +267,7 @@ class Pages:
         return "table"
 
     async def _undo(self, form: dict[str, str]) -> str:
-        """The robot before the last change; with `redo` the one before the last undo."""
+        """Restore the robot before the last change; with `redo`, the robot before the last undo."""
         self._of_this_robot(form)
         self.folder.bring_back(*(("undone", "robot") if "redo" in form else ()))
         return ""
@@ -282,7 +288,7 @@ class Pages:
         return "certificate"
 
     async def _study(self, form: dict[str, str]) -> str:
-        """The study as text, or as values in JSON."""
+        """Replace the study by a text, or by values in JSON."""
         if form.get("digest", "") != self.folder.study_digest:
             raise InputError("another page has changed the study; reload this one")
         text = form.get("text", "").replace("\r\n", "\n")
@@ -291,7 +297,7 @@ class Pages:
         return "study"
 
     def _command(self) -> tuple[str, str]:
-        """Names of the robot file and of the study for a command."""
+        """Return the names of the robot file and of the study file, for a command line."""
         if not self.folder.read("study.yaml"):
             raise InputError("no study yet; answer the questions on the page Record first")
         return self._source().name, "study.yaml"
@@ -302,8 +308,10 @@ class Pages:
         return "findings"
 
     async def _solve(self, form: dict[str, str]) -> str:
-        """A run of the study, or of the values of a form in JSON: an estimate, or a study of the
-        resolution. Its settings begin with its command.
+        """Queue a run: an identification, or a study of the encoder resolution.
+
+        The settings are those of the study, or values of a form in JSON. The command line is the
+        first line of the settings file of the run.
         """
         robot, _ = self._command()
         if "anyway" not in form and not self._is_checked():
@@ -334,7 +342,10 @@ class Pages:
         return "jobs"
 
     async def _apply(self, form: dict[str, str]) -> str:
-        """The values of a run into the user's own file: the diff first."""
+        """Queue the command that writes the values of a run into the user's URDF or MJCF.
+
+        It writes a new file and shows the changed lines.
+        """
         run = self.folder.run(form.get("run", ""))
         own, robot = self.folder.first(TREES), self._source()
         if own is None:
@@ -362,5 +373,5 @@ def answering(handler: Handler) -> Handler:
 
 
 def safe(text: str) -> str:
-    """Keep only letters, digits, _ . and - of a text, for the name of a file."""
+    """Shorten a text to letters, digits, _ . and -, for the name of a file."""
     return re.sub(r"[^A-Za-z0-9_.-]", "", text).lstrip(".-")[:60]

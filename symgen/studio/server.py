@@ -1,5 +1,6 @@
-"""What all requests of the studio share: the work folder, the queue, the process of views; needs
-pip install symgen[studio].
+"""State that all requests of the studio share: work folder, command queue and view processes.
+
+It needs pip install symgen[studio].
 """
 
 from __future__ import annotations
@@ -31,13 +32,13 @@ PAGE_TEMPLATES = Environment(
 
 
 class Server:
-    """The state that all requests share.
+    """The state that all requests of the studio share.
 
     Parameters
     ----------
     folder : WorkFolder
     programs : dict of str to list of str
-        As of `Jobs`.
+        As for `Jobs`.
     """
 
     def __init__(self, folder: WorkFolder, programs: dict[str, list[str]]) -> None:
@@ -51,15 +52,17 @@ class Server:
         self.views: dict[Any, dict[str, Any]] = {}
 
     def changed(self) -> None:
-        """Tell every page."""
+        """Notify every open page of a change."""
         self.version += 1
         self.news.set()
         self.news = asyncio.Event()
 
     async def view(self, view: Callable[..., dict[str, Any]], *args: Any) -> dict[str, Any]:
-        """A view of files in a process of views, which ends if it takes too long; its earlier value
-        if the robot, the file of the view and the arguments are the same. Views that derive have a
-        process of their own, so that pages do not wait for them.
+        """Compute a view of a file in a child process, or return its stored value.
+
+        The stored value is used if robot, file and arguments are the same. A view that takes too
+        long ends its process and gives an error. Views that derive models have a process of their
+        own, so that pages do not wait for them.
         """
         file = Path(args[0])
         written = file.stat().st_mtime_ns if file.exists() else 0
@@ -84,7 +87,7 @@ class Server:
             return value
 
     async def robot(self) -> dict[str, Any]:
-        """The view of the robot file, or of its draft."""
+        """Return the view of the robot file, or of its draft."""
         path, draft = self.folder.robot, self.folder.read(DRAFT)
         if path is None and not draft:
             return {}
@@ -94,6 +97,6 @@ class Server:
 
 
 def page(name: str, status: int = 200, **context: Any) -> Response:
-    """Render a template as an answer; all names in it are escaped."""
+    """Render a template as an HTML answer; all names in it are escaped."""
     text = PAGE_TEMPLATES.get_template(f"{name}.html.jinja").render(step=name, **context)
     return HTMLResponse(text, status)

@@ -1,4 +1,4 @@
-"""The studio as a process: the application, its events, its end (pip install symgen[studio])."""
+"""Run the studio server: its application, its events and its end (pip install symgen[studio])."""
 
 from __future__ import annotations
 
@@ -28,8 +28,9 @@ PULSE = 0.25  # s between two events of one page
 
 
 def application(server: Server, port: int, end: Callable[[], None]) -> Guard:
-    """The ASGI application: guarded, all paths behind the token; `end` is called when no page has
-    been open for IDLE_TIME seconds.
+    """Build the web application of the studio, with all paths behind the token.
+
+    `end` is called after no page has been open for IDLE_TIME seconds.
     """
 
     async def events(request: Request) -> Response:
@@ -67,7 +68,7 @@ def application(server: Server, port: int, end: Callable[[], None]) -> Guard:
 
 
 async def told(server: Server) -> AsyncIterator[str]:
-    """Server-sent events of one page: a number that changes with whatever has changed."""
+    """Yield the events of one open page: version number and robot digest, after each change."""
     server.pages += 1
     try:
         while True:
@@ -99,9 +100,9 @@ def serve(
     port: int = 0,
     browser: bool = True,
 ) -> None:
-    """Serve the page of a work folder until Ctrl-C, or IDLE_TIME after its last page has gone.
+    """Serve the page of a work folder until Ctrl-C, or until no page is open for IDLE_TIME seconds.
 
-    Raises InputError or SymgenError where robot or record cannot be taken.
+    Raises InputError or SymgenError if robot or record cannot be used.
     """
     work = WorkFolder(folder)
     if robot is not None:

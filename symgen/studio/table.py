@@ -1,4 +1,7 @@
-"""The table of a robot file as cells, and edits of it that leave the rest of the text as it is."""
+"""Show the frame table of a robot file as cells, and write edited cells back into the file.
+
+Other parts of the text stay as they are.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,9 @@ CELL = 200  # characters of a cell
 
 
 def cells_of(text: str) -> dict[str, Any]:
-    """Frames, constants, gravity and loops of a robot file as texts, whatever they are.
+    """Return frames, constants, gravity and loops of a robot file as texts.
+
+    Values that are not valid for a robot are accepted too.
 
     Returns
     -------
@@ -40,7 +45,7 @@ def cells_of(text: str) -> dict[str, Any]:
 
 
 def _texts(x: Any) -> Any:
-    """Turn every scalar into a text; what stands deeper than a cell becomes JSON."""
+    """Turn every scalar inside x into a text."""
     if isinstance(x, dict):
         return {str(key): _texts(value) for key, value in x.items()}
     if isinstance(x, list):
@@ -49,11 +54,11 @@ def _texts(x: Any) -> Any:
 
 
 def with_cells(text: str, asked: str) -> str:
-    """Put the cells of `asked`, JSON as `cells_of`, into the text of a robot file.
+    """Write edited cells into the text of a robot file.
 
-    The other parts stay, with their comments.
+    asked : the cells, in JSON with the form of `cells_of`. Other parts stay, with their comments.
 
-    Raises DescriptionError where that is no table.
+    Raises DescriptionError if `asked` is no such table.
     """
     try:
         cells = {key: type(empty)(json.loads(asked)[key]) for key, empty in EDITED.items()}
@@ -76,13 +81,16 @@ def with_cells(text: str, asked: str) -> str:
 
 
 def blocks(text: str) -> list[tuple[str, str]]:
-    """Split a robot file into its parts (key, lines), in order; lines ahead of all parts have the key ""."""
+    """Split a robot file into its top-level parts, as pairs of key and lines, in order.
+
+    Lines before the first part have the key "".
+    """
     parts = [part if part.endswith("\n") else f"{part}\n" for part in TOP_LEVEL.split(text) if part]
     return [(re.match(r"[A-Za-z_]*", part)[0], part) for part in parts]  # type: ignore[index]
 
 
 def wrong(text: str) -> DescriptionError | None:
-    """Error that a text has as a robot file; None if it has none."""
+    """Return the error in the text of a robot file; None if it has no error."""
     try:
         parse_robot(text.encode(), "robot.yaml")
     except DescriptionError as error:
@@ -91,9 +99,10 @@ def wrong(text: str) -> DescriptionError | None:
 
 
 def fitted(text: str) -> tuple[str, list[str]]:
-    """Remove the parts of a text that no longer fit after frames were added or removed.
+    """Remove the parts of a robot file that no longer fit after frames were added or removed.
 
-    Returns the text and the names of these parts.
+    For instance, `limits` must have one entry per joint. Return the new text and the names of the
+    removed parts.
     """
     left_out: list[str] = []
     while (error := wrong(text)) is not None and error.path and error.path[0] in SIZED:
@@ -110,7 +119,7 @@ def _flow(items: Iterable[tuple[str, Any]]) -> str:
 
 
 def _scalar(x: Any) -> str:
-    """Write a text as YAML, in quotes unless it is plain; a deeper value as JSON."""
+    """Write a text as YAML, in quotes unless it is plain; other values as JSON."""
     if not isinstance(x, str):
         return json.dumps(x)
     return x if PLAIN_CELL.match(x) and len(x) <= CELL else json.dumps(x[: CELL + 1])

@@ -1,5 +1,6 @@
-"""What the pages show of files, computed in a process of its own: plain values, or an error with
-its place.
+"""Compute the data that the studio pages show, as plain values, in a separate process.
+
+A view that fails returns an error and its place in the file.
 """
 
 from __future__ import annotations
@@ -33,7 +34,10 @@ NAMES_LISTED = 200  # columns that are listed
 
 
 def answered(view: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, Any]]:
-    """Wrap a view so that its errors become values {error, path}; notes of the library are added."""
+    """Wrap a view so that an error becomes a value {error, path}.
+
+    Warnings of the library are added to the value as notes.
+    """
 
     @wraps(view)
     def shown(*args: Any) -> dict[str, Any]:
@@ -51,9 +55,9 @@ def answered(view: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, Any
 
 @answered
 def robot(path: str, draft: str) -> dict[str, Any]:
-    """Describe a robot file, or its draft, without deriving anything.
+    """Describe a robot file, or its draft, without deriving any model.
 
-    Returns the text of its table, its drawing, angles in degrees, and doubts.
+    Returns the text of its table, its drawing, angles in degrees, and doubts about the file.
     """
     described = (
         symgen.parse_robot(draft.encode(), "robot.yaml") if draft else symgen.load_robot(path)
@@ -77,8 +81,11 @@ def robot(path: str, draft: str) -> dict[str, Any]:
 
 @answered
 def formulas(path: str, before: str) -> dict[str, Any]:
-    """Base parameters with their formulas, what becomes of every standard parameter and why, and
-    what the edit of the text `before` has changed.
+    """List the base parameters with their formulas, and the fate of every standard parameter.
+
+    A standard parameter is alone, regrouped or without effect, and the view says why. If `before`,
+    an earlier text of the robot, is given, the differences of the base parameters from it are
+    added.
     """
     from symgen.emit.spec import module_spec
     from symgen.pages.effects import effects
@@ -112,7 +119,7 @@ def formulas(path: str, before: str) -> dict[str, Any]:
 
 @answered
 def model(path: str, request: Mapping[str, str]) -> dict[str, Any]:
-    """A model in symbols in three notations."""
+    """Write a symbolic model of the robot as text, LaTeX and SymPy."""
     models = symgen.symbolic(symgen.load_robot(path))
     name, form = request.get("model", "gravity"), request.get("form", "closed")
     frames: dict[str, Any] = {
@@ -124,7 +131,7 @@ def model(path: str, request: Mapping[str, str]) -> dict[str, Any]:
 
 @answered
 def module(path: str, request: Mapping[str, str]) -> dict[str, Any]:
-    """{file: text} of an emitted target, below its certificate."""
+    """Generate the module of one target language, with its certificate; return its text by file name."""
     from symgen.certify.modules import certified_files
 
     described, targets = symgen.load_robot(path), (request.get("target", "numpy"),)
@@ -133,9 +140,12 @@ def module(path: str, request: Mapping[str, str]) -> dict[str, Any]:
 
 @answered
 def preview(path: str, request: Mapping[str, Any]) -> dict[str, Any]:
-    """Names of the columns of a measured file, what they tell as `identify --suggest`, and of those
-    asked for (`columns`, by commas) first rows and thinned lines; rate and gaps by the column `t` in
-    its `unit`. Without a `decimal` mark the one that reads more columns.
+    """Show the columns of a measured file: names, first rows, and thinned lines for a plot.
+
+    `columns`, names separated by commas, selects the columns with rows and lines. The result
+    includes the roles of columns as far as their names show them, as in `identify --suggest`, and
+    sampling rate and gaps of the time column `t` in its `unit`. If `decimal` is not given, the
+    decimal mark that reads more columns is used.
     """
     from runtime.core.clock import time_stamps
     from runtime.reading.formats import read_table
@@ -175,8 +185,10 @@ def preview(path: str, request: Mapping[str, Any]) -> dict[str, Any]:
 
 @answered
 def series(path: str, request: Mapping[str, str]) -> dict[str, Any]:
-    """Measured and predicted torques of one `record` of the run in the folder `run`, fitted or to
-    validate on, with positions, at instants that its estimate read.
+    """Compute measured and predicted torques of one record of a run, with positions, for a plot.
+
+    The record may be fitted or validated. path : robot file.   request : `run`, the folder of the run,
+    and `record`.
     """
     from runtime.core.validation import direct_comparison
     from runtime.documents.estimates import load_whole_estimate
@@ -203,9 +215,11 @@ def series(path: str, request: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _read(path: str, study_file: Path, asked: str | None = None) -> tuple[Any, ...]:
-    """Model, study, records, and settings of all of its records by their names; of the records
-    those that are fitted, or the one that is `asked` for, "" for the first. Files of a command are
-    relative to its study.
+    """Load the model and the study, and read records of the study.
+
+    Return model, study, records, and the settings of all records by name. The records are the
+    fitted ones, or only the record called `asked`, by default the first. File names are relative to
+    the study.
     """
     from runtime.reading.records import read_records
     from runtime.study import located
@@ -224,8 +238,9 @@ def _read(path: str, study_file: Path, asked: str | None = None) -> tuple[Any, .
 
 @answered
 def findings(robot_file: str, study_file: str) -> dict[str, Any]:
-    """Checks of record, study and robot with their remedies, and the predicted deviation of every
-    parameter, %.
+    """Check record, study and robot, and predict the standard deviation of each parameter, %.
+
+    Each check has its remedy.
     """
     from runtime.plausible.motion import unexcited_shares
 
@@ -249,7 +264,10 @@ def findings(robot_file: str, study_file: str) -> dict[str, Any]:
 
 
 def check() -> None:
-    """`check ROBOT STUDY FILE`: write the findings; code 2 and one line where there are none."""
+    """Write the findings of ROBOT and STUDY to FILE: the command `check ROBOT STUDY FILE`.
+
+    If there is an error, print one line and exit with code 2.
+    """
     robot_file, study_file, target = sys.argv[1:4]
     value = findings(robot_file, study_file)
     if "error" in value:
@@ -259,7 +277,7 @@ def check() -> None:
 
 
 def digest_of(*paths: Path) -> str:
-    """SHA-256 of several files together."""
+    """Compute one SHA-256 over the contents of several files."""
     return sha256(b"".join(path.read_bytes() for path in paths if path.is_file())).hexdigest()
 
 

@@ -285,7 +285,7 @@ def test_joints_of_which_no_row_is_left_are_told(model):
     study = replace(STUDY, rows=replace(STUDY.rows, low_speed=(1e3, 0.97 * fastest)))
     result = runtime.identify(model, record, study, physical=True)
     assert result.part("feasibility").judged is None
-    assert any("physical consistency: the record does not tell" in x for x in result.missing)
+    assert any("physical consistency: the record does not separate" in x for x in result.missing)
     assert result.warnings[0] == "No row of joint 1 is used: rows.low_speed leaves them out."
     assert result.estimate.status == "rank-deficient"
 

@@ -117,8 +117,8 @@ def test_editors_show_what_a_key_holds():
     definitions = json_schema("study")["$defs"]
     assert definitions["Lowpass"]["properties"]["cutoff"]["description"] == (
         "Cutoff frequency; auto: from the motion and the noise of the records "
-        "(`runtime.core.signals.cutoff`), twice that for counts, 50 at most, as in the chapter, and 50 "
-        "where no record is. [Hz]"
+        "(`runtime.core.signals.cutoff`), twice that for counts, at most 50, as in the chapter, and 50 "
+        "if there is no record. [Hz]"
     )
     for name, definition in definitions.items():
         assert [

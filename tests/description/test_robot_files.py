@@ -166,7 +166,7 @@ WRONG = [
     ("d: D2", "d: d2", 8, ["'d2'", "did you mean 'D2'"]),
     ("D2: 0.5", "D2: 500 mm", 5, ["unexpected 'mm'", "SI and rad"]),
     ("D2: 0.5", "D2: 0,5", 5, ["decimal comma"]),
-    ("D2: 0.5", "D2: g/20", 5, ["a constant is a number of its own"]),
+    ("D2: 0.5", "D2: g/20", 5, ["a constant is one number"]),
     (
         "theta: q2, r: 0",
         "theta: 0, r: q2",

@@ -297,7 +297,7 @@ def test_gaps_of_positions_stay_out_of_the_loop(arm, clean):
 def test_what_is_missing_is_said(arm, clean, method):
     model, study = arm[:2]
     plain = observe(model, clean[0], study)
-    with pytest.raises(SettingsError, match="give a section `controller`"):
+    with pytest.raises(SettingsError, match="add a section `controller`"):
         estimate_of(plain, EstimateSettings(method), model=model)
     for options, said in (
         ({"passes": 0}, "passes: 0; expected at least 1"),

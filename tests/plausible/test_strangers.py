@@ -183,7 +183,7 @@ def test_few_samples_beside_the_bound_are_doubtful_and_two_levels_alone_are_not(
     assert check.state == "good" and "only these two values" in check.finding
     tau[:, 0] = np.where(np.arange(len(t)) % 9 < 8, tau[:, 0], 0.1)  # one sample in nine is free
     check = judged(model, t, q, tau)[FULL]
-    assert check.state == "doubtful" and "too few others" in check.finding
+    assert check.state == "doubtful" and "too few other samples" in check.finding
 
 
 def test_motors_that_are_clipped_behind_a_coupling_are_told(tmp_path) -> None:
