@@ -155,8 +155,9 @@ def simulated_record(
     The file is a .csv.gz of q1..qn,tau1..taun on the motor side; the record is then read from it
     like any measured record.
 
-    study : settings except for the record.   encoder : step, rad on the motor.   noise : standard
-    deviation, relative to the largest torque of each motor.
+    study : settings except for the record.
+    encoder : step, rad on the motor.
+    noise : standard deviation, relative to the largest torque of each motor.
     """
     n = len(model.JOINTS)
     drives = Drives.from_mapping(model.DRIVES or {"ratio": np.eye(n)})
@@ -209,8 +210,8 @@ def demonstrate(
 ) -> Demonstration:
     """Identify the robot and study its encoder and torque resolution.
 
-    quick : whether to make two runs per step and to leave further studies out.   progress : called with
-    the name of each computation before it begins.
+    quick : whether to make two runs per step and to leave further studies out.
+    progress : called with the name of each computation before it begins.
     """
     model, record, runs = prepared.model, prepared.record, 2 if quick else CestacSettings().runs
     study = replace(prepared.study, cestac=CestacSettings(delta=DELTA, runs=runs))
@@ -421,7 +422,7 @@ def _table_3(demo: Demonstration) -> Section:
 
 
 def _table_4(result: Cestac) -> Section:
-    """Build the section of Table 4: torque steps alone, and together with the first position step."""
+    """Build the section of Table 4: torque steps alone, and with the first position step."""
     torque = [r for r in result.levels if r.level.torque]
     alone, both = (
         [r for r in torque if bool(r.level.delta) is rounded] for rounded in (False, True)

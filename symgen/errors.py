@@ -41,7 +41,7 @@ def printable(text: str) -> str:
 
 
 class CertificateError(SymgenError):
-    """A certificate that does not hold: the robot file is valid, but a check of its formulas failed.
+    """A certificate that does not hold: the robot file is valid, but a check of formulas failed.
 
     Parameters
     ----------

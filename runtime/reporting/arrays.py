@@ -37,7 +37,7 @@ HEADER = b"MATLAB 5.0 MAT-file, written by symgen"
 
 
 def estimate_arrays(fit: Estimate) -> dict[str, Array]:
-    """Convert an Estimate into named arrays of shape (b,), (b, b), and (n,) for values per joint."""
+    """Convert an Estimate into named arrays: shapes (b,), (b, b), and (n,) for values per joint."""
     joints = fit.per_joint
     return {
         "names": _texts(fit.names),

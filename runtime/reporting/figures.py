@@ -93,7 +93,7 @@ def joint_overlay(joint: JointComparison, unit: str = "N m", source: str = "meas
 def torque_overlay(
     comparison: Sequence[JointComparison], unit: str = "N m", source: str = "measured"
 ) -> Figure:
-    """Draw measured and predicted torque and the error, one panel for each joint (chapter, Fig. 4)."""
+    """Draw measured torque, predicted torque and error, a panel for each joint (chapter, Fig. 4)."""
 
     def draw(ax: Axes, joint: JointComparison) -> None:
         _torques(ax, ax, joint, source)

@@ -59,7 +59,7 @@ def motion_figure(excitation: Excitation) -> Figure:
 def simulation_figure(
     joints: Sequence[str], simulation: Simulation, units: Sequence[tuple[str, str]]
 ) -> Figure:
-    """Draw a simulation: position with reference, tracking error and torque, one row for each joint.
+    """Draw a simulation, one row per joint: position with reference, tracking error, torque.
 
     units : units of position and torque of each joint.
     """

@@ -50,7 +50,7 @@ class Matrix:
 
     @property
     def cells(self) -> list[list[tuple[str, int]]]:
-        """Text and shade, from 0 to 4, of each cell, by row; a number that rounds to zero is "0"."""
+        """Text and shade (0 to 4) of each cell, by row; a number that rounds to zero is "0"."""
         return [
             [
                 (f"{x:+.2f}".replace("-", "−") if abs(x) >= 0.005 else "0", min(4, int(5 * abs(x))))

@@ -149,7 +149,7 @@ def settings_section(study: str) -> Section:
 
 
 def provenance_section(result: Identification) -> Section:
-    """Build the section with the file hashes and versions that are needed to reproduce the result."""
+    """Build the section with the file hashes and versions that reproduce the result."""
     provenance = result.estimate.provenance
     rows = [("robot file", provenance["robot"], f"SHA-256 {provenance['robot_sha256']}")]
     rows += [

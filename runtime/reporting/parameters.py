@@ -125,8 +125,8 @@ def _half(fit: Estimate, name: str) -> float:
 def _difference(fit: Estimate, name: str, given: float) -> str:
     """Write the difference of a fitted value from the value of the robot file, % of the latter.
 
-    The text is empty if the value of the robot file is smaller than half the 95 % interval of the
-    fit.
+    The text is empty if the value of the robot file is smaller than half the width of the 95 %
+    interval.
     """
     if name not in fit.names or not abs(given) > (half := _half(fit, name)):
         return ""

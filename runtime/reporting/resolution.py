@@ -1,4 +1,4 @@
-"""Build the report of a study of the encoder resolution: its section and the numbers at its head."""
+"""Show a study of the encoder resolution: its section on a page, and numbers for the page head."""
 
 from __future__ import annotations
 
@@ -19,11 +19,12 @@ def resolution_section(
     curve: Cestac | None = None,
     names: Sequence[str] = (),
 ) -> Section:
-    """Build the section with %e, %sigma and %e(rho) of each step, and the curve of %e against Delta.
+    """Build the section on each encoder step: %e, %sigma, %e(rho), and the curve of %e against Delta.
 
-    This is Table 3 of the chapter, with both definitions of %e(rho).
+    The table is Table 3 of the chapter, with both definitions of %e(rho).
 
-    curve : study with more steps, for the figure.   names : parameters that are coloured in the figure.
+    curve : study with more steps, for the figure.
+    names : parameters that are coloured in the figure.
     """
     shown = curve or result
     figures = [error_against_resolution(shown, names)] if shown.figures() else []

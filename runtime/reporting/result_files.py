@@ -55,7 +55,8 @@ class Results:
     def write_all(self, contents: Mapping[str, str | bytes]) -> list[Path]:
         """Write every file into the folder, or none; return their paths.
 
-        If a file cannot be written, OutputError is raised and the folder is as before.
+        If a file cannot be written, OutputError is raised. The folder is then as before, or the
+        next command completes it.
         """
         with _clear_errors(self.folder):
             self.recover()
@@ -141,9 +142,9 @@ def _require_plain(path: Path) -> None:
 
 @contextmanager
 def _new_folder(folder: Path) -> Iterator[None]:
-    """Make the folder if it is missing for the duration of the block; delete it after if it is empty.
+    """Make the folder if it is missing; after the block, delete it again if it is empty.
 
-    Only folders that were missing before the block are deleted.
+    A folder that existed before the block is never deleted.
     """
     with _clear_errors(folder):
         made = [path for path in (folder, *folder.parents) if not path.exists()]

@@ -1,4 +1,4 @@
-"""Build the sections of an identification report: tables and figures from the values of a result."""
+"""Build the sections of an identification report, with tables and figures, from a result."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def _joints_shown(result: Identification) -> list[JointComparison]:
 def _torque_figures(
     result: Identification, joints: Sequence[JointComparison], title: str
 ) -> Section:
-    """Build a section with a figure of measured torque, predicted torque and error for each joint."""
+    """Build a section with figures of measured torque, predicted torque and error of each joint."""
     unit = result.torque_unit
     columns = {"essential": "the essential", "feasible": "the physical", "all": "all"}[
         result.model_columns
@@ -156,7 +156,7 @@ def joint_section(result: Identification) -> Section:
 
 
 def record_section(result: Identification) -> Section:
-    """Build the section with the errors of each record and the description of its time stamps."""
+    """Build the section with the errors of each record and remarks on the records."""
     header = (
         "record",
         "rows",
@@ -242,9 +242,9 @@ def validation_section(result: Identification) -> Section:
 
 
 def residual_section(result: Identification, unit: str = "N m") -> Section:
-    """Build the section of the residuals: spectra with the cut-off of the decimation, and histograms.
+    """Build the section of the residuals: their spectra and their histograms.
 
-    The histograms are compared with the normal distribution.
+    The spectra show the cut-off of the decimation, the histograms the normal distribution.
     """
     joints = result.uncertainty.whiteness
     if not joints:
@@ -279,7 +279,7 @@ def residual_section(result: Identification, unit: str = "N m") -> Section:
 
 
 def decimation_cutoff(result: Identification) -> float | None:
-    """Return the cut-off frequency of the filter of the parallel decimation, Hz; None without a filter."""
+    """Return the cut-off frequency of the parallel decimation, Hz; None without decimation."""
     if result.study.signals.decimate is None or result.observation.settings.get("factor") == 1:
         return None
     return CUTOFF * result.observation.rate / 2

@@ -20,7 +20,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Two lines over time, such as measured and predicted torque, for a figure with their difference.
+    """Two lines over time, such as measured and predicted torque, and their labels.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Series:
 def series(
     joint: JointComparison, unit: str, source: str, most: int = LIMIT.INSTANTS_SHOWN
 ) -> Series:
-    """Make the lines of measured and predicted torque of one joint, broken where rows are missing."""
+    """Make the lines of measured and predicted torque of a joint, broken where rows are missing."""
     kept = extremes(np.array([joint.measured, joint.predicted, joint.error]), most)
     piece = np.searchsorted(gaps(joint.t), kept, side="right")
     holes = np.flatnonzero(np.diff(piece)) + 1

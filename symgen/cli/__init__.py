@@ -1,4 +1,1 @@
-"""The command line, with one module for each command.
-
-Only this package imports both symgen and runtime.
-"""
+"""The command line of symgen, with one module for each command."""

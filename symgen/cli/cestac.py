@@ -1,4 +1,4 @@
-"""The command `symgen cestac ROBOT RECORD`: the estimate with coarser encoders or torque sensors."""
+"""The command `symgen cestac ROBOT RECORD`: study how coarser encoders change the estimate."""
 
 from __future__ import annotations
 

@@ -73,7 +73,10 @@ def generate(
 
 
 def _among(known: Collection[str], what: str, text: str) -> tuple[str, ...]:
-    """Split an option at commas into words; an unknown word ends the program with a list of known words."""
+    """Split an option at commas into words; an unknown word ends the program.
+
+    The error message lists the known words.
+    """
     words = tuple(dict.fromkeys(map(str.strip, text.split(","))))
     if unknown := [word for word in words if word not in known]:
         fail(f"{what} {', '.join(map(repr, unknown))}; there is {', '.join(known)}")

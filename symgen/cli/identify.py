@@ -1,4 +1,4 @@
-"""The command `symgen identify ROBOT RECORD`: identify parameters and judge how far to trust them."""
+"""The command `symgen identify ROBOT RECORD`: identify parameters and judge their quality."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ Text = str | None
 
 
 def folder(files: str) -> Any:
-    """Make the option -o of a command that writes these files."""
+    """Make the option -o of a command; `files` names the written files in the help text."""
     return typer.Option("-o", "--output", help=f"Folder for {files}.")
 
 

@@ -93,7 +93,10 @@ def _noted_angles() -> Iterator[None]:
 
 @contextmanager
 def results_in(output: Path | None) -> Iterator[Any]:
-    """Yield the output folder as a Results object, or None, with the errors of `reported_errors`."""
+    """Yield the output folder as a Results object; None if no folder is given.
+
+    Errors inside the block become messages, as in `reported_errors`.
+    """
     with reported_errors():
         from runtime.reporting import result_files
 
@@ -138,7 +141,7 @@ def show(
 
 
 def on_terminal(text: str, width: int, verdict: Any = None) -> str:
-    """Wrap a text between words at the width of a terminal, and colour the answer of the verdict."""
+    """Wrap a text between words at the width of a terminal, and colour the verdict's answer."""
     text = "\n".join(_wrapped(line, width) for line in text.split("\n"))
     if verdict is None:
         return text
@@ -369,7 +372,10 @@ def stopped(checkpoint: Checkpoint | None) -> NoReturn:
 
 @contextmanager
 def progress_lines(after: float = 2.0) -> Iterator[None]:
-    """Print one line for each stage of long work, after `after` seconds, for the duration of the block."""
+    """Print one line for each stage of long work for the duration of the block.
+
+    Lines are printed on the error stream, after the first `after` seconds.
+    """
     import logging
     from time import monotonic
 

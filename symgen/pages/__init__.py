@@ -1,1 +1,1 @@
-"""One self-contained HTML page of a robot: drawing, frame table, formulas, effects of parameters."""
+"""One self-contained HTML page of a robot: drawing, frame table, formulas, parameter effects."""

@@ -111,9 +111,9 @@ def inertial_meaning(family: str, j: int) -> str:
 
 
 class Reasons:
-    """Finder of reasons why standard parameters have no effect.
+    """Reasons why standard parameters of one robot have no effect.
 
-    It uses the components of motion and gravity that are zero in every motion of a link.
+    They come from components of motion and gravity that are zero in every motion of a link.
     """
 
     def __init__(self, robot: Robot) -> None:

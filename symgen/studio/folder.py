@@ -7,8 +7,10 @@
     study.yaml                meaning of the record, and settings of its evaluation
     proof.json, check.json    the certificate and the findings
     study-NN-name.yaml, runs/NN-name/    settings and results of one command
-    history/robot/NNNN/, history/study/NNNN/    files that a change has replaced, newest: largest NNNN
+    history/robot/NNNN/, history/study/NNNN/    files that a change has replaced
     history/undone/NNNN/      robots that undo has replaced
+
+In a history, the newest folder has the largest number NNNN.
 """
 
 from __future__ import annotations
@@ -143,7 +145,7 @@ class WorkFolder:
             self.take_robot(source, content_of(Path(source)))
 
     def edit_robot(self, text: str, *, draft: bool) -> None:
-        """Save an edited text of the table: as a draft if it describes no robot, else as the robot file.
+        """Save an edited table: as a draft if it describes no robot, else as the robot file.
 
         Drafts do not enter the history.
         """
@@ -163,7 +165,10 @@ class WorkFolder:
     def take_measured(self, kind: str, name: str, part: Path) -> None:
         """Use an uploaded file as the record or the validation record.
 
-        A new record starts a new study.   name : original name of the file.   part : the uploaded file.
+        A new record starts a new study.
+
+        name : original name of the file.
+        part : the uploaded file.
         """
         ending = "".join(s for s in map(str.lower, Path(name).suffixes) if s in (*endings(), ".gz"))
         if not name.lower().endswith(ending) or ending.removesuffix(".gz") not in endings():

@@ -85,18 +85,18 @@ class Job:
 
     @property
     def counted(self) -> list[str]:
-        """Numbers of finished steps and of all steps, from the progress bar; empty without a bar."""
+        """Numbers of finished and of all steps, from the progress bar; empty without a bar."""
         return re.findall(r"\d+(?=/\d)|(?<=\d/)\d+", "".join(self.said[-1:]))[:2]
 
     @property
     def last(self) -> str:
-        """Last error message of the command, or else its last line of text."""
+        """Last error message of the command, or else its last line of text or its exit code."""
         errors = [line for line in self.said if line.startswith("error: ")]
         words = (errors or self.said or [f"exit code {self.code}"])[-1]
         return words.removeprefix("error: ")
 
     def signal(self, number: signal.Signals) -> None:
-        """Send a signal to the process of the command and to its child processes, if they still run."""
+        """Send a signal to the process of the command and to its child processes."""
         if self.process is not None:
             with suppress(ProcessLookupError, PermissionError):
                 os.killpg(self.process.pid, number)
@@ -151,7 +151,10 @@ class Jobs:
             self.changed()
 
     async def work(self) -> None:
-        """Run the queued commands, without end; if this task is cancelled, the running process is ended."""
+        """Run the queued commands, without end.
+
+        If this task is cancelled, the running process is ended.
+        """
         while True:
             job = next((j for j in self.all if j.state == WAITING), None)
             if job is None:
@@ -198,7 +201,7 @@ class Jobs:
             job.state = DONE if told else FAILED
 
     def _written(self, job: Job) -> int:
-        """Return the time at which the result of a command was written, ns; 0 if the file is missing."""
+        """Return the time when the result of a command was written, ns; 0 without a result."""
         path = self.folder / job.result
         return path.stat().st_mtime_ns if path.is_file() else 0
 
@@ -211,7 +214,10 @@ class Jobs:
             self.changed()
 
     def _tidy(self, job: Job) -> None:
-        """Delete the temporary files of a command that has ended, and its results if it is not done."""
+        """Delete the temporary files of a command that has ended.
+
+        Its results are deleted too unless the command is done.
+        """
         if job.process is None and not any(j.state == RUNNING for j in self.all):
             shutil.rmtree(self.folder / ".tmp", ignore_errors=True)
         if job.run and job.state != DONE:

@@ -64,7 +64,7 @@ class Pages:
         self.server, self.folder, self.jobs = server, server.folder, server.jobs
 
     def routes(self) -> list[Route]:
-        """Return the routes of all pages; those under /do/ are for POST only, except /do/upload."""
+        """Return the routes of all pages; routes under /do/ accept POST only."""
         gets = {
             "/{name}": self._show,
             "/view/{name}": self._view,
@@ -108,7 +108,7 @@ class Pages:
         return await self._part(name, request.query_params.get("run"))
 
     async def _part(self, name: str, asked: str | None = None) -> Response:
-        """Render a page or a part of a page, with all data that it shows except the views of `_view`."""
+        """Render a page or a part of a page, with all its data except the views of `_view`."""
         folder, version, shown = self.folder, self.server.version, await self.server.robot()
         runs = [folder.about(run) for run in folder.results()]
         record, validation = folder.measured("record"), folder.measured("validation")

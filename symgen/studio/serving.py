@@ -68,7 +68,10 @@ def application(server: Server, port: int, end: Callable[[], None]) -> Guard:
 
 
 async def told(server: Server) -> AsyncIterator[str]:
-    """Yield the events of one open page: version number and robot digest, after each change."""
+    """Yield the events of one open page: version number and robot digest, after each change.
+
+    An event is also sent after about 15 s without a change.
+    """
     server.pages += 1
     try:
         while True:

@@ -131,7 +131,7 @@ def model(path: str, request: Mapping[str, str]) -> dict[str, Any]:
 
 @answered
 def module(path: str, request: Mapping[str, str]) -> dict[str, Any]:
-    """Generate the module of one target language, with its certificate; return its text by file name."""
+    """Generate the module of one target language, with its certificate; return text by file name."""
     from symgen.certify.modules import certified_files
 
     described, targets = symgen.load_robot(path), (request.get("target", "numpy"),)
@@ -187,8 +187,10 @@ def preview(path: str, request: Mapping[str, Any]) -> dict[str, Any]:
 def series(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     """Compute measured and predicted torques of one record of a run, with positions, for a plot.
 
-    The record may be fitted or validated. path : robot file.   request : `run`, the folder of the run,
-    and `record`.
+    The record may be fitted or validated.
+
+    path : robot file.
+    request : `run`, the folder of the run, and `record`, the name of the record.
     """
     from runtime.core.validation import direct_comparison
     from runtime.documents.estimates import load_whole_estimate
@@ -238,9 +240,10 @@ def _read(path: str, study_file: Path, asked: str | None = None) -> tuple[Any, .
 
 @answered
 def findings(robot_file: str, study_file: str) -> dict[str, Any]:
-    """Check record, study and robot, and predict the standard deviation of each parameter, %.
+    """Check record, study and robot; list checks, remedies, and uncertain parameters.
 
-    Each check has its remedy.
+    The uncertainty is the predicted standard deviation of each parameter, % of its largest possible
+    value.
     """
     from runtime.plausible.motion import unexcited_shares
 

@@ -261,7 +261,7 @@ def test_the_parameters_printed_first_are_written(tmp_path) -> None:
     document = json.loads((tmp_path / "results" / "estimate.json").read_text())
     next(own for own in document["sets"] if own["name"] == "feasible")["X"].pop()
     (tmp_path / "results" / "estimate.json").write_text(json.dumps(document))
-    with pytest.raises(InputError, match="sets are not those of its parameters"):
+    with pytest.raises(InputError, match="its sets and its parameters do not match"):
         symgen.apply(tmp_path / "results", path)
 
 
@@ -277,7 +277,7 @@ def test_estimates_of_other_robots_are_refused(tmp_path) -> None:
         provenance={"labels": {"q1": "shoulder", "q2": "wrist"}},
     )
     with pytest.raises(
-        DescriptionError, match=r"q2 of the estimate is wrist, of arm\.urdf elbow: say --chain"
+        DescriptionError, match=r"q2 of the estimate is wrist, of arm\.urdf elbow: give --chain"
     ):
         symgen.apply(named, path)
     with pytest.raises(DescriptionError, match="float given as estimate"):
