@@ -66,7 +66,7 @@ class Disagreement:
 
     @property
     def difference(self) -> float:
-        """Difference between `value` and `others`, % of the larger of the two."""
+        """Difference between this record's value and that of the other records, % of the larger."""
         return 100 * abs(self.value - self.others) / max(abs(self.value), abs(self.others))
 
 
@@ -100,7 +100,7 @@ class Homogeneity(Result, Part, keys="records parameters agree disagreements unt
 
     @property
     def records_differ(self) -> bool:
-        """Whether one of the disagreements exceeds LIMIT.RELEVANT_DIFFERENCE, % of the value."""
+        """Whether a parameter of `disagreements` differs by over LIMIT.RELEVANT_DIFFERENCE %."""
         return any(d.difference > LIMIT.RELEVANT_DIFFERENCE for d in self.disagreements)
 
     def checks(self) -> tuple[Check, ...]:

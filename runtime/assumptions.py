@@ -1,4 +1,4 @@
-"""Test with a record whether parameters that the robot file assumes to be zero are zero.
+"""Use a record to test parameters that the robot file assumes to be zero.
 
 The model without the assumptions has X = K chi = K' y + K_p p, with p one assumed parameter and y
 all other parameters, the other assumed ones among them. Generalised least squares with the

@@ -1,4 +1,4 @@
-"""The four lists of features of the package, and the functions that its users call.
+"""Lists of the steps, readers, methods and analyses of the package, and its public functions.
 
     STEPS      Problem -> Problem: changes of a problem before its rows are made, in this order
     READERS    Record, Signals -> States: signals.reader of a study
@@ -119,7 +119,7 @@ METHODS: dict[str, Method] = {
 
 
 def later(module: str, name: str) -> Callable[..., Any]:
-    """Return a function that imports its module only when it is first called.
+    """Return a substitute for a function of a module, which is imported only at the first call.
 
     So an analysis on request does not slow down other calls.
     """
@@ -213,7 +213,7 @@ def state_problem(
     unseen: Sequence[Record] = (),
     simulator: Simulator | None = None,
 ) -> Problem:
-    """Build the problem of model, records and study before any preparation step."""
+    """Combine model, records and study into a Problem, without any preparation step."""
     study = complete_study(require_study(study))
     methods: Mapping[str, Method] = METHODS
     if simulator is not None:
@@ -614,7 +614,7 @@ def static_poses(
 
 
 def extras(asked: Mapping[str, Mapping[str, Any]], attempted: bool = False) -> list[Extra]:
-    """Select the analyses of EXTRAS to make, with the options of the requested analyses.
+    """Select the analyses that follow an identification, with the options that the user requested.
 
     An analysis on request that is not in `asked` is replaced by its substitute, if it has one.
     """
@@ -679,9 +679,9 @@ def simulate(
 
 
 def json_schema(of: str) -> dict[str, Any]:
-    """Return the JSON Schema of one kind of file.
+    """Return the JSON Schema of study files, of estimate.json or of cestac.json.
 
-    of : "study" for study files, "estimate" for estimate.json, or "cestac" for cestac.json.
+    of : "study", "estimate" or "cestac".
     """
     from runtime.documents.estimates import result_schema
 
@@ -702,7 +702,7 @@ def _with_loaded(
     loaded: Sequence[Record] | None,
     simulator: Simulator | None,
 ) -> Problem:
-    """Prepare the problem, together with the records that have the load of study.payload.
+    """Prepare the problem of a study, including the records with the load of study.payload.
 
     The same steps prepare the records with the load, which are stored in a note of the problem.
     """
@@ -721,7 +721,7 @@ def _with_loaded(
 
 
 def _candidate(model: GeneratedModel, candidate: Study | tuple[Study, Records, Records]) -> Problem:
-    """Build the problem of one treatment, before any preparation step."""
+    """Build the Problem of one candidate study and its records, without any preparation step."""
     if isinstance(candidate, Study):
         fitted = records_of(candidate.record, model, candidate)
         predicted = records_of(candidate.validate.record, model, candidate)

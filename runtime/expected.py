@@ -59,7 +59,7 @@ Array = np.ndarray
 
 
 class Expected(NamedTuple):
-    """Expected error of predictions, %, and the interval of LIMIT.EXPECTED_INTERVAL around it."""
+    """Expected error of predictions, and the limits of the interval in which it is likely, %."""
 
     error: float
     low: float
@@ -75,7 +75,7 @@ class Expected(NamedTuple):
     "positions (symgen excite; signals: {reader: counts})",
 )
 def expected_off(likely: Expected) -> Answer | None:
-    """Judge the expected error of predictions by its interval; None if the error is not known."""
+    """Judge whether the expected prediction error is small enough; None if the error is unknown."""
     if np.isnan(likely.error):
         return None
     limit = LIMIT.EXPECTED_ERROR

@@ -201,7 +201,7 @@ def page_files(page: Page) -> Files:
 
 
 def part_files(part: Part) -> Files:
-    """Make the files that one part of a result adds to the folder of the page."""
+    """Make the files of one analysis, which are written beside the page."""
     files: Files = dict(part.files())
     for stem, arrays in part.arrays().items():
         files |= array_files(stem, arrays)

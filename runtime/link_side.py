@@ -1,4 +1,4 @@
-"""Use torques that are measured behind the gears: parameters of the drives do not act on them."""
+"""Use torques measured behind the gears, which friction and inertia of the drives do not affect."""
 
 from __future__ import annotations
 

@@ -26,11 +26,13 @@ Array = np.ndarray
 
 
 def share_taken(tau: Array, q: Array, rate: float, window: int) -> Array:
-    """Compute which share of the torque a median removes in time with the motion, shape (n,).
+    """Compute the share of each joint torque that a running median removes in time with the motion.
 
-    The share of a joint is 0 if most of the removed torque does not depend on the motion.
+    Return the shares, shape (n,). The share of a joint is 0 if most of the removed torque does not
+    depend on the motion.
 
-    tau, q : torques and positions, shape (N, n).   window : samples of the median.
+    tau, q : torques and positions, shape (N, n).
+    window : samples of the median.
     """
     block = max(1, round(LIMIT.TORQUE_BLOCK * rate))
     count, n = len(tau) // block, tau.shape[1]

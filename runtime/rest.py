@@ -23,7 +23,7 @@ TEXT = "others (inertias, friction) are left out. Dry friction holds a joint wit
 
 
 def at_rest(record: Record, signals: Signals) -> States:
-    """Return q unchanged with qd = qdd = 0: the reader `static`, for static poses."""
+    """Return the states of static poses: recorded q, with qd = qdd = 0 (reader `static`)."""
     require_positions(record.missing, "reader: static", record.name, COUNTS)
     rest = np.zeros_like(record.q)
     return States(record.q, rest, rest)

@@ -57,7 +57,7 @@ class IrlsOptions(LinearOptions):
 
 @dataclass(frozen=True, eq=False)
 class Robust:
-    """State of the iteration after one pass.
+    """State of robust least squares after one pass: parameters, residuals, weights and scales.
 
     X are the parameters, shape (b,), u the scaled residuals and w the weights, shape (r,), and S
     the scales of the joints, shape (n,). T fulfils T T' = (sum_j W_j'W_j / S_j^2)^-1.
@@ -100,7 +100,7 @@ def slope(u: Array, loss: str, tuning: float) -> Array:
 
 
 def _iterated(start: Beginning, W: Array, X: Array, loss: str) -> Robust:
-    """Compute weights and parameters in turn, starting from X, until X stays the same."""
+    """Compute weights and parameters in turn, starting from X, until the parameters converge."""
     observation, raw, options = start.observation, start.system.raw, start.options
     tuning = _tuning(options, loss)
     for done in range(1, options.passes + 1):

@@ -57,9 +57,10 @@ def crossings(
 
 
 def recorded_speeds(problem: Problem) -> Problem:
-    """Replace `signals.velocity: auto` by frequencies in Hz if all fitted records have velocities.
+    """Find the frequencies, Hz, above which recorded velocities are used, for the settings.
 
-    This is a step of the preparation of a problem; it acts only with the reader lowpass.
+    This is a step of the preparation of a problem. It acts if signals.velocity is auto, the reader
+    is lowpass, and all fitted records have velocities.
     """
     signals = problem.settings.signals
     if signals.velocity != "auto" or signals.reader != "lowpass" or not problem.records:

@@ -154,7 +154,7 @@ def study_from_text(text: str, *, file: str = "study") -> Study:
 
 
 def study_of(record: str | Path) -> tuple[Study, Path]:
-    """Find the Study for the name of a dataset, a study file or a measured file.
+    """Return the study settings that belong to a dataset, a study file or a measured file.
 
     Return the Study, and the folder to which its file names are relative.
 

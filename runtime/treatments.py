@@ -68,7 +68,10 @@ class Ranking:
 
     @property
     def mean_errors(self) -> dict[str, float]:
-        """Geometric mean of the prediction errors e_ck over the treatments k, %, by candidate."""
+        """Mean prediction error of each candidate over the rows of all treatments, %.
+
+        It is the geometric mean of e_ck over k.
+        """
         return {
             name: float(np.exp(np.mean(np.log(list(own.values())))))
             for name, own in self.errors.items()
@@ -263,7 +266,7 @@ def _require_alike(name: str, further: Sequence[Record], first: Sequence[Record]
 
 
 def _error(problem: Problem, fit: Estimate, treatment: Problem) -> float:
-    """Compute the error of an estimate on its validation records, treated as another problem does.
+    """Compute the prediction error of an estimate on rows that another treatment makes, %.
 
     The error is the norm of the residual, % of the norm of the measured torque.
     """

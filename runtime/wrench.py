@@ -191,7 +191,7 @@ class WrenchModel:
         return self.elements() if name == "ELEMENTS" else getattr(self._model, name)
 
     def elements(self, **constants: float) -> dict[str, Any]:
-        """Return the ELEMENTS of the model together with the offsets of the sensors."""
+        """Return the joint elements of the model, such as friction, and the sensor offsets."""
         offsets = {f"B{row}": ("offset", "both", {row: 1.0}) for row in self.JOINTS[self._n :]}
         return {**elements_of(self._model, constants), **offsets}
 
@@ -250,7 +250,7 @@ class WrenchModel:
         return np.concatenate([D, np.broadcast_to(offsets, (len(D), *offsets.shape))], axis=2)
 
     def _probed(self, constants: Mapping[str, Any]) -> Array:
-        """Compute the regressor of `_standard` at random states."""
+        """Compute the regressor of standard parameters and sensor offsets at random states."""
         rng = np.random.default_rng(0)
         q, qd, qdd = rng.uniform(-np.pi, np.pi, (3, PROBED_STATES, self._n))
         timed = {c: rng.uniform(0.5, 2, PROBED_STATES) for c in channels_of(self._model)}
@@ -260,7 +260,10 @@ class WrenchModel:
             raise InputError(f"{self._model.NAME} with a wrench: {e} in random states") from None
 
     def _regrouped(self, constants: Mapping[str, Any]) -> Array:
-        """Compute K, shape (b, p), in X = K (chi, b): base from standard parameters and offsets."""
+        """Compute the matrix K that maps standard parameters and sensor offsets to base parameters.
+
+        K has the shape (b, p): X = K (chi, b).
+        """
         A = self._probed(constants)[:, self._used]
         A = A.reshape(-1, A.shape[2])
         K = np.linalg.lstsq(A[:, self._columns], A, rcond=None)[0]

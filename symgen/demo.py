@@ -462,7 +462,7 @@ def _compared(
     caption: str,
     residual: Sequence[tuple[str, str]],
 ) -> Table:
-    """Make a table of published mean, our mean and their difference, %, for each step.
+    """Make a table of published mean, our mean and their difference, %, for each resolution step.
 
     The last row is the residual.
     """

@@ -80,12 +80,12 @@ def estimate_arrays(fit: Estimate) -> dict[str, Array]:
 
 
 def array_files(stem: str, arrays: Mapping[str, Array]) -> dict[str, str | bytes]:
-    """Write the arrays as the two files stem.npz and stem.mat."""
+    """Write the arrays as two files, for NumPy (stem.npz) and for MATLAB (stem.mat)."""
     return {f"{stem}.npz": npz(arrays), f"{stem}.mat": mat(arrays)}
 
 
 def npz(arrays: Mapping[str, Array]) -> bytes:
-    """Write the arrays as a NumPy archive that loads without pickles."""
+    """Write the arrays as a NumPy archive (.npz) without Python objects."""
     for name, array in arrays.items():
         if array.dtype.hasobject:
             raise TypeError(f"{name} holds Python objects; an archive holds numbers and texts")

@@ -50,7 +50,7 @@ RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 def draw_figure(
     caption: str, figure: Figure, alt: str, name: str = "", series: Series | None = None
 ) -> Image:
-    """Turn a matplotlib figure into the image of a page.
+    """Convert a matplotlib figure into an Image, which a report page can show.
 
     name : name of the files, PNG and SVG, that are written beside the page; "": no files.
     """
@@ -93,7 +93,7 @@ def joint_overlay(joint: JointComparison, unit: str = "N m", source: str = "meas
 def torque_overlay(
     comparison: Sequence[JointComparison], unit: str = "N m", source: str = "measured"
 ) -> Figure:
-    """Draw measured torque, predicted torque and error, a panel for each joint (chapter, Fig. 4)."""
+    """Draw measured torque, predicted torque and error of each joint: Fig. 4 of the chapter."""
 
     def draw(ax: Axes, joint: JointComparison) -> None:
         _torques(ax, ax, joint, source)
@@ -207,7 +207,7 @@ def panels(
 
 
 def of_part(figure: PartFigure) -> Image:
-    """Draw the figure of a part of a result, as an image of the page."""
+    """Draw the figure that one analysis defines, and return it as an Image for a page."""
 
     def draw(ax: Axes, fill: Callable[[Axes], None]) -> None:
         if figure.logarithmic:

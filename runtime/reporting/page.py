@@ -62,7 +62,7 @@ class Matrix:
 
 @dataclass(frozen=True)
 class Image:
-    """A figure of a page.
+    """A figure of a report page: its SVG, caption and files.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Page:
-    """A report.
+    """A report page: its verdict, numbers and sections.
 
     Attributes
     ----------

@@ -101,7 +101,7 @@ def resolution_page(result: Cestac, study: str) -> Page:
 def part_page(
     part: Part, subject: str, verdict: str, provenance: Mapping[str, Any], study: str
 ) -> Page:
-    """Build a page for one part of a result.
+    """Build the page of a single analysis, such as the advice on encoder resolution.
 
     subject : words of the title between the robot and the records.   study : text of study.yaml.
     """

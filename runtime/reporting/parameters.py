@@ -103,7 +103,7 @@ def every_section(result: Identification) -> Section:
 
 
 def _columns(head: str, fit: Estimate, names: Sequence[str]) -> list[tuple[str, list[str]]]:
-    """Make the two columns with values and intervals of the named parameters.
+    """Make two table columns with the values and the 95 % intervals of the given parameters.
 
     Cells of parameters that are not in the fit are empty. head : start of both column titles.
     """

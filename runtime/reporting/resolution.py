@@ -19,7 +19,7 @@ def resolution_section(
     curve: Cestac | None = None,
     names: Sequence[str] = (),
 ) -> Section:
-    """Build the section on each encoder step: %e, %sigma, %e(rho), and the curve of %e against Delta.
+    """Build the section on all encoder steps: %e, %sigma, %e(rho), and the curve of %e over Delta.
 
     The table is Table 3 of the chapter, with both definitions of %e(rho).
 

@@ -73,7 +73,7 @@ class Results:
         return [self.folder / name for name in contents]
 
     def recover(self) -> None:
-        """Complete what earlier commands left: move finished files up, delete unfinished files."""
+        """Finish interrupted commands: move their complete files up, delete incomplete files."""
         for unfinished in self.folder.glob(f"{UNFINISHED}*"):
             if unfinished.is_dir() and not unfinished.is_symlink():  # rmtree waits for a pipe
                 shutil.rmtree(unfinished, ignore_errors=True)
@@ -174,7 +174,7 @@ def _keep_rights(path: Path, replaced: Path) -> None:
 
 
 def _sync(folder: Path) -> None:
-    """Make the names of the files in `folder` durable on disk, if the system can do that."""
+    """Write the directory entries of `folder` to disk, if the system can do that."""
     with suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY)
         try:

@@ -286,13 +286,13 @@ def decimation_cutoff(result: Identification) -> float | None:
 
 
 def part_sections(result: Identification) -> list[Section]:
-    """Build a section for every part of a result that has text, figures or tables."""
+    """Build a section for every analysis that has text, figures or tables."""
     sections = map(part_section, result.parts)
     return [one for one in sections if one.text or one.images or one.tables]
 
 
 def part_section(part: Part) -> Section:
-    """Build the section of one part of a result: warnings, text, figures and tables."""
+    """Build the section of one analysis: its warnings, text, figures and tables."""
     text = [*part.warnings(), *filter(None, part.text().splitlines())]
     images = [plots.of_part(figure) for figure in part.figures()]
     return Section(part.title, text, images, part.tables())

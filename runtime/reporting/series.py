@@ -69,10 +69,11 @@ def series(
 
 
 def extremes(values: Array, most: int) -> Array:
-    """Select at most `most` columns of `values`, shape (m, N), that show its extremes.
+    """Select samples of m curves, at most `most`, so that their extreme values remain.
 
-    Return the indices of the first and last column, and of the smallest and largest value of every
-    row in each of several intervals of equal length.
+    values : shape (m, N), one curve per row. Return the indices of the first and the last sample,
+    and of the smallest and the largest value of every curve in each of several intervals of equal
+    length.
     """
     m, N = values.shape
     if most >= N:
@@ -87,7 +88,7 @@ def extremes(values: Array, most: int) -> Array:
 
 
 def gaps(t: Array) -> Array:
-    """Find the indices of the rows before which a line must break.
+    """Find the rows before which a plotted line must break, as indices.
 
     A line breaks if rows are left out, or if time goes back because another record starts.
     """

@@ -57,7 +57,7 @@ WENT = {
 
 
 class Verbs(TyperGroup):
-    """The group of all `symgen` commands.
+    """The `symgen` command group, which imports a command only when the command is called.
 
     A command VERB is the function of that name in the module symgen/cli/VERB.py. The list of
     commands in the help text is shown without importing these modules.

@@ -31,7 +31,7 @@ BROKEN_PIPE, INTERRUPTED = 141, 130  # as shells have them: 128 + SIGPIPE, 128 +
 
 
 def single_thread() -> None:
-    """Set one BLAS thread, unless the user set another number.
+    """Set the number of BLAS threads to one, unless the user has set a number.
 
     Matrices here are small, and results then agree in every bit. Call it before numpy is imported.
     """
@@ -345,9 +345,9 @@ def names_of(text: str | None) -> str | list[str] | None:
 
 @contextmanager
 def map_of(workers: int, scheduler: str | None = None) -> Iterator[Any]:
-    """Yield the map function of --workers or of --scheduler.
+    """Yield a map function that runs in worker processes or on a Dask cluster.
 
-    It runs in processes of this machine or on a Dask cluster.
+    The options --workers and --scheduler specify which.
     """
     from runtime.core.errors import InputError
     from runtime.parallel.cluster import cluster

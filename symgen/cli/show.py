@@ -189,7 +189,7 @@ def _values(given: list[str]) -> dict[str, str]:
 
 
 def _numbers(rows: str) -> tuple[int, ...]:
-    """Convert a text such as 1,2 to the numbers of rows."""
+    """Convert a text of row numbers, such as 1,2, to a tuple of integers."""
     parts = [part.strip() for part in rows.split(",")]
     if not all(part.isascii() and part.isdigit() and len(part) < 3 for part in parts):
         fail(f"--rows {rows!r}; expected numbers of rows, 1 to 6, e.g. --rows 1,2")

@@ -88,7 +88,7 @@ def mapping(regrouping: Regrouping, only: str | None = None) -> dict[str, Any]:
 
 
 def selected(regrouping: Regrouping, only: str | None) -> list[BaseParameter]:
-    """Return all base parameters, or only the one with the name `only`.
+    """Return all base parameters, or only the base parameter with the name `only`.
 
     Raises SymgenError, which suggests similar names, if no base parameter has this name.
     """

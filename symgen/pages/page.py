@@ -190,9 +190,9 @@ def printed(text: str) -> str:
 
 
 def _places(parameters: Sequence[Effect]) -> dict[str, list[dict[str, Any]]]:
-    """Group the standard parameters by link or joint, with the fate of each.
+    """Group the standard parameters by link or joint; mark each as alone, regrouped or none.
 
-    The fate is none (no effect), alone or regrouped.
+    The mark none means that the parameter has no effect.
     """
     places: dict[str, list[dict[str, Any]]] = {}
     for e in parameters:

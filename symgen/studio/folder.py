@@ -72,7 +72,7 @@ class WorkFolder:
         return self.first(ROBOT_ENDINGS)
 
     def first(self, endings: tuple[str, ...]) -> Path | None:
-        """Return the first existing robot file with one of these endings; None if there is none.
+        """Return the first existing robot file with one of the given endings; None if none exists.
 
         With the endings of TREES, it is the user's own file.
         """
@@ -86,11 +86,11 @@ class WorkFolder:
         return sha256(path.read_bytes()).hexdigest() if path else ""
 
     def kept(self, history: str) -> list[Path]:
-        """List the folders of one history, such as "robot" or "study", the oldest first."""
+        """List the folders with earlier versions of the robot or the study, the oldest first."""
         return sorted((self.path / "history" / history).glob("[0-9]*"), key=lambda p: int(p.name))
 
     def keep(self, kind: str, history: str = "") -> None:
-        """Copy the present robot or study to the end of a history."""
+        """Copy the present robot or study to the end of a history of earlier versions."""
         place, before = self.path / "history" / (history or kind), self.kept(history or kind)
         own = [path for path in self.path.glob(f"{kind}.*") if path.is_file()]
         if own:
@@ -102,7 +102,7 @@ class WorkFolder:
             remove(old)
 
     def bring_back(self, history: str = "robot", other: str = "undone") -> None:
-        """Replace the present robot by the last robot of a history.
+        """Replace the present robot by the last robot of a history, for undo and redo.
 
         The present robot is added to the history `other`. InputError if the history is empty.
         """

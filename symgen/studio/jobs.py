@@ -137,7 +137,7 @@ class Jobs:
         self.changed()
 
     def last(self, title: str) -> Job | None:
-        """Return the last command with the title `title`; None if there is none."""
+        """Return the last command with the given title; None if there is none."""
         return next((job for job in reversed(self.all) if job.title == title), None)
 
     def cancel(self, job: Job) -> None:

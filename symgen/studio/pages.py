@@ -108,7 +108,10 @@ class Pages:
         return await self._part(name, request.query_params.get("run"))
 
     async def _part(self, name: str, asked: str | None = None) -> Response:
-        """Render a page or a part of a page, with all its data except the views of `_view`."""
+        """Render a page or a part of a page from the present state of the work folder.
+
+        Data that `_view` computes are not included.
+        """
         folder, version, shown = self.folder, self.server.version, await self.server.robot()
         runs = [folder.about(run) for run in folder.results()]
         record, validation = folder.measured("record"), folder.measured("validation")
@@ -181,7 +184,7 @@ class Pages:
         return bool(json_of(self.folder.path / "check.json").get("of") == now)
 
     async def _view(self, request: Request) -> Response:
-        """Answer with a view of robot, record or run, as a part of a page or as JSON."""
+        """Answer with computed data on robot, record or run, as a part of a page or as JSON."""
         name, asked = request.path_params["name"], dict(request.query_params)
         if name == "formulas" and self.folder.read(DRAFT):  # those of the last robot stay
             return PlainTextResponse("", headers={"hx-reswap": "none"})

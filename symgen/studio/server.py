@@ -58,11 +58,11 @@ class Server:
         self.news = asyncio.Event()
 
     async def view(self, view: Callable[..., dict[str, Any]], *args: Any) -> dict[str, Any]:
-        """Compute a view of a file in a child process, or return its stored value.
+        """Compute a view, the data that a page shows of a file, in a child process.
 
-        The stored value is used if robot, file and arguments are the same. A view that takes too
-        long ends its process and gives an error. Views that derive models have a process of their
-        own, so that pages do not wait for them.
+        If robot, file and arguments are the same as before, the stored value is returned. A view
+        that takes too long ends its process and gives an error. Views that derive models have a
+        process of their own, so that pages do not wait for them.
         """
         file = Path(args[0])
         written = file.stat().st_mtime_ns if file.exists() else 0
@@ -87,7 +87,7 @@ class Server:
             return value
 
     async def robot(self) -> dict[str, Any]:
-        """Return the view of the robot file, or of its draft."""
+        """Return the data that pages show of the robot file, or of its draft."""
         path, draft = self.folder.robot, self.folder.read(DRAFT)
         if path is None and not draft:
             return {}

@@ -34,7 +34,7 @@ NAMES_LISTED = 200  # columns that are listed
 
 
 def answered(view: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, Any]]:
-    """Wrap a view so that an error becomes a value {error, path}.
+    """Wrap a function so that an error becomes a value with the keys error and path.
 
     Warnings of the library are added to the value as notes.
     """
@@ -81,7 +81,7 @@ def robot(path: str, draft: str) -> dict[str, Any]:
 
 @answered
 def formulas(path: str, before: str) -> dict[str, Any]:
-    """List the base parameters with their formulas, and the fate of every standard parameter.
+    """List the base parameters with formulas, and the role of every standard parameter in them.
 
     A standard parameter is alone, regrouped or without effect, and the view says why. If `before`,
     an earlier text of the robot, is given, the differences of the base parameters from it are
@@ -131,7 +131,7 @@ def model(path: str, request: Mapping[str, str]) -> dict[str, Any]:
 
 @answered
 def module(path: str, request: Mapping[str, str]) -> dict[str, Any]:
-    """Generate the module of one target language, with its certificate; return text by file name."""
+    """Generate the module of one target language, with certificate; return text by file name."""
     from symgen.certify.modules import certified_files
 
     described, targets = symgen.load_robot(path), (request.get("target", "numpy"),)
