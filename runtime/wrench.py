@@ -224,11 +224,13 @@ class WrenchModel:
     def base_parameters(self, standard: Any, **constants: Any) -> Array:
         """Compute the base parameters X from standard parameters.
 
-        standard : a vector, a matrix of columns, or a mapping of name to value, in which a missing
-            name means zero.
+        standard : a vector, a matrix of columns, or a mapping of name to value; offsets of sensors
+            that the mapping does not have are zero.
         """
         if isinstance(standard, Mapping):
-            standard = np.array([standard.get(name, 0.0) for name in self.STANDARD_PARAMETERS])
+            names = self.STANDARD_PARAMETERS
+            given = dict.fromkeys(names[-6 * len(self._behind) :], 0.0) | {**standard}
+            standard = np.array([given[name] for name in names])
         return np.asarray(self._regrouped(constants) @ standard)
 
     def _standard(self, q: Array, qd: Array, qdd: Array, constants: Mapping[str, Any]) -> Array:

@@ -243,7 +243,7 @@ def assumptions_of(robot: str, records: Any, study: Study, *, exact: bool = Fals
     free = load_model(symgen.model(replace(described, assume=frozenset())))
     fit = runtime.estimate(free, records, study)
     if fit.status != "ok":
-        return ["assume: the record does not determine the model without the assumptions"]
+        return ["the record does not determine the model without the assumptions"]
     return [a.text for a in assumptions_asked(free, fit, sorted(described.assume))]
 
 

@@ -225,6 +225,7 @@ def test_what_does_not_have_channels_refuses(model) -> None:
             lambda: runtime.excite(model, record, STUDY),
         ):
             with pytest.raises(
-                InputError, match=r"FT1, FT2.* read .*temperature|temperature.* need at every sample"
+                InputError,
+                match=r"FT1, FT2.* read .*temperature|temperature.* need at every sample",
             ):
                 ask()
