@@ -101,7 +101,7 @@ def from_text(kind: type[T], text: str, schema: str, file: str) -> T:
         result: T = TypeAdapter(kind).validate_python(data)
     except ValidationError as e:
         raise InputError(
-            f"{settings_error(e, data)}; the file was changed, or another version of symgen wrote it",
+            f"{settings_error(e, data)}; the file was edited, or another version of symgen wrote it; make it again",
             file=file,
         ) from e
     return result

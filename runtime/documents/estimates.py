@@ -259,7 +259,8 @@ def load_whole_estimate(path: Path | str) -> Estimate:
         or not len(whole.X) == len(whole.sigma_corrected) == len(fit.X)
     ):
         raise InputError(
-            "its sets and its parameters do not match; the file was changed", file=str(path)
+            "its sets and its parameters do not match, so the file was edited; write it again with symgen identify",
+            file=str(path),
         )
     return replace(
         fit,

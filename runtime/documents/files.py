@@ -32,7 +32,7 @@ def require_file(path: Path) -> int:
     if not S_ISREG(status.st_mode):
         what = "a folder" if S_ISDIR(status.st_mode) else "a pipe or a device"
         raise InputError(
-            f"cannot be read: {what}; expected a file, copy its content into one", file=str(path)
+            f"{what} cannot be read here; save its content as an ordinary file", file=str(path)
         )
     return status.st_size
 

@@ -122,7 +122,7 @@ class JointTable(Table):
         else:
             return float(values[message.joints.index(joint)])
         raise InputError(
-            f"{reason}; expected every message to hold what the record names",
+            f"{reason}; expected in every message the joints and quantities that record.columns names",
             file=self.file,
             row=self._row(message),
         )

@@ -39,9 +39,7 @@ def khalil_values(robot: Robot) -> dict[str, float]:
         if lost.any():
             row = enters[:, lost].any(axis=1) @ enters & ~known
             raise DescriptionError(
-                f"values of link {j} are those of the frame at its end (convention: distal); with "
-                f"{', '.join(np.array(names)[lost])} expected "
-                f"{', '.join(np.array(names)[row])} too",
+                f"values of link {j} are given in the frame at the end of the link (convention: distal); to convert {', '.join(np.array(names)[lost])}, give {', '.join(np.array(names)[row])} too",
                 path=("values", names[int(np.argmax(lost))]),
             )
         x = np.array([values.pop(name, 0.0) for name in names])

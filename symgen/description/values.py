@@ -88,8 +88,7 @@ def with_estimate(robot: Robot, standard: object, file: str) -> Robot:
     for name, x in standard.items():
         if isinstance(x, bool) or not isinstance(x, int | float) or not abs(x) < 1e300:
             raise DescriptionError(
-                f"{file}: details.standard: {name[:60]} is {x!r:.60}; expected a number; the file "
-                "was changed"
+                f"{file}: details.standard: {name[:60]} is {x!r:.60}; expected a number; the file was edited, write it again with symgen identify"
             )
     if unknown := sorted(set(standard) - set(robot.parameters)):
         raise DescriptionError(

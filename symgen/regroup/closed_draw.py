@@ -76,8 +76,7 @@ class ClosedDraw(Draw):
         self.tied = self.system.closure.tied
         if spatial := [loop for loop in robot.loops if loop.cut in self.tied]:
             raise ArithmeticError(
-                f"the orientation of frame {spatial[0].cut} on {spatial[0].twin} is no sum of "
-                "angles, the loop is spatial"
+                f"the orientation of frame {spatial[0].cut} on {spatial[0].twin} is no sum of joint angles, so the loop is spatial"
             )
         p = p if p is not None else primes_for(robot, 1)[0]
         rng = np.random.default_rng([seed, 1])

@@ -467,6 +467,5 @@ def require_same_frames(text: RobotText, robot: Robot, file: str) -> None:
             different.append(j)
     if different:
         raise DescriptionError(
-            f"{file} and {text.file} have other frames {', '.join(map(str, sorted(different)))}: "
-            "give --chain, --lock and --exact as for the conversion of one from the other"
+            f"frames {', '.join(map(str, sorted(different)))} of {file} and {text.file} differ; if one file was converted from the other, give the same --chain, --lock and --exact again"
         )

@@ -165,8 +165,7 @@ def butterworth(rate: float, low: Lowpass) -> tuple[Array, int]:
         raise InputError(
             f"low-pass at {low.hertz:g} Hz for a record at {rate:g} Hz; expected less than the "
             f"Nyquist frequency {rate / 2:g} Hz, "
-            "set signals.lowpass.cutoff (or record.units.t, where the rate is not that of the "
-            "record)"
+            "lower signals.lowpass.cutoff; if the record has another rate, correct record.units.t"
         )
     sos = butter(low.order, low.hertz, fs=rate, output="sos")
     length = low.order + 1
