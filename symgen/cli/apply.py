@@ -18,12 +18,16 @@ def apply(
     model: Annotated[
         Path, typer.Argument(help="File to take the values: .urdf, or MJCF as .xml or .mjcf.")
     ],
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="File to write.")] = None,
-    in_place: Annotated[bool, typer.Option("--in-place", help="Write MODEL itself.")] = False,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="File to write; MODEL stays as it is.")
+    ] = None,
+    in_place: Annotated[
+        bool, typer.Option("--in-place", help="Overwrite MODEL instead of writing another file.")
+    ] = False,
     robot: Annotated[
         str | None,
         typer.Option(
-            help="Robot file that was identified, if it was converted from MODEL. Give --exact, --lock and --chain as for that conversion."
+            help="Robot file that was identified, if MODEL was converted to it. Give the same --exact, --lock and --chain as for that conversion."
         ),
     ] = None,
     exact: options.Exact = False,

@@ -15,7 +15,7 @@ def compare(
     study: Annotated[
         list[str],
         typer.Argument(
-            help="Study files to compare, all with the same validate.record. For a single file, symgen chooses the variants."
+            help="Study files to compare, all with the same validate.record. A single file is compared with variants of itself: without rows at rest, and without known torques."
         ),
     ],
     output: Annotated[

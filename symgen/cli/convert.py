@@ -51,8 +51,8 @@ def convert(
         Path | None,
         typer.Option(
             help=(
-                "Standard parameters for OUT: a CSV of name,value, as standard_parameters.csv of "
-                "a feasible estimate."
+                "Standard parameters to write into OUT: a CSV file with the columns name,value, such as "
+                "the standard_parameters.csv of `symgen identify`."
             )
         ),
     ] = None,

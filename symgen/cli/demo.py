@@ -13,11 +13,15 @@ from symgen.cli import options, session
 def demo(
     output: Annotated[Path, options.folder("the results")] = Path("symgen-demo"),
     quick: Annotated[
-        bool, typer.Option("--quick", help="Make two runs per step and no further studies.")
+        bool,
+        typer.Option(
+            "--quick",
+            help="Shorter: only two runs per encoder step, and no torque steps or advice.",
+        ),
     ] = False,
 ) -> None:
     """Identify the Stäubli TX40 from its public record, or from a simulated one if that cannot be
-    fetched, judge its encoder resolution, and print the published tables beside it.
+    fetched, judge its encoder resolution, and compare the results with the published tables.
     """
     with session.results_in(output) as results:
         from symgen.demo import demonstrate, prepare

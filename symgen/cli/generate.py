@@ -35,7 +35,7 @@ def generate(
     target: Annotated[
         str,
         typer.Option(
-            help="What to emit, one or several as numpy,c: "
+            help="What to generate; separate several by commas, as in numpy,c. Choices: "
             + ", ".join(
                 f"{name} ({t.language}, {t.file.format('NAME')})" for name, t in TARGETS.items()
             )

@@ -51,7 +51,7 @@ def identify(
     suggest: Annotated[
         Path | None,
         typer.Option(
-            help="Write a study file that can read the records (columns guessed by name, resampling, units) and go on with it."
+            help="Write a study file that can read the records (columns guessed by name, resampling, units), then identify with it."
         ),
     ] = None,
     json: options.Json = False,

@@ -78,8 +78,8 @@ Side = Annotated[
 Rounding = Annotated[
     Text,
     typer.Option(
-        help="How positions are rounded: two-point, uniform, gaussian, quantise, or phase (the counts of "
-        "a real encoder whose lines start at random)."
+        help="How positions are rounded: two-point (up or down by one step at random, as in the chapter), "
+        "uniform, gaussian, quantise, or phase (a real encoder with a random zero in each run)."
     ),
 ]
 Uneven = Annotated[

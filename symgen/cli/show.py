@@ -74,7 +74,7 @@ def show(
         bool,
         typer.Option(
             "--recursive",
-            help="Print the formulas link by link, as SYMORO does, instead of in full as in eq. (27).",
+            help="Print the formulas link by link, each in terms of the next link, as SYMORO does. Without it, each formula is written in full.",
         ),
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="Same as --format json.")] = False,
