@@ -66,7 +66,7 @@ class Disagreement:
 
     @property
     def difference(self) -> float:
-        """Difference between this record's value and that of the other records, % of the larger."""
+        """Difference of this record's value from the mean of the other records, % of the larger."""
         return 100 * abs(self.value - self.others) / max(abs(self.value), abs(self.others))
 
 
@@ -100,7 +100,7 @@ class Homogeneity(Result, Part, keys="records parameters agree disagreements unt
 
     @property
     def records_differ(self) -> bool:
-        """Whether a parameter of `disagreements` differs by over LIMIT.RELEVANT_DIFFERENCE %."""
+        """Whether a parameter differs between records by more than LIMIT.RELEVANT_DIFFERENCE %."""
         return any(d.difference > LIMIT.RELEVANT_DIFFERENCE for d in self.disagreements)
 
     def checks(self) -> tuple[Check, ...]:
@@ -168,7 +168,7 @@ def agreeing(found: Homogeneity) -> Answer:
 
 
 def agreement(result: Identification) -> Homogeneity | None:
-    """Compare all records of an identification, fitted and predicted; None for a single record.
+    """Compare the parameters from all records, fitted or predicted; None for a single record.
 
     All parameters are compared. If one record does not determine all of them, only the essential
     parameters are compared.

@@ -56,7 +56,7 @@ class Assumption:
 def assumptions_asked(
     model: GeneratedModel, fit: Estimate, names: Sequence[str]
 ) -> tuple[Assumption, ...]:
-    """Test each assumption of the robot file, with all other parameters free.
+    """Test each parameter that the robot file assumes to be zero, with all other parameters free.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Lists of the steps, readers, methods and analyses of the package, and its public functions.
+"""The public functions, and the lists of preparation steps, readers, methods and analyses.
 
     STEPS      Problem -> Problem: changes of a problem before its rows are made, in this order
     READERS    Record, Signals -> States: signals.reader of a study
@@ -119,7 +119,7 @@ METHODS: dict[str, Method] = {
 
 
 def later(module: str, name: str) -> Callable[..., Any]:
-    """Return a substitute for a function of a module, which is imported only at the first call.
+    """Return a function that calls `name` of `module`, which is imported only at the first call.
 
     So an analysis on request does not slow down other calls.
     """
@@ -187,7 +187,7 @@ def list_records(records: Records) -> tuple[Record, ...]:
 
 
 def complete_study(study: Study) -> Study:
-    """Check method and reader of a study, and complete the options of its reader.
+    """Check that the method and the reader of a study exist, and complete the reader options.
 
     SettingsError if the method or the reader is unknown.
     """
@@ -460,7 +460,7 @@ def compare(
     *,
     variants: GeneratedModel | None = None,
 ) -> Ranking:
-    """Identify with several studies and order the studies by their error on unseen data.
+    """Identify with several settings (studies) and order them by their error on unseen data.
 
     Parameters
     ----------
@@ -570,7 +570,7 @@ def delay(
 def payload(
     model: GeneratedModel, records: Records, study: Study, *, loaded: Sequence[Record] | None = None
 ) -> PayloadStudy:
-    """Identify the load of study.payload from records with and without the load.
+    """Identify the load on the robot (study.payload) from records with and without this load.
 
     loaded : records with the load; default: the records of study.payload.record.
     """
@@ -588,7 +588,7 @@ def excite(
     map: Callable[..., Iterable[Any]] = map,
     progress: Callable[[int, int], None] | None = None,
 ) -> Excitation:
-    """Search an exciting motion: the smallest criterion of study.excitation, within the limits.
+    """Search an exciting motion, within the limits, that minimises the criterion of the study.
 
     The best motion over all starts of the search is returned. Without records, the values of the
     robot file serve as parameters.
@@ -667,7 +667,7 @@ def simulate(
     study = require_study(study)
     if study.controller is None:
         raise InputError(
-            "the study has no section `controller`; it says law, rate and reference of the closed loop"
+            "the study has no section `controller`; add this section with law, rate and reference of the closed loop"
         )
     records: Sequence[Record] = ()
     if study.controller.reference.record is not None:
@@ -702,7 +702,7 @@ def _with_loaded(
     loaded: Sequence[Record] | None,
     simulator: Simulator | None,
 ) -> Problem:
-    """Prepare the problem of a study, including the records with the load of study.payload.
+    """Prepare the problem of a study, including the records with a load (study.payload).
 
     The same steps prepare the records with the load, which are stored in a note of the problem.
     """
@@ -721,7 +721,7 @@ def _with_loaded(
 
 
 def _candidate(model: GeneratedModel, candidate: Study | tuple[Study, Records, Records]) -> Problem:
-    """Build the Problem of one candidate study and its records, without any preparation step."""
+    """Build the Problem of one study to compare and its records, without any preparation step."""
     if isinstance(candidate, Study):
         fitted = records_of(candidate.record, model, candidate)
         predicted = records_of(candidate.validate.record, model, candidate)

@@ -68,7 +68,7 @@ class Elasticity(Result, Part):
     title = "Gears with two encoders"
 
     def text(self) -> str:
-        """Write one sentence for each joint, one per line."""
+        """Write one sentence on each gear with two encoders, one per line."""
         return "\n".join(self.sentences)
 
     def brief(self) -> str:
@@ -77,7 +77,7 @@ class Elasticity(Result, Part):
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """One sentence for each joint: its gear, and whether a rigid model is accurate enough."""
+        """One sentence on each gear: stiffness, damping, and whether a rigid model is enough."""
         texts = []
         for j, K, s, D, d, lag, f in zip(
             self.joints,
@@ -143,7 +143,7 @@ def elasticity(problem: Problem, names: Sequence[str], X: Array) -> Elasticity |
 
 
 def _gear(records: Sequence[Prepared], j: int, Ia: float | None) -> tuple[float, ...]:
-    """Fit the gear of joint j; return K, its sigma, D, its sigma, and the lag.
+    """Fit stiffness K and damping D of the gear of joint j: return K, its sigma, D, its sigma, lag.
 
     K and D are nan if the records do not determine the stiffness.
     """

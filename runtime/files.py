@@ -79,7 +79,7 @@ def files_of(result: object, folder: Path, study: Study) -> Files:
     InputError for a result that has no files.
     """
     raise InputError(
-        f"{type(result).__name__} is no result that is written; expected an Identification, "
+        f"{type(result).__name__} cannot be written to files; expected an Identification, "
         "Ranking, Cestac, Advice, Simulation, Excitation or StaticPoses"
     )
 
@@ -159,7 +159,7 @@ def _(result: Advice, folder: Path, study: Study) -> Files:
 
 @files_of.register
 def _(result: Simulation, folder: Path, study: Study) -> Files:
-    """Make a simulated record, a study that reads this record, figures of merit and a figure."""
+    """Make the files of a simulation: the record, a study that reads it, key numbers, a figure."""
     figure = simulation_figure(joint_labels(result.model), result, result.units)
     record = RecordSettings(
         files=(str(folder / RECORD),), rate=result.rate, name=result.name, simulated=True
@@ -201,7 +201,7 @@ def page_files(page: Page) -> Files:
 
 
 def part_files(part: Part) -> Files:
-    """Make the files of one analysis, which are written beside the page."""
+    """Make the text and array files of one analysis, which are written next to the report page."""
     files: Files = dict(part.files())
     for stem, arrays in part.arrays().items():
         files |= array_files(stem, arrays)

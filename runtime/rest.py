@@ -53,7 +53,7 @@ def poses_at_rest(problem: Problem) -> Problem:
     columns = tuple(name for name in asked if acting[names.index(name)])
     if not columns:
         raise InputError(
-            f"poses at rest show no parameter of {problem.model.NAME}: gravity acts along none of its joints, and there is no offset or spring; record a motion, or correct gravity in the robot file"
+            f"poses at rest show no parameter of {problem.model.NAME}: gravity acts along no joint, and no joint has an offset or spring; record a motion, or correct gravity in the robot file"
         )
     text = f"Poses at rest: {len(columns)} of {len(asked)} base parameters have a torque in them, the {TEXT}"
     estimate = replace(settings.estimate, columns=columns)

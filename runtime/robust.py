@@ -122,12 +122,12 @@ def _iterated(start: Beginning, W: Array, X: Array, loss: str) -> Robust:
 
 
 def _weighted(observation: Observation, W: Array, raw: Factor, root: Array) -> Factor:
-    """Factor the observation matrix W and Y after each row is multiplied by root, shape (r,)."""
+    """Compute the triangular factor of [W Y] after row i is multiplied by root[i]."""
     return factor(W * root[:, None], observation.Y * root, observation.rows, raw.names)
 
 
 def _scales(observation: Observation, raw: Factor, e: Array) -> Array:
-    """Compute the residual scale S_j of each joint, shape (n,), never below rounding of Y_j."""
+    """Compute the residual scale S_j of each joint, shape (n,), at least the rounding of Y_j."""
     by_joint = [e[observation.joint(j)] for j in range(observation.n)]
     S = np.array(
         [

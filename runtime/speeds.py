@@ -57,7 +57,7 @@ def crossings(
 
 
 def recorded_speeds(problem: Problem) -> Problem:
-    """Find the frequencies, Hz, above which recorded velocities are used, for the settings.
+    """Set the frequencies, Hz, above which recorded velocities replace differences of positions.
 
     This is a step of the preparation of a problem. It acts if signals.velocity is auto, the reader
     is lowpass, and all fitted records have velocities.

@@ -221,7 +221,7 @@ def read_record(
     if len(records) != 1:
         names = ", ".join(record.name for record in records)
         raise InputError(
-            f"{len(records)} records or pieces between gaps; read_records returns them all: {names}"
+            f"{len(records)} records or pieces between gaps, but one is expected; use read_records, which returns all of them: {names}"
         )
     return records[0]
 
@@ -319,7 +319,7 @@ def study_text(study: Study, destination: Path, *, defaults: bool = True) -> str
 
 
 def _differing(mapping: Mapping[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the entries of a mapping that differ from their usual value, also inside sections."""
+    """Return the entries of a mapping that differ from `usual`, also inside sections."""
     return {
         key: _differing(value, usual[key])
         if isinstance(value, Mapping) and isinstance(usual.get(key), Mapping)

@@ -1,4 +1,4 @@
-"""Find which of several treatments of the same records predicts validation records best.
+"""Find which choice of settings for the same records predicts validation records best.
 
 A treatment is a choice of settings, for instance with all rows or without rows at rest, with the
 counterbalance torque known or not. Every candidate is identified with its own settings. Of its sets
@@ -42,7 +42,7 @@ STATED = "as stated"
 
 @dataclass(frozen=True, eq=False)
 class Ranking:
-    """Result of a comparison: treatments in the order of their prediction error, the best first.
+    """Result of a comparison: ways to treat the records, ordered by their prediction error.
 
     Attributes
     ----------
@@ -63,12 +63,12 @@ class Ranking:
 
     @property
     def best(self) -> Identification:
-        """Identification of the treatment that predicts best."""
+        """Identification with the treatment of the records that predicts best."""
         return next(iter(self.results.values()))
 
     @property
     def mean_errors(self) -> dict[str, float]:
-        """Mean prediction error of each candidate over the rows of all treatments, %.
+        """Mean prediction error of each treatment, %, over the validation rows of all treatments.
 
         It is the geometric mean of e_ck over k.
         """
@@ -79,7 +79,7 @@ class Ranking:
 
     @property
     def verdict(self) -> str:
-        """One sentence that ranks the treatments, best first."""
+        """One sentence that ranks the treatments by their prediction error, best first."""
         first, *others = [
             f"{name} ({columns_text(*self.standing[name])}) {error:.1f} %"
             for name, error in self.mean_errors.items()
@@ -148,7 +148,7 @@ class Ranking:
 def compare(
     problems: Mapping[str, Problem], extras: Sequence[Extra], of_the_best: Sequence[Extra] = ()
 ) -> Ranking:
-    """Identify with several studies and order the studies by their error on unseen data.
+    """Identify with several settings (studies) and order them by their error on unseen data.
 
     Parameters
     ----------
@@ -246,7 +246,7 @@ def columns_text(name: SetName, fit: Estimate) -> str:
 def _require_alike(name: str, further: Sequence[Record], first: Sequence[Record]) -> None:
     if not further:
         raise InputError(
-            f"{name} has no validation record, by which treatments are compared; set "
+            f"{name} has no validation record, which the comparison of treatments needs; set "
             "validate.record"
         )
     for record in further:
@@ -260,13 +260,13 @@ def _require_alike(name: str, further: Sequence[Record], first: Sequence[Record]
             )
     if [len(record) for record in further] != [len(record) for record in first]:
         raise InputError(
-            f"{name} is validated by {', '.join(r.file for r in further)}, the first by "
-            f"{', '.join(r.file for r in first)}; expected the same"
+            f"{name} is validated by {', '.join(r.file for r in further)}, but the first treatment by "
+            f"{', '.join(r.file for r in first)}; expected the same validation records"
         )
 
 
 def _error(problem: Problem, fit: Estimate, treatment: Problem) -> float:
-    """Compute the prediction error of an estimate on rows that another treatment makes, %.
+    """Compute the error, %, of an estimate on validation rows made with other settings.
 
     The error is the norm of the residual, % of the norm of the measured torque.
     """

@@ -50,7 +50,7 @@ READ_SAMPLE_BY_SAMPLE = ("lowpass", "static")
 
 
 def force_sensors(problem: Problem) -> Problem:
-    """Add six joints that do not move to model and records for each force sensor.
+    """Add six fixed joints to the model and to the records for each force sensor.
 
     This is a step of the preparation of a problem. A problem without force sensors is not changed.
 
@@ -74,13 +74,13 @@ def force_sensors(problem: Problem) -> Problem:
         for c in channels:
             if record.channels.get(c, np.empty((0, 0))).shape[1] != 6:
                 raise InputError(
-                    f"no {c} of three forces and three moments; name its six columns in every record that is fitted or predicted, record.columns: {{wrench: {{{c.removeprefix(WRENCH)}: [...]}}}}",
+                    f"no signal {c} of three forces and three moments; give its six columns in every record that is fitted or predicted, record.columns: {{wrench: {{{c.removeprefix(WRENCH)}: [...]}}}}",
                     file=record.file,
                 )
     settings = problem.settings
     if settings.signals.reader not in READ_SAMPLE_BY_SAMPLE:
         raise InputError(
-            f"signals.reader: {settings.signals.reader} does not read wrenches; leave it out, or the wrench"
+            f"signals.reader: {settings.signals.reader} does not support wrenches; use reader: lowpass, or remove record.columns.wrench"
         )
     n = len(problem.model.JOINTS)
     torques = any(record.tau.any() for record in problem.records)
@@ -100,7 +100,7 @@ def force_sensors(problem: Problem) -> Problem:
 
 
 def _record(record: Record, channels: Sequence[str]) -> Record:
-    """Add six joints at rest to a record for each sensor; their torques are the measured wrench."""
+    """Add to a record six fixed joints for each force sensor; their torques are the wrench."""
     rest = np.zeros((len(record), 6 * len(channels)))
     others = {
         c: np.hstack([x, rest * (np.nan if c == "q_link" else 0)]) if c in JOINT_CHANNELS else x
@@ -119,7 +119,7 @@ def _record(record: Record, channels: Sequence[str]) -> Record:
 
 
 class WrenchModel:
-    """A robot model with six additional joints, which do not move, for each force sensor.
+    """A robot model with six additional fixed joints for each force sensor.
 
     The torques of these joints are the wrench that the sensor measures.
 
@@ -144,7 +144,9 @@ class WrenchModel:
             )
         if wrong := [f for f in sensors if f and (f not in frames or hasattr(model, "PASSIVE"))]:
             why = "links behind it are in loops" if wrong[0] in frames else "no such frame"
-            raise InputError(f"a wrench in frame {wrong[0]} of {model.NAME}: {why}; 0 is the base")
+            raise InputError(
+                f"a wrench in frame {wrong[0]} of {model.NAME} is not possible: {why}; frame 0 is the base"
+            )
         standard = physical_model(model).standard
         rows = tuple(f"{axis}{f}" for f in sensors for axis in AXES)
         self.JOINTS = (*model.JOINTS, *rows)
@@ -259,7 +261,9 @@ class WrenchModel:
         try:
             return self._standard(q, qd, qdd, {**constants, **timed})
         except ValueError as e:  # what an emitted module of a general loop raises
-            raise InputError(f"{self._model.NAME} with a wrench: {e} in random states") from None
+            raise InputError(
+                f"{self._model.NAME}: the model extended with a wrench failed its check at random states: {e}"
+            ) from None
 
     def _regrouped(self, constants: Mapping[str, Any]) -> Array:
         """Compute the matrix K that maps standard parameters and sensor offsets to base parameters.

@@ -1,4 +1,4 @@
-"""Demonstration of the chapter: identify the Staubli TX40 and judge its encoder resolution.
+"""Demonstration of a book chapter: identify the Staubli TX40 and judge its encoder resolution.
 
 The record is the public one, or a simulated one if that cannot be fetched. Results are compared
 with the published Tables 2, 3, 4 and Figure 4.
@@ -150,7 +150,7 @@ def simulated_record(
     encoder: float = ENCODER,
     noise: float = 0.02,
 ) -> Prepared:
-    """Simulate the record of a motion, with encoder steps and torque noise, through a file.
+    """Simulate a record with encoder steps and torque noise, write a file, and read it back.
 
     The file is a .csv.gz of q1..qn,tau1..taun on the motor side; the record is then read from it
     like any measured record.
@@ -322,7 +322,7 @@ class Demonstration:
 
 
 def sections(demo: Demonstration) -> list[Section]:
-    """Build the sections of the report: Tables 2 to 4 beside our values, and contradictions.
+    """Build the report sections: comparisons with Tables 2 to 4 of the chapter, and contradictions.
 
     Contradictions are statements of the chapter that do not agree with each other.
     """
@@ -336,7 +336,7 @@ def sections(demo: Demonstration) -> list[Section]:
 
 
 def differences(demo: Demonstration) -> dict[str, float]:
-    """Compute the difference from Table 2, %, of each of its parameters that stays essential."""
+    """Compute the difference of our values from those of Table 2, %, for essential parameters."""
     fit = demo.result.essential.estimate
     return {n: percent(fit[n], value) for n, value in TABLE_2.items() if n in fit.names}
 
@@ -358,7 +358,7 @@ def _fit_cells(fit: Estimate, name: str) -> tuple[str, str, str]:
 
 
 def _table_2(demo: Demonstration) -> Section:
-    """Build the section of Table 2: least squares values of the chapter beside our values.
+    """Build the report section that compares our least squares values with Table 2.
 
     Our values are those of the essential fit and of the fit of all parameters.
     """
@@ -401,7 +401,7 @@ def _table_2(demo: Demonstration) -> Section:
 
 
 def _table_3(demo: Demonstration) -> Section:
-    """Build the section of Table 3: mean estimates for each encoder step, chapter beside ours."""
+    """Build the report section that compares mean estimates for each encoder step with Table 3."""
     levels = demo.resolution.levels
     labels = [(f"Table 3, {level.level.label}", "ours") for level in levels]
     table = _compared(
@@ -422,7 +422,10 @@ def _table_3(demo: Demonstration) -> Section:
 
 
 def _table_4(result: Cestac) -> Section:
-    """Build the section of Table 4: torque steps alone, and with the first position step."""
+    """Build the report section that compares mean estimates for each torque step with Table 4.
+
+    Both cases are shown: torque steps alone, and with the first position step.
+    """
     torque = [r for r in result.levels if r.level.torque]
     alone, both = (
         [r for r in torque if bool(r.level.delta) is rounded] for rounded in (False, True)

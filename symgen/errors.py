@@ -41,7 +41,7 @@ def printable(text: str) -> str:
 
 
 class CertificateError(SymgenError):
-    """A certificate that does not hold: the robot file is valid, but a check of formulas failed.
+    """Error for a certificate that does not hold: the robot file is valid, but a check has failed.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class CertificateError(SymgenError):
 
 
 class DescriptionError(SymgenError):
-    """A robot file (or a Robot built in Python) that does not describe a mechanism.
+    """Error for a robot file (or a Robot built in Python) that does not describe a mechanism.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class DescriptionError(SymgenError):
 
 
 class ExpressionError(SymgenError):
-    """A text that is not an expression of the robot-file grammar.
+    """Error for a text that is not an expression of the robot-file grammar.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ _end: ContextVar[tuple[float, str]] = ContextVar("_end", default=(math.inf, ""))
 
 @contextmanager
 def limited(what: str) -> Iterator[None]:
-    """Limit the processor time of the block to SECONDS, as checked by `require_time`.
+    """Limit processor time in the block to SECONDS; after it, `require_time` raises an error.
 
     what : name of the task for the message, such as "the regrouping of tx40".
     """
@@ -36,7 +36,7 @@ def require_time() -> None:
     end, what = _end.get()
     if time.process_time() > end:
         raise SymgenError(
-            f"{what} takes more than {SECONDS:g} s of processor time and was ended; write decimal "
-            "angles as fractions of pi and let fewer symbols "
-            "into the frame table, or divide the robot (convert --chain, --lock)"
+            f"{what} takes more than {SECONDS:g} s of processor time and was stopped; write decimal "
+            "angles as fractions of pi and use fewer symbols in the frame table, "
+            "or divide the robot (convert --chain, --lock)"
         )

@@ -164,7 +164,7 @@ def test_what_is_missing_is_said() -> None:
     with pytest.raises(InputError, match="--with base_wrench_regressor"):
         runtime.identify(symgen.model("planar_2r"), record, STUDY)
     counts = study_from_mapping({"signals": {"reader": "counts"}})
-    with pytest.raises(InputError, match="reader: counts does not read wrenches"):
+    with pytest.raises(InputError, match="reader: counts does not support wrenches"):
         runtime.identify(model, record, counts)
     elsewhere = runtime.Record(
         record.t, record.q, record.tau, rate=1000.0, channels={"wrench9": np.ones((6000, 6))}

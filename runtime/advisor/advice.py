@@ -62,7 +62,7 @@ def sampled(delta: float, ratios: Array) -> Sampled:
 
 @dataclass(frozen=True, eq=False)
 class Limit:
-    """Encoder step at which the estimate of the first parameter changes by `percent` %.
+    """Coarsest encoder step before a parameter that decides the verdict changes by `percent` %.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Limit:
 
 @dataclass(frozen=True, eq=False)
 class EncoderAdvice:
-    """Coarsest steps for one choice of encoders, with all other encoders exact.
+    """Coarsest steps that some encoders may have, if all other encoders are exact.
 
     Attributes
     ----------
@@ -127,7 +127,7 @@ class EncoderAdvice:
     unit: str = "rad"
 
     def reached(self, percent: float) -> Array:
-        """Find the step at which the |change| of each parameter first reaches `percent`.
+        """Find, for each parameter, the smallest encoder step at which it changes by `percent` %.
 
         Return the steps, shape (b,); nan if the curve does not show this step.
         """
@@ -136,7 +136,7 @@ class EncoderAdvice:
 
 @dataclass(frozen=True, eq=False)
 class ReaderAdvice:
-    """Coarsest steps of real encoders whose signals are read in one way: positions or counts.
+    """Coarsest steps that real encoders may have, if read as positions or if read as counts.
 
     Attributes
     ----------
@@ -201,7 +201,7 @@ class Advice(Result, Part):
         return "\n".join([self.verdict, *self.asked_lines(), *self.assumptions])
 
     def figures(self) -> tuple[Figure, ...]:
-        """Plot the change of every deciding parameter against the encoder step.
+        """Plot the change of every parameter that decides the verdict against the encoder step.
 
         No figure without a deciding parameter.
         """
@@ -229,10 +229,11 @@ class Advice(Result, Part):
 
     @property
     def ways(self) -> tuple[tuple[str, tuple[EncoderAdvice, ...], Array], ...]:
-        """Label, advice by encoder and changes at requested steps, for each rounding law or reader.
+        """For each way to treat rounding: its label, the advice and the changes at requested steps.
 
-        The chapter's law is first, with an empty label, unless only real encoders were judged. Real
-        encoders follow, once for each reader.
+        A way is a rounding law, or a reader of real encoders; there is one advice for each choice
+        of encoders. The chapter's law is first, with an empty label, unless only real encoders were
+        judged. Real encoders follow, once for each reader.
         """
         real = tuple((NAMES[one.reader], one.encoders, one.steps) for one in self.real)
         if self.real and self.encoders is self.real[0].encoders:
@@ -255,7 +256,7 @@ class Advice(Result, Part):
         ]
 
     def worst(self, step: int, steps: Array | None = None) -> tuple[str, float]:
-        """Find the deciding parameter that changes most at a requested encoder step.
+        """Find which of the deciding parameters changes most at a requested encoder step.
 
         Return its name and its change %e.
 
@@ -269,7 +270,7 @@ class Advice(Result, Part):
 
     @property
     def negative(self) -> bool:
-        """Whether a requested step would bias least squares, or runs contradict the prediction.
+        """Whether a requested step biases least squares, or CESTAC runs contradict the prediction.
 
         The runs are those of CESTAC at the steps of the limits.
         """
@@ -279,7 +280,7 @@ class Advice(Result, Part):
 
     @property
     def verdict(self) -> str:
-        """The verdict in sentences.
+        """Verdict in sentences: how coarse the encoders may be without bias of the estimate.
 
         It states the coarsest steps of all encoders together, and which single encoder must be
         finest.
@@ -292,7 +293,7 @@ class Advice(Result, Part):
         return " ".join(parts)
 
     def _answers(self, encoders: Sequence[EncoderAdvice]) -> list[str]:
-        """Write the sentences of the verdict for one rounding law or reader.
+        """Write the verdict, in sentences, for one rounding law or one way to read real encoders.
 
         The first sentences are about all encoders together.
         """
@@ -358,12 +359,12 @@ class Advice(Result, Part):
         return text + ")."
 
     def brief(self) -> str:
-        """Write the verdict, the steps of each encoder, and the changes at the requested steps."""
+        """Write the verdict, the coarsest step of each encoder, and changes at requested steps."""
         steps = [f"{table.caption}\n{table.to_text()}" for table in self.tables()[:-1]]
         return "\n\n".join([self.verdict, *steps, *self.asked_lines()])
 
     def to_table(self) -> str:
-        """Write the tables of steps by encoder and by parameter, then the assumptions."""
+        """Write tables of the coarsest steps, by encoder and by parameter, then the assumptions."""
         tables = [table.to_text() for table in self.tables()]
         notes = [note for reader in self.real for note in reader.notes]
         return "\n\n".join(
@@ -375,7 +376,11 @@ class Advice(Result, Part):
         )
 
     def tables(self) -> list[Table]:
-        """Tabulate the steps by encoder for each rounding law and reader, then by parameter."""
+        """Make the tables of the coarsest encoder steps: for each encoder, then for each parameter.
+
+        The steps of each encoder have one table for the chapter's rounding law and one for real
+        encoders.
+        """
         law, real = ([way for way in self.ways if bool(way[0]) == real] for real in (False, True))
         captions = (
             "Coarsest step of each encoder, the others exact; sampled: %e of that parameter with "
@@ -393,7 +398,7 @@ class Advice(Result, Part):
     def _step_table(
         self, caption: str, ways: Sequence[tuple[str, tuple[EncoderAdvice, ...], Array]]
     ) -> Table:
-        """Tabulate the coarsest step of each encoder.
+        """Make the table of the coarsest step that each encoder may have.
 
         Each rounding law or reader has its own columns.
         """
@@ -415,7 +420,7 @@ class Advice(Result, Part):
         return Table(caption, headers, rows)
 
     def parameter_table(self) -> Table:
-        """Tabulate for each parameter %sigma, the steps at the limits and the effect of noise.
+        """Tabulate, for each parameter, %sigma, the steps for 1 % and 5 % change, and noise effect.
 
         The steps are those of all encoders together. The effect is %sigma added by torque noise,
         per N m (N) of its standard deviation.
@@ -444,7 +449,7 @@ class Advice(Result, Part):
         return Table(caption, header, rows)
 
     def asked_lines(self) -> list[str]:
-        """Write the largest predicted change of a parameter at each requested encoder step.
+        """Write, for each requested encoder step, the largest predicted change of a parameter.
 
         There is one line for each step and rounding law. Return one text with all lines in a list,
         or an empty list without requested steps.
@@ -491,7 +496,7 @@ class Advice(Result, Part):
 
 
 def advice_figure(advice: Advice) -> Figure:
-    """Plot %e against the step Delta of all encoders, for every deciding parameter.
+    """Plot the change %e of each deciding parameter against the step Delta of all encoders.
 
     Lines are predicted; points are CESTAC runs with their Student intervals. If real encoders were
     judged, both readers are shown, otherwise the rounding law of the paper.
@@ -550,7 +555,7 @@ def _panel(ax: Any, reader: str, encoder: EncoderAdvice, line: str, points: str,
     f"bias below {LIMIT.NEGLIGIBLE:g} % (usable to {LIMIT.BIASED:g} %)",
 )
 def answer(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer:
-    """Answer whether the encoder is fine enough, from the advice or from steps in the positions.
+    """Judge whether the encoder is fine enough, by the advice or by the steps seen in positions.
 
     steps : without an advice, a sentence on the steps that the positions show.
     share : share of the mean square of an acceleration that these steps make.
@@ -592,7 +597,7 @@ def answer(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer
 
 @dataclass(frozen=True, eq=False)
 class NoAdvice(Part):
-    """Part of a report without an advice: it judges the encoder steps seen in the positions."""
+    """Report part used without an advice: it judges the encoder steps seen in the positions."""
 
     result: Identification
 
@@ -620,7 +625,7 @@ def _summary(advice: EncoderAdvice) -> dict[str, Any]:
 def confirm_by_runs(
     advice: EncoderAdvice, reference: Estimate, level: Callable[[float], Sampled]
 ) -> EncoderAdvice:
-    """Add CESTAC runs at the steps of the limits, which confirm or contradict the prediction.
+    """Add CESTAC runs at the coarsest allowed steps, which confirm or contradict the prediction.
 
     If all encoders are coarse together, runs between these steps and above them are added, too.
 

@@ -71,7 +71,7 @@ FIRST_ORDER = "to first order in the variance of the errors, for a motion that i
 
 @dataclass(frozen=True, eq=False)
 class Predictor:
-    """Prediction of the estimate X as a function of the encoder step, for records of one robot.
+    """Prediction of how the estimate X depends on the encoder step, for records of one robot.
 
     parts : effect of position errors on each record.
     weights : weight 1/s_j of the rows of each joint, shape (n,).
@@ -83,7 +83,7 @@ class Predictor:
     share: float
 
     def change(self, delta: float, encoders: Sequence[int]) -> Array:
-        """Predict the change of X if these encoders have the step `delta`, shape (b,), %.
+        """Predict the change of X if the given encoders have the step `delta`, shape (b,), %.
 
         It is 100 (X(v)/X(0) - 1).
         """
@@ -158,7 +158,7 @@ def advise(
     """
     if any(is_axis(joint) for joint in problem.model.JOINTS):
         raise InputError(
-            "the advisor judges the encoder of every joint, and a force sensor has none; leave the wrench out"
+            "the advisor supports only encoders of joints, but the record has a force sensor; remove record.columns.wrench"
         )
     settings = problem.settings
     sought = replace(settings.cestac, delta=())  # steps are what is sought
@@ -248,9 +248,10 @@ def advise(
 
 
 def _selections(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str, tuple[int, ...]]:
-    """Make the sets of encoders that are coarse at the same time, by label.
+    """List the groups of encoders that are made coarse together: all, or a single one.
 
-    The label is "all" or that of a joint; the encoders are numbered from 0.
+    Return a mapping from the label of a group, "all" or that of a joint, to the numbers of its
+    encoders, from 0.
     """
     n = len(model.JOINTS)
     every = {ALL: tuple(range(n)), **{str(joint): (i,) for i, joint in enumerate(model.JOINTS)}}
@@ -258,7 +259,7 @@ def _selections(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str
     unknown = [label for label in labels if label not in every]
     if unknown or not labels:
         raise InputError(
-            f"no encoder {', '.join(unknown) or 'named'}; expected some of {', '.join(every)}"
+            f"no encoder {', '.join(unknown) or 'given'}; expected some of {', '.join(every)}"
         )
     names = dict(zip(list(every)[1:], joint_labels(model), strict=True))
     return {names.get(label, label): every[label] for label in labels}
@@ -267,7 +268,7 @@ def _selections(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str
 def _advice(
     predictor: Predictor, label: str, encoders: Sequence[int], reference: Estimate, unit: str
 ) -> EncoderAdvice:
-    """Compute how the estimate changes with the step of some encoders, and their coarsest steps.
+    """Compute how the estimate changes with the step of some encoders, and how coarse they may be.
 
     Steps are tried in geometric progression until both limits are passed; the curve of all encoders
     extends beyond them.
@@ -304,7 +305,7 @@ def _advice(
 
 
 def torque_sigma(predictor: Predictor, drives: Drives | None) -> Array:
-    """Compute the standard deviation of X for white noise on every motor torque, shape (b,).
+    """Compute the standard deviation of X due to white noise on all motor torques, shape (b,).
 
     The standard deviation of the noise is 1 N m (N).
     """
@@ -411,21 +412,21 @@ def assumptions(
 def _refuse(study: Study) -> None:
     if study.estimate.method not in ("ols", "wls"):
         raise SettingsError(
-            f"{study.estimate.method!r}; the prediction is that of least squares, use ols or wls",
+            f"{study.estimate.method!r}; the advisor predicts only estimates by least squares: use ols or wls",
             path=("estimate", "method"),
         )
     if study.estimate.weights == "covariance":
         raise SettingsError(
-            "'covariance'; the prediction supports only weights by joint: use joint or iterated",
+            "'covariance'; the advisor supports only one weight per joint: use joint or iterated",
             path=("estimate", "weights"),
         )
 
 
 def advice_of(result: Identification, encoder: Sequence[float] = ()) -> Advice:
-    """Predict the coarsest encoders for the essential parameters of an identification.
+    """Predict how coarse encoders may be for the essential parameters of an identification.
 
     encoder : steps of the encoders in use, rad or m.
     """
     if not result.determined:
-        raise InputError("the record does not determine the parameters")
+        raise InputError("the record does not determine the parameters; record a richer motion")
     return advise(result.problem, columns=result.essential.names, asked=tuple(encoder))

@@ -1,4 +1,4 @@
-"""Simulate some encoders as coarse and the others as exact, with one rounding law and one reader.
+"""Simulate coarse and exact encoders together, with one rounding law and one way to read them.
 
     error of encoder i, as read
             e_i = reader(rounded(x_i)) - reader of the record, filtered alike
@@ -58,7 +58,7 @@ QUADRATURE = 1 << 20  # number of the first stream of the nodes: beyond those of
 
 @dataclass(frozen=True, eq=False)
 class Encoders:
-    """The encoders of one record: their positions, and the states computed from them.
+    """The encoders of one record: their positions, and the states q, qd, qdd computed from them.
 
     Attributes
     ----------
@@ -131,7 +131,7 @@ class CoarseEncoders:
 
     @property
     def coarsest(self) -> Array:
-        """Largest step of each encoder that can be judged, shape (n,), rad or m.
+        """Largest step that can be judged for each encoder, shape (n,), rad or m.
 
         LIMIT.LINES_IN_MOTION steps of this size are in the motion of the encoder; inf for an
         encoder at rest.
@@ -141,7 +141,7 @@ class CoarseEncoders:
 
     @property
     def finest(self) -> float:
-        """Smallest step that can be judged, rad or m.
+        """Smallest encoder step that can be judged, rad or m.
 
         It is LIMIT.EXACT_FROM times the largest step of the encoders that made the records, so that
         the recorded positions are exact in comparison; 0 if those encoders are unknown.
@@ -164,7 +164,7 @@ class CoarseEncoders:
         return np.full(len(self.reference), np.nan)
 
     def locking(self, delta: Array) -> Array:
-        """Compute the power of the rounding error behind the low-pass, relative to white noise.
+        """Compute the power of rounding errors that passes the low-pass, relative to white noise.
 
         The rounding error is a sawtooth. The result, shape (m,), is the largest power of all
         records and speeds.
@@ -189,7 +189,7 @@ class CoarseEncoders:
         return most
 
     def nodes(self, delta: float, moving: Sequence[int], read: int = 0) -> list[list[Array]]:
-        """Compute the errors of every record for several phases of the encoder lines.
+        """Compute the errors of q, qd and qdd in every record for several phases of encoder lines.
 
         These phases are the nodes of a quadrature. At first there are PHASES nodes. If `read` nodes
         are known already, as many new ones are computed, in the middle between the known ones.
@@ -206,7 +206,9 @@ class CoarseEncoders:
         ]
 
     def ratios(self, nodes: Sequence[Sequence[Array]], encoders: Sequence[int]) -> Array:
-        """Compute the estimate X with these encoders coarse, divided by X with exact encoders.
+        """Compute the estimate X with some encoders coarse, divided by X with exact encoders.
+
+        encoders : numbers of the coarse encoders.
 
         nodes : errors of every record, for each phase of the encoder lines.
 
@@ -215,7 +217,7 @@ class CoarseEncoders:
         return np.array([self._ratio(errors, encoders) for errors in nodes])
 
     def sampled(self, encoders: Sequence[int], delta: float, runs: int | None = None) -> Sampled:
-        """Run CESTAC with the step `delta` on these encoders, the others being exact.
+        """Run CESTAC with the step `delta` on the given encoders, while the others are exact.
 
         Eqs. (17), (18), (21).
 
@@ -229,7 +231,7 @@ class CoarseEncoders:
         return sampled(delta, np.array(ratios))
 
     def _rounded(self, delta: float, encoders: Sequence[int], run: int) -> list[Array]:
-        """Draw errors of every record for a law that rounds each sample independently.
+        """Draw errors of q, qd and qdd for a law that rounds each sample independently.
 
         The random numbers of an encoder do not depend on which other encoders are coarse.
         """
@@ -241,14 +243,14 @@ class CoarseEncoders:
         return self._read(drawn, encoders, delta)
 
     def _counted_at_random(self, delta: float, encoders: Sequence[int], run: int) -> list[Array]:
-        """Draw errors of every record for encoders that count lines, with random phases."""
+        """Draw errors of q, qd and qdd for encoders that count lines, with random phases."""
         phases = stream(self.task.settings.seed, run, *encoders).random(len(self.root))
         return self._counts(delta, delta * phases, encoders, (run, *encoders, 0))
 
     def _counts(
         self, delta: float, phases: Array, encoders: Sequence[int], key: tuple[int, ...]
     ) -> list[Array]:
-        """Compute the errors of every record for encoders that count lines, at given phases.
+        """Compute the errors of q, qd and qdd for encoders that count lines, at given phases.
 
         key : selects the random numbers of uneven lines, which are the same in every record.
         """
@@ -307,7 +309,7 @@ class CoarseEncoders:
         return np.asarray(self._solved(coarse) / (self.reference if every else self._solved(exact)))
 
     def _solved(self, parts: Sequence[tuple[States, Array]]) -> Array:
-        """Solve least squares for X from the states of every record.
+        """Solve least squares for X from the states q, qd and qdd of every record.
 
         Each part has the states of a record and the mask of its rows, bool (n, K).
         """
@@ -326,10 +328,10 @@ class CoarseEncoders:
 
 
 def mean_change(ratios: Array) -> Array:
-    """Compute the mean change of the estimate over the nodes, and its standard deviation, in %.
+    """Compute the mean change of the estimate over several phases, and its standard deviation.
 
-    Return both in one array, shape (2, b). The standard deviation is that of the mean, if the nodes
-    were independent.
+    Return both in one array, shape (2, b), %. The standard deviation is that of the mean, if the
+    phases (nodes) were independent.
 
     ratios : estimates at the nodes over the exact estimate, shape (count, b).
     """

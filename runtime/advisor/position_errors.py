@@ -81,7 +81,7 @@ class Perturbation:
     known: dict[tuple[int, int], Switched] = field(default_factory=dict)
 
     def expected(self, variance: float, encoders: Sequence[int]) -> Array:
-        """Compute the Gram matrices expected if the given encoders have errors of this variance.
+        """Compute the Gram matrices expected if some encoders have errors of the given variance.
 
         The encoders are numbered from 0; all others are exact.
         """
@@ -123,7 +123,7 @@ class Perturbation:
             gram[j][np.ix_(columns, columns)] += shift.T @ shift + both
 
     def _at(self, switch: Switch, sigma: float) -> Switched:
-        """Interpolate the effect of a velocity error on a switching column.
+        """Interpolate how a velocity error changes a column of W that switches sign.
 
         sigma : standard deviation of the error; the effect is computed at the two nearest nodes.
         """
@@ -179,7 +179,7 @@ def perturbation(
     own = replace(record, study=replace(study, signals=positions), reader=lowpassed)
     own.take_states(record)
     band = bandwidth(signals, own.record.rate)
-    require_positions(own.record.missing, "the effect of steps on them", own.record.file)
+    require_positions(own.record.missing, "the effect of encoder steps", own.record.file)
     selection = own.selection
     observation = own.observation(model, names)
     settings = {**observation.settings, "signals": to_mapping(signals)}

@@ -1,4 +1,4 @@
-"""Predict how coarse a real encoder may be, with its signal read as positions and read as counts.
+"""Predict how coarse a real encoder may be if it is read as positions, and if it is read as counts.
 
 The change of the estimate is computed along steps of law phase, for both readers
 (`runtime.advisor.coarse_encoders`). White noise does not describe a sawtooth that is locked to the
@@ -44,7 +44,7 @@ def reader_advice(
     confirm: bool = True,
     progress: Callable[[], None] = lambda: None,
 ) -> ReaderAdvice:
-    """Compute the coarsest steps of real encoders that are read in one way: positions or counts.
+    """Compute how coarse real encoders may be if they are read as positions, or as counts.
 
     reference : estimate of the records as measured, whose deciding parameters decide here.
     selections : numbers (from 0) of the coarse encoders, by label.
@@ -82,12 +82,12 @@ def curves(
     start: float,
     decisive: Sequence[int],
 ) -> dict[str, tuple[Array, Array]]:
-    """Compute, for each choice of coarse encoders, how the estimate changes with their step.
+    """Compute, for each group of coarse encoders, how the estimate changes with their step.
 
     Steps go from `start` down until all changes are below the first limit, and up until all are
     above the last limit. They are finer where constant speeds of the record lock to the sampling.
 
-    A label names a choice of encoders. Return for each label the steps, shape (m,), and the changes
+    A label names a group of encoders. Return for each label the steps, shape (m,), and the changes
     with their standard deviations, shape (m, 2, b), %.
     """
     known: dict[str, dict[float, Array]] = {label: {} for label in selections}
@@ -101,7 +101,7 @@ def curves(
         return float(np.abs(mean_change(known[label][k])[0, decisive]).max(initial=0.0))
 
     def read(k: float, labels: Iterable[str], nodes: int = 0) -> list[str]:
-        """Compute the changes of the estimate at step number k, for each choice of encoders.
+        """Compute the changes of the estimate at step number k of the curve, for several groups.
 
         They are computed at the first phases of the encoder, or at `nodes` more phases. Return the
         labels of the choices for which this is possible.
@@ -165,7 +165,7 @@ def curves(
 def vague_steps(
     changes: Mapping[float, Array], decisive: Sequence[int], limit: float
 ) -> list[float]:
-    """Find the encoder steps next to a limit at which the change is still too uncertain.
+    """Find the encoder steps around a limit, 1 or 5 %, at which the change is too uncertain.
 
     The limit is between two steps. A step is returned if the standard deviation of its change moves
     the limit by more than LIMIT.CURVE_SHARPNESS of it, by straight lines on logarithmic axes. If
@@ -193,7 +193,7 @@ def vague_steps(
 def uncertain(
     reader: ReaderName, advice: EncoderAdvice, error: Array, names: Sequence[str]
 ) -> list[str]:
-    """Write a sentence for each limit near which the curve is too flat to determine the step.
+    """Write a warning for each limit, 1 or 5 %, if the curve is too flat to find its encoder step.
 
     error : standard deviation of the change, shape (m, b), %.
     """

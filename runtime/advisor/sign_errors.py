@@ -88,7 +88,9 @@ def switch_with_error(
     settings: Decimate | None,
     used: Array,
 ) -> Switched:
-    """Compute the effect of an error of s, of standard deviation `sigma`, on a switching column.
+    """Compute how an error of the speed s changes a column of W that switches sign with s.
+
+    sigma : standard deviation of the error.
 
     s : G qd of the filtered velocities of the window, shape (N,).
     factor, settings : factor and settings of the decimation.
@@ -114,10 +116,11 @@ def switch_with_error(
 
 
 def _coefficients(switch: Switch, u: Array, m: Array, phi: Array, sigma: float) -> Array:
-    """Compute the scaled Hermite coefficients c_n/sqrt(n!) of a switching column, n = 1 ... ORDERS.
+    """Compute the Hermite coefficients c_n/sqrt(n!) of a column that switches sign.
 
-    Return them with one more row, shape (ORDERS + 1, len(u)). This row stands for all higher
-    orders: the square root of the variance they contribute, with the sign of the next coefficient.
+    Return those of order n = 1 ... ORDERS and one more row, shape (ORDERS + 1, len(u)). This row is
+    for all higher orders: the square root of the variance they contribute, with the sign of the
+    next coefficient.
     """
     He = [np.ones_like(u), -u]
     for n in range(1, ORDERS):
@@ -136,7 +139,10 @@ def _coefficients(switch: Switch, u: Array, m: Array, phi: Array, sigma: float) 
 
 @dataclass(frozen=True, eq=False)
 class Kernels:
-    """Fourier transforms of rho_k^n r_k, with which the variances of switching columns are added.
+    """Fourier transforms with which the variances of columns that switch sign are summed.
+
+    They are those of rho_k^n r_k, with rho_k the correlation of velocity errors k samples apart,
+    and r_k the same for the decimation filter.
 
     spectra : transforms for n = 1 ... ORDERS + 1, shape (ORDERS + 1, length//2 + 1). Frequencies
         between 0 and the Nyquist frequency count twice.
@@ -150,7 +156,7 @@ class Kernels:
 
 
 def kernels(band: Bandwidth, N: int, factor: int) -> Kernels:
-    """Compute the Fourier transforms with which variances over N samples are added (Kernels).
+    """Compute the Fourier transforms with which variances over N samples are summed.
 
     factor : the samples are decimated by this factor. Kernels change little over an eighth of it,
         so sums over this number of samples suffice.
@@ -171,7 +177,7 @@ def kernels(band: Bandwidth, N: int, factor: int) -> Kernels:
 
 
 def _summed_variance(coefficients: Array, near: Array, known: Kernels) -> float:
-    """Compute the variance of a switching column, added over all its instants.
+    """Compute the variance of a column that switches sign, summed over all its instants.
 
     It is the sum of c_n(t) c_n(t') rho^n r over all orders n and instants t, t', by Parseval's
     theorem.

@@ -1,4 +1,4 @@
-"""Fit of the gain kd and of the delay of a control law whose torque replaces a measured one.
+"""Fit of the gain kd and the delay of a control law whose torque replaces a measured torque.
 
 Settings: `controller.law` with kd: fit, delay: fit.
 
@@ -102,7 +102,7 @@ def law_of_controller(problem: Problem) -> Problem:
 
 @dataclass(frozen=True)
 class GainDoubt(Part):
-    """Warning that another gain kd than the stated one explains the records."""
+    """Warning that another gain kd than the stated gain explains the records better."""
 
     sentence: str
 
@@ -110,20 +110,20 @@ class GainDoubt(Part):
     title = "Law of the controller"
 
     def warnings(self) -> tuple[str, ...]:
-        """Return the question about the gains for the user, as the only warning."""
+        """Return the only warning: a question to the user whether the stated gains are right."""
         return (self.sentence,)
 
 
 def doubt_of_gains(result: Identification) -> GainDoubt | None:
-    """Return a warning if the stated gains kd are doubtful, else None."""
+    """Return a warning if other gains kd than the stated ones fit much better, else None."""
     sentence = gain_doubt(result.problem, result.estimate.relative_error)
     return GainDoubt(sentence) if sentence else None
 
 
 def gain_doubt(problem: Problem, error: float) -> str:
-    """Write a sentence if another gain kd than the stated one explains the records, else "".
+    """Write a warning if another gain kd than the stated gain fits much better, else "".
 
-    The sentence is written if another kd more than halves the error. It is also "" if the records
+    The warning is written if another kd more than halves the error. It is also "" if the records
     do not use the torque of the law.
 
     error : relative error of the torque with the stated kd, %.
@@ -182,7 +182,7 @@ def law_estimate(problem: Problem, law: Law, saturation: Array) -> LawEstimate:
 def _search_kd(
     torques: TorquesOfLaw, gains: Sequence[str], late_too: bool, kd: Array, cuts: bool
 ) -> tuple[Array, float, float]:
-    """Search kd and the delay by Gauss-Newton passes from a first value of kd.
+    """Search kd and the delay by Gauss-Newton iterations that start from the given kd.
 
     Returns kd, the delay and their misfit, which is nan if the drives do not cut.
 
@@ -215,7 +215,7 @@ def _search_kd(
 
 @dataclass(frozen=True, eq=False)
 class TorquesOfLaw:
-    """The records whose torque is computed by the control law, with the rows of their regressor.
+    """The records whose torque is computed by the control law, with their observation matrix W.
 
     Attributes
     ----------
@@ -234,12 +234,12 @@ class TorquesOfLaw:
     saturation: Array
 
     def torques(self, kd: Array, delay: float) -> list[Array]:
-        """Compute the torques of all records with given gains and delay, shape (N, n) each."""
+        """Compute the torques of the law for all records, given kd and delay, shape (N, n) each."""
         records = [prepared.record for prepared in self.records]
         return [torque_of(record, kd, delay, self.saturation) for record in records]
 
     def slopes(self, kd: Array, delay: float) -> list[Array]:
-        """Compute the derivatives of the torques by kd: v without saturation, else zero.
+        """Compute the derivatives of the torques with respect to kd: v, or zero at saturation.
 
         v = qd_ref - qd, late by the delay.
         """
@@ -271,7 +271,7 @@ class TorquesOfLaw:
         return linear_estimate(wide, EstimateSettings("wls", "joint"), model=self.model)
 
     def misfit(self, kd: Array, delay: float) -> float:
-        """Compute the misfit sum_j N_j log ||Y_j - W_j X|| of given gains and delay.
+        """Compute the misfit sum_j N_j log ||Y_j - W_j X|| for given kd and delay.
 
         X is the least-squares estimate weighted by joint.
         """
@@ -282,7 +282,7 @@ class TorquesOfLaw:
 
 
 def torque_of(record: Record, kd: Array, delay: float, saturation: Array) -> Array:
-    """Compute the torque of the control law for a record, late by `delay` s, shape (N, n)."""
+    """Compute the torque of the control law for a record, delayed by `delay` s, shape (N, n)."""
     tau = record.tau + kd * record.channels["law_v"] if np.any(kd) else record.tau
     return late(record.t, np.clip(tau, -saturation, saturation), np.nan_to_num(delay))
 

@@ -76,7 +76,7 @@ class TorqueLaw:
 
 
 def velocity(q: Array, channels: Mapping[str, Array], rate: float) -> Array:
-    """Return the velocities for the law, shape (N, n): recorded ones, else backward differences."""
+    """Return joint velocities, shape (N, n): the recorded qd, or else backward differences of q."""
     if "qd" in channels:
         return channels["qd"]
     return np.asarray(np.diff(q, axis=0, prepend=q[:1]) * rate)
@@ -105,21 +105,22 @@ def torque_law(controller: Controller | None, n: int, limits: Mapping[str, Any])
     gains = law.gains(n)
     if np.any(gains["K"]):
         raise SettingsError(
-            f"{law.ki} is not supported here: a record does not hold the state of an integral, so the "
-            "torque can be computed from kp and kd alone; leave ki out",
+            f"{law.ki} is not supported here: a record does not contain the state of the integrator, so "
+            "the torque can be computed only from kp and kd; remove ki",
             path=("controller", "law", "ki"),
         )
     if np.any(law.ca):
         raise SettingsError(
-            f"{law.ca} is not supported here; name the column of the feed-forward torque in "
-            "record.columns.tau_ff",
+            f"{law.ca} is not supported here; remove ca, and give the column of the feed-forward "
+            "torque in record.columns.tau_ff",
             path=("controller", "law", "ca"),
         )
     largest = None if controller is None else controller.torque.largest(limits)
     bound = np.atleast_1d(np.asarray(np.inf if largest is None else largest, dtype=float))
     if len(bound) not in (1, n):
         raise SettingsError(
-            f"{len(bound)} values; expected one or {n}", path=("controller", "torque", "saturation")
+            f"{len(bound)} values; expected one or {n}, one per joint",
+            path=("controller", "torque", "saturation"),
         )
     saturation = np.broadcast_to(bound, (n,)).copy()
     fit, delay = law.kd == "fit", 0.0 if law.delay == "fit" else float(law.delay)

@@ -29,7 +29,9 @@ def number(text: str) -> float:
     Raise ValueError for any other text, and if the value is not finite and real.
     """
     if len(text) > LIMIT.NUMBER_CHARACTERS:
-        raise ValueError(f"a number of {len(text)} characters; at most {LIMIT.NUMBER_CHARACTERS}")
+        raise ValueError(
+            f"a number of {len(text)} characters; expected at most {LIMIT.NUMBER_CHARACTERS}"
+        )
     try:
         with warnings.catch_warnings(
             action="ignore"

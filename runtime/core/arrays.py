@@ -52,8 +52,9 @@ def real(x: Any, label: str, file: str | None = None) -> Array:
     if isinstance(x, np.ma.MaskedArray) and np.ma.is_masked(x):
         count = int(np.ma.getmaskarray(x).sum())
         raise InputError(
-            f"{label} masks {count} of its values; a record has all of them: cut it, or fill them "
-            "(x.filled(np.nan) and missing=np.isnan(q) where q is read as counts)",
+            f"{label} masks {count} of its values, but a record needs every value: cut the masked "
+            "samples, or fill the masked values (x.filled(np.nan) and missing=np.isnan(q) where q is "
+            "read as counts)",
             file=file,
         )
     try:
@@ -62,14 +63,14 @@ def real(x: Any, label: str, file: str | None = None) -> Array:
         if kind in CURES:
             raise InputError(f"{label} has dtype {array.dtype}, {CURES[kind]}", file=file)
         if kind == "O" and (wrong := [v for v in array.flat if not _is_real(v)]):
-            raise InputError(f"{label} holds {kind_of(wrong[0])}; expected numbers", file=file)
+            raise InputError(f"{label} contains {kind_of(wrong[0])}; expected numbers", file=file)
         return np.asarray(array, dtype=float)
     except InputError:
         raise
     except Exception as e:  # whatever an array of another package raises becomes one kind of error
         raise InputError(
             f"{label}, {kind_of(x)}, is no array of real numbers: {first_line(e)}; expected rows of "
-            "one length",
+            "equal length",
             file=file,
         ) from e
 

@@ -1,4 +1,4 @@
-"""A model with new values of its constants, for instance of a fitted friction law."""
+"""A model with new values for some of its constants, such as those of a fitted friction law."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ P = ParamSpec("P")
 
 @dataclass(frozen=True)
 class Check:
-    """One question about a record or an identification, with its answer, its limit and a remedy.
+    """One question on a record or an identification: its answer, the limit for "good", a remedy.
 
     Attributes
     ----------
@@ -54,13 +54,13 @@ class Check:
 
     @property
     def sentence(self) -> str:
-        """The question, the finding and the remedy as one text."""
+        """The question, what was found and what to do, as one text."""
         remedy = f" {self.remedy[0].upper()}{self.remedy[1:]}." if self.remedy else " "
         return f"{self.question} {self.finding}.{remedy}"
 
 
 class Answer(NamedTuple):
-    """The answer to a Question: its state (good, doubtful, no or open) and its finding, a sentence.
+    """Answer to a Question: its state (good, doubtful, no, open) and a sentence on what was found.
 
     remedy and limit, if given, replace those of the Question.
     """
@@ -74,7 +74,7 @@ class Answer(NamedTuple):
 
 @dataclass(frozen=True)
 class Question:
-    """Decorator of a function that answers one question: it then returns a Check, not an Answer.
+    """Decorator for a function that answers one question: the function then returns a Check.
 
     The decorator holds the question, the limit of a good answer and the remedy for other answers.
     If the function returns None, the decorated function returns None too.
@@ -100,7 +100,7 @@ class Question:
 
 
 def worst_of(checks: Sequence[Check]) -> Check | None:
-    """Return the first check with the worst state; None if no check is doubtful or "no"."""
+    """Return the first check with the worst state; None if no check is "doubtful" or "no"."""
     return next((c for state in WORST[:2] for c in checks if c.state == state), None)
 
 
@@ -115,7 +115,7 @@ def first_names(names: Sequence[str]) -> str:
 
 
 def state_of(value: float, good: float, usable: float) -> State:
-    """Judge a number that should be small: good up to `good`, doubtful up to `usable`, else no."""
+    """Judge a number that should be small: good up to `good`, doubtful up to `usable`, or "no"."""
     if value <= good:
         return "good"
     return "doubtful" if value <= usable else "no"

@@ -53,7 +53,7 @@ class Checklist(Result):
 
     @property
     def state(self) -> State:
-        """The worst state of all checks: "no", "doubtful" or "good"; "open" without any answer."""
+        """The worst state of all checks: "no", "doubtful" or "good"; "open" without answers."""
         return next(
             (state for state in WORST if any(check.state == state for check in self.checks)), "open"
         )
@@ -76,7 +76,7 @@ class Checklist(Result):
 
     @property
     def doubt(self) -> str:
-        """Sentence that names the largest doubt, or the questions that were not judged."""
+        """Sentence on the largest doubt; without a doubt, on the questions that were not judged."""
         if self.worst is not None:
             return f"{self.worst.question} {self.worst.finding}."
         unanswered = [check.question for check in self.checks if check.state == "open"]
@@ -146,7 +146,7 @@ def checklist_of(
     halves: bool = False,
     single: bool = False,
 ) -> Checklist:
-    """Check an identification: first its record, then its predictions, then its values.
+    """Make the verdict on an identification: check its record, its predictions and its values.
 
     If the record does not determine the parameters, only the checks of the record are made.
 
@@ -287,7 +287,9 @@ def explained_by_joint(
 
 
 def lost_joints(estimate: Estimate, fit: Estimate) -> str:
-    """Name the joints whose torque only the removed parameters explain, and a remedy; "" if none.
+    """Name the joints that are badly explained because parameters were removed, and give a remedy.
+
+    Return "" if there are none.
 
     Such joints occur because the threshold of the essential parameters uses ||Y - W X|| of all
     joints. Without weights this norm mostly depends on the joint with the largest forces, such as a

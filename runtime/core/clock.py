@@ -38,7 +38,7 @@ def sample(i: int) -> str:
 
 @dataclass(frozen=True)
 class Stamps:
-    """Properties of the time stamps of one record: names for messages, rate and allowed jitter.
+    """What a record states about its time stamps: file, column, sampling rate and allowed jitter.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ def rate_of(stamps: Stamps, t: Array) -> float:
     """
     N = len(t)
     if N < 2:
-        raise InputError(f"{N} samples; a record needs more", file=stamps.file)
+        raise InputError(f"{N} samples; a record needs at least 2", file=stamps.file)
     step = np.diff(t)
     place: int | None = None
     if (step <= 0).any():
@@ -85,10 +85,10 @@ def rate_of(stamps: Stamps, t: Array) -> float:
         tolerance = RATE_TOLERANCE + 2 * stamps.jitter / (N - 1)
         off_grid = np.abs(t - t[0] - np.arange(N) / rate).max() * rate
         if stamps.rate is not None and abs(rate / stamps.rate - 1) > tolerance:
-            message = f"time runs at {rate:g} Hz, record.rate is {stamps.rate:g} Hz; correct one, or the unit of time"
+            message = f"time runs at {rate:g} Hz, but record.rate is {stamps.rate:g} Hz; correct record.rate, the time or the unit of time"
         elif off_grid > stamps.jitter:
             place = int(np.argmax(np.abs(step * rate - 1))) + 1
-            message = f"time is not uniform: off the grid by up to {off_grid:.3g} sampling periods, step {step[place - 1]:g} s here, {1 / rate:g} s on average"
+            message = f"time is not uniform: up to {off_grid:.3g} sampling periods off the uniform grid; the step is {step[place - 1]:g} s here and {1 / rate:g} s on average"
         else:
             return stamps.rate or rate
     resample: dict[str, Any] | None = None
@@ -146,7 +146,7 @@ def remedy_text(t: Array, stamps: TimeStamps, *, arrays: bool = False) -> str:
         does.append(f"bridges gaps of up to {settings['longest']:g} periods by interpolation")
     written = ", ".join(f"{key}: {value}" for key, value in settings.items())
     uniform = "{gaps: split, method: count}" if "gaps" in settings else "{method: count}"
-    return f"{count} record.resample: {{{written}}} {' and '.join(does) or 'interpolates at the stamps'}. Where samples are uniform and their stamps alone are not: record.resample: {uniform}, or record.rate: {rate:.6g} without columns.t"
+    return f"{count} record.resample: {{{written}}} {' and '.join(does) or 'interpolates at the stamps'}. If the samples are uniform and only their stamps are not: record.resample: {uniform}, or record.rate: {rate:.6g} without columns.t"
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from runtime.core.errors import encodable
 
 
 class Result:
-    """Base class of dataclasses that hold results: it gives each of them a text and a JSON text.
+    """Base class of result dataclasses, with functions that write a result as text and as JSON.
 
         class Delay(Result, keys="joints shift")
 
@@ -37,13 +37,13 @@ class Result:
         return str(text())
 
     def summary(self) -> dict[str, Any]:
-        """Return the content of the JSON text as a mapping."""
+        """Return the result as a mapping: the content of its JSON text."""
         head = {} if self._schema is None else {"schema": self._schema}
         names = [word.partition(":") for word in self._keys.split() or self.__dataclass_fields__]
         return head | {key: getattr(self, name or key) for key, _, name in names}
 
     def to_json(self) -> str:
-        """Write the summary as JSON text."""
+        """Write the result as JSON text."""
         return json_text(self.summary())
 
 

@@ -67,7 +67,7 @@ class Drives:
         if not all(np.isfinite(x).all() for x in (ratio, offset, constant)) or not constant.all():
             raise InputError(
                 "drives: ratio, offset and torque_constant must be finite, and no torque constant "
-                "zero"
+                "may be zero"
             )
         if not (np.diag(ratio).all() and np.linalg.matrix_rank(ratio) == n):
             raise InputError(
@@ -134,7 +134,7 @@ class Drives:
 
     @property
     def motion(self) -> Array:
-        """Motor turns per joint turn, shape (n, n): R, or only its diagonal if uncoupled."""
+        """Motor turns per joint turn, shape (n, n): R, or its diagonal if couplings are ignored."""
         return self._matrix("position")
 
     def _matrix(self, quantity: str) -> Array:
@@ -144,8 +144,7 @@ class Drives:
         x = np.asarray(x, dtype=float)
         if x.ndim != 2 or x.shape[1] != self.n:
             raise InputError(
-                f"drives of {self.n} joints given an array of shape {x.shape}; expected (N, "
-                f"{self.n})"
+                f"an array of shape {x.shape} for drives of {self.n} joints; expected (N, {self.n})"
             )
         return x
 
@@ -167,7 +166,7 @@ def encoder_drives(side: str, drives: Drives | None, section: str = "signals") -
 
 
 def encoder_root(drives: Drives | None, n: int) -> Array:
-    """Compute the matrix from encoder motion to joint motion, shape (n, n).
+    """Compute the matrix, shape (n, n), that converts encoder velocities to joint velocities.
 
     For encoders at the joints (drives None) it is the identity, for encoders at the motors R^-1.
     """

@@ -125,7 +125,7 @@ class DataUnavailableError(InputError):
 
 
 def instant(t: float) -> str:
-    """Write a time, s, for messages with six digits; times from 1e5 s on to the millisecond.
+    """Write a time, s, for messages: six digits; to the millisecond if it is 1e5 s or more.
 
     Time stamps that count from an epoch such as 1970 are that large.
     """

@@ -30,7 +30,7 @@ THRESHOLDS = (1.02, 1.03, 1.04, 1.05, 1.06, 1.07, 1.08, 1.09, 1.10)
 
 @dataclass(frozen=True)
 class Removal:
-    """One step of the elimination: the parameter of the largest %sigma, and whether it was removed.
+    """One step of the elimination: parameter with the largest %sigma, and whether it was removed.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class Essential(Result):
         return tuple(step.name for step in self.trail if step.removed)
 
     def to_table(self) -> str:
-        """Write the removals as a table, then the number of parameters for each threshold."""
+        """Write the removed parameters as a table, then how many are left at each threshold."""
         first = len(self.all_parameters.names)
         lines: list[Sequence[str]] = [("removed", "left", "%sigma", "sigma_rho ratio")]
         for k, step in enumerate(self.trail):
@@ -106,7 +106,7 @@ class Essential(Result):
         )
 
     def summary(self) -> dict[str, Any]:
-        """Return the content of `to_json` as a mapping."""
+        """Return the result as a mapping, for JSON."""
         return {
             "schema": 1,
             "names": self.names,
@@ -125,7 +125,7 @@ def essential_of(
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Essential:
-    """Find the essential parameters of an observation (section 4.1.1).
+    """Find the essential parameters of a system Y = W X + rho (section 4.1.1).
 
     Parameters
     ----------
@@ -162,12 +162,12 @@ def essential_of(
 
 
 def _removals(steps: Sequence[Removal], threshold: float) -> int:
-    """Count the removals before the first step whose ratio of sigma_rho reaches the threshold."""
+    """Count the parameters removed before sigma_rho reaches `threshold` times its first value."""
     return next((k for k, step in enumerate(steps) if not step.ratio < threshold), len(steps))
 
 
 def _trail(system: System, threshold: float) -> list[Removal]:
-    """Remove the parameter with the largest %sigma, again and again; return these removals.
+    """Remove the parameter with the largest %sigma, fit again, and repeat; return these removals.
 
     They end when the ratio of sigma_rho to its first value reaches `threshold`, or with one
     parameter left. A Removal has %sigma before the removal and the ratio after the removal.

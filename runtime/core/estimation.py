@@ -53,7 +53,7 @@ def observe_rows(problem: Problem) -> Observation:
 
 
 def observed_unseen(problem: Problem, k: int) -> Observation:
-    """Build the rows Y = W X + rho of the k-th record that is not fitted, k from 0."""
+    """Build the rows Y = W X + rho of validation record k, which is not fitted; k counts from 0."""
     alone = problem.changed(records=(problem.unseen[k],), unseen=())
     if "prepared_unseen" in vars(problem):
         alone.prepared[0].take_states(problem.prepared_unseen[k])
@@ -66,7 +66,7 @@ def estimated(
     settings: EstimateSettings | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Estimate:
-    """Estimate the parameters from the rows of a problem.
+    """Estimate the parameters from the rows Y = W X + rho of a prepared problem.
 
     settings : method of estimation; default: the settings of the problem.
     """

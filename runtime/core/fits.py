@@ -1,4 +1,4 @@
-"""Fits of all rows with all, the essential and the physical parameters, and their validation."""
+"""Estimates of all, of the essential and of the physical parameters, and their validation."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from runtime.core.validation import CrossValidation, cross_validation, split_val
 
 @dataclass(frozen=True)
 class Fits:
-    """Estimates from all rows of the records, one for each set of parameters.
+    """Estimates from all rows of the records, one for each set of parameters (essential, all, ...).
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Fits:
 
 
 def fit_problem(problem: Problem, observation: Observation, provenance: Mapping[str, Any]) -> Fits:
-    """Fit all parameters to the rows of a problem, then the essential ones."""
+    """Fit all parameters to the rows Y = W X + rho of a problem, then only the essential ones."""
     study, model = problem.settings, problem.model
     at("least squares, essential parameters")
     reduced = essential_of(
@@ -89,7 +89,9 @@ def validated(
     unseen: Mapping[str, Observation],
     name: str,
 ) -> tuple[Fits, tuple[CrossValidation, ...], tuple[str, ...]]:
-    """Predict data that were not fitted: windows or fifths of the records, then further records.
+    """Predict data that were not fitted: other parts of the records, then separate records.
+
+    The parts are time windows, or fifths of the records.
 
     Return three values: the fits, with the physical set if it may be used; the predictions; and
     sentences on the predictions or fits that failed. Fifths of the records are used if their halves
@@ -134,7 +136,7 @@ def _validation(
     choices: Mapping[Any, EstimateSettings],
     known: Mapping[Any, Estimate],
 ) -> tuple[tuple[CrossValidation, ...], tuple[str, ...]]:
-    """Validate sets of parameters between windows of the records, then on further records.
+    """Validate sets of parameters: predict other time windows of the records, then other records.
 
     Between windows, the sets `choices` are fitted again; on further records the estimates `known`,
     from all rows, are used. Return the validations, and sentences on those that failed.

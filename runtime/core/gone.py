@@ -10,14 +10,14 @@ RATIO = (
     "the columns are those of the motors"
 )
 WENT: Mapping[str, str] = {
-    "estimate.options.prior: entropic": "the distance entropic went; set euclidean, or none",
-    "estimate.method: tls": "total least squares went; set wls, and ask `symgen cestac --advise` what the encoder does to the estimate",
-    "estimate.method: cloe": "output error of the closed loop went; set didim, which reads the same records of the same loop",
+    "estimate.options.prior: entropic": "the distance entropic was removed; use euclidean or none",
+    "estimate.method: tls": "total least squares was removed; use wls, and `symgen cestac --advise` to see the effect of the encoder on the estimate",
+    "estimate.method: cloe": "output error of the closed loop was removed; use didim, which uses the same records of the same loop",
     "record.ratio": RATIO,
     "record.gear_ratio": RATIO,
-    "signals.lines": "lines of uneven encoders are no longer estimated; leave the key out: bounds are widened by their deviation",
-    "estimate.options.prior: pullback": "the distance pullback went; set euclidean, or none",
-    "stream": "gone, every record is read whole; remove the key, and cut a record that memory does not hold into shorter ones",
+    "signals.lines": "lines of uneven encoders are no longer estimated; remove this key: bounds are widened by the deviation of the lines",
+    "estimate.options.prior: pullback": "the distance pullback was removed; use euclidean or none",
+    "stream": "this setting was removed, every record is read whole; remove the key, and cut a record that is too large for the memory into shorter records",
 }
 """Messages for settings that are gone, by key ("stream") or by key and value
 ("estimate.method: tls"); keys of lists have no numbers ("record.resample").
@@ -25,7 +25,7 @@ WENT: Mapping[str, str] = {
 
 
 def gone(path: tuple[str | int, ...], value: Any) -> str | None:
-    """Return the sentence on a setting that is no longer used; None for any other setting.
+    """Return the message on a setting that was removed or moved; None for any other setting.
 
     Parameters
     ----------

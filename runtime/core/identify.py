@@ -125,7 +125,7 @@ def with_parts(
     extras: Sequence[Extra],
     progress: Callable[[str], None] = lambda label: None,
 ) -> Identification:
-    """Make further analyses of an identification, and add their results as parts.
+    """Make further analyses of an identification, and store the result of each as a Part.
 
     Each analysis uses the identification without the new parts.
     """

@@ -23,7 +23,7 @@ T = TypeVar("T")
 
 
 class Numbers:
-    """Annotation for pydantic: an array of floats, in JSON nested lists with null for nan.
+    """Type for pydantic: an array of floats, in JSON written as nested lists with null for nan.
 
     Parameters
     ----------
@@ -88,20 +88,23 @@ def from_text(kind: type[T], text: str, schema: str, file: str) -> T:
     given = data.get("schema") if isinstance(data, dict) else None
     if not isinstance(given, str) or given.partition("/")[0] != schema.partition("/")[0]:
         raise InputError(
-            f"its schema is {given!r:.60}; expected {schema!r}, as symgen writes it", file=file
+            f"the schema is {given!r:.60}; expected {schema!r}: give a file that symgen wrote",
+            file=file,
         )
     if given != schema:
         raise InputError(
-            f"has schema {given!r:.60}; this version reads {schema!r}: update symgen, or make the file again",
+            f"the schema is {given!r:.60}; this version of symgen reads {schema!r}: update symgen, or write the file again",
             file=file,
         )
     if missing := [f.name for f in fields(kind) if f.name not in data]:  # type: ignore[arg-type]
-        raise InputError(f"no {missing[0]!r}; the file is incomplete", file=file)
+        raise InputError(
+            f"no {missing[0]!r}, so the file is incomplete; write the file again", file=file
+        )
     try:
         result: T = TypeAdapter(kind).validate_python(data)
     except ValidationError as e:
         raise InputError(
-            f"{settings_error(e, data)}; the file was edited, or another version of symgen wrote it; make it again",
+            f"{settings_error(e, data)}; the file was edited, or another version of symgen wrote the file; write the file again",
             file=file,
         ) from e
     return result

@@ -1,4 +1,4 @@
-r"""LaTeX of an Estimate in the form of the chapter's Table 2, for \usepackage{booktabs}.
+r"""Parameter table of an Estimate in LaTeX, like Table 2 of the chapter (package booktabs).
 
 No name, unit or label is interpreted as LaTeX: a text without one of the known forms below is
 escaped, character by character.

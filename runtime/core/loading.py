@@ -1,4 +1,4 @@
-"""Loading of emitted files as Python modules, only if they can be trusted.
+"""Loading of emitted (generated) files as Python modules, only if they can be trusted.
 
     generated/tx40.py
 
@@ -24,11 +24,11 @@ from types import ModuleType
 from runtime.core.errors import ModelError
 
 KEY = 32  # digits of the SHA-256 that name a text in the cache
-UNTRUSTED = "is code that this installation has not emitted and certified; pass trust=True (--trust) if you would run any program of its author, or emit it here with `symgen generate`"
+UNTRUSTED = "is code that this installation has not emitted and certified; pass trust=True (--trust) if you trust the author of this file, or emit the model here with `symgen generate`"
 
 
 def cache_folder(of: str) -> Path:
-    """Return the path of the cache folder `of`, such as "modules" or "compiled".
+    """Return the path of one of the cache folders of symgen, for instance "modules" or "compiled".
 
     The folder is in SYMGEN_CACHE, if set, or in the cache folder of the platform.
     """
@@ -105,9 +105,12 @@ def run(text: str, path: Path) -> ModuleType:
     try:
         loader.exec_module(module)
     except ModuleNotFoundError as e:
-        raise ModelError(f"needs {e.name}, which is not installed", file=str(path)) from e
+        raise ModelError(
+            f"needs the package {e.name}, which is not installed; install this package",
+            file=str(path),
+        ) from e
     except Exception as e:  # whatever a broken file raises becomes one kind of error
         raise ModelError(
-            f"fails on import with {type(e).__name__}: {e}; emit it again", file=str(path)
+            f"fails on import with {type(e).__name__}: {e}; emit the model again", file=str(path)
         ) from e
     return module

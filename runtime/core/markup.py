@@ -35,7 +35,7 @@ class Markup(str):
 
 
 def element(tag: str, *children: str, **attributes: str) -> Markup:
-    """Make the HTML <tag attributes>children</tag>, with escaped texts and attribute values.
+    """Make the HTML element <tag attributes>children</tag>; texts and attribute values are escaped.
 
     `class_` becomes class, `aria_label` becomes aria-label.
     """
@@ -60,7 +60,10 @@ def split(name: str) -> tuple[str, str]:
 
 
 def symbol(name: str) -> Markup:
-    """Write a parameter in HTML with its subscript; a copy of this text is the name in one word."""
+    """Write the name of a parameter, such as ZZ1R, in HTML with its index as a subscript.
+
+    Text that is copied from the page has the name in one word.
+    """
     letter, subscript = split(name)
     return element("var", letter, *([element("sub", subscript)] if subscript else []))
 

@@ -22,7 +22,7 @@ COUNTS = (
 
 @dataclass(frozen=True, eq=False)
 class Missing:
-    """Marks of the samples of a record that have no position, for each recorded column.
+    """Which samples of a record have no position, for each recorded position column.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Missing:
         return self.samples if self.follows is not None else self.samples @ (drives.motion != 0).T
 
     def near_gaps(self, longest: int, reach: int) -> Array:
-        """Return a mask of the samples in or near long gaps, bool, shape (N,).
+        """Return a mask of the samples in or near long gaps of the positions, bool, shape (N,).
 
         A gap is long if it has more than `longest` samples; near means at most `reach` samples
         away.
@@ -116,7 +116,7 @@ def require_positions(missing: Missing | None, who: str, file: str, hint: str = 
         i, j = np.argwhere(missing.samples)[0]
         raise InputError(
             f"{missing.samples.sum()} positions are missing, the first of column {j + 1} at sample "
-            f"{i + 1}; {who} needs all of them: "
+            f"{i + 1}; {who} needs all positions: "
             f"repair or cut the record{f'; {hint}' if hint else ''}",
             file=file,
         )

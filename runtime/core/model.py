@@ -1,4 +1,4 @@
-"""The interface to emitted models: loading, checks, and tables such as joint units and elements.
+"""Interface to emitted (generated) models: loading, checks, and data such as the joint units.
 
 A model is a plain Python module written by the generator (NumPy only): `load_model("tx40")` loads
 generated/tx40.py of the current folder. A module is code: a file runs only if this installation has
@@ -69,7 +69,7 @@ class GeneratedModel(Protocol):
     casadi: Callable[..., Any]  # casadi.Function of a function of the module, by name
 
     def store(self, N: int) -> Array:
-        """Make an array for the argument `out` of the other functions, shape (b, n, N).
+        """Make a workspace array, shape (b, n, N), for the argument `out` of the other functions.
 
         Entries that are always zero are already zero in this array.
         """
@@ -91,7 +91,7 @@ class GeneratedModel(Protocol):
 def load_model(
     model: str | Path | ModuleType, *, folder: str | Path | None = None, trust: bool = False
 ) -> GeneratedModel:
-    """Load an emitted model and check it.
+    """Load an emitted (generated) robot model, and check it.
 
     Parameters
     ----------
@@ -123,8 +123,8 @@ def load_model(
             else []
         )
         raise ModelError(
-            f"no emitted model {path}; {path.parent} holds {', '.join(present) or 'none'}: emit it "
-            f"with `symgen generate {path.stem}`"
+            f"no emitted model {path}; {path.parent} contains {', '.join(present) or 'none'}: emit the "
+            f"model with `symgen generate {path.stem}`"
         )
     return checked_model(module_of(path, trust=trust))
 
@@ -139,7 +139,7 @@ def require_emitted(model: Any) -> None:
 
 
 def _reduced(module: ModuleType) -> tuple[Callable[..., ModuleType], tuple[Any, ...]]:
-    """Define how pickle sends a module to another process: an emitted module as its text.
+    """Return how pickle sends a module to another process: an emitted module is sent as its text.
 
     The receiving process trusts the sending one. Any other module is imported by its name. Raise
     InputError for an emitted module without a file.
@@ -149,7 +149,7 @@ def _reduced(module: ModuleType) -> tuple[Callable[..., ModuleType], tuple[Any, 
     file = getattr(module, "__file__", None)
     if not file:
         raise InputError(
-            "this model was not loaded from a file, which other processes need; use one process alone"
+            "other processes need a model that was loaded from a file, but this model was not; load the model from its file, or use one process"
         )
     loader = getattr(getattr(module, "__spec__", None), "loader", None)
     text = getattr(loader, "text", None)  # that runs here, whatever stands in the file by now
@@ -169,7 +169,7 @@ def checked_model(module: ModuleType) -> GeneratedModel:
     missing = [name for name in (*CONSTANTS, *FUNCTIONS) if not hasattr(module, name)]
     if missing:
         raise ModelError(
-            f"no {', '.join(missing)}; expected an emitted model, emit it again", file=label
+            f"no {', '.join(missing)}; expected an emitted model: emit the model again", file=label
         )
     model = cast(GeneratedModel, module)
     _check_names(model, label)
@@ -179,7 +179,7 @@ def checked_model(module: ModuleType) -> GeneratedModel:
         raise ModelError(
             (
                 f"{n} joints and {b} base parameters {model.BASE_PARAMETERS}; expected at least "
-                "one of each, names once"
+                "one joint and one parameter, each name once"
             ),
             file=label,
         )
@@ -204,23 +204,23 @@ def require(model: GeneratedModel, *functions: str) -> None:
     missing = [name for name in functions if not callable(getattr(model, name, None))]
     if "forward_dynamics" in missing and any(c.startswith(TRANSMITTED) for c in channels_of(model)):
         raise ModelError(
-            "no forward_dynamics: friction laws depend on tau_model, which depends on the accelerations",
+            "no forward_dynamics: friction laws depend on tau_model, which depends on the accelerations; remove these laws from the robot file",
             file=model.NAME,
         )
     if missing == ["casadi"]:
         raise ModelError(
-            "no casadi(): its loops are closed by iteration, which no CasADi expression can hold, or another version emitted the module; emit it again",
+            "no casadi(): the loops of this robot are closed by iteration, which CasADi cannot express, or another version of symgen emitted the model; in this case emit the model again",
             file=model.NAME,
         )
     if missing:
         raise ModelError(
-            f"no function {', '.join(missing)}; emit the model again with the target that has them",
+            f"no function {', '.join(missing)}; emit the model again with the target that contains these functions",
             file=model.NAME,
         )
 
 
 def drives_of(model: GeneratedModel) -> Drives | None:
-    """Return the drives of a model; None if it has none."""
+    """Return the drives of a robot model; None for a model without drives."""
     return None if model.DRIVES is None else Drives.from_mapping(model.DRIVES)
 
 
@@ -239,7 +239,7 @@ def constants_of(model: GeneratedModel, constants: Mapping[str, float]) -> dict[
 
 
 def channels_of(model: GeneratedModel) -> Mapping[str, tuple[str, ...]]:
-    """Return, for each channel, the base parameters that depend on this channel.
+    """Return, for each measured signal in the model (a temperature), the parameters that need it.
 
     A channel is a measured quantity in a law of the robot file, such as a temperature: a constant
     that is a function of time.
@@ -248,15 +248,16 @@ def channels_of(model: GeneratedModel) -> Mapping[str, tuple[str, ...]]:
 
 
 def require_no_channels(model: GeneratedModel, what: str) -> None:
-    """Raise InputError if laws of the model need measured signals, such as a temperature.
+    """Raise InputError if the model needs signals besides the motion, such as a temperature.
 
     Such signals are called channels. what : name of the caller, which has no such signals.
     """
     if channels := channels_of(model):
         names = sorted({name for own in channels.values() for name in own})
         raise InputError(
-            f"{what} does not have {', '.join(channels)}, which {', '.join(names)} of "
-            f"{model.NAME} need at every sample; remove these laws from the robot file"
+            f"{what} does not have the measured signals {', '.join(channels)}, which the laws of "
+            f"{', '.join(names)} of {model.NAME} need at every sample; remove these laws from the "
+            "robot file"
         )
 
 
@@ -283,7 +284,7 @@ def is_axis(joint: int | str) -> bool:
 def elements_of(
     model: GeneratedModel, constants: Mapping[str, float] | None = None
 ) -> Mapping[str, Any]:
-    """Return the elements of a model (friction, inertia, springs), by name of the parameter.
+    """Return the elements on the joints (friction, motor inertia, springs), by parameter name.
 
     An element gives the kind of its parameter, and the direction of motion on which it acts, by
     joint.
@@ -303,8 +304,8 @@ def elements_of(
     if not hasattr(model, table):
         raise ModelError(
             (
-                f"no {table}, the directions along which friction acts; emit it again with this version "
-                "of symgen"
+                f"no {table}, the directions along which friction acts; emit the model again with this "
+                "version of symgen"
             ),
             file=model.NAME,
         )
@@ -373,10 +374,12 @@ def _check_names(model: GeneratedModel, label: str) -> None:
         if not (isinstance(name, str) and re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII))
     ]:
         raise ModelError(
-            f"NAME or BASE_PARAMETERS hold {wrong[0]!r:.60}; expected identifiers", file=label
+            f"NAME or BASE_PARAMETERS contain {wrong[0]!r:.60}; expected identifiers", file=label
         )
     if strange := [j for j in model.JOINTS if type(j) is not int or j < 1]:
-        raise ModelError(f"JOINTS hold {strange[0]!r:.60}; expected numbers of joints", file=label)
+        raise ModelError(
+            f"JOINTS contain {strange[0]!r:.60}; expected joint numbers from 1", file=label
+        )
 
 
 def _check_store(model: GeneratedModel, b: int, n: int, label: str) -> None:
@@ -396,7 +399,8 @@ def _check_store(model: GeneratedModel, b: int, n: int, label: str) -> None:
             )
     except Exception as e:  # whatever a broken file raises becomes one kind of error
         raise ModelError(
-            f"fails on two samples at rest with {type(e).__name__}: {e}; emit it again", file=label
+            f"fails on two samples at rest with {type(e).__name__}: {e}; emit the model again",
+            file=label,
         ) from e
     if shape != (b, n, N):
         raise ModelError(f"store({N}) has shape {shape}; expected {(b, n, N)}", file=label)
@@ -411,7 +415,7 @@ def _check_store(model: GeneratedModel, b: int, n: int, label: str) -> None:
 
 
 def check_states(model: GeneratedModel, **states: Array) -> None:
-    """Raise InputError unless all states are real arrays of the same shape, (N, n) or (n,).
+    """Raise InputError unless the states (q, qd, ...) are real arrays of one shape, (N, n) or (n,).
 
     n is the number of joints of the model.
     """

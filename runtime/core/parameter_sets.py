@@ -1,4 +1,4 @@
-"""Sets of parameters of one robot: essential, feasible, all. Which set predicts unseen data best?
+"""Which set of parameters predicts unseen data best: essential, physically consistent or all?
 
     essential    fewest columns, the others zero
     feasible     all columns; values of a physically possible robot, close to the values of the
@@ -47,7 +47,7 @@ ORDER: tuple[SetName, ...] = ("essential", "feasible", "all")
 def least_squares_sets(
     settings: EstimateSettings, reduced: Essential
 ) -> tuple[dict[SetName, Estimate], dict[SetName, EstimateSettings]]:
-    """Return the estimates of the essential and of all parameters, and the settings of both sets.
+    """Return the estimates of the essential and of all parameters, and the settings that fit each.
 
     The method of estimation is linear.
     """
@@ -57,7 +57,7 @@ def least_squares_sets(
 
 
 def physical_asked(errors: Mapping[Any, float], first: bool) -> bool:
-    """Whether the physical set may be the set that is used, so that it has to be fitted.
+    """Whether to fit physically consistent parameters, which may be the set that is used.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def physical_possible(observation: Observation, settings: EstimateSettings, fit:
 
 
 def physical_set(problem: Problem, observation: Observation) -> tuple[Estimate, EstimateSettings]:
-    """Fit physically consistent parameters to all rows; also return settings for later fits.
+    """Fit physically consistent parameters to all rows; also return settings to fit only some rows.
 
     The settings are for fits of parts of the rows: they fix the prior, its weight and the bounds by
     reach as found from all rows.
@@ -136,7 +136,9 @@ def best_set(errors: Mapping[Any, float], essential: bool = False) -> SetName:
 
 
 def whole_set(names: Collection[SetName], model_columns: SetName) -> SetName:
-    """Return the name of the set to use if all base parameters are needed, as in a robot file.
+    """Name the set of parameters to use if values of all base parameters are needed.
+
+    A robot file, for instance, needs all of them.
 
     This is `model_columns`, the set that is used. If that is the essential set, it is the physical
     set if `names` has it, else "all".

@@ -1,4 +1,4 @@
-"""Results of further analyses of an identification: parts with texts, tables, figures and checks.
+"""Result of a further analysis of an identification: its texts, tables, figures and checks.
 
 Code that prints, judges, exports or reports an identification uses all its parts alike, and no part
 by name. An Extra makes a Part of an Identification (`runtime.core.identify`).
@@ -44,11 +44,11 @@ class Figure:
     columns : int
         Largest number of panels in a row.
     cell : (float, float), inch
-        Width and height of a panel; `extra` is added to the height of all, and the whole is at least
-        `least` wide.
+        Width and height of a panel; `extra` is added to the height of all, and the whole is at
+        least `least` wide.
     legend : int
-        Number of columns of the common legend above the panels, whose letters have `letters` points;
-        0: no legend.
+        Number of columns of the common legend above the panels, whose letters have `letters`
+        points; 0: no legend.
     logarithmic : bool
         Whether both axes of every panel are logarithmic.
     x, y : str
@@ -101,40 +101,43 @@ class Part:
         return False
 
     def text(self) -> str:
-        """Return the text of the part: paragraphs, one per line."""
+        """Return the text on this analysis: paragraphs, one per line."""
         return ""
 
     def brief(self) -> str:
-        """Return a shorter text of the part, for a short print."""
+        """Return a shorter text on this analysis, for a short print."""
         return ""
 
     def warnings(self) -> Sequence[str]:
-        """Return sentences that the user should read before the values are used."""
+        """Return sentences that the user should read before the parameter values are used."""
         return ()
 
     def tables(self) -> Sequence[Table]:
-        """Return tables, which are printed after the text."""
+        """Return the tables of this analysis, which are printed after its text."""
         return ()
 
     def figures(self) -> Sequence[Figure]:
-        """Return figures for a report."""
+        """Return the figures of this analysis, for a report."""
         return ()
 
     def checks(self) -> Sequence[Check]:
-        """Return checks for the verdict."""
+        """Return the checks of this analysis, which count in the verdict."""
         return ()
 
     def summary(self) -> Any:
-        """Return the part as a mapping for JSON; None if it has no entry there."""
+        """Return this result as a mapping for estimate.json; None if it has no entry there."""
         return None
 
     def entries(self) -> Mapping[str, Any]:
-        """Return the entries of estimate.json by key: the summary, if there is one."""
+        """Return the entries that this analysis adds to estimate.json, by key.
+
+        Default: the summary under the name of the part.
+        """
         summary = self.summary()
         return {} if summary is None else {self.name: summary}
 
     def files(self) -> Mapping[str, str]:
-        """Return the texts of further files to write, by file name."""
+        """Return the text files that this analysis writes: their contents, by file name."""
         return {}
 
     def arrays(self) -> Mapping[str, Mapping[str, np.ndarray]]:
@@ -143,7 +146,7 @@ class Part:
 
 
 def printed(part: Part) -> str:
-    """Write the title, the text and the tables of a part; "" if it has neither text nor table."""
+    """Write the title, text and tables of an analysis (Part); "" without text and tables."""
     tables = [table.to_text() for table in part.tables()]
     shown = "\n\n".join(text for text in (part.text(), *tables) if text)
     return f"{part.title}\n{shown}" if shown else ""

@@ -88,7 +88,7 @@ class Problem:
             require_kind(record, Record, "record", RECORD_EXPECTED)
             if record.n != n:
                 raise InputError(
-                    f"{record.n} joints; {self.model.NAME} has {n}: a record of another robot, or of some of its joints",
+                    f"the record has {record.n} joints, but {self.model.NAME} has {n}; give a record of all joints of this robot",
                     file=record.file,
                 )
 
@@ -103,7 +103,7 @@ class Problem:
         return tuple(self.reading(record) for record in self.unseen)
 
     def reading(self, record: Record) -> Prepared:
-        """Prepare one record for filtering by the settings.
+        """Combine a record with the settings and the function that compute its states q, qd, qdd.
 
         A record without drives gets those of the model.
         """
@@ -118,12 +118,12 @@ class Problem:
         return self.methods[self.settings.estimate.method]
 
     def noted(self, kind: str) -> Note | None:
-        """Find the first note of this kind; None if there is none."""
+        """Return the first message (note) on the subject `kind`; None if there is no message."""
         return next((note for note in self.notes if note.kind == kind), None)
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Names, hashes and clocks of the records, and the data of the notes, for JSON."""
+        """Names and time stamps of the records, and data from the preparation steps, for JSON."""
         automatic = " ".join(note.text for note in self.notes if note.kind == SIGNALS)
         entries = {**origin(self.records), **({"lowpass": automatic} if automatic else {})}
         for note in self.notes:
@@ -131,7 +131,7 @@ class Problem:
         return entries
 
     def changed(self, *notes: Note, **changes: Any) -> Problem:
-        """Copy the problem with other fields and further notes.
+        """Copy the problem with new values of some fields and with further messages (notes).
 
         Filtered states are reused for records whose positions and signals do not change.
         """

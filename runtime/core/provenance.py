@@ -50,7 +50,10 @@ def processor() -> str:
 
 
 def cpuinfo(*starts: str) -> str:
-    """Return the first line of the processor information with one of these starts; "" if none."""
+    """Return the first line of the processor information that begins with a text of `starts`.
+
+    Return "" if there is no such line.
+    """
     info = Path("/proc/cpuinfo")
     text = info.read_text(errors="replace") if info.is_file() else platform.processor()
     return next((line for line in text.splitlines() if line.startswith(starts)), "")

@@ -36,7 +36,7 @@ FINITE = float(np.finfo(float).max)
 
 @dataclass(frozen=True, eq=False)
 class Origin:
-    """Source of a record: files, clock and drives.
+    """Source of a record: its files, time stamps and drives, and whether it was simulated.
 
     Attributes
     ----------
@@ -141,7 +141,9 @@ class Record:
         **named: ArrayLike | None,
     ) -> None:
         if unknown := sorted(named.keys() - {*JOINT_CHANNELS}):
-            raise TypeError(f"{unknown[0]}; a record is given {', '.join(JOINT_CHANNELS)} by name")
+            raise TypeError(
+                f"unexpected argument {unknown[0]}; expected some of {', '.join(JOINT_CHANNELS)}"
+            )
         require_kind(name, str, "name", "a text")
         require_kind(channels, (Mapping, type(None)), "channels", "a mapping of names to arrays")
         require_kind(origin, (Origin, type(None)), "origin", "an Origin")
@@ -158,15 +160,15 @@ class Record:
         N = len(given["t"]) if given["t"].ndim == 1 else -1
         if given["q"].ndim != 2 or given["q"].shape != given["tau"].shape or len(given["q"]) != N:
             text = ", ".join(f"{label} {shapes[label]}" for label in ("t", "q", "tau"))
-            raise InputError(f"{text}; expected (N,), (N, n), (N, n)", file=file)
+            raise InputError(f"{text}; expected the shapes (N,), (N, n), (N, n)", file=file)
         if N < LIMIT.FEWEST_SAMPLES:
             raise InputError(
-                f"{N} samples; a record has at least {LIMIT.FEWEST_SAMPLES}", file=file
+                f"{N} samples; a record needs at least {LIMIT.FEWEST_SAMPLES}", file=file
             )
         for label, x in given.items():
             if label != "t" and x.shape != given["q"].shape:
                 raise InputError(
-                    f"{label} {shapes[label]}, q {given['q'].shape}; expected the same",
+                    f"{label} {shapes[label]}, q {given['q'].shape}; expected the same shape",
                     file=file,
                 )
         others = {**(channels or {}), **named}
@@ -213,7 +215,7 @@ class Record:
 
     @cached_property
     def torque(self) -> Array:
-        """Torques for the model, shape (N, n), N m or N: tau without the known torques."""
+        """Torques that the model explains, shape (N, n), N m or N: tau minus the known torques."""
         return self.tau if self.tau_known is None else self.tau - self.tau_known
 
     def moved(self, q: Array, **changes: Any) -> Record:
@@ -226,13 +228,13 @@ class Record:
 
     @property
     def subtracted(self) -> str:
-        """Sentence about the known torques that are subtracted from tau; "" without known torques."""
+        """Sentence on known torques (e.g. of a counterbalance) subtracted from tau; "" if none."""
         known = self.tau_known
         return known_text(None if known is None else np.abs(known).max(axis=0), self.origin.joints)
 
     @property
     def files(self) -> Mapping[str, str]:
-        """SHA-256 of the files, by name."""
+        """SHA-256 hash of each file of the record, by file name."""
         return self.origin.files
 
     @property
@@ -293,24 +295,28 @@ def _missing(
         missing = Missing(samples[:, None] if samples.ndim == 1 else samples)
     if missing.samples.shape != shape or missing.samples.dtype != np.bool_:
         raise InputError(
-            f"missing {missing.samples.dtype} {missing.samples.shape}; expected bool {shape}, as q",
+            f"missing {missing.samples.dtype} {missing.samples.shape}; expected bool {shape}, the shape of q",
             file=file,
         )
     return missing if missing.samples.any() else None
 
 
 def _marks(missing: Any, file: str) -> Array:
-    """Convert the marks of missing positions to an array, of any dtype."""
+    """Convert the marks of missing positions to an array; InputError for rows of unequal length."""
     try:
         return np.array(missing)
     except Exception as e:  # ragged
-        raise InputError("missing is ragged; expected marks in the shape of q", file=file) from e
+        raise InputError(
+            "missing has rows of different lengths; expected bool values in the shape of q",
+            file=file,
+        ) from e
 
 
 def known_text(largest: Array | None, joints: Sequence[str]) -> str:
-    """Write a sentence on the known torques that are subtracted from tau; "" for None.
+    """Write a sentence on known torques (of a counterbalance, ...) that are subtracted from tau.
 
-    largest : their largest absolute values, shape (n,).
+    Return "" if `largest` is None. largest : largest absolute value of the known torque of each
+    joint, shape (n,).
     """
     if largest is None:
         return ""

@@ -35,7 +35,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Whiteness:
-    """Whiteness of the residuals of one joint.
+    """Whiteness (independence) of the residuals of one joint: correlation, test and spectrum.
 
     Attributes
     ----------
@@ -126,7 +126,7 @@ def joint_whiteness(joint: JointComparison, rate: float, lags: int = LIMIT.LAGS)
 
 
 def residual_correlation(residual: Array) -> Array:
-    """Compute the autocorrelation rho_k, k = 1 ... N - 1, of residuals at equal distances.
+    """Compute the autocorrelation rho_k, k = 1 ... N - 1, of equally spaced residuals.
 
     residual : shape (N,).
     """
@@ -158,7 +158,7 @@ def correlation_time(rho: Array) -> float:
 
 
 def effective_share(joints: Sequence[Whiteness]) -> float:
-    """Return the effective number of rows divided by the number of rows, for all joints together.
+    """Compute the number of effective (independent) rows as a fraction of all rows of all joints.
 
     The result is at most 1.
     """
@@ -166,7 +166,7 @@ def effective_share(joints: Sequence[Whiteness]) -> float:
 
 
 def unseen_by_blocks(observation: Observation, fit: Estimate) -> float:
-    """Compute the factor by which the corrected variance of a parameter is too small.
+    """Compute the factor by which variances from blocks of time are too small for slow residuals.
 
     The corrected variance assumes that blocks of L seconds are independent. With residuals that are
     correlated as exp(-t/tau), the factor is
@@ -208,7 +208,7 @@ def _lagged_sums(x: Array, place: Array, starts: Array) -> tuple[Array, Array]:
 def p_value(
     squares_first: float, squares: float, terms_first: int, terms: int, count: float
 ) -> float:
-    """Compute the probability of the F-test of a model with more terms against the first model.
+    """Compute the p-value of an F-test: does a model with more terms fit better than the first one?
 
     squares_first, squares : sums of squared residuals of both models. terms_first, terms : numbers
     of terms. count : number of independent samples.

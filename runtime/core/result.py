@@ -102,18 +102,18 @@ class Identification:
         return next((part for part in self.parts if part.name == name), None)
 
     def with_part(self, part: Part) -> Identification:
-        """Copy the identification and add a part; a part of the same name is replaced."""
+        """Copy the identification and add, or replace, the result (part) of one analysis."""
         others = [other for other in self.parts if other.name != part.name]
         return replace(self, parts=(*others, part))
 
     @property
     def model(self) -> GeneratedModel:
-        """The model with fitted constants of laws, and with axes of force sensors if any."""
+        """The robot model, with fitted constants of its laws and added axes of force sensors."""
         return self.problem.model
 
     @property
     def study(self) -> Study:
-        """All settings; file names are relative to the current folder."""
+        """All settings of the identification; file names are relative to the current folder."""
         return self.problem.settings
 
     @property
@@ -177,7 +177,7 @@ class Identification:
 
     @property
     def by_records(self) -> bool:
-        """Whether the sets of parameters are compared on separate records.
+        """Whether the sets of parameters are compared on separate validation records.
 
         If not, they are compared on parts of the fitted records.
         """
@@ -203,7 +203,7 @@ class Identification:
 
     @property
     def whole_estimate(self) -> Estimate:
-        """Estimate of all base parameters, for a robot file or a program.
+        """Estimate of all base parameters, to be written to a robot file or used in a program.
 
         It is `model_estimate`, or the physical set if the essential set is used.
         """
@@ -213,7 +213,7 @@ class Identification:
 
     @cached_property
     def written_sets(self) -> Mapping[SetName, Estimate]:
-        """Estimates of `sets`, with the physical set added if the essential set is used.
+        """Estimates by set of parameters; a physical set is added if the essential set is used.
 
         A robot file or a program needs all parameters, which the essential set does not have.
         """
@@ -239,13 +239,13 @@ class Identification:
 
     @cached_property
     def record_errors(self) -> tuple[RecordError, ...]:
-        """Error of each record with the used parameters; empty if there is one record only."""
+        """Relative error of each fitted record with the used parameters; empty for one record."""
         names = record_names(self.records)
         return record_errors(self.observation, self.model_estimate, names) if len(names) > 1 else ()
 
     @cached_property
     def time_stamps(self) -> tuple[str, ...]:
-        """Remarks on the records: time stamps, subtracted known torques, low-pass filter, findings.
+        """Sentences on the records: time stamps, subtracted torques, low-pass filter, findings.
 
         Findings are sentences of the readers and the steps.
         """
@@ -264,7 +264,7 @@ class Identification:
 
     @property
     def prediction_error(self) -> float:
-        """Largest relative error, %, of `model_estimate` on data that were not fitted.
+        """Largest relative error, %, of the used parameters on data that were not fitted.
 
         These data are the validation records, or else parts of the records; nan without such data.
         """
@@ -348,12 +348,12 @@ class Identification:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences to read before the values are used, also about correlated parameters."""
+        """Sentences to read before the values are used, also on correlated parameters."""
         return (*self.own_warnings, *self.correlations.warnings)
 
     @property
     def own_warnings(self) -> tuple[str, ...]:
-        """Warnings about single joints and from the parts, but not about correlations.
+        """Warnings about single joints and from further analyses, without those about correlations.
 
         Joints are named that have no rows, that have negative friction or motor inertia, or that
         lost their parameters in the elimination.
@@ -435,7 +435,7 @@ class Identification:
         return "\n".join([head, *lines[:room], f"Unexplained by joint: {by_joint}"])
 
     def _lines(self, names: Sequence[str]) -> list[str]:
-        """Write the values of these parameters with 95 % intervals and units, several per line."""
+        """Write values with 95 % intervals and units, several parameters per line."""
         fit = self.model_estimate
         k = [fit.names.index(name) for name in names]
         units = [fit.units.get(name, "") for name in names]
@@ -490,7 +490,7 @@ class Identification:
         )
 
     def motion_table(self) -> Table:
-        """Table of the simulated minus the measured motion of each joint.
+        """Make a table of the difference between simulated and measured motion, joint by joint.
 
         It is empty unless the method simulates the closed loop.
         """
@@ -516,7 +516,7 @@ class Identification:
         return json_text({**json.loads(self.estimate.to_json()), **self.summary()})
 
     def summary(self) -> dict[str, Any]:
-        """Return the entries of estimate.json besides those of the Estimate of all parameters."""
+        """Return the entries that estimate.json has besides the Estimate of all parameters."""
         fit = self.essential.estimate
         summary: dict[str, Any] = {
             "essential": {

@@ -53,7 +53,7 @@ LIMITS = {
 
 
 class Written:
-    """Annotation of a type that a study file may write in several forms, for its JSON Schema.
+    """Annotation, for the JSON Schema, of a type whose values a file may write in several forms.
 
     For instance, a number may also be written as a text.
 
@@ -129,7 +129,7 @@ Many = Annotated[
 
 
 def require(ok: bool, message: str, *path: str | int) -> None:
-    """Raise SettingsError about the key at `path` unless `ok` is true.
+    """Raise SettingsError for the setting at `path` (its keys) if the condition `ok` is false.
 
     In __post_init__, `path` starts at the settings that call this function.
     """
@@ -220,7 +220,7 @@ class Settings(metaclass=SettingsType):
 
 
 def _with_limits(schema: Any) -> Any:
-    """Rename the limits of pydantic in a JSON Schema: "ge" becomes "minimum", and so on."""
+    """Rename the limits of pydantic to those of JSON Schema: "ge" becomes "minimum", and so on."""
     if isinstance(schema, dict):
         return {LIMITS.get(key, key): _with_limits(value) for key, value in schema.items()}
     return [_with_limits(item) for item in schema] if isinstance(schema, list) else schema
@@ -255,7 +255,7 @@ def structure(cls: type[T], value: Any, path: Path = ()) -> T:
 
 
 def _value_at(path: Path, value: Any) -> Any:
-    """Return the value at these keys of a mapping from a file; None if there is no such key."""
+    """Return the value to which the keys `path` lead in nested mappings; None without a value."""
     for key in path:
         if isinstance(value, Mapping):
             value = (

@@ -37,7 +37,7 @@ EXPECTED = {  # by the type of an error of pydantic
 
 
 def shown(value: Any) -> str:
-    """Return the first 80 characters of the Python text of a value, on one line."""
+    """Write a value as Python prints it (repr), on one line of at most 80 characters."""
     return " ".join(repr(value).split())[:80]
 
 
@@ -60,7 +60,7 @@ def settings_error(error: ValidationError, given: Any, path: Path = ()) -> Setti
 
 
 def _problem(details: ErrorDetails, given: Any) -> tuple[Path, str]:
-    """Return the path and the reason of one error of pydantic.
+    """Return the keys at which pydantic found one error, and the reason as text.
 
     The path has the keys of `loc` without the members of unions, which are not keys.
     """

@@ -16,7 +16,7 @@ SIGNED = ("inertia", "viscous", "coulomb", "dissipative")
 
 
 def is_form(acts: Mapping[Any, float]) -> bool:
-    """Whether an element of a model, such as a spring, is a quadratic form q'Bq.
+    """Whether an element on the joints, such as a spring, is given by a quadratic form q'Bq.
 
     Other elements act along a combination s = G q of joints. acts : coefficients of the element, by
     joint; in a quadratic form by pair of joints.

@@ -43,7 +43,7 @@ SCHEMA = 1
 
 def version(number: int) -> int:
     """Return the version of a study file; raise SettingsError for a version that cannot be read."""
-    require(number == SCHEMA, f"schema {number}; this version reads {SCHEMA}")
+    require(number == SCHEMA, f"schema {number}; this version of symgen reads schema {SCHEMA}")
     return number
 
 
@@ -61,8 +61,8 @@ class Lowpass(Settings):
     ----------
     cutoff : float or str, Hz
         Cutoff frequency; auto: from the motion and the noise of the records
-        (`runtime.core.signals.cutoff`), twice that for counts, at most 50, as in the chapter, and 50
-        if there is no record.
+        (`runtime.core.signals.cutoff`), twice that for counts, at most 50, as in the chapter, and
+        50 if there is no record.
     order : int
         Order of the filter.
     on : tuple of str
@@ -78,12 +78,12 @@ class Lowpass(Settings):
 
     @property
     def hertz(self) -> float:
-        """Cut-off frequency as a number, Hz; for "auto" that of the chapter, 50 Hz."""
+        """Cut-off frequency as a number, Hz; "auto" gives 50 Hz, the value of the chapter."""
         return CHAPTER_CUTOFF if self.cutoff == "auto" else float(self.cutoff)
 
 
 class Decimate(Settings):
-    """Parallel decimation of Y and of every column of W: filter, then one sample kept in `factor`.
+    """Decimation of Y and of every column of W: low-pass filter, then one sample in `factor`.
 
     The filter is Chebyshev I of order 8, 0.05 dB, 0.8/factor, zero phase.
 
@@ -118,17 +118,17 @@ class Signals(Settings):
         Decimation; null switches it off.
     reader : str
         Treatment of positions before the low-pass. lowpass: positions are used as they are. counts:
-        positions are counts of an encoder, which bound the motion; no median is needed. static: each
-        row is a pose at rest, with the mean of its torques; then there is no filter, no decimation
-        and no trim, whatever their settings are.
+        positions are counts of an encoder, which bound the motion; no median is needed. static:
+        each row is a pose at rest, with the mean of its torques; then there is no filter, no
+        decimation and no trim, whatever their settings are.
     step : float or tuple of float or None, rad or m
         Step of the encoders, for counts; null: from the record.
     side : str
         Side of the encoders, for counts: joint, or motor by the drives of the robot.
     velocity : str or float or tuple of float, Hz
         Use of recorded velocities (record.columns.qd), for reader lowpass: the frequency from which
-        they replace differences of q. auto: the frequency at which both have the same noise; they are
-        not used if they disagree with the positions. differences: they are not used.
+        they replace differences of q. auto: the frequency at which both have the same noise; they
+        are not used if they disagree with the positions. differences: they are not used.
     torque_median : int or str
         Window of the median filter on torques; auto: as on positions, but no filter if it would
         remove torque that belongs to the motion, as from a controller that answers every count
@@ -155,7 +155,7 @@ class Signals(Settings):
         ):
             require(
                 self.reader == "counts" or not given,
-                f"given, but reader is {self.reader}; it is a setting of reader: counts",
+                f"given, but reader is {self.reader}; set reader: counts, or remove this key",
                 key,
             )
         if self.reader == "static":
@@ -165,12 +165,12 @@ class Signals(Settings):
 
     @property
     def window_of_torques(self) -> int:
-        """Window of the median filter on torques, in samples; for "auto", that on positions."""
+        """Median window for torques, in samples; for "auto", the window for positions."""
         return self.median if isinstance(self.torque_median, str) else self.torque_median
 
     @property
     def admits_missing(self) -> bool:
-        """Whether positions of a record may be missing, because the counts reader bridges them."""
+        """Whether records may lack positions at some samples, as the reader `counts` allows."""
         return self.reader == "counts"
 
 
@@ -195,7 +195,7 @@ class Rows(Settings):
 
 
 class EstimateSettings(Settings):
-    """Method of estimation, weights and columns.
+    """Method of estimation, weights of the rows, and columns of W that are fitted.
 
     Attributes
     ----------
@@ -303,27 +303,27 @@ class CestacSettings(Settings):
         law, loop = self.rounding, self.place == "loop"
         require(
             not self.uneven or law == "phase",
-            f"{self.uneven} with rounding: {law}; uneven lines belong to rounding: phase",
+            f"{self.uneven} with rounding: {law}; uneven lines need rounding: phase",
             "uneven",
         )
         require(
             not (self.common and law == "phase"),
-            "the phase of rounding: phase is drawn anew for every step; set common: false",
+            "rounding: phase draws a new phase for every step; set common: false",
             "common",
         )
         require(
             not loop or law == "phase",
-            f"{law} with place: loop; the encoder in the loop rounds by the law phase alone",
+            f"{law} with place: loop; expected phase, the only rounding of an encoder in the loop",
             "rounding",
         )
         require(
             not (loop and self.uneven),
-            f"{self.uneven} with place: loop; the encoder in the loop has even lines",
+            f"{self.uneven} with place: loop; the encoder in the loop has even lines: remove uneven",
             "uneven",
         )
         require(
             not (loop and self.torque),
-            "with place: loop; steps of the torque there are controller.torque.step",
+            "given with place: loop; remove torque, and set torque steps in controller.torque.step",
             "torque",
         )
 

@@ -1,4 +1,4 @@
-"""Tests of the assumptions behind eqs. (9)-(11) and behind the threshold 1.04, on the record.
+"""Tests of the assumptions behind eqs. (9)-(11) and behind the threshold 1.04 on sigma_rho.
 
     bootstrap     blocks of time are drawn again with replacement, least squares each time: this
                   gives standard deviations without the assumption of independent residuals, to
@@ -75,14 +75,14 @@ class BlockBootstrap:
 
     @property
     def ratio(self) -> Array:
-        """Standard deviation of the bootstrap divided by that of eq. (10), shape (b,)."""
+        """Standard deviations from the bootstrap divided by those from eq. (10), shape (b,)."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(self.drawn / self.sigma)
 
 
 @dataclass(frozen=True)
 class FTest:
-    """F-test of one removed parameter.
+    """F-tests after the removal of one parameter: do the removed parameters have an effect?
 
     Attributes
     ----------
@@ -142,7 +142,7 @@ class Uncertainty(Result):
 
     @property
     def kept_by_f_test(self) -> int:
-        """Number of parameters left before the first significant removal."""
+        """Number of parameters left before the first removal that an F-test finds significant."""
         return self.all_count - next(
             (k for k, test in enumerate(self.f_tests) if test.significant), len(self.f_tests)
         )
@@ -180,7 +180,7 @@ class Uncertainty(Result):
 
     @property
     def too_short(self) -> str:
-        """Sentence that the residuals are correlated for longer than a block, and a remedy."""
+        """Sentence with a remedy, for residuals that are correlated for longer than a block."""
         return (
             f"The residuals remember {self.memory:.2g} s, the blocks last "
             f"{self.bootstrap.length:.2g} s: the corrected deviations may be too small. Find what "
@@ -189,15 +189,15 @@ class Uncertainty(Result):
         )
 
     def to_table(self) -> str:
-        """Write the sentences of the verdict, then all tables."""
+        """Write the results of the tests as sentences, then as tables."""
         return "\n\n".join(["\n".join(self.verdict), *(own.to_text() for own in self.tables())])
 
     def to_text(self) -> str:
-        """Write the verdict, the standard deviations and the residuals by joint."""
+        """Write the results of the tests, the standard deviations and the residuals by joint."""
         return "\n\n".join(["\n".join(self.verdict), *(own.to_text() for own in self.tables()[:2])])
 
     def tables(self) -> tuple[Table, ...]:
-        """Return four tables: standard deviations, residuals, F-tests and sets by threshold."""
+        """Return four tables: standard deviations, residuals, F-tests, parameters by threshold."""
         drawn = self.bootstrap
         deviations = (drawn.sigma, drawn.corrected, drawn.drawn)
         columns = [[f"{x:.3g}" for x in own] for own in deviations]
@@ -267,7 +267,7 @@ def uncertainty(
     essential: Essential,
     comparison: Sequence[JointComparison],
 ) -> Uncertainty:
-    """Test the essential parameters of an observation: bootstrap, whiteness, F-tests, thresholds.
+    """Test the essential parameters of a fit: bootstrap, whiteness, F-tests, other thresholds.
 
     Parameters
     ----------
@@ -300,7 +300,7 @@ def block_bootstrap(
     runs: int = LIMIT.BOOTSTRAP_RUNS,
     seed: int = SEED,
 ) -> BlockBootstrap:
-    """Compute standard deviations of `fit` by a bootstrap over blocks of time.
+    """Compute the standard deviations of an estimate by a bootstrap over blocks of time.
 
     runs : number of draws. The weights of the rows do not change.
     """
@@ -345,7 +345,7 @@ def f_tests(essential: Essential, share: float = 1.0) -> tuple[FTest, ...]:
 
 
 def sets(essential: Essential) -> tuple[tuple[float, int, tuple[str, ...]], ...]:
-    """Compare the essential parameters at each threshold with the set that is used.
+    """Compare the essential parameters at each threshold with those at the threshold that is used.
 
     Return for each threshold: the threshold, the number of parameters left, and the names that
     differ from the used set ("-": removed in addition, "+": not removed).

@@ -67,7 +67,7 @@ class JointComparison:
 
 
 def direct_comparison(observation: Observation, fit: Estimate) -> tuple[JointComparison, ...]:
-    """Compare the measured torques with W X of the Estimate, for each joint, row by row."""
+    """Compare the measured torques Y with the predicted W X, row by row, for each joint."""
     missing = [name for name in fit.names if name not in observation.names]
     if missing:
         raise InputError(
@@ -161,7 +161,7 @@ class CrossValidation(Result):
         return "\n".join([self.table().caption, self.table().to_text(), *self.missing])
 
     def summary(self) -> dict[str, Any]:
-        """Return the content of `to_json` as a mapping."""
+        """Return the validation as a mapping, for JSON."""
         return {
             "schema": 1,
             "joints": self.joints,
@@ -203,7 +203,7 @@ class RecordError:
 def record_errors(
     observation: Observation, fit: Estimate, names: Sequence[str]
 ) -> tuple[RecordError, ...]:
-    """Compute the error of each record with the parameters of `fit`.
+    """Compute the relative error of each record with the parameters of one common fit.
 
     names : names of the records, in the order of `observation`.
     """
@@ -224,7 +224,7 @@ def cross_validation(
     fitted: Mapping[Any, Estimate] | None = None,
     further: bool = False,
 ) -> CrossValidation:
-    """Fit every set of parameters to one observation, and predict other observations.
+    """Fit every set of parameters to some rows Y = W X + rho, and predict Y of other rows.
 
     A set whose fit fails is left out, with a sentence in `missing`.
 
@@ -344,7 +344,7 @@ class WeakDirections(Result, keys="threshold pairs groups directions", schema=1)
         return tuple(sentences)
 
     def tables(self, name: Callable[[str], str] = str) -> list[Table]:
-        """Return a table of the correlated pairs (if any) and a table of the weak directions.
+        """Return a table of correlated pairs (if any) and one of badly determined combinations.
 
         name : function that writes the name of a parameter.
         """

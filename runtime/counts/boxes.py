@@ -66,7 +66,7 @@ determined jerks; the least share of a window's density in that of the record.
 
 @dataclass(frozen=True)
 class Errors:
-    """Errors of the counts and time stamps of an encoder besides rounding, as rms values.
+    """Root mean square errors of the counts and time stamps of an encoder, besides rounding.
 
     `count` is the error of a count in steps, `time` the error of a time stamp in sampling periods.
     """
@@ -75,13 +75,13 @@ class Errors:
     time: float = 0.0
 
     def variance(self, speed: Array) -> Array:
-        """Compute the variance of the errors, in steps^2, at speeds in steps per sample."""
+        """Compute the variance of position errors, in steps^2, at speeds in steps per sample."""
         return np.asarray(self.count**2 + (self.time * speed) ** 2)
 
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """The motion estimated from the counts of one encoder, with covariances and evidence.
+    """The motion estimated from encoder counts, with covariances and evidence (log likelihood).
 
     At each of the S samples used, a normal law (the site) replaces the bounds.
 
@@ -169,11 +169,11 @@ class Boxes:
         return Posterior(c, used, t, u, Z, factor, errors, likely, without)
 
     def again(self, errors: Errors, start: Posterior) -> Posterior:
-        """Estimate the motion for other errors of the counts, starting from the motion `start`."""
+        """Estimate the motion again with other assumed errors of counts, starting from `start`."""
         return self.posterior(errors, start.c, start.density, start.tau, start.nu)
 
     def promised(self, errors: Errors, read: Posterior) -> float:
-        """Predict how much the evidence of the counts rises with other errors, to first order.
+        """Predict how much other assumed errors raise the likelihood of the counts, to first order.
 
         To this order, settled sites need no change. Only some of the sites are used in the sum.
         """
@@ -208,7 +208,7 @@ class Boxes:
         return np.append(worst, np.argmax(read.density) * self.basis.m)[::-1]
 
     def around(self, middle: int, read: Posterior) -> tuple[int, Boxes, Posterior]:
-        """Estimate the motion again from the samples near the sample `middle` alone.
+        """Estimate the motion again, only from the samples near the sample `middle`.
 
         BESIDE samples on either side are used. Returns the first sample of this part, its bounds
         and its motion.
@@ -227,7 +227,7 @@ class Boxes:
         return begin, boxes, boxes.posterior(read.errors, c, density, *sites)
 
     def jump(self, near: int, read: Posterior) -> tuple[int, float, float]:
-        """Find the sample near `near` from which on all counts most likely have a constant error.
+        """Find the sample near `near` from which on all counts are most likely off by a constant.
 
         Returns the sample, the error in counts, and the rise of the log posterior if it is
         corrected.
@@ -248,7 +248,7 @@ class Boxes:
         return int(self.sites[at[best]]), float(number[best]), float(0.5 * g[best] * number[best])
 
     def later(self, at: int, counts: int, read: Posterior) -> tuple[Boxes, Posterior]:
-        """Estimate the motion if all counts from sample `at` on are larger by `counts`.
+        """Estimate the motion after adding `counts` to all counts from sample `at` on.
 
         Returns the new bounds and the motion.
         """
@@ -258,7 +258,7 @@ class Boxes:
         return boxes, boxes.posterior(read.errors, read.c, read.density, read.tau, nu)
 
     def _tilted(self, m: Array, v: Array, e2: Array) -> tuple[Array, Array, Array]:
-        """Update the site of every sample from its bounds and from the other samples.
+        """Update the normal law (site) that replaces the bounds of each sample.
 
         The other samples give the position m and its variance v. Returns the logarithm of the mass
         of the tilted law, and the precision and precision times mean of the new site.
@@ -276,7 +276,7 @@ class Boxes:
 def of_most_evidence(
     boxes: Boxes, sizes: Sequence[float], start: Posterior, moves: Sequence[tuple[int, int]] = MOVES
 ) -> Posterior:
-    """Find the errors of counts and time stamps with the most evidence, and their motion.
+    """Find the most likely errors of counts and time stamps, and the motion estimated with them.
 
     The search starts from `start` and changes the errors by one element of `sizes` or CLOCK_ERRORS
     at a time, in the directions `moves`, as long as the evidence clearly rises.
@@ -299,10 +299,10 @@ def of_most_evidence(
 
 
 def box_moments(a: Array, b: Array) -> tuple[Array, Array, Array]:
-    """Compute the log probability that a unit normal variable is between a and b, and derivatives.
+    """Compute the log probability of a <= x <= b for a normal x, and its derivatives by the mean.
 
-    Returns log Z, g = d log Z/dm and H = -d^2 log Z/dm^2 at the mean m = 0, with Z = Phi(b) -
-    Phi(a). One of the bounds must be within a few standard deviations of zero.
+    The variance of x is 1. Returns log Z, g = d log Z/dm and H = -d^2 log Z/dm^2 at the mean m = 0,
+    with Z = Phi(b) - Phi(a). One of the bounds must be within a few standard deviations of zero.
     """
     middle, half = np.abs(a + b) / 2, (b - a) / 2  # the side that is nearer to the mean first
     low, high = middle - half, middle + half
@@ -316,9 +316,10 @@ def box_moments(a: Array, b: Array) -> tuple[Array, Array, Array]:
 
 
 def jerk_density(basis: Basis, c: Array, Z: Array, density: Array) -> Array:
-    """Estimate the density of the jerk in windows of time by MacKay's rule, shape (M,).
+    """Estimate the power spectral density of the jerk in windows of time, shape (M,).
 
-    The whole record has the weight of OF_RECORD determined jerks in every window.
+    The estimate follows MacKay's rule. The whole record has the weight of OF_RECORD determined
+    jerks in every window.
     """
     squares, determined = (
         basis.jerk(c) ** 2 * basis.h,

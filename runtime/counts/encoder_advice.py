@@ -91,7 +91,7 @@ def encoder_sentences(
 def acceleration_error(
     record: Record, states: States, signals: Signals, drives: Drives | None
 ) -> float:
-    """Compute the largest share of a mean squared acceleration that encoder steps cause.
+    """Compute the share of a mean squared acceleration due to encoder steps, largest over joints.
 
     The accelerations are filtered. 0 if the positions show no steps.
     """
@@ -102,7 +102,7 @@ def acceleration_error(
 def _steps(
     record: Record, states: States, signals: Signals, motors: Drives | None
 ) -> tuple[Array, Array, str] | None:
-    """Find the encoder steps of the positions, and the share of each acceleration that they cause.
+    """Find the encoder steps of the positions, and their share of each mean squared acceleration.
 
     Returns the steps, the shares and the side, joint or motor; None if no steps are found.
     """
@@ -128,7 +128,7 @@ def _range(steps: Array) -> str:
 def _attenuation(
     rate: float, signals: Signals, motion: Array, found: Lattice, drives: Drives | None
 ) -> Array:
-    """Compute the share of the mean square of qdd that encoder steps cause, by joint, shape (n,).
+    """Compute which share of the mean square of qdd is due to encoder steps, by joint, shape (n,).
 
     `motion` is the mean square of qdd.
     """

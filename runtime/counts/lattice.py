@@ -46,7 +46,7 @@ or two where a joint turns back near a line.
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """The lattice of the positions of n encoders, position = count step + phase.
+    """Grid of the positions that n encoders can report: position = count step + phase.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ def lattice(
         step = np.broadcast_to(given, (n,))
     if not any(np.nanmax(x) > np.nanmin(x) for x in position.T if np.isfinite(x).any()):
         raise InputError(
-            "no position changes: counts that never change say nothing of a motion; record one",
+            "no position changes, so the counts do not contain a motion; record a motion",
             file=name,
         )
     steps, phases, shares, findings = np.empty(n), np.empty(n), np.zeros(n), []
@@ -111,8 +111,8 @@ def lattice(
         if not len(x):
             raise InputError(
                 (
-                    f"{label}: no sample is known; leave its joint out of the robot, or record its "
-                    "positions"
+                    f"{label}: all positions are missing; record the positions of its joint, or remove "
+                    "this joint from the robot file"
                 ),
                 file=name,
             )
@@ -167,11 +167,11 @@ def smallest_step(x: Array) -> float:
 
 
 def to_and_fro(counts: Array) -> Array:
-    """Find the moments at which counts cross one encoder line three times in a row, shape (m, 2).
+    """Find the moments at which counts cross the same encoder line three times in a row.
 
-    Returns the sample before the first change and the sample behind the last. The counts have shape
-    (N,), none missing. A smooth motion crosses a line once, or twice if it turns back between two
-    lines.
+    Returns, shape (m, 2), the sample before the first change and the sample behind the last. The
+    counts have shape (N,), none missing. A smooth motion crosses a line once, or twice if it turns
+    back between two lines.
     """
     change = np.diff(counts)
     at = np.flatnonzero(change)
@@ -181,7 +181,7 @@ def to_and_fro(counts: Array) -> Array:
 
 
 def shaken_share(counts: Array) -> float:
-    """Compute the share of the changes of the counts that cross one line the third time in a row.
+    """Compute which share of the count changes crosses the same line the third time in a row.
 
     A large share shows that the motion shakes.
     """
@@ -194,7 +194,7 @@ def unwrapped_counts(
     *,
     name: str = "record",
 ) -> tuple[Lattice, Array, tuple[str, ...]]:
-    """Convert positions to counts that continue when a counter of WRAPS (16 or 32) bits overflows.
+    """Convert positions to counts, and undo the overflows of a counter of 16 or 32 bits (WRAPS).
 
     Returns the lattice of the positions (see `lattice`), the counts, shape (N, n), and a sentence
     for each encoder that overflows. Raises InputError if counts jump otherwise.
@@ -219,8 +219,8 @@ def unwrapped_counts(
             is_wrap = np.any([np.abs(np.abs(size) - w) <= moved for w in periods], axis=0)
             first = int(np.argmin(is_wrap))
             raise InputError(
-                f"encoder {j + 1}: the count jumps by {size[first]:.0f} at sample {at[first]}; it "
-                "was reset or lost there, cut the record at such samples",
+                f"encoder {j + 1}: the count jumps by {size[first]:.0f} at sample {at[first]}; "
+                "the encoder was reset or its count was lost, cut the record at such samples",
                 file=name,
             )
         turns = np.zeros(len(k))
@@ -251,8 +251,8 @@ def _step(x: Array, given: float | None, label: str, name: str) -> tuple[float, 
     if given > 1.5 * span:
         raise InputError(
             (
-                f"{label}: step {given:g} is larger than its motion, {span:g}; correct "
-                f"signals.step (side: {label} sees the motor or the joint)"
+                f"{label}: step {given:g} is larger than the motion of the encoder, {span:g}; correct "
+                f"signals.step or signals.side (whether {label} measures the motor or the joint)"
             ),
             file=name,
         )
@@ -279,20 +279,23 @@ def _distance(x: Array, step: float, phase: float) -> float:
 
 
 def _off(x: Array, off: float, step: float, own: bool) -> str:
-    """Write the error message for positions `off` steps (rms) off their lattice, with a remedy."""
+    """Write the error message for positions that are no multiples of the encoder step.
+
+    `off` is their distance from the nearest multiples, in steps (rms).
+    """
     text = f"positions lie {off:.2g} steps (rms) off the lattice of step {step:.6g}"
     suggested = 0.0 if own else smallest_step(x)
     if suggested and _distance(x, suggested, _phase(x, suggested)) < OFF / 5:
-        part, remedy = step / suggested, f"set signals.step to {suggested:.6g}, encoder by encoder"
+        part, remedy = step / suggested, f"set signals.step to {suggested:.6g} for this encoder"
         if part > 1.5 and abs(part - round(part)) < 0.01:
             return (
-                f"{text} and on one {round(part)} times finer: {remedy}, or, if a driver "
+                f"{text} and on a lattice {round(part)} times finer: {remedy}, or, if a driver "
                 "averaged that number of samples, record the counts"
             )
-        return f"{text} and on one of step {suggested:.6g}: {remedy}"
+        return f"{text} and on the lattice of step {suggested:.6g}: {remedy}"
     return (
-        f"{text}; they were filtered, interpolated or converted by a driver or by record.resample, "
-        "or the step is another: correct signals.step, "
+        f"{text}; the positions were filtered, interpolated or converted by a driver or by "
+        "record.resample, or the step is wrong: correct signals.step, "
         "record the counts, or use reader: lowpass"
     )
 

@@ -58,9 +58,10 @@ class OwnEncoder:
         return self.reading is not None
 
     def positions(self, q: Array, delta: float, rng: np.random.Generator) -> Array:
-        """Return joint positions, shape (N, n), for a simulated encoder of step delta to quantise.
+        """Return the joint positions that a simulated encoder of step delta quantises.
 
-        They are the measured positions q if delta is coarse, else a draw from the posterior.
+        Shape (N, n). They are the measured positions q if delta is coarse, else a draw from the
+        posterior.
         """
         if self.reading is None or delta >= (1 - 1e-9) * LIMIT.EXACT_FROM * self.step.max():
             return q
@@ -100,9 +101,9 @@ def own_encoder(record: Record, study: Study, drives: Drives | None) -> OwnEncod
     finest, coarsest = min(settings.delta, default=np.inf), int(np.argmax(step))
     if finest <= 1.001 * step[coarsest]:
         raise SettingsError(
-            f"a step of {finest:.4g} is not coarser than that of encoder {coarsest + 1} of "
-            f"{record.name}, {step[coarsest]:.4g}: it would only shift the counts, and the result "
-            f"would look too certain; ask for steps above {step[coarsest]:.4g}",
+            f"step {finest:.4g} is not coarser than the step of encoder {coarsest + 1} of "
+            f"{record.name}, {step[coarsest]:.4g}: rounding would only shift the counts, and the "
+            f"result would look too certain; set only steps above {step[coarsest]:.4g}",
             path=("cestac", "delta"),
         )
     if finest >= (1 - 1e-9) * LIMIT.EXACT_FROM * step[coarsest]:
@@ -111,10 +112,10 @@ def own_encoder(record: Record, study: Study, drives: Drives | None) -> OwnEncod
         reading = read_counts(np.where(missing, np.nan, q), record.rate, step, name=record.name)
     except InputError as e:
         raise InputError(
-            f"a step of {finest:.4g} is less than {LIMIT.EXACT_FROM:g} steps of encoder "
+            f"step {finest:.4g} is less than {LIMIT.EXACT_FROM:g} steps of encoder "
             f"{coarsest + 1} "
-            f"({step[coarsest]:.4g}), so positions would be drawn from "
-            f"the counts, which cannot be read: {e.message}",
+            f"({step[coarsest]:.4g}), so the study needs the counts of this encoder, "
+            f"which cannot be read: {e.message}",
             file=record.name,
         ) from e
     return OwnEncoder(step, reading, own_drives)

@@ -22,7 +22,7 @@ Array = np.ndarray
 
 
 def counted(record: Record, signals: Signals) -> States:
-    """Estimate the joint states from encoder counts (reader `counts`).
+    """Estimate joint positions, velocities and accelerations from encoder counts.
 
     The posterior mean of the positions is filtered as the study specifies. The standard deviations
     of the velocities are kept as errors of the states.
@@ -45,7 +45,7 @@ def counted(record: Record, signals: Signals) -> States:
 
 
 def unwrapped(record: Record, signals: Signals, drives: Drives | None = None) -> Record:
-    """Return the record with positions that continue when the counter of an encoder wraps around.
+    """Return the record without the jumps of position that overflowing encoder counters cause.
 
     Any reader except `counts` leaves the record unchanged. `drives` are the drives of the robot,
     for encoders on the motor side.

@@ -92,7 +92,7 @@ class Reading:
 
     @property
     def starts(self) -> Starts:
-        """Starting values to estimate the same motion with other phases of the encoders.
+        """Starting values to estimate the same motion again with other phases of the encoders.
 
         They are listed by the first sample of a stretch and the encoder, from 0.
         """
@@ -229,7 +229,7 @@ def read_stretch(
     rest: Array,
     starts: Mapping[int, SearchStart] | None = None,
 ) -> tuple[Part | None, list[Array], Array]:
-    """Estimate the motion from the counts of one stretch, shape (N, n).
+    """Estimate the motion from the counts of one stretch of a record, shape (N, n).
 
     Returns the stretch (None if no joint moves), the list [q, qd, qdd, s_q, s_qd, s_qdd] in steps,
     and a mask of the samples with unknown state, shape (N, n) each.

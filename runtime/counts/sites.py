@@ -73,7 +73,7 @@ SPACING = 0.3
 
 
 class SearchStart(NamedTuple):
-    """Starting values to estimate a motion again, for the same motion with another encoder phase.
+    """Starting values to estimate the same motion again with another encoder phase.
 
     errors : errors of the counts.
     m : samples from knot to knot of the spline.
@@ -87,7 +87,7 @@ class SearchStart(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """The motion estimated from the counts of one encoder, in steps relative to `origin`.
+    """The motion estimated from the counts of one encoder, in steps from the count `origin`.
 
     said : sentence about the errors of the counts, or empty.
     """
@@ -99,7 +99,7 @@ class Smoothed:
 
     @property
     def density(self) -> float:
-        """Mean density of the jerk, steps^2/s^5."""
+        """Mean power spectral density of the jerk, steps^2/s^5."""
         return float(self.read.density.mean())
 
     def state(self, order: int) -> tuple[Array, Array]:
@@ -157,7 +157,7 @@ def smoothed(
 
 @dataclass(frozen=True, eq=False)
 class Counts:
-    """The counts y of one encoder, shape (N,), with the samples that have a count.
+    """Counts y of one encoder, shape (N,), and which samples have a count.
 
     `measured` lists these samples; `rest` is the small precision given to the other samples.
     """
@@ -193,12 +193,12 @@ class Counts:
         if not boxes.agrees(read):
             raise InputError(
                 f"no motion fits the counts, even with errors of {sizes[-1]:g} steps; "
-                "read them by the low-pass (signals: reader: lowpass)"
+                "use the low-pass instead (signals: {reader: lowpass})"
             )
         return boxes, read
 
     def liveliest(self) -> Counts:
-        """Extract the LIVELIEST consecutive samples in which the count changes most often."""
+        """Extract the stretch of LIVELIEST samples in which the count changes most often."""
         changed = np.zeros(len(self.y))
         changed[self.measured[1:]] = np.diff(self.y[self.measured]) != 0
         total = np.cumsum(changed)
@@ -208,7 +208,7 @@ class Counts:
         return Counts(self.y[part], inside, self.rest[part], self.Ts)
 
     def searched(self, sizes: Sequence[float]) -> tuple[Boxes, Posterior]:
-        """Estimate the motion together with the errors of the counts that have the most evidence.
+        """Estimate the motion together with the most likely errors of the counts.
 
         The smallest errors are used unless larger ones have UNEVEN nats more evidence. If the
         errors of the counts are large, errors of the clock are tried too.
@@ -228,7 +228,7 @@ class Counts:
         return boxes, read
 
     def first(self, errors: Errors, start: SearchStart | None = None) -> tuple[Boxes, Posterior]:
-        """Set up the bounds of the counts with the given errors, and estimate a first motion.
+        """Set up the bounds of the positions, and estimate a first motion with the given errors.
 
         The knots of the spline are as far apart as a motion near the changes of the count allows.
         start : a known motion, whose knots and density of the jerk are used.
@@ -350,7 +350,7 @@ class Counts:
 
 
 def _error_notes(errors: Errors, least: float, sites: int) -> list[str]:
-    """Write a sentence on each error of counts or time stamps that is not the smallest.
+    """Write a sentence for errors of counts and one for errors of time stamps, if not negligible.
 
     No sentence if there are too few sites.
     """
@@ -371,7 +371,7 @@ def _error_notes(errors: Errors, least: float, sites: int) -> list[str]:
 def _spline_through_sites(
     basis: Basis, tau: Array, nu: Array, density: float
 ) -> tuple[Array, Array]:
-    """Fit a spline to positions with Gaussian errors, and estimate the density of its jerk.
+    """Fit a spline to positions with Gaussian errors, and estimate the density of its white jerk.
 
     Returns the coefficients and the density, shape (M,), which starts from `density` and is updated
     at most FIRST times.

@@ -75,7 +75,9 @@ class Basis:
 
     @property
     def least_density(self) -> float:
-        """Least density of the jerk with which A can be factored in double precision, steps^2/s^5.
+        """Least spectral density of the jerk with which A can be factored in double precision.
+
+        A is the precision matrix of the coefficients. Unit: steps^2/s^5.
 
         The precision of a site is 0.06 or more.
         """
@@ -90,14 +92,14 @@ class Basis:
         return np.asarray((windows @ self.values[order].T).ravel())
 
     def rows(self, samples: Array) -> csr_array:
-        """Return the basis functions b_k at some samples, a sparse matrix of shape (S, P)."""
+        """Return the values of the B-splines at some samples, a sparse matrix of shape (S, P)."""
         interval, u = np.divmod(samples, self.m)
         columns = (interval[:, None] + np.arange(4)).ravel()
         ends = np.arange(0, len(columns) + 1, 4)
         return csr_array((self.values[0][u].ravel(), columns, ends), shape=(len(samples), self.P))
 
     def variances(self, Z: Array, order: int = 0) -> Array:
-        """Compute the variances of the spline or of a derivative at all samples, shape (m M,).
+        """Compute the variances of the spline or of its derivative at all samples, shape (m M,).
 
         Z : covariances of its coefficients, from `Factor.inverse`, shape (4, P).
         """
@@ -147,7 +149,7 @@ class Basis:
         return A
 
     def gradient(self, pull: Array, density: Array, c: Array) -> Array:
-        """Compute the gradient of the log posterior by the coefficients, at c, shape (P,).
+        """Compute the gradient of the log posterior with respect to the coefficients c, shape (P,).
 
         pull : nu - tau x(c) at all samples, shape (m M,).
         """
@@ -238,7 +240,7 @@ class Factor:
 
 
 def next_density(basis: Basis, samples: Array, unit: Array, g: Array, r: float) -> float:
-    """Compute the next estimate of the density r of the jerk of a spline by MacKay's rule.
+    """Compute the next estimate of the spectral density r of a spline's jerk by MacKay's rule.
 
     It is the sum of squared jerks over the number of jerks that the samples determine.
 
@@ -256,7 +258,7 @@ def next_density(basis: Basis, samples: Array, unit: Array, g: Array, r: float) 
 
 
 def _joined(first: Array, through: Array) -> Array:
-    """Compute the covariance of the three coefficients behind every stretch of a spline.
+    """Compute the covariance of the three coefficients that follow each stretch of a spline.
 
     Returns an array of shape (3, 3, stretches).
 

@@ -29,7 +29,7 @@ from runtime.documents.files import result_text
 
 @dataclass(frozen=True, eq=False)
 class EssentialDocument:
-    """Essential parameters, fitted without the other parameters.
+    """Essential parameters (they suffice to explain the torques), fitted without the others.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class SetDocument:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SetsDocument(Estimate):
-    """Estimate of all parameters by the method of the study, with the nested parameter sets.
+    """Estimate of all parameters, and of the nested sets essential, feasible and all parameters.
 
     Attributes
     ----------
@@ -177,7 +177,7 @@ class IdentificationDocument(SetsDocument):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LevelDocument(LevelResult):
-    """One level of a study in cestac.json, that is one step of position and torque.
+    """Result, in cestac.json, of a study for one rounding step of positions and one of torques.
 
     Attributes
     ----------
@@ -240,12 +240,12 @@ def load_estimate(path: Path | str) -> Estimate:
 
 
 def load_whole_estimate(path: Path | str) -> Estimate:
-    """Read the estimate of all base parameters from estimate.json, for a robot file or a program.
+    """Read from estimate.json the values of all base parameters that a robot model should use.
 
-    Its names, X, sigma_corrected, relative_error and details.standard are those of the set that is
-    used, or, if the essential set is used, those of the physical parameters (`whole_set`). The
-    other fields, for instance the covariance, are those of least squares. InputError as for
-    `load_estimate`.
+    The estimate has names, X, sigma_corrected, relative_error and details.standard of the
+    parameter set that is used, or of the physical parameters if the essential set is used
+    (`whole_set`). The other fields, for instance the covariance, are those of least squares.
+    InputError as for `load_estimate`.
     """
     fit, text = load_estimate(path), result_text(path)
     if not json.loads(text).get("sets"):
@@ -259,7 +259,7 @@ def load_whole_estimate(path: Path | str) -> Estimate:
         or not len(whole.X) == len(whole.sigma_corrected) == len(fit.X)
     ):
         raise InputError(
-            "its sets and its parameters do not match, so the file was edited; write it again with symgen identify",
+            "the sets and the parameters in the file do not match, so the file was edited; write the file again with symgen identify",
             file=str(path),
         )
     return replace(
@@ -273,7 +273,7 @@ def load_whole_estimate(path: Path | str) -> Estimate:
 
 
 class ResultSchema(GenerateJsonSchema):
-    """Generator of the JSON Schema of results, in which null means nan or infinity."""
+    """Generator of the JSON Schema of result files, in which null means nan or infinity."""
 
     def float_schema(self, schema: core_schema.FloatSchema) -> dict[str, Any]:
         """Return the JSON Schema of a value that is a number or null."""

@@ -1,4 +1,4 @@
-"""Reading of text files, and of settings in YAML with the line of every key."""
+"""Reading of text files, and of settings in YAML with the line number of every key."""
 
 from __future__ import annotations
 
@@ -31,9 +31,7 @@ def require_file(path: Path) -> int:
         ) from e
     if not S_ISREG(status.st_mode):
         what = "a folder" if S_ISDIR(status.st_mode) else "a pipe or a device"
-        raise InputError(
-            f"{what} cannot be read here; save its content as an ordinary file", file=str(path)
-        )
+        raise InputError(f"{what} cannot be read here; give an ordinary file", file=str(path))
     return status.st_size
 
 
@@ -57,7 +55,7 @@ def text_of(path: str | Path) -> str:
     path = Path(path)
     if require_file(path) > 4 * LIMIT.YAML_CHARACTERS:  # bytes of so many characters
         raise InputError(
-            f"more than {4 * LIMIT.YAML_CHARACTERS} bytes; a file of settings has a few thousand",
+            f"more than {4 * LIMIT.YAML_CHARACTERS} bytes; a settings file has a few thousand bytes",
             file=str(path),
         )
     try:
@@ -108,6 +106,6 @@ def lines_of(path: str | Path) -> Iterator[None]:
 def _at_line(
     error: SettingsError, lines: Mapping[tuple[str | int, ...], int], file: str
 ) -> SettingsError:
-    """Return the error with the line of its key, or of the section in which the key is missing."""
+    """Add to an error the line number of its key, or of the section that should contain the key."""
     places = (error.path[:k] for k in range(len(error.path), -1, -1) if error.path[:k] in lines)
     return SettingsError(error.reason, path=error.path, file=file, line=lines.get(next(places, ())))

@@ -1,4 +1,4 @@
-"""Conversion of YAML 1.2 texts to plain values, with the line of every key and within limits.
+"""Conversion of YAML 1.2 texts to plain values, with line numbers of all keys and limits of size.
 
 Only the parts of YAML that settings need are accepted: mappings, lists and scalars of the core
 schema. Anchors, aliases, tags, merge keys, repeated keys and second documents are refused, so that
@@ -31,14 +31,14 @@ CONSTANTS: dict[str, bool | None] = {
 
 
 def yaml_values(text: str, *, file: str) -> tuple[Any, dict[Path, int]]:
-    """Convert a YAML text to plain values; return also the line, from 1, of every key path.
+    """Convert a YAML text to plain values; also return the line number of every key.
 
-    Plain values are dict (keys as texts), list, str, int, float, bool and None. SettingsError with
-    file and line.
+    Line numbers start at 1, and a key is identified by its path. Plain values are dict (keys as
+    texts), list, str, int, float, bool and None. SettingsError has file and line.
     """
     if len(text) > LIMIT.YAML_CHARACTERS:
         raise InputError(
-            f"{len(text)} characters; such a file has at most {LIMIT.YAML_CHARACTERS}", file=file
+            f"{len(text)} characters; expected at most {LIMIT.YAML_CHARACTERS}", file=file
         )
     from ruamel.yaml.error import MarkedYAMLError
 
@@ -82,7 +82,7 @@ def _yaml() -> Any:
 
 
 def _require_plain(text: str, file: str) -> None:
-    """Raise SettingsError if a YAML text is not plain, is nested too deeply or has too many values.
+    """Raise SettingsError if a YAML text has tags or anchors, is too deep or has too many values.
 
     The test comes before any value is built from the text.
     """
@@ -94,19 +94,19 @@ def _require_plain(text: str, file: str) -> None:
         documents += kind == "DocumentStartEvent"
         refused = ""
         if kind == "AliasEvent" or getattr(event, "anchor", None) is not None:
-            refused = "anchors and aliases (& and *) are not read; write the value out"
+            refused = "anchors and aliases (& and *) are not supported; write the value itself"
         elif getattr(event, "tag", None) not in (None, "!"):
-            refused = "tags (!) are not read; write a plain value"
+            refused = "tags (!) are not supported; write a plain value"
         elif documents > 1:
-            refused = "a second document starts here; such a file holds one"
+            refused = "a second document starts here; expected one document per file"
         elif depth > LIMIT.YAML_LEVELS + 2 or count > LIMIT.YAML_VALUES:
-            refused = f"nested deeper than {LIMIT.YAML_LEVELS} levels or more than {LIMIT.YAML_VALUES} keys and values"
+            refused = f"nested deeper than {LIMIT.YAML_LEVELS} levels or more than {LIMIT.YAML_VALUES} keys and values; write fewer"
         if refused:
             raise SettingsError(refused, file=file, line=event.start_mark.line + 1)
 
 
 def _value(node: Node, path: Path, lines: dict[Path, int], file: str) -> Any:
-    """Convert a YAML node to a plain value, and put its line and those of its keys into `lines`."""
+    """Convert a YAML node to a plain value; store its line number and those of its keys."""
     from ruamel.yaml import MappingNode, ScalarNode
 
     lines.setdefault(path, node.start_mark.line + 1)

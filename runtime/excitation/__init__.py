@@ -1,1 +1,4 @@
-"""Search for the motion that determines the parameters best (chapter, section 2.2.3)."""
+"""Search for the motion that determines the parameters most precisely.
+
+Reference: chapter, section 2.2.3.
+"""

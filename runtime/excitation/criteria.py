@@ -61,7 +61,7 @@ class MotionLimits:
     tau: Array
 
     def of(self, share: float) -> MotionLimits:
-        """Return narrower limits, which leave the fraction `share` of each limit free.
+        """Return narrower limits: the fraction `share` of each limit stays unused.
 
         The range of positions shrinks about its middle.
         """
@@ -110,7 +110,7 @@ def limits_of(model: GeneratedModel, given: Mapping[str, Any]) -> MotionLimits:
     if missing:
         raise SettingsError(
             (
-                f"{model.NAME} has no limits of {', '.join(missing)}; give them here or in the "
+                f"{model.NAME} has no limits of {', '.join(missing)}; give these limits here or in the "
                 "robot file"
             ),
             path=("limits",),
@@ -118,7 +118,8 @@ def limits_of(model: GeneratedModel, given: Mapping[str, Any]) -> MotionLimits:
     unknown = known.keys() - {"q", "qd", "qdd", "tau"}
     if unknown:
         raise SettingsError(
-            f"no limit {', '.join(sorted(unknown))}; there are q, qd, qdd, tau", path=("limits",)
+            f"unknown limit {', '.join(sorted(unknown))}; expected some of q, qd, qdd, tau",
+            path=("limits",),
         )
     largest = {}
     for name in ("qd", "qdd", "tau"):
@@ -148,10 +149,10 @@ def weights_of(
     essential: Sequence[str] = (),
     s: Sequence[float] = (),
 ) -> Weights:
-    """Choose the columns of W and the scales of its rows and columns, from parameter values X.
+    """Choose the columns of W, and the factors that scale its rows and columns.
 
-    Rows are scaled by the standard deviations of the torques, columns by the sizes of the
-    parameters.
+    The rows are scaled by the standard deviations of the torques, the columns by the sizes of the
+    parameters, from their values X.
 
     `essential`, `s`: essential parameters, and standard deviations of the torques, of an estimate
     if there is one.
@@ -170,7 +171,7 @@ def weights_of(
     if not all(largest.values()):
         raise InputError(
             f"every parameter in {', '.join(u for u, x in largest.items() if not x)} is zero; give "
-            "values in the robot file or an estimate"
+            "the values in the robot file, or an estimate"
         )
     return Weights(
         names,
@@ -185,7 +186,7 @@ def weights_of(
 
 
 def criterion_of(weights: Weights, observation: Observation, criterion: str) -> float:
-    """Compute the criterion of a motion from its observation matrix W; smaller is better.
+    """Compute the criterion of a motion, such as cond(W), from its matrix W; smaller is better.
 
     The value is exact: W has the rows that the identification will use.
     """
@@ -274,7 +275,7 @@ def excesses(
 def usage(
     model: GeneratedModel, motion: Motion, limits: MotionLimits, rate: float, X: Array
 ) -> dict[str, list[float]]:
-    """Compute the largest share of each limit that the motion uses, by quantity and joint.
+    """Compute which share of each limit the motion uses at most, by quantity and joint.
 
     A share of 1 is the limit. The motion is sampled at `rate`, Hz. The share of a position range is
     measured from the middle of the range.

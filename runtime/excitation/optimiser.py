@@ -35,7 +35,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """Data that every start of the search needs, sent to the processes that run the starts.
+    """Data of a search for an exciting motion, sent to the processes that optimise each start.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ def improve(search: Search, number: int, guess: Motion) -> Start:
 
 
 def _states(settings: ExcitationSettings, p: Sequence[Any]) -> tuple[Any, Any, Any]:
-    """Write q, qd, qdd at the points of the grid as expressions of the coefficients p.
+    """Write q, qd, qdd at the instants of the time grid as expressions of the coefficients p.
 
     Each result has shape (M, n); the parts of the motion follow each other.
     """
@@ -114,7 +114,7 @@ def _information(
     qd: Any,
     qdd: Any,
 ) -> Any:
-    """Write the information matrix A = sum_j W_wj'W_wj / M over the M points of the grid.
+    """Write the information matrix A = sum_j W_wj'W_wj / M over the M instants of the grid.
 
     W_wj holds the weighted rows of joint j; A has shape (c, c).
     """
@@ -137,9 +137,9 @@ def _logdet(A: Any) -> Any:
 
 
 def _spread(A: Any, criterion: str) -> Any:
-    """Write the logarithm of a smooth upper bound of the squared criterion.
+    """Write the logarithm of a smooth bound of cond(W_w)^2, or of the largest variance C_ii.
 
-    The criterion is the condition number of W_w, or the largest standard deviation.
+    For criterion sigma or record the bound is that of the variance, else that of cond(W_w)^2.
     """
     C = ca.solve(A, ca.DM.eye(A.shape[0]), "qr")
     if criterion in ("sigma", "record"):
@@ -256,7 +256,7 @@ def _distances(
     ]
     if unknown:
         raise InputError(
-            f"no frame {unknown[0]} that could carry a sphere; there are 0, "
+            f"no frame {unknown[0]} for a sphere; expected one of the frames 0, "
             f"{', '.join(name[1:] for name in poses)}"
         )
     poses["T0"] = ca.SX.eye(4)

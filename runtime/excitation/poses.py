@@ -113,7 +113,9 @@ def static_poses(problem: Problem) -> StaticPoses:
     """
     model, settings = problem.model, cast(Any, problem.settings).excitation or ExcitationSettings()
     if problem.records and problem.settings.signals.reader != "static":
-        raise InputError("poses are sought beside recorded poses: signals: {reader: static}")
+        raise InputError(
+            "new poses can be added only to a record of poses at rest; set signals: {reader: static}"
+        )
     count, n = settings.poses or 20, len(model.JOINTS)
     rng = np.random.default_rng(settings.seed)
     s = per_joint(settings.torque_sigma or 1.0, n, "excitation.torque_sigma")
@@ -145,8 +147,8 @@ def static_poses(problem: Problem) -> StaticPoses:
     condition, sigma = zip(*(_quality(_sum(A, M, x)) for x in (best, others)), strict=True)
     if np.isinf(condition[0]):
         raise InputError(
-            f"{count} poses do not determine the {len(size)} parameters that rest shows; ask for "
-            "more poses or wider limits"
+            f"{count} poses do not determine the {len(size)} parameters that act at rest; "
+            "set more poses or wider limits"
         )
     return StaticPoses(
         model,
@@ -181,13 +183,13 @@ def _acting(model: GeneratedModel, q: Array, columns: Any) -> tuple[str, ...]:
     shown = tuple(name for name in asked if name in acting)
     if not shown:
         raise InputError(
-            f"poses at rest show no parameter of {model.NAME}: gravity acts along none of its joints, and there is no offset or spring; record a motion, or correct gravity in the robot file"
+            f"poses at rest show no parameter of {model.NAME}: gravity acts along no joint, and no joint has an offset or spring; record a motion, or correct gravity in the robot file"
         )
     return shown
 
 
 def _sum(A: Array, M: Array, chosen: Array) -> Array:
-    """Add W'W of the chosen poses to M.
+    """Add W'W of the chosen poses to the information matrix M.
 
     A, shape (K, n, c), holds the rows of all candidate poses; `chosen` holds indices of poses.
     """

@@ -52,7 +52,7 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """Parameter values that the search uses, and the precision of the recorded motion.
+    """Parameter values for the search, and how precisely the recorded motion determines parameters.
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ class Excitation(Result):
 
     @property
     def usage(self) -> dict[str, list[float]]:
-        """Largest share of each limit that the motion uses, by quantity and joint; 1: the limit."""
+        """Share of each limit that the motion uses at most, by quantity and joint; 1: the limit."""
         return usage(self.model, self.motion, self.limits, self.settings.rate, self.known.X)
 
     @property
@@ -274,7 +274,7 @@ class Excitation(Result):
         )
 
     def starts_table(self) -> Table:
-        """Make a table of all starts: criterion, violation, and message of the optimiser."""
+        """Make a table of all starts: criterion, constraint violation, message of the optimiser."""
         rows = [
             (str(s.number), f"{s.criterion:.4g}", f"{s.violation:.1e}", s.message)
             for s in self.starts

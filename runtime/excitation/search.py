@@ -44,7 +44,7 @@ def excite(
     map: Callable[..., Iterable[Any]] = map,
     progress: Callable[[int, int], None] | None = None,
 ) -> Excitation:
-    """Search the motion with the smallest criterion that keeps the limits at the controller rate.
+    """Search the motion of best criterion that respects the limits at every controller tick.
 
     The search runs from all starts of study.excitation.
 
@@ -67,15 +67,15 @@ def excite(
     """
     model = problem.model
     study: Any = problem.settings
-    require_no_channels(model, "a motion that is sought")
-    require_motion(study.signals, "a motion that is sought (poses: excitation: {poses: N})")
+    require_no_channels(model, "the search for a motion")
+    require_motion(study.signals, "the search for a motion (poses: excitation: {poses: N})")
     settings = study.excitation or ExcitationSettings()
     known = _known_estimate(problem, settings)
     limits, weights = limits_of(model, settings.limits), known.weights
     if settings.criterion == "record" and not known.relative_sigma:
         raise InputError(
-            "criterion: record compares with the motion of a record; give one, or ask for cond, "
-            "logdet or sigma"
+            "criterion: record compares with the motion of a record, but no record is given; give "
+            "a record, or set criterion: cond, logdet or sigma"
         )
     if settings.criterion == "auto":
         settings = replace(settings, criterion="record" if known.relative_sigma else "cond")
@@ -101,7 +101,7 @@ def excite(
         raise InputError(
             f"none of {settings.starts} starts gave a motion within the limits; the best one exceeds "
             f"a limit by {100 * least.violation:.2g} % ({least.message}). Widen the limits, make the "
-            "parts longer, ask for fewer harmonics or points, or leave `begin` open"
+            "parts longer, use fewer harmonics or points, or remove `begin`"
         )
     candidates = []
     for motion, margin in _within(model, search, kept[: LIMIT.STARTS_COMPARED]):
@@ -112,8 +112,8 @@ def excite(
     if not candidates:
         exceeded = excesses(model, motion_from_mapping(kept[0].motion), limits, settings, known.X)
         raise InputError(
-            "the best motions exceed a limit between the points of the grid, also with twice and four "
-            "times the margin: "
+            "the best motions exceed a limit between the points of the time grid, also with two and "
+            "four times the safety margin: "
             f"{'; '.join(map(str, exceeded[:3]))}. Raise `grid`, which is {settings.grid:g} Hz"
         )
     _, motion, margin, observation = min(candidates, key=lambda candidate: candidate[0])
@@ -134,7 +134,7 @@ def excite(
 def _within(
     model: GeneratedModel, search: Search, starts: Sequence[Start]
 ) -> Iterator[tuple[Motion, float]]:
-    """Yield motions that keep the limits at the controller rate, each with the margin it needed.
+    """Yield motions that respect the limits at every controller tick, each with its margin.
 
     If a motion exceeds a limit between grid points, it is optimised again with twice the margin, a
     few times. A start that still exceeds a limit yields nothing.
@@ -153,7 +153,7 @@ def _within(
 
 
 def _known_estimate(problem: Problem, settings: ExcitationSettings) -> Known:
-    """Collect the parameter values that the search uses, and the precision of the recorded motion.
+    """Collect parameter values for the search, and the precision that recorded motions give.
 
     They come from an estimate with the records; without records, the values come from the robot
     file.
@@ -172,7 +172,7 @@ def _known_estimate(problem: Problem, settings: ExcitationSettings) -> Known:
     if fit.status == "rank-deficient":
         raise InputError(
             f"the record does not determine {', '.join(' '.join(group) for group in fit.groups)}; "
-            "leave it out, or name columns"
+            "remove this record from the study, or use a record that determines these parameters"
         )
     names = essential_of(observation, study.essential, linear).names
     deviations = [joint.sigma_rho for joint in fit.per_joint]

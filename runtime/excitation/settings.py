@@ -120,13 +120,13 @@ class ExcitationSettings(Settings):
         for pair in self.apart or ():
             require(
                 all(1 <= k <= len(self.spheres) for k in pair),
-                f"{list(pair)}; there are {len(self.spheres)} spheres",
+                f"{list(pair)}; expected two numbers of spheres, from 1 to {len(self.spheres)}",
                 "apart",
             )
 
     @property
     def pairs(self) -> tuple[tuple[int, int], ...]:
-        """Pairs of spheres that must keep a distance, by their indices from 0."""
+        """Pairs of spheres that must keep a distance, as indices from 0."""
         if self.apart is not None:
             return tuple((a - 1, b - 1) for a, b in self.apart)
         count = range(len(self.spheres))

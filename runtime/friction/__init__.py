@@ -1,1 +1,1 @@
-"""Friction against velocity, joint by joint, and the law that it follows."""
+"""Friction of each joint against its velocity, and the friction law that describes it."""

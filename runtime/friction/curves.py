@@ -137,7 +137,7 @@ class FrictionCurve:
         return next(law for law in self.laws if law.name == self.law_name)
 
     def to_table(self) -> str:
-        """Write a table of the laws as text, then the parameters of the chosen law and the note."""
+        """Write a table of the laws, the parameters of the chosen law, and the note on its FST."""
         compared, predicting = law_tables([self])
         parts = [compared.to_text(), f"{self.label}: {predicting.rows[0][2]}", self.note]
         return "\n".join(part for part in parts if part)
@@ -153,7 +153,7 @@ class FrictionCurve:
 
     @property
     def note(self) -> str:
-        """Sentence that explains the sign of FST; empty for a law without FST."""
+        """Sentence that explains the sign of the Stribeck term FST; empty for a law without it."""
         excess = self.law.parameters.get("FST")
         if excess is None:
             return ""
@@ -191,7 +191,7 @@ class Friction(Part):
     title = "Friction curves"
 
     def text(self) -> str:
-        """Explain how a law is chosen, and what the sign of FST means for each joint."""
+        """Explain how a law is chosen, and the sign of its Stribeck term FST for each joint."""
         notes = [f"Joint {curve.joint}: {curve.note}." for curve in self.curves if curve.note]
         return "\n".join([CHOSEN, *notes])
 
@@ -250,7 +250,7 @@ def friction_figure(curves: Sequence[FrictionCurve], unit: str = "N m") -> Figur
 def friction(result: Identification) -> Friction:
     """Compute the friction curves of all joints from the result of an identification."""
     if not result.determined:
-        raise InputError("the record does not determine the parameters")
+        raise InputError("the record does not determine the parameters; record a richer motion")
     return Friction(friction_curves(result.problem, result.estimate), result.torque_unit)
 
 
@@ -291,7 +291,7 @@ def law_tables(curves: Sequence[FrictionCurve]) -> tuple[Table, Table]:
 
 
 def friction_curves(problem: Problem, fit: Estimate) -> tuple[FrictionCurve, ...]:
-    """Compute the friction curve of each joint from a prepared problem and an estimate.
+    """Compute the friction curve of each joint from an identification problem and its estimate.
 
     The estimate must contain all parameters.
     """
@@ -321,7 +321,7 @@ def own_friction(model: GeneratedModel, j: int) -> list[int]:
 
 
 def _terms(model: GeneratedModel, record: Prepared, fit: Estimate, number: int) -> list[Terms]:
-    """Compute the friction torque and the terms of the laws of every joint of one record."""
+    """Compute, for each joint of one record, the friction torque and the terms of its laws."""
     selection = record.certain(model)
     observation = record.observation(model)
     window = record.states[selection.samples]
@@ -381,8 +381,8 @@ def _terms(model: GeneratedModel, record: Prepared, fit: Estimate, number: int) 
 def _curve(joint: str, terms: Terms) -> FrictionCurve:
     if len(terms.f) < 10 * len(LAWS["stribeck+load"]):
         raise InputError(
-            f"{len(terms.f)} rows of joint {joint}; a friction curve needs more of the record "
-            "(rows.window, rows.low_speed)"
+            f"only {len(terms.f)} rows of joint {joint}; a friction curve needs more rows: widen "
+            "rows.window, or lower rows.low_speed"
         )
     all_rows = np.ones(len(terms.f), dtype=bool)
     even = terms.block % 2 == 0
@@ -413,7 +413,7 @@ def _curve(joint: str, terms: Terms) -> FrictionCurve:
 
 
 def _predicting(laws: Sequence[FrictionLaw]) -> str:
-    """Choose the law with the smallest held-out error among the significant laws.
+    """Choose, of the significant laws, the one with least error on data not used in its fit.
 
     A law must also predict clearly better than the first law. If no law does, the first law is
     chosen.

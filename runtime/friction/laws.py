@@ -24,7 +24,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """Friction torque, velocity and terms of the friction laws of one joint, row by row.
+    """Friction torque, velocity and terms of the friction laws of one joint, sample by sample.
 
     Attributes
     ----------
@@ -48,7 +48,10 @@ class Terms:
 
     @cached_property
     def grid(self) -> tuple[Array, Array]:
-        """Starting values of log(VS), shape (k,), and the Stribeck term for each, shape (k, N)."""
+        """Starting values of log VS, VS the Stribeck velocity, and the Stribeck term for each.
+
+        Their shapes are (k,) and (k, N).
+        """
         x = np.log(
             np.abs(self.v).max()
             * np.geomspace(LIMIT.STRIBECK_SLOWEST, LIMIT.STRIBECK_FASTEST, LIMIT.STRIBECK_GRID)
@@ -66,7 +69,7 @@ LAWS: Mapping[str, tuple[str, ...]] = {
 
 
 def joined(parts: Sequence[Terms]) -> Terms:
-    """Join the rows of one joint from several records."""
+    """Join the friction torque and the terms of one joint from several records."""
     linear = {
         name: np.concatenate([part.linear[name] for part in parts]) for name in parts[0].linear
     }
@@ -78,7 +81,10 @@ def joined(parts: Sequence[Terms]) -> Terms:
 
 
 def _columns(terms: Terms, names: Sequence[str], VS: float | None) -> Array:
-    """Build the matrix of the linear terms of a law, shape (N, terms)."""
+    """Build the matrix of the terms of a friction law that have linear parameters.
+
+    Shape (N, terms).
+    """
     return np.column_stack(
         [
             terms.excess(cast(float, VS)) if name == "FST" else terms.linear[name]
@@ -89,7 +95,7 @@ def _columns(terms: Terms, names: Sequence[str], VS: float | None) -> Array:
 
 
 def fit_law(terms: Terms, names: Sequence[str], rows: Array) -> dict[str, float]:
-    """Fit the parameters of a friction law to some rows by least squares.
+    """Fit the parameters of a friction law to a subset of the samples by least squares.
 
     VS is searched on a logarithmic axis.
     """
@@ -135,7 +141,7 @@ def _excess_velocity(terms: Terms, names: Sequence[str], rows: Array) -> float:
 
 
 def law_torque(terms: Terms, law: Mapping[str, float]) -> Array:
-    """Compute the torque of a law at the rows, shape (N,), from the values of its parameters."""
+    """Compute the torque of a friction law at all samples, shape (N,), from its parameters."""
     names = tuple(law)
     return np.asarray(
         _columns(terms, names, law.get("VS")) @ [law[name] for name in names if name != "VS"]
@@ -143,7 +149,7 @@ def law_torque(terms: Terms, law: Mapping[str, float]) -> Array:
 
 
 def held_out_error(terms: Terms, names: Sequence[str], even: Array) -> float:
-    """Compute the prediction error of a law, in %, on rows that were not used in its fit.
+    """Compute the prediction error of a friction law, %, on samples not used in its fit.
 
     The fit to one half of the blocks of time predicts the other half.
     """
@@ -154,7 +160,7 @@ def held_out_error(terms: Terms, names: Sequence[str], even: Array) -> float:
 
 
 def deviations(terms: Terms, law: Mapping[str, float], residual: Array) -> dict[str, float]:
-    """Compute the standard deviations of the parameters of a law, by name.
+    """Compute the standard deviations of the parameters of a friction law, by name.
 
     Blocks of time are taken as independent. For VS, the derivative of the law with respect to VS is
     used as its column.

@@ -1,4 +1,4 @@
-"""Variable projection: least squares in parameters X and in scalars a that enter W nonlinearly.
+"""Variable projection: least squares in parameters X and in constants a that enter W nonlinearly.
 
 A scalar is a constant in the law of a column that the robot file adds to W, for instance the
 velocity of a Stribeck law. The table FIT of the emitted module lists the scalars. The torque is
@@ -33,10 +33,10 @@ SLOPE_STEP = 1e-4  # of log(a), or of the bounds: differences of columns
 
 
 class LawProblem:
-    """The observation matrix W and torques Y of all records, with W a function of scalars.
+    """W and Y of all records, if columns of W are functions (laws) with nonlinear constants.
 
-    The scalars are constants in the laws of columns. The coordinate of a scalar a is u = log(a) if
-    its lower bound is positive, else u = a.
+    The coordinate of a constant a in the search is u = log(a) if its lower bound is positive, else
+    u = a.
     """
 
     def __init__(
@@ -64,15 +64,15 @@ class LawProblem:
         return np.where(self.log, np.log(np.where(self.log, a, 1.0)), a)
 
     def values(self, u: Array) -> Array:
-        """Convert the coordinates u of the search to the scalars a of the laws."""
+        """Convert search coordinates u to the nonlinear constants a: a = exp(u) or a = u."""
         return np.where(self.log, np.exp(np.where(self.log, u, 0.0)), u)
 
     def bound(self, u: Array) -> Any:
-        """Return the model with the scalars of its laws set to the values at u."""
+        """Return the model with the nonlinear constants of its laws set to the values at u."""
         return BoundModel(self.model, dict(zip(self.scalars, self.values(u).tolist(), strict=True)))
 
     def _varying(self) -> list[list[int]]:
-        """Find the columns of W that depend on each scalar, by changing the scalar."""
+        """Find the columns of W that depend on each nonlinear constant, by varying the constant."""
         model, rng = cast(Any, self.model), np.random.default_rng(3)
         q, qd, qdd = rng.uniform(-1, 1, (3, 200, len(model.JOINTS)))
         qd = qd * 10 ** rng.uniform(-3, 0, qd.shape)
@@ -97,7 +97,7 @@ class LawProblem:
         return [record.observation(model, columns or self.names) for record in self.records]
 
     def column(self, c: int, u: Array) -> Array:
-        """Compute column c of W at all rows, for the scalars at u."""
+        """Compute column c of W at all rows, for the nonlinear constants at u."""
         own = [k for k, columns in enumerate(self.varying) if c in columns]
         key = (c, *(float(u[k]) for k in own))
         if key not in self._columns:
@@ -119,7 +119,7 @@ class LawProblem:
 
 
 class Projection:
-    """The least-squares problem in the scalars alone, with X eliminated, on some rows of W.
+    """Least squares over the nonlinear constants alone: X is eliminated; a subset of rows is used.
 
     Each row is divided by its scale.
     """
@@ -135,7 +135,7 @@ class Projection:
         return np.asarray(A - self.Q @ (self.Q.T @ A))
 
     def parts(self, u: Array) -> tuple[Array, Array, Array]:
-        """Compute the residual P Y at u, and the fit of the columns that depend on scalars.
+        """Compute the residual P Y at u, and fit the columns with nonlinear constants.
 
         Returns P Y, an orthonormal basis of these columns (projected orthogonally to the fixed
         columns), and their coefficients in X.
@@ -161,7 +161,7 @@ class Projection:
         return np.asarray(B @ (B.T @ S) - S)
 
     def polished(self, u: Array) -> tuple[Array, float]:
-        """Find the local minimum of the sum of squares near u.
+        """Find the local minimum of the sum of squared residuals near the coordinates u.
 
         Returns the coordinates of the minimum and the sum of squares there.
         """
@@ -182,7 +182,7 @@ class Projection:
     def fitted(
         self, groups: Sequence[Sequence[int]]
     ) -> tuple[Array, float, dict[int, list[Array]]]:
-        """Find the best minimum of the sum of squares, starting from grids of the scalars.
+        """Find the least sum of squared residuals, starting from grids of the nonlinear constants.
 
         `groups` lists the scalars of each law. Returns the coordinates u of the minimum, its sum of
         squares, and the other local minima of each law, by the number of the law.
@@ -222,7 +222,7 @@ class Projection:
 
 
 def _valleys(starts: Sequence[Array], costs: Sequence[float], counts: Sequence[int]) -> list[Array]:
-    """Select at most four points of a grid whose cost does not exceed that of any neighbour.
+    """Select at most four points of a grid whose cost does not exceed the cost of any neighbour.
 
     The last of `starts` is no point of the grid and is ignored.
     """
@@ -236,7 +236,7 @@ def _valleys(starts: Sequence[Array], costs: Sequence[float], counts: Sequence[i
 
 
 def basis(A: Array) -> Array:
-    """Compute an orthonormal basis of the range of A, as columns."""
+    """Compute an orthonormal basis of the column space of A, as columns."""
     size = np.linalg.norm(A, axis=0)
     A = A[:, size > 0] / size[size > 0]
     Q, R = np.linalg.qr(A)

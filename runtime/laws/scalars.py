@@ -1,4 +1,4 @@
-"""Scalars in the laws of columns, for instance the velocity of a Stribeck law, fitted to a record.
+"""Fit of the nonlinear constants (scalars) of laws, such as the velocity of a Stribeck law.
 
 The fit is the one of `runtime.laws.projection`; other local minima are reported. Standard
 deviations are computed for X and the scalars together, from the linear problem with the columns [W,
@@ -41,7 +41,7 @@ LOOSE = 0.5  # deviation of log(a), or share of the bounds, above which a is not
 
 @dataclass(frozen=True)
 class FittedScalar:
-    """One fitted scalar in the law of a column, for instance the velocity of a Stribeck law.
+    """One fitted constant of a law, for instance the velocity of a Stribeck law.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class FittedScalar:
 
 @dataclass(frozen=True)
 class LawTest:
-    """Test of the law of a column: whether the law improves the prediction of torques.
+    """Test of a law, which gives a column of W: whether it improves the prediction of torques.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class LawTest:
 
 @dataclass(frozen=True)
 class FittedLaws(Part):
-    """The scalars in the laws of columns, fitted to records, with tests of the laws."""
+    """Fitted constants of laws, such as a Stribeck velocity, with tests of the laws."""
 
     scalars: tuple[FittedScalar, ...]
     tests: tuple[LawTest, ...]
@@ -106,11 +106,11 @@ class FittedLaws(Part):
 
     @property
     def constants(self) -> dict[str, float]:
-        """Fitted values of the scalars, by name."""
+        """Fitted values of the nonlinear constants of the laws, by name."""
         return {s.name: s.value for s in self.scalars}
 
     def tables(self) -> list[Table]:
-        """Make the tables of the scalars, and of the prediction errors of the laws."""
+        """Make a table of the fitted constants, and one of the prediction errors of the laws."""
         said = [
             (s.name, s.parameter, s.doubt, "")
             if s.doubt
@@ -142,11 +142,11 @@ class FittedLaws(Part):
         ]
 
     def text(self) -> str:
-        """Sentence that says how the scalars were estimated."""
+        """Sentence that says how the nonlinear constants of the laws were estimated."""
         return "Scalars inside the laws of columns, by variable projection."
 
     def brief(self) -> str:
-        """Write the scalars with their 95 % confidence intervals in one line."""
+        """Write the fitted constants with their 95 % confidence intervals in one line."""
         said = [
             f"{s.name} {s.doubt or f'{s.value:.4g} ± {1.96 * s.sigma:.2g}'}" for s in self.scalars
         ]
@@ -159,12 +159,12 @@ class FittedLaws(Part):
         return f"Scalars of laws (± 95 %): {', '.join(said)}{worth}"
 
     def summary(self) -> dict[str, Any]:
-        """Return the scalars and the tests of the laws as a mapping for JSON."""
+        """Return the fitted constants and the tests of the laws as a mapping for JSON."""
         return {"scalars": self.scalars, "tests": self.tests}
 
 
 def fitted_scalars(problem: Problem) -> Problem:
-    """Fit the scalars in the laws of columns to the records, and set their values in the model.
+    """Fit the nonlinear constants of laws, such as a Stribeck velocity; set them in the model.
 
     A step of the identification. Without scalars (`fit:` of the robot file) or records, the problem
     is returned unchanged.
@@ -179,7 +179,7 @@ def fitted_scalars(problem: Problem) -> Problem:
     estimate = problem.settings.estimate
     if problem.method.observe is not None:
         raise InputError(
-            f"scalars of laws are not fitted by {estimate.method}, which simulates the loop with those of the file; fit them by ols, then fix them: fit: {{vs: 0.08}}"
+            f"{estimate.method} cannot fit the constants of a law, because it simulates the loop with the constants of the robot file; fit these constants by ols, then fix their values in the robot file: fit: {{vs: 0.08}}"
         )
     at("scalars of laws")
     columns = None if estimate.columns == "all" else tuple(estimate.columns)
@@ -189,7 +189,7 @@ def fitted_scalars(problem: Problem) -> Problem:
 
 
 def scalars_of_laws(result: Identification) -> FittedLaws | None:
-    """Return the fitted scalars in the laws of columns; None if none were fitted."""
+    """Return the fitted nonlinear constants of the laws; None if none were fitted."""
     note = result.problem.noted(KIND)
     return None if note is None else note.result
 
@@ -201,7 +201,7 @@ def fit_laws(
     *,
     weights: bool = False,
 ) -> FittedLaws:
-    """Fit the scalars in the laws of the columns of a model to records.
+    """Fit the nonlinear constants of a model's laws, such as a Stribeck velocity, to records.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ def fit_laws(
 
 
 def fitted_laws(problem: LawProblem, weights: bool = False) -> FittedLaws:
-    """Fit the scalars in the laws of columns to prepared rows W, Y; see `fit_laws`."""
+    """Fit the nonlinear constants of laws to the W and Y of a LawProblem; see `fit_laws`."""
     every, scale = np.ones(len(problem.Y), dtype=bool), np.ones(len(problem.Y))
     groups: dict[str, list[int]] = {}
     for k, name in enumerate(problem.scalars):
@@ -253,9 +253,9 @@ def fitted_laws(problem: LawProblem, weights: bool = False) -> FittedLaws:
 
 
 def _joint_deviations(problem: LawProblem, u: Array, scale: Array) -> tuple[Array, Array, Array]:
-    """Compute W, X, and the standard deviations of X and of the scalars together.
+    """Compute W, X, and the standard deviations of X and of the nonlinear constants at u.
 
-    The scalars have the values at u. Blocks of time are taken as independent.
+    Both standard deviations come from one covariance. Blocks of time are taken as independent.
     """
     A = problem.W.copy()
     for c in problem.moving:
@@ -273,7 +273,7 @@ def _joint_deviations(problem: LawProblem, u: Array, scale: Array) -> tuple[Arra
 def _half(
     problem: LawProblem, rows: Array, scale: Array, members: Sequence[Sequence[int]], u: Array
 ) -> Array:
-    """Fit the scalars of the laws to some rows alone, starting from u."""
+    """Fit the nonlinear constants of the laws to a subset of the rows, from the initial value u."""
     return Projection(problem, rows, scale).polished(u)[0]
 
 
@@ -286,7 +286,7 @@ def _squares(A: Array, Y: Array, scale: Array) -> float:
 def _unseen(
     problem: LawProblem, halves: Sequence[tuple[Array, Array]], without: Sequence[int], scale: Array
 ) -> float:
-    """Compute the prediction error, in %, of each half of the rows from a fit to the other half.
+    """Compute the prediction error, %, if each half of the rows is predicted from the other half.
 
     `without` lists the columns of W that are left out.
     """

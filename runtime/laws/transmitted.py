@@ -1,4 +1,4 @@
-"""Laws of columns that depend on the torque which the rest of the model transmits at their joint.
+"""Columns of W that depend on the torque transmitted at their joint, as load-dependent friction.
 
 An example is load-dependent friction. Such a model is bilinear in the parameters,
 
@@ -32,7 +32,7 @@ SAME_TORQUE = 1e-6  # of the rms of tau_m, between two passes
 
 
 def transmitted_torque(problem: Problem) -> Problem:
-    """Add the torque that each joint transmits to the records, if columns depend on this torque.
+    """Add to the records the torque that each joint transmits, if columns of W depend on it.
 
     A step of the identification. Without such laws the problem is returned unchanged.
 
@@ -59,7 +59,7 @@ def transmitted_torque(problem: Problem) -> Problem:
         before = tau
     else:
         raise InputError(
-            f"{parameters}: the torque of the model does not settle in {PASSES} passes; is the friction larger than the torque that causes it?"
+            f"{parameters}: the torque of the model does not converge in {PASSES} passes; check in the robot file whether the friction is larger than the torque that causes the friction"
         )
     text = f"{parameters}: {TRANSMITTED} is the torque of the other parameters at the states of the rows, not the measured one; it settled in {k + 1} passes."
     unseen = [torque.given(record, X) for record in problem.prepared_unseen]
@@ -72,7 +72,7 @@ def transmitted_torque(problem: Problem) -> Problem:
 
 
 def _solve(observations: Sequence[Observation], weights: bool) -> Array:
-    """Estimate the parameters X of all columns by least squares.
+    """Estimate the parameters X of all columns of W by least squares.
 
     With `weights`, the rows of each joint are divided by the standard deviation of its residual.
     """
@@ -89,7 +89,7 @@ def _solve(observations: Sequence[Observation], weights: bool) -> Array:
 
 
 class TransmittedTorque:
-    """Computes the transmitted torque tau_m from the columns of W that do not depend on tau_m.
+    """Calculator of the torque tau_m that a joint transmits, from the columns of W without tau_m.
 
     `read` lists, by channel of tau_m, the parameters whose columns depend on this channel.
     """
@@ -102,7 +102,7 @@ class TransmittedTorque:
         self.place = {c: model.JOINTS.index(int(c.removeprefix(TRANSMITTED))) for c in read}
 
     def given(self, record: Prepared, X: Array | None) -> Prepared:
-        """Return the record with the channels of tau_m computed from X; zero if X is None."""
+        """Add tau_m, computed from X, to the signals of a record; add zeros if X is None."""
         tau = np.zeros((len(record.record), len(self.model.JOINTS)))
         if X is not None:
             s = record.states

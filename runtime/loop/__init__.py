@@ -1,1 +1,1 @@
-"""References, control laws, and the simulated closed loop that moves the arm."""
+"""Simulation of the closed loop that moves the arm, and the methods that use it (IV, DIDIM)."""

@@ -73,17 +73,17 @@ class Loop:
 
     @property
     def model(self) -> GeneratedModel:
-        """Model of the problem."""
+        """Generated model of the robot."""
         return self.problem.model
 
     @property
     def study(self) -> Any:
-        """Settings of the problem."""
+        """Settings of the study of encoder resolution."""
         return self.problem.settings
 
     @property
     def options(self) -> Mapping[str, Any]:
-        """Options of estimate.options that concern the loop: `around` and `reference`."""
+        """Options of the estimation method that concern the loop: `around` and `reference`."""
         return {
             key: self.study.estimate.options[key]
             for key in ALIKE
@@ -92,7 +92,7 @@ class Loop:
 
     @cached_property
     def reference(self) -> Reference:
-        """Reference that the controller follows in simulated records (place: loop)."""
+        """Reference motion that the controller follows in records simulated for the study."""
         return reference_of(self.simulator.controller, self.model, records=self.problem.records)
 
     @cached_property
@@ -102,9 +102,9 @@ class Loop:
 
     @cached_property
     def closed(self) -> ClosedLoop:
-        """Closed loop of the measured records; for place: loop, of one simulated record.
+        """Closed loop of the measured records, or of a record simulated with encoders in the loop.
 
-        The simulated record is made with the encoder of the study.
+        The second case is place: loop. The simulated record is made with the encoder of the study.
         """
         if self.study.cestac.place == "record":
             return closed_loop(self.problem, self.problem.prepared, self.simulator, **self.options)
@@ -112,12 +112,12 @@ class Loop:
 
     @property
     def parts(self) -> tuple[LoopPart, ...]:
-        """Parts of the closed loop, one per record that it simulates."""
+        """Data of each record that the loop simulates: reference, filtered states, rows used."""
         return tuple(self.closed.parts)
 
     @property
     def estimate(self) -> EstimateSettings:
-        """Settings of the estimate; without `around` and `reference` if its method has no loop."""
+        """Estimate settings; without `around` and `reference` if the method simulates no loop."""
         settings: EstimateSettings = self.study.estimate
         if self.problem.method.observe is not None:
             return settings
@@ -149,11 +149,11 @@ class Loop:
         return tuple(notes)
 
     def measured(self) -> Observation:
-        """Build the rows Y = W X + rho of the records as measured."""
+        """Build the system Y = W X + rho of the records without the encoder steps under study."""
         return self.closed.measured()
 
     def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
-        """Attach the closed loop to rows computed from perturbed positions of every record.
+        """Attach the closed loop to a system Y = W X + rho computed from perturbed positions.
 
         positions : shape (N, n) per record.
         """
@@ -169,11 +169,11 @@ class Loop:
         )
 
     def rows(self, level: Level, draw: tuple[int, ...]) -> Observation:
-        """Simulate a record with encoders of step level.delta, and build its rows Y = W X + rho."""
+        """Simulate a record with encoder steps level.delta, and build its system Y = W X + rho."""
         return self.simulated(level, draw).measured()
 
     def simulated(self, level: Level, draw: tuple[int, ...]) -> ClosedLoop:
-        """Simulate a record with encoders of step level.delta, and return its closed loop.
+        """Simulate a record with encoder steps level.delta, and return its closed loop.
 
         If level.delta is 0, the encoder is that of the study. draw : numbers of the run; the last
         sets its seed.
@@ -191,7 +191,7 @@ class Loop:
         return self._of(simulator, int(random.integers(2**31)), level.delta)
 
     def _of(self, simulator: Any, seed: int, delta: float) -> ClosedLoop:
-        """Make a record by simulation with `simulator`, and the closed loop of this record.
+        """Simulate a record with `simulator`, and make the closed loop of this record.
 
         The closed loop itself is simulated with the encoder of the settings. A reader of encoder
         counts gets the step; without any step, the positions are low-pass filtered instead.
@@ -213,7 +213,7 @@ class Loop:
 
 
 def _loop(problem: Problem) -> Loop:
-    """Make the loop of a problem, with a simulator from the section `controller`."""
+    """Make the Loop of an identification problem; section `controller` gives the simulator."""
     from runtime.loop.simulation import Simulator
 
     settings: Any = problem.settings
@@ -221,7 +221,7 @@ def _loop(problem: Problem) -> Loop:
 
 
 def loop_of(problem: Problem, simulator: Simulator | None = None) -> Loop | None:
-    """Make the loop of a problem, or None if neither its study nor its method simulates a loop.
+    """Make the Loop of an identification problem; None if no closed loop has to be simulated.
 
     simulator : default: made from the section `controller`; SettingsError if that is missing.
     """
@@ -231,7 +231,7 @@ def loop_of(problem: Problem, simulator: Simulator | None = None) -> Loop | None
     if study.controller is None:
         asked = "place: loop" if study.cestac.place == "loop" else study.estimate.method
         raise SettingsError(
-            f"{asked} simulates the closed loop, but this study describes none; add a section "
+            f"{asked} simulates the closed loop, but this study does not describe it; add a section "
             "`controller` with law, rate and reference, "
             "or use ols, wls or irls on recorded positions",
             path=("cestac", "place") if study.cestac.place == "loop" else ("estimate", "method"),

@@ -81,7 +81,7 @@ class LoopOptions(Settings):
 
 @dataclass(frozen=True, eq=False)
 class LoopPart:
-    """One record of a closed loop, with its reference and the choice of its rows.
+    """One record of a closed loop, with its reference and the rows of W that are used.
 
     Attributes
     ----------
@@ -107,12 +107,12 @@ class LoopPart:
 
     @property
     def record(self) -> Record:
-        """The record of this part."""
+        """Record of measured or simulated positions and torques."""
         return self.prepared.record
 
     @property
     def given(self) -> dict[str, Any]:
-        """Arguments for a simulation of this record, except the parameters and the reference."""
+        """Arguments for a simulation: first position, disturbance, recorded feed-forward torque."""
         return {
             "start": self.record.q[0],
             "disturbance": self.disturbance,
@@ -120,7 +120,7 @@ class LoopPart:
         }
 
     def decimated(self, x: Array) -> Array:
-        """Decimate signals of the record like Y: from shape (N, n, ...) to shape (n, ..., K)."""
+        """Decimate signals of the record as Y was: from shape (N, n, ...) to shape (n, ..., K)."""
         window = np.moveaxis(x[: len(self.record)][self.selection.samples], 0, -1)
         return decimated(
             np.ascontiguousarray(window), self.selection.factor, self.selection.signals.decimate
@@ -143,7 +143,7 @@ class ClosedLoop:
     law: tuple[LawFit, ...] = ()
 
     def run(self, X: Array, g: Array | float = 1.0) -> list[Simulation]:
-        """Simulate every record with all base parameters X, shape (b,), without noise and steps.
+        """Simulate every record with base parameters X, shape (b,), without noise or quantisation.
 
         Each simulation starts at rest, at the first measured position. g : factor on everything
         between position error and torque.
@@ -154,15 +154,16 @@ class ClosedLoop:
         ]
 
     def torques(self, runs: Sequence[Simulation]) -> list[Array]:
-        """Compute the drive torque of each run, shape (N, n), minus the known torque of its record.
+        """Compute the drive torque of each simulation, shape (N, n), minus the known torque.
 
-        The result is comparable with `Record.torque`.
+        The known torque is that of the record (`tau_known`). The result is comparable with
+        `Record.torque`.
         """
         pairs = zip(runs, (part.record.tau_known for part in self.parts), strict=True)
         return [run.tau if known is None else run.tau[: len(known)] - known for run, known in pairs]
 
     def measured(self) -> Observation:
-        """Build the rows Y = W X + rho of the measured positions, with the loop attached."""
+        """Build the system Y = W X + rho from measured positions, and attach this loop to it."""
         states = [p.prepared.states for p in self.parts]
         observation = self._observed([replace(s, errors=None) for s in states])
         observation = replace(
@@ -202,7 +203,7 @@ class ClosedLoop:
         return replace(observation, W=np.asfortranarray(Z[observation.closed_loop.rows]))
 
     def outputs(self, signals: Sequence[Array], observation: Observation) -> Array:
-        """Decimate signals of every record like Y, and select the rows of `observation`.
+        """Decimate signals of every record as Y was, and select the rows that `observation` uses.
 
         The signals have shape (N, n) or (N, n, c) per record, the result shape (r,) or (r, c).
         """
@@ -217,7 +218,7 @@ class ClosedLoop:
         return np.asarray(np.concatenate(by_joint)[observation.closed_loop.rows])
 
     def inertia(self, X: Array) -> Array:
-        """Compute the mean inertia J_j of each joint over the references, shape (n,).
+        """Compute the mean inertia J_j of each joint along the reference motions, shape (n,).
 
         J_j is the mean of A_jj, A the inertia matrix with parameters X.
         """
@@ -238,7 +239,7 @@ class ClosedLoop:
 
 
 def observed_loop(problem: Problem, simulator: Simulator | None = None) -> Observation:
-    """Build the rows of the records of a problem, with the closed loop attached.
+    """Build the system Y = W X + rho of all records, and attach their closed loop to it.
 
     Methods that simulate the loop need this. simulator : default: made from the section
     `controller` of the settings; without this section no loop is attached.
@@ -246,7 +247,7 @@ def observed_loop(problem: Problem, simulator: Simulator | None = None) -> Obser
     settings: Any = problem.settings
     if any(is_axis(joint) for joint in problem.model.JOINTS):
         raise InputError(
-            f"estimate.method: {settings.estimate.method} cannot use the measured wrench of the base; use another method, or leave the wrench out"
+            f"estimate.method: {settings.estimate.method} cannot use the measured wrench of the base; use another method, or remove record.columns.wrench"
         )
     if simulator is None and settings.controller is not None:
         from runtime.loop.simulation import Simulator as FromController
@@ -284,15 +285,15 @@ def closed_loop(
         fed = record.tau_ff if controller.feedforward == "record" else None
         if controller.feedforward == "record" and fed is None:
             raise SettingsError(
-                f"{record.file} holds no feed-forward torque; name its columns in "
+                f"{record.file} contains no feed-forward torque; give its columns in "
                 "record.columns.tau_ff",
                 path=("controller", "feedforward"),
             )
         followed = _reference(model, measured, k, controller, asked.reference)
         if -(-len(followed) // every) < len(record):
             raise InputError(
-                f"the reference ends after {len(followed) / controller.rate:g} s, the record "
-                f"after {record.t[-1] - record.t[0]:g} s",
+                f"the reference ends after {len(followed) / controller.rate:g} s, but the record "
+                f"after {record.t[-1] - record.t[0]:g} s; give a longer reference, or cut the record",
                 file=record.file,
             )
         speed = slips(followed.qd[::every][: len(record)], simulator.friction.G)
@@ -346,14 +347,14 @@ def _reference(
     given = controller.reference
     if all(getattr(given, name) is None for name in ("file", "motion", "points", "record")):
         raise SettingsError(
-            f"what the controller followed in {record.file} is not known; give columns qr1 ... "
-            "(record.columns.q_ref) or controller.reference, or say "
+            f"the reference of the controller in {record.file} is not known; give columns qr1 ... "
+            "(record.columns.q_ref) or controller.reference, or set "
             "estimate.options.reference: measured",
             path=("controller", "reference"),
         )
     if len(records) > 1 and given.record is None:
         raise SettingsError(
-            f"one reference for {len(records)} records; give each record its columns qr1 ...",
+            f"one reference for {len(records)} records; give the reference columns qr1 ... in each record",
             path=("controller", "reference"),
         )
     return reference_of(
@@ -364,10 +365,10 @@ def _reference(
 
 
 def slips(qd: Array, G: Array) -> Array:
-    """Compute, for each joint, the smallest slip speed of the dry friction that acts on it.
+    """Compute, by joint, the smallest of its speed and the slip speeds of its friction elements.
 
-    The speed of the joint itself counts too. The result has shape (N, n), like qd. G : shape
-    (elements, n); G qd are the slips of the friction elements.
+    The result has shape (N, n), like qd. G : shape (elements, n); G qd are the slips of the
+    friction elements.
     """
     speed: Array = np.abs(qd)
     for element in G:
@@ -377,7 +378,7 @@ def slips(qd: Array, G: Array) -> Array:
 
 
 def _usable(simulator: Simulator, record: Record, keep: Array | None) -> Array | None:
-    """Select the samples whose torque is below its limit and whose position is not in a long gap.
+    """Select the samples with torque below its limit and no long gap of positions nearby.
 
     keep : samples that may be used; None: all.
     """
@@ -393,15 +394,15 @@ def _usable(simulator: Simulator, record: Record, keep: Array | None) -> Array |
 
 
 def loop_of(observation: Observation, method: str) -> ClosedLoop:
-    """Return the closed loop that is attached to an observation.
+    """Return the closed loop that is attached to the system Y = W X + rho of an observation.
 
     SettingsError if there is none; the message names `method`, which needs the loop.
     """
     if observation.closed_loop is None:
         raise SettingsError(
-            f"{method} simulates the closed loop of the record, but this study describes none; add a "
+            f"{method} simulates the closed loop of the record, but this study does not describe it; add a "
             "section `controller` with law, rate and reference "
-            "(symgen identify then makes it), or use ols, wls or irls",
+            "(symgen identify then builds the loop), or use ols, wls or irls",
             path=("estimate", "method"),
         )
     loop: ClosedLoop = observation.closed_loop.loop

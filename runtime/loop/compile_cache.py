@@ -1,4 +1,4 @@
-"""Compile the C code of CasADi functions on first use, and keep it in a cache that is checked.
+"""Compile the C code of CasADi functions on first use, and store it in a cache of checked files.
 
 The system compiler (`CC`, else cc, gcc, clang) writes a shared object into a cache folder (compiled
 in `SYMGEN_CACHE`, else in the cache folder of the platform). The file name holds the SHA-256 of
@@ -86,14 +86,14 @@ def shared_object(
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         if is_writable_by_others(folder):
             raise NotCompiledError(
-                f"anyone may write to the cache folder {folder}; choose another by SYMGEN_CACHE"
+                f"anyone may write to the cache folder {folder}; choose another folder by the variable SYMGEN_CACHE"
             )
         return _cached(folder, key[:32], opened) or opened(
             _compiled(command, flags, path, text, folder, key[:32])
         )
     except OSError as e:  # no right to write, full, or mounted without the right to execute
         raise NotCompiledError(
-            f"cache folder {folder}: {e.strerror or e}; choose another by SYMGEN_CACHE"
+            f"cache folder {folder}: {e.strerror or e}; choose another folder by the variable SYMGEN_CACHE"
         ) from e
 
 
@@ -156,7 +156,7 @@ def compiler() -> tuple[tuple[str, ...], str]:
     unsafe = [flag for flag in given[1:] if flag in UNSAFE]
     if unsafe:
         raise NotCompiledError(
-            f"CC holds {', '.join(unsafe)}, which changes the arithmetic of the whole process"
+            f"CC contains {', '.join(unsafe)}, which changes the arithmetic of the whole process; remove this flag"
         )
     command = (program, *given[1:])
     try:

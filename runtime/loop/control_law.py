@@ -90,7 +90,7 @@ class ControlLaw:
         return len(self.P)
 
     def matrix(self, g: Array, *, ideal: bool) -> Array:
-        """Arrange the gains, limits and steps of the law as a matrix for one tick, a row per joint.
+        """Arrange gains, limits and quantisation steps of the law in a matrix, one row per joint.
 
         g : factor on the torque, shape (n,). ideal : encoder and converter have no steps.
         """
@@ -102,7 +102,7 @@ class ControlLaw:
         )
 
     def shown(self, q: Array) -> Array:
-        """Compute the positions that the encoders show at the joint positions q, shape (n,)."""
+        """Compute the quantised positions, shape (n,), that the encoders report at positions q."""
         step = np.where(self.encoder_step > 0, self.encoder_step, 1.0)
         qm = self.R @ (q - self.offset)
         return np.asarray(
@@ -131,7 +131,8 @@ def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
 
     if "fit" in (law.kd, law.delay):
         raise SettingsError(
-            "fit; a loop is simulated with numbers, found by identify", path=("controller", "law")
+            "fit, but a simulation needs numbers; identify the record first, and give the fitted numbers here",
+            path=("controller", "law"),
         )
     gains = law.gains(n)
     one, zero = np.ones(n), np.zeros(n)
@@ -144,7 +145,8 @@ def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
     )
     if drives is None:
         raise SettingsError(
-            f"motor; {model.NAME} has no drives", path=("controller", "encoder", "side")
+            f"motor, but {model.NAME} has no drives; use side: joint or give drives in the robot file",
+            path=("controller", "encoder", "side"),
         )
     weights = (0.0, 0.5) if controller.velocity == "averaged" else (1.0, 0.0)
     return ControlLaw(
@@ -174,21 +176,23 @@ def parameters_of(model: GeneratedModel, controller: Controller | None = None) -
     if missing := [name for name in emitted.STANDARD_PARAMETERS if name not in values]:
         message = (
             f"{model.NAME} has no value of "
-            f"{', '.join(missing[:6])}{' ...' if len(missing) > 6 else ''}; give them in the "
-            "robot file"
+            f"{', '.join(missing[:6])}{' ...' if len(missing) > 6 else ''}; give these values in "
+            "the robot file"
         )
         if controller is None:
             raise InputError(
-                f"{message} (0 for each that is zero), or give a record from which they are estimated"
+                f"{message} (0 for a parameter that is zero), or give a record from which the values are estimated"
             )
-        raise SettingsError(f"{message} or here, 0 where one is zero", path=where)
+        raise SettingsError(f"{message} or here, 0 for a parameter that is zero", path=where)
     if unknown := sorted(set(changed) - set(emitted.STANDARD_PARAMETERS)):
-        raise SettingsError(f"no standard parameter {', '.join(unknown)}", path=where)
+        raise SettingsError(
+            f"{model.NAME} has no standard parameter {', '.join(unknown)}", path=where
+        )
     return np.asarray(emitted.base_parameters(values), dtype=float)
 
 
 def discrete_poles(law: ControlLaw, A: Array, B: Array, g: Array) -> Array:
-    """Compute the poles of the sampled loop, linearised about a point at rest.
+    """Compute the poles of the sampled closed loop, linearised about a point at rest.
 
     A, B : inertia matrix and viscous friction, shape (n, n).
 
@@ -215,7 +219,7 @@ def discrete_poles(law: ControlLaw, A: Array, B: Array, g: Array) -> Array:
 
 
 def continuous_pole(law: ControlLaw, A: Array, B: Array, g: Array) -> float:
-    """Compute the modulus of the fastest pole of the loop with continuous control, 1/s."""
+    """Compute the modulus of the fastest pole of the closed loop in continuous time, 1/s."""
     n = law.joints
     one, zero = np.eye(n), np.zeros((n, n))
     inverse = np.linalg.inv(A)

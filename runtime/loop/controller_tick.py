@@ -49,7 +49,7 @@ CVODES = {"abstol": 1e-10, "reltol": 1e-9}
 
 @dataclass(frozen=True, eq=False)
 class LoopInputs:
-    """Input arrays of one simulated run.
+    """Input arrays of one simulation of the closed loop.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class LoopInputs:
 
 
 def blocks(rows: Array, size: int) -> Iterator[tuple[Array, int]]:
-    """Yield the input rows in blocks of `size` rows, each block with its number of valid rows.
+    """Yield input samples in blocks of `size` rows, each with its number of rows without padding.
 
     The last block is filled up with copies of its last row.
     """
@@ -178,7 +178,7 @@ def _steps(x: MX, step: MX) -> MX:
 def plant_function(
     model: GeneratedModel, friction: DryFriction, constants: dict[str, float], integrator: str
 ) -> Any:
-    """Make the CasADi function of the arm with dry friction, for one integration step h.
+    """Make the CasADi function that moves the arm with dry friction over an integration step h.
 
     (q, qd, tau, Xs, plus, minus, h) -> q, qd after h, and qdd at its start.
 
@@ -207,19 +207,21 @@ def plant_function(
 
 
 def sliding_friction(friction: DryFriction, qd: MX, plus: MX, minus: MX) -> tuple[MX, MX]:
-    """Compute friction forces f and directions of slip if every friction element slides."""
+    """Compute friction forces f and directions of slip if no friction element is at rest."""
     direction = ca.sign(ca.DM(friction.G) @ qd)
     return kinetic(direction, plus, minus), direction
 
 
 def keeps_sliding(friction: DryFriction, direction: MX, qd: MX, end: MX) -> MX:
-    """Whether every friction element slips in the same direction at the velocities qd and `end`."""
+    """Whether no friction element stops or reverses between the velocities qd and `end`."""
     G = ca.DM(friction.G)
     return ca.mmin(ca.vertcat(ca.fabs(G @ qd), direction * (G @ end))) > LIMIT.SLIP_REST
 
 
 def flow_function(model: GeneratedModel, constants: dict[str, float], integrator: str) -> Any:
-    """Make the CasADi function of the arm without dry friction, for a step h at constant torque.
+    """Make the CasADi function that moves the arm without dry friction over a step h.
+
+    The torque is constant over the step.
 
     (q, qd, tau, Xs, h) -> q, qd after h, and qdd at the start.
     """
@@ -229,7 +231,7 @@ def flow_function(model: GeneratedModel, constants: dict[str, float], integrator
 def _rounds(
     model: GeneratedModel, friction: DryFriction, constants: dict[str, float], flow: Any
 ) -> Any:
-    """Make the CasADi function of the arm for a step in which friction elements stop or rest.
+    """Make the CasADi function that moves the arm over a step in which friction elements stop.
 
     The step h is divided into rounds; each round lasts until the next slip stops.
     """
@@ -262,7 +264,7 @@ def round_function(
     *,
     whole: int,
 ) -> Any:
-    """Make the CasADi function of the arm until the next friction element stops, or for all of h.
+    """Make the CasADi function that moves the arm until a friction element stops, or over all of h.
 
     whole : 1 for the whole of h. Results: q, qd, the remaining part of h, qdd, f, direction, Y, and
     which slips stopped.
@@ -287,9 +289,10 @@ def round_function(
 
 
 def plant_inputs(model: GeneratedModel, friction: DryFriction | None = None) -> list[MX]:
-    """Make the symbolic inputs of the functions of the arm: q, qd, tau, Xs, plus, minus, h.
+    """Make the symbolic inputs of the arm functions: q, qd, tau, Xs, plus, minus, h.
 
-    Without dry friction, plus and minus are empty.
+    Xs : parameters without dry friction; plus, minus : largest friction forces in each direction; h
+    : time step. Without dry friction, plus and minus are empty.
     """
     n, m = len(model.JOINTS), 0 if friction is None else len(friction.G)
     names = ("q", "qd", "tau", "X", "plus", "minus", "h")
@@ -317,7 +320,7 @@ def runge_kutta(
 
 
 def _runge_kutta(model: GeneratedModel, constants: dict[str, float]) -> Any:
-    """Make the function of the arm for a step h, by Runge-Kutta of order 4.
+    """Make the CasADi function that moves the arm over a step h by Runge-Kutta of order 4.
 
     (q, qd, tau, Xs, h) -> q, qd after h at constant torque, and qdd at the start.
     """
@@ -331,7 +334,7 @@ def _runge_kutta(model: GeneratedModel, constants: dict[str, float]) -> Any:
 
 
 def _cvodes(model: GeneratedModel, constants: dict[str, float]) -> Any:
-    """Make the function of the arm for a step h, by CVODES with variable order and step.
+    """Make the CasADi function that moves the arm over a step h by CVODES.
 
     Inputs and results are those of `_runge_kutta`.
     """
@@ -370,7 +373,7 @@ def compiled(function: Any, cache: Path | None = None) -> Any:
         )
     except (NotCompiledError, OSError) as e:
         warnings.warn(
-            f"simulation: CasADi's own interpreter in place of C: {e}",
+            f"the simulation runs in the interpreter of CasADi, because it cannot run as compiled C: {e}",
             FallbackWarning,
             stacklevel=2,
         )

@@ -1,4 +1,4 @@
-"""Dry (Coulomb) friction of a model: its columns, and the directions along which it acts.
+"""Dry (Coulomb) friction of a robot model: its columns of W, and the directions it acts along.
 
 Every Coulomb element acts along a row of G. Its slip is s = G qd; its force is c_plus if s > 0 and
 -c_minus if s < 0. There may be more elements than joints (on a wrist, FS5, FS6 and FSM6 act along

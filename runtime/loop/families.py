@@ -49,7 +49,7 @@ class Family:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the coefficients p of a joint."""
+        """Names of the coefficients p that define the motion of one joint."""
         raise NotImplementedError
 
     def joint(self, t: Array, p: Any, math: Any) -> States:
@@ -60,7 +60,7 @@ class Family:
         raise NotImplementedError
 
     def guess(self, rng: np.random.Generator, lower: float, upper: float, speed: float) -> Array:
-        """Draw random coefficients, shape (P,), of a motion about the middle of [lower, upper].
+        """Draw random coefficients, shape (P,), of a motion around the middle of [lower, upper].
 
         The motion is not faster than about `speed`.
         """
@@ -151,8 +151,8 @@ class Sinusoids(Family, Settings):
 
     def __post_init__(self) -> None:
         message = (
-            f"sinusoids rise and fall within {self.ramp} s each, more than their length of "
-            f"{self.length} s; shorten it"
+            f"sinusoids: the ramps at the start and at the end, {self.ramp} s each, are longer than "
+            f"the length {self.length} s; shorten the ramp"
         )
         require(2 * self.ramp <= self.length, message, "ramp")
 
@@ -210,11 +210,11 @@ class Polyline(Family):
 
     @property
     def ramps(self) -> list[tuple[float, float]]:
-        """Start and end time of the motion to each next position, s, for sharp corners."""
+        """Start and end time, s, of the move to each next position; corners not yet rounded."""
         raise NotImplementedError
 
     def stride(self, speed: float) -> float:
-        """Return the largest distance between neighbouring positions of a guess, rad or m."""
+        """Return the largest distance between neighbouring random positions, rad or m."""
         raise NotImplementedError
 
     @property
@@ -261,8 +261,8 @@ class PointToPoint(Polyline, Settings):
 
     def __post_init__(self) -> None:
         message = (
-            f"point-to-point: gaining and losing speed takes {2 * self.blend} s of "
-            f"{self.travel} s; shorten it"
+            f"point-to-point: acceleration and deceleration take {2 * self.blend} s of the travel "
+            f"time {self.travel} s; shorten the blend"
         )
         require(2 * self.blend <= self.travel, message, "blend")
 
@@ -307,7 +307,7 @@ class Triangular(Polyline, Settings):
     def __post_init__(self) -> None:
         message = (
             f"triangular: a corner takes {self.blend} s, more than the {self.travel} s "
-            "between corners; shorten it"
+            "between corners; shorten the blend"
         )
         require(self.blend <= self.travel, message, "blend")
 
@@ -334,7 +334,7 @@ def _linear(basis: Sequence[Array], p: Any, math: Any) -> States:
 
 
 def _step(t: Array, width: float, sign: float = 1.0) -> tuple[Array, Array, Array]:
-    """Compute a smooth step from 0 to 1 within [0, width], with its two derivatives by time.
+    """Compute a smooth step from 0 to 1 within [0, width], and its two time derivatives.
 
     The step is 10 x^3 - 15 x^4 + 6 x^5 with x = t/width. sign : -1 if t runs against the time.
     """
@@ -344,7 +344,7 @@ def _step(t: Array, width: float, sign: float = 1.0) -> tuple[Array, Array, Arra
 
 
 def _corner(u: Array, blend: float) -> Array:
-    """Compute a ramp max(u, 0) whose corner is rounded within |u| < blend/2, with two derivatives.
+    """Compute a ramp max(u, 0), rounded within |u| < blend/2, and its two derivatives.
 
     The result has shape (3, N). In the corner the speed rises as 3 x^2 - 2 x^3, x from 0 to 1.
     """
@@ -356,5 +356,5 @@ def _corner(u: Array, blend: float) -> Array:
 
 
 def _between(rng: np.random.Generator, lower: float, upper: float) -> float:
-    """Draw a random position in the middle half of the range."""
+    """Draw a random position in the middle half of the range [lower, upper]."""
     return float(rng.uniform(0.75 * lower + 0.25 * upper, 0.25 * lower + 0.75 * upper))

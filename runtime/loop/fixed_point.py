@@ -77,7 +77,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Fixed:
-    """End of the iteration: last step, list of passes, convergence, ratio of last two changes."""
+    """Result of the iteration: last pass, all passes, convergence, ratio of last two changes."""
 
     step: Step
     trail: tuple[dict[str, Any], ...]
@@ -114,8 +114,9 @@ def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]
             base = parameters_of(model)
         except InputError as e:
             raise SettingsError(
-                f"start: values needs all of them, but {e.message.partition(';')[0]}; give these in the "
-                "robot file (0 for each that is zero), or use start: ols and gains: one",
+                f"start: values needs the values of all parameters, but "
+                f"{e.message.partition(';')[0]}; give the missing values in the robot file (0 for a "
+                "parameter that is zero), or use start: ols and gains: one",
                 path=("estimate", "options"),
             ) from e
     else:
@@ -124,7 +125,7 @@ def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]
             own = next((name for name in (f"Ia{j}", f"ZZ{j}", f"M{j}") if name in standard), None)
             if own is None:
                 raise SettingsError(
-                    f"joint {j} of {model.NAME} has no inertia of its own; use start: ols",
+                    f"joint {j} of {model.NAME} has no inertia parameter of its own; use start: ols",
                     path=("estimate", "options", "start"),
                 )
             standard[own] = 1.0
@@ -147,7 +148,7 @@ def iterate(
     J = None if options.gains == "one" else loop.inertia(full(names, reference, every))
     if J is not None and not np.all(J > 0):
         raise InputError(
-            f"gains: {options.gains}: these parameters have no positive inertia about joint "
+            f"gains: {options.gains}: these parameters do not give a positive inertia about joint "
             f"{joint_labels(loop.model)[int(np.argmin(J))]}; {_physical_start(loop, start)}"
         )
     remedy = _physical_start(loop, start)
@@ -194,7 +195,7 @@ def iterate(
 
 
 def _physical_start(loop: ClosedLoop, start: Beginning) -> str:
-    """Write which start to set if the parameters are not those of a physical robot.
+    """Write which start values to set if the iteration starts from unphysical parameters.
 
     The advice is the values of the robot file if they give a positive inertia about every joint,
     else the parameters of method feasible.
@@ -204,11 +205,13 @@ def _physical_start(loop: ClosedLoop, start: Beginning) -> str:
             start.observation.names, initial(loop, start, "values"), loop.model.BASE_PARAMETERS
         )
         if np.all(loop.inertia(X) > 0):
-            return "set estimate.options: {start: values, gains: values}, those of the robot file"
+            return (
+                "set estimate.options: {start: values, gains: values}, the values of the robot file"
+            )
     except InputError:
         pass
     return (
-        "identify with estimate: {method: feasible} first, and give its parameters by name as "
+        "identify with estimate: {method: feasible} first, and give the estimated parameters by name as "
         "estimate.options.start, with gains: start"
     )
 
@@ -235,14 +238,13 @@ def _simulated(
                 g = loop.inertia(full(names, X, every)) / J
                 if not np.all(g > 0):
                     least = joint_labels(loop.model)[int(np.argmin(g))]
-                    raise InputError(f"inertia of negative sign about joint {least}")
+                    raise InputError(f"the inertia about joint {least} is negative")
             return X, g, loop.run(full(names, X, every), g), ""
         except InputError as e:
             reason = str(e)
             if before is None:
                 raise InputError(
-                    f"the loop cannot be simulated with the parameters it starts from: {reason}; "
-                    f"{remedy}"
+                    f"the loop cannot be simulated with the start parameters: {reason}; {remedy}"
                 ) from None
             X = (X + before) / 2
     return (

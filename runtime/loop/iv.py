@@ -111,7 +111,7 @@ def hausman(names: Sequence[str], d: Array, U: Array) -> dict[str, Any]:
 
 
 def _solve(W: Array, Z: Array, Y: Array) -> tuple[Array, Array, Array]:
-    """Solve weighted rows with the instruments Z; return X, its covariance C, and A = (Z'VW)^-1."""
+    """Solve the weighted system with instruments Z; return X, its covariance C, A = (Z'VW)^-1."""
     size = np.linalg.norm(W, axis=0)
     W, Z = W / size, Z / size
     try:
@@ -128,7 +128,7 @@ def _solve(W: Array, Z: Array, Y: Array) -> tuple[Array, Array, Array]:
 
 
 def _quality(W: Array, Z: Array) -> dict[str, float]:
-    """Compute how well the instruments Z explain W, both with weighted rows.
+    """Compute how well the instruments Z explain the observation matrix W, both weighted.
 
     Returns the condition number of Z'VW with unit columns, the smallest correlation between the two
     column spaces, and the smallest correlation between a column of W and its own instrument.

@@ -32,7 +32,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class LawFit:
-    """Comparison of the control law with the record, for one joint.
+    """Measures of how well the control law explains the recorded torque of one joint.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class LawFit:
 def law_fits(
     law: Any, parts: Sequence[Any], controller: Controller, joints: Sequence[str]
 ) -> tuple[LawFit, ...]:
-    """Compare the torque of the control law with the records, joint by joint.
+    """Compare the torque of the control law with the recorded torque, joint by joint.
 
     parts : parts of a `ClosedLoop`, with references at the rate of the controller.
     """
@@ -121,7 +121,7 @@ def _integral(steps: Array, first: float, bound: float) -> Array:
 
 
 def law_text(fits: Sequence[LawFit]) -> str:
-    """Write which share of the torque the law explains, by joint, and causes of a small share."""
+    """Write which share of each joint torque the law explains, and causes of a small share."""
     shares = ", ".join(f"{max(one.share, 0.0):.0f} % of joint {one.joint}" for one in fits)
     poor = [one for one in fits if one.share < LIMIT.LAW_POOR]
     if not poor:
@@ -140,7 +140,7 @@ def law_text(fits: Sequence[LawFit]) -> str:
 
 
 def _share(y: Array, x: Array) -> tuple[float, float, float]:
-    """Compute the share of a signal y that a signal x explains, without and with a best factor.
+    """Compute how well a signal x explains a signal y, %, without and with a best factor on x.
 
     Returns the share, %; the best factor of x; and the share with this factor, %.
     """

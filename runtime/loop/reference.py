@@ -53,10 +53,12 @@ class Reference:
         if len(shapes) != 1 or len(np.shape(self.q)) != 2 or len(self.q) < 2:
             raise InputError(
                 f"reference q, qd, qdd of shapes {np.shape(self.q)}, {np.shape(self.qd)}, "
-                f"{np.shape(self.qdd)}; expected one (N, n)"
+                f"{np.shape(self.qdd)}; expected the same shape (N, n) for all"
             )
         if not all(np.isfinite(x).all() for x in (self.q, self.qd, self.qdd)):
-            raise InputError("the reference holds values that are not finite")
+            raise InputError(
+                "the reference contains values that are not finite; correct these values"
+            )
 
     @classmethod
     def sampled(cls, q: Array, rate: float) -> Reference:
@@ -95,7 +97,7 @@ def reference_of(
     records: Sequence[Record] = (),
     folder: str | Path | None = None,
 ) -> Reference:
-    """Make the reference that the settings of a controller describe.
+    """Make the reference motion that the settings of a controller describe.
 
     The reference must be within the limits of the robot, unless the settings say to ignore them.
 
@@ -122,7 +124,7 @@ def reference_of(
     elif settings.record is not None:
         if not 0 <= settings.record < len(records):
             raise SettingsError(
-                f"record {settings.record}; the study has {len(records)}",
+                f"record {settings.record}; the study has {len(records)} records, numbered from 0",
                 path=("controller", "reference", "record"),
             )
         reference = of_record(records[settings.record], controller)
@@ -135,12 +137,12 @@ def reference_of(
         reference = point_to_point(model, settings.points, rate)
     else:
         raise SettingsError(
-            "nothing to follow; give one of file, record, motion, points",
+            "no reference is given; give one of file, record, motion, points",
             path=("controller", "reference"),
         )
     if reference.q.shape[1] != n:
         raise SettingsError(
-            f"reference of {reference.q.shape[1]} joints; {model.NAME} has {n}",
+            f"the reference has {reference.q.shape[1]} joints, but {model.NAME} has {n} joints",
             path=("controller", "reference"),
         )
     if settings.limits == "refuse":
@@ -151,7 +153,7 @@ def reference_of(
 def _check_length(duration: float, rate: float, key: str) -> None:
     if duration * rate > LIMIT.LONGEST_REFERENCE:
         raise SettingsError(
-            f"{duration:g} s at {rate:g} Hz; at most {LIMIT.LONGEST_REFERENCE:,} ticks",
+            f"{duration:g} s at {rate:g} Hz; expected at most {LIMIT.LONGEST_REFERENCE:,} ticks of the controller",
             path=("controller", "reference", key),
         )
 
@@ -174,8 +176,8 @@ def read_reference(path: Path, rate: float, n: int) -> Reference:
         if abs(own / rate - 1) > LIMIT.RATE_TOLERANCE:
             raise InputError(
                 (
-                    f"time runs at {own:g} Hz; the controller at {rate:g} Hz: resample one, or set "
-                    "controller.rate"
+                    f"time runs at {own:g} Hz, but the controller at {rate:g} Hz; resample the reference, "
+                    "or correct controller.rate"
                 ),
                 file=path.name,
             )
@@ -194,7 +196,7 @@ def of_record(record: Record, controller: Controller) -> Reference:
     where, every = ("controller", "reference", "record"), controller.record_every
     if record.q_r is None:
         raise SettingsError(
-            f"{record.file} holds no reference; name its columns in record.columns.q_ref",
+            f"{record.file} contains no reference; give its columns in record.columns.q_ref",
             path=where,
         )
     require_rate(record, controller)
@@ -202,7 +204,7 @@ def of_record(record: Record, controller: Controller) -> Reference:
 
 
 def require_rate(record: Record, controller: Controller) -> None:
-    """Raise SettingsError unless the record holds every `record_every`-th tick of the controller.
+    """Raise SettingsError unless record rate times controller.record_every is the controller rate.
 
     The error names the setting to change.
     """
@@ -211,8 +213,8 @@ def require_rate(record: Record, controller: Controller) -> None:
         return
     ratio = rate / record.rate
     told = (
-        f"{record.file} at {record.rate:g} Hz, of a controller at {rate:g} Hz that records "
-        f"every {every}. tick"
+        f"{record.file} has the rate {record.rate:g} Hz, which does not match a controller at "
+        f"{rate:g} Hz that records every {every}. tick"
     )
     if round(ratio) >= 1 and abs(ratio / round(ratio) - 1) <= LIMIT.RATE_TOLERANCE:
         raise SettingsError(
@@ -221,15 +223,15 @@ def require_rate(record: Record, controller: Controller) -> None:
         )
     raise SettingsError(
         (
-            f"{told}; the rate of the controller is no multiple of that of the record: correct one "
-            "of them"
+            f"{told}; the rate of the controller is no multiple of the rate of the record: correct one "
+            "of these rates"
         ),
         path=("controller", "rate"),
     )
 
 
 def check_limits(reference: Reference, limits: Mapping[str, Any], joints: Sequence[str]) -> None:
-    """Raise InputError if a reference leaves the limits of a model.
+    """Raise InputError if a reference exceeds the limits of q, qd or qdd of the robot.
 
     The message gives joint, value, limit and time of the first value outside.
     """
@@ -246,8 +248,8 @@ def check_limits(reference: Reference, limits: Mapping[str, Any], joints: Sequen
             raise InputError(
                 f"the reference leaves the limits of joint {joints[j]} at {k / reference.rate:g} "
                 f"s: {quantity} = {x[k, j]:.4g} rad{unit} or m{unit}, "
-                f"limits {low[j]:.4g} to {high[j]:.4g}; slow it down or move it, or set "
-                "controller.reference.limits to ignore"
+                f"limits {low[j]:.4g} to {high[j]:.4g}; slow down or move the reference, or set "
+                "controller.reference.limits: ignore"
             )
 
 
@@ -295,7 +297,7 @@ def point_to_point(model: GeneratedModel, settings: Points, rate: float) -> Refe
 
 
 def _unit_piece(x: Array) -> tuple[Array, Array, Array]:
-    """Compute position (0 to 1), velocity and acceleration of one move at x = t/T in [0, 1]."""
+    """Compute position, velocity, acceleration of a normalised move 0 to 1 at x = t/T in [0, 1]."""
     top = 1 / (1 - RAMP)
     up, down = np.clip(x / RAMP, 0, 1), np.clip((1 - x) / RAMP, 0, 1)
     v = top * np.minimum(up**2 * (3 - 2 * up), down**2 * (3 - 2 * down))

@@ -20,7 +20,7 @@ TORQUE = {"rad": "N m", "m": "N"}  # unit of the torque by that of the position
 
 
 class SimulationError(InputError):
-    """Error of a simulation: inertia not positive definite, loop unstable, or motion lost.
+    """Error of a simulation: inertia not positive definite, loop unstable, reference not followed.
 
     `time` : time of the reference at which this appears, s.
     """
@@ -32,7 +32,7 @@ class SimulationError(InputError):
 
 @dataclass(frozen=True, eq=False)
 class Simulation(Result):
-    """Signals of one simulated run at the recorded ticks; shape (N, n), joint side, SI.
+    """Signals of one simulation at the recorded controller ticks; shape (N, n), joint side, SI.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ class Simulation(Result):
         return np.asarray((np.abs(self.qd) <= LIMIT.SLIP_REST).mean(axis=0))
 
     def summary(self) -> dict[str, Any]:
-        """Return the figures of merit as JSON values, for the file simulation.json."""
+        """Return tracking error, torque and parameters as JSON values, for simulation.json."""
         error = self.q - self.q_r
         return {
             "robot": self.model.NAME,

@@ -90,7 +90,7 @@ class Law(Settings):
         for key in ("kv", "cv", "ca") if self.kind == "pid" else ("kd",):
             value = getattr(self, key)
             none = value != "fit" and not np.any(value)
-            require(none, f"{value}; a {self.kind} law has no such gain", key)
+            require(none, f"{value}, but a {self.kind} law has no gain {key}; remove {key}", key)
 
     def gains(self, n: int) -> dict[str, np.ndarray]:
         """Return the gains P, Vr, Vm, K of u = P e + Vr qd_r - Vm qd_m + K I, shape (n,) each.
@@ -108,7 +108,7 @@ class Law(Settings):
 
         gain, kp, kd, kv, ki, cv = map(each, ("gain", "kp", "kd", "kv", "ki", "cv"))
         if not kp.all():
-            text = "expected a gain for every joint: nothing else holds its position"
+            text = "expected a gain other than 0 for every joint, to control its position"
             raise SettingsError(f"{self.kp}; {text}", path=("controller", "law", "kp"))
         if self.kind == "pid":
             return {"P": gain * kp, "Vr": gain * kd, "Vm": gain * kd, "K": gain * ki}
@@ -279,7 +279,7 @@ class Controller(Settings):
 
     def __post_init__(self) -> None:
         given = {key: x for key in ("kp", "kd") if (x := getattr(self, key)) is not None}
-        message = "given together with law; kp and kd are short for law: {kp: ..., kd: ...}; leave one out"
+        message = "given together with law; kp and kd are short for law: {kp: ..., kd: ...}; remove either these gains or law"
         require(not given or self.law == Law(), message, *list(given)[:1])
         if given:
             object.__setattr__(self, "law", Law(**given))

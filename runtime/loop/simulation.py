@@ -217,15 +217,15 @@ class Simulator:
                 raise SimulationError(
                     f"the inertia matrix of these parameters is not positive definite at {time:g} "
                     f"s of the reference, smallest eigenvalue {smallest:.3g}; "
-                    "take parameters of a physical robot (feasible, CAD), or a smaller step "
-                    "towards these",
+                    "use parameters of a physical robot (method feasible, CAD), or a smaller step "
+                    "towards these parameters",
                     time=time,
                 )
             pole = np.abs(discrete_poles(self.law, A, B, g)).max()
             if pole > LIMIT.UNSTABLE_POLE:
                 raise SimulationError(
-                    f"the loop of these gains and parameters is unstable at {time:g} s of the "
-                    f"reference: discrete pole of modulus {pole:.4g}, at most 1; "
+                    f"the loop with these gains and parameters is unstable at {time:g} s of the "
+                    f"reference: a discrete pole has modulus {pole:.4g}, expected at most 1; "
                     f"lower kp and {'kd' if self.controller.law.kind == 'pid' else 'kv'}, raise "
                     "the controller's rate, or scale the gains with the inertia (g)",
                     time=time,
@@ -243,7 +243,7 @@ class Simulator:
         return steps
 
     def _ticks(self, substeps: int) -> Any:
-        """Return the CasADi function of BLOCK ticks; it is made once for each `substeps`."""
+        """Return the CasADi function that simulates BLOCK ticks, made once for each `substeps`."""
         if substeps not in self._compiled:
             tick = tick_function(
                 self.model, self.friction, self.constants, substeps, self.controller.integrator
@@ -269,7 +269,7 @@ class Simulator:
         return np.vstack(states), np.vstack(out)
 
     def _start(self, reference: Reference, start: Array | None, *, ideal: bool) -> Array:
-        """Return the first state of the loop, at rest, shape (6n,)."""
+        """Return the initial state of the closed loop, with the arm at rest, shape (6n,)."""
         n = len(self.model.JOINTS)
         given = self.controller.start if start is None else start
         q = np.asarray(reference.q[0] if given is None else given, dtype=float)
@@ -325,7 +325,7 @@ def simulate(
 
 
 def _rest_functions(model: GeneratedModel, constants: Mapping[str, float]) -> Any:
-    """Make the CasADi function of the inertia matrix A and the viscous friction B at rest.
+    """Make the CasADi function that computes inertia matrix A and viscous friction B at rest.
 
     (q, Xs) -> A, B = dGamma/dqd.
     """
@@ -342,9 +342,11 @@ def _rest_functions(model: GeneratedModel, constants: Mapping[str, float]) -> An
 
 def _check_shapes(reference: Reference, rate: float, n: int, N: int, *given: Array | None) -> None:
     if reference.q.shape[1] != n:
-        raise InputError(f"reference of {reference.q.shape[1]} joints; expected {n}")
+        raise InputError(f"the reference has {reference.q.shape[1]} joints; expected {n}")
     if abs(reference.rate / rate - 1) > 1e-9:
-        raise InputError(f"reference at {reference.rate:g} Hz; the controller runs at {rate:g} Hz")
+        raise InputError(
+            f"the reference is at {reference.rate:g} Hz, but the controller runs at {rate:g} Hz; resample the reference"
+        )
     for x in given:
         if x is not None and np.shape(x) != (N, n):
             raise InputError(
@@ -354,7 +356,7 @@ def _check_shapes(reference: Reference, rate: float, n: int, N: int, *given: Arr
 
 
 def _check_motion(q: Array, reference: Reference) -> None:
-    """Raise SimulationError if the motion is not finite or far away from the whole reference.
+    """Raise SimulationError if positions are not finite, or far outside the range of the reference.
 
     The error gives the first such tick.
     """
@@ -365,6 +367,6 @@ def _check_motion(q: Array, reference: Reference) -> None:
         raise SimulationError(
             f"the motion leaves its reference at {(k + 1) / reference.rate:g} s, position {j + 1} "
             "first: the loop is unstable there; lower the gains, "
-            "raise the rate, or slow the reference down",
+            "raise the rate, or slow down the reference",
             time=(k + 1) / reference.rate,
         )

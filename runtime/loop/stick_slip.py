@@ -30,7 +30,7 @@ SX = Any  # casadi.SX
 def friction_function(
     model: GeneratedModel, friction: DryFriction, constants: dict[str, float]
 ) -> Any:
-    """Make the CasADi function of the dry friction forces f in a state of the arm.
+    """Make the CasADi function that computes the dry friction forces f from the state of the arm.
 
     (q, qd, tau, Xs, c_plus, c_minus) -> f, direction of every element (-1, 0 stuck, 1), qdd, and
     Y = A^-1 G'.
@@ -66,7 +66,7 @@ def friction_function(
 
 
 def kinetic(direction: SX, plus: SX, minus: SX) -> SX:
-    """Compute the friction forces, shape (m,), of sliding elements; 0 for a direction of 0."""
+    """Compute the forces, shape (m,), of friction elements that slip; 0 for all others."""
     return (direction > 0) * plus - (direction < 0) * minus
 
 
@@ -92,7 +92,7 @@ def _at_rest(D: SX, free: SX, moving: SX, plus: SX, minus: SX) -> tuple[SX, SX]:
 
 
 def _masked(D: SX, rows: SX) -> SX:
-    """Keep the rows and columns of D that are marked 1; replace all others by the identity.
+    """Replace the rows and columns of D that are not marked 1 by those of the identity matrix.
 
     The diagonal becomes slightly larger, since rows of G may depend on each other.
     """
@@ -104,7 +104,7 @@ def _masked(D: SX, rows: SX) -> SX:
 
 
 def rest_function(friction: DryFriction, columns: int = 1) -> Any:
-    """Make the CasADi function that sets the marked slips of a velocity to zero.
+    """Make the CasADi function that stops marked friction elements: their slips G qd become zero.
 
     (qd, Y, at_rest) -> the nearest velocity with these slips zero. The metric is A, so that kinetic
     energy only falls. If a displacement replaces qd, elements that rest over the step do not creep.
@@ -120,7 +120,7 @@ def rest_function(friction: DryFriction, columns: int = 1) -> Any:
 
 
 def event_function(friction: DryFriction) -> Any:
-    """Make the CasADi function that cuts a step where the first slip changes its sign.
+    """Make the CasADi function that ends a step as soon as a slip velocity changes its sign.
 
     (q, qd, qdd, q1, qd1, h, direction, whole) -> q, qd at the cut, the remaining part of h, and
     which slips are zero at the cut. The slip is taken as quadratic over the step. `whole` = 1 keeps
@@ -155,7 +155,7 @@ def event_function(friction: DryFriction) -> Any:
 
 
 def _root(c: SX, b: SX, end: SX) -> SX:
-    """Find x in [0, 1] where c + b x + a x**2 first falls through zero.
+    """Find the first x in [0, 1] at which c + b x + a x**2 falls below zero.
 
     The polynomial is c >= 0 at x = 0 and `end` < 0 at x = 1.
     """

@@ -1,6 +1,7 @@
-"""Trajectories of the joints: chains of parts, each a family of motions with its coefficients.
+"""Trajectories of the joints, in parts: each part is a family of motions with its coefficients.
 
-Each part begins where the part before it ends. SI units, rad.
+A family is, for instance, Fourier series (`runtime.loop.families`). Each part begins where the part
+before it ends. SI units, rad.
 """
 
 from __future__ import annotations
@@ -21,7 +22,10 @@ BLOCK = 2**22  # times at once, by coefficients: a family holds a row of them fo
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One part of a motion: a family with the coefficients p of every joint, shape (P, n)."""
+    """One part of a motion: a family such as Fourier, with the coefficients p of every joint.
+
+    p has shape (P, n).
+    """
 
     family: Family
     p: Array
@@ -32,7 +36,7 @@ class Part:
             expected = f"({len(self.family.names)}, joints)"
             raise InputError(
                 f"coefficients of shape {p.shape} of a {self.family.family} part; expected "
-                f"{expected}, finite"
+                f"finite numbers of shape {expected}"
             )
         object.__setattr__(self, "p", p)
 
@@ -89,7 +93,7 @@ class Motion:
         return t, *self.states(t)
 
     def to_mapping(self) -> dict[str, Any]:
-        """Return the parts with their coefficients, by joint, as a mapping for a file."""
+        """Return the parts of the motion, with the coefficients of each joint, as a mapping."""
         return {
             "parts": [{**to_mapping(part.family), "p": part.p.T.tolist()} for part in self.parts]
         }

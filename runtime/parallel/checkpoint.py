@@ -29,7 +29,7 @@ UNFINISHED = ".unfinished"
 
 
 class Checkpoint:
-    """The stored runs of one study in a folder, written every `every` seconds and by `flush`."""
+    """The file of the finished runs of a study, written every `every` seconds and by `flush`."""
 
     def __init__(self, folder: str | Path, *, every: float = LIMIT.ARCHIVE_PERIOD) -> None:
         self.file = Path(folder) / FILE
@@ -40,7 +40,7 @@ class Checkpoint:
         self._last = monotonic()
 
     def resume(self, identity: Mapping[str, Any], b: int) -> Runs:
-        """Return the runs that an earlier study stored in the folder, b parameters each.
+        """Return the runs that were stored before an interruption, with b parameters each.
 
         identity : JSON values that differ between different studies.
 
@@ -52,8 +52,8 @@ class Checkpoint:
         for path in (self.file, self.file.with_name(FILE + UNFINISHED)):
             if path.is_symlink() or (path.exists() and not path.is_file()):
                 raise InputError(
-                    "the runs are saved under this name, which is a link, a folder, a pipe or a device; remove it, or "
-                    "choose another folder",
+                    "the runs are saved in a file of this name, but a link, a folder, a pipe or a device has this name; "
+                    "rename that entry, or choose another folder",
                     file=str(path),
                 )
         self._study = json.dumps(identity, sort_keys=True)
@@ -83,7 +83,7 @@ class Checkpoint:
             except OSError as e:
                 unfinished.unlink(missing_ok=True)
                 raise InputError(
-                    f"cannot be written: {e.strerror or e}; {self.written} runs are safe, make room and repeat the command to go on",
+                    f"cannot be written: {e.strerror or e}; {self.written} runs are saved, make room on the disk and repeat the command to continue",
                     file=str(self.file),
                 ) from e
             self.written = len(runs)
@@ -91,7 +91,7 @@ class Checkpoint:
         self._last = monotonic()
 
     def remove(self) -> None:
-        """Delete the file, once other files contain its runs."""
+        """Delete the file of runs; call this when the results are saved in other files."""
         self.file.unlink(missing_ok=True)
         self.file.with_name(FILE + UNFINISHED).unlink(missing_ok=True)
 
@@ -123,13 +123,13 @@ class Checkpoint:
         other = [key for key in keys if earlier.get(key) != identity.get(key)]
         if other:
             raise InputError(
-                f"holds runs of another study (different: {', '.join(other)}); use another folder, or delete this file",
+                f"contains runs of another study (different: {', '.join(other)}); use another folder, or delete this file",
                 file=str(self.file),
             )
         R = len(runs.run)
         if [x.shape for x in vars(runs).values()] != [(R,), (R,), (R, b), (R,)]:
             raise InputError(
-                f"holds arrays that do not fit {R} runs of {b} parameters; delete this file, and the runs are computed again",
+                f"contains arrays that do not fit {R} runs of {b} parameters; delete this file, and the runs are computed again",
                 file=str(self.file),
             )
         return runs

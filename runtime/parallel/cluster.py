@@ -1,4 +1,4 @@
-"""Function like `map` that computes on the workers of a Dask cluster (extra `scale`).
+"""Function like `map` that computes on the workers of a Dask cluster; needs symgen[scale].
 
 It is an argument `map=` of other functions. The workers must have the versions of this process and
 run the code that this process sends; use only a scheduler that you trust. Results are those of one
@@ -51,12 +51,12 @@ def cluster(scheduler: str, timeout: float = TIMEOUT) -> Iterator[Callable[..., 
     except silence as e:
         reason = str(e).partition("\n")[0] or "no reply in time"
         raise InputError(
-            f"no answer from the scheduler {scheduler} or its workers: {reason}"
+            f"no answer from the scheduler {scheduler} or its workers: {reason}; check the address, and whether workers run"
         ) from e
 
 
 def _mapped(client: Any, function: Callable[..., Any], keys: Any) -> Iterator[Any]:
-    """Yield the results in the order of the keys; the function is sent once to each worker."""
+    """Call the function on the workers with each of `keys`; yield the results in that order."""
     sent = client.scatter(packed(function), broadcast=True, hash=False)
     for future in [client.submit(there, sent, key, pure=False) for key in keys]:
         yield future.result()
@@ -74,7 +74,7 @@ async def _shake_hands(scheduler: str, timeout: float) -> None:
 
 
 def _check_versions(client: Any) -> None:
-    """Raise InputError for workers with other versions of symgen, NumPy or SciPy than this process.
+    """Raise InputError if a worker has another version of symgen, NumPy or SciPy than this process.
 
     Their results could differ in some bits. Workers that cannot run the tasks are refused too.
     """
@@ -88,7 +88,7 @@ def _check_versions(client: Any) -> None:
     for address, versions in of_workers.items():
         if versions != here:
             raise InputError(
-                f"the worker {address} has other versions: {versions}; this process {here}. Install the same"
+                f"the worker {address} has the versions {versions}, but this process has {here}; install the same versions"
             )
 
 

@@ -48,7 +48,7 @@ def processes(count: int) -> Iterator[Map]:
         yield lambda function, keys: pool.map(partial(there, packed(function)), keys)
     except BrokenProcessPool as e:
         raise InputError(
-            'a process died: no memory left, or a script without `if __name__ == "__main__":`; use fewer workers'
+            'a process died: the memory is full, or the script has no `if __name__ == "__main__":`; use fewer workers'
         ) from e
     finally:
         pool.shutdown(cancel_futures=True)
@@ -60,7 +60,7 @@ def packed(function: Callable[[Any], Any]) -> bytes:
 
 
 def there(sent: bytes, key: Any) -> Any:
-    """Compute the value of a packed function in the process that receives it."""
+    """Unpickle a function in a worker process, and call it with the argument `key`."""
     return _unpacked(sent)(key)
 
 

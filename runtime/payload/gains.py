@@ -82,14 +82,15 @@ class DriveGains(Result, keys="joints constant together sigma alone sigma_alone 
 
     @property
     def factors(self) -> Array:
-        """Correction factors g of the torque constants, shape (n,); 1 without an estimate."""
+        """Correction factors g of the torque constants, shape (n,); 1 if not estimated."""
         return np.where(np.isfinite(self.together), self.together, 1.0)
 
     @property
     def refused(self) -> tuple[str, ...]:
-        """Motors whose factor is not determined: its %sigma is LIMIT.GAIN_REFUSED or more.
+        """Motors whose factor g is not determined, because its standard deviation is too large.
 
-        The factor is that of the joint solution `together`.
+        Its %sigma is LIMIT.GAIN_REFUSED or more. The factor is that of the joint solution
+        `together`.
         """
         return tuple(
             j
@@ -111,7 +112,7 @@ class DriveGains(Result, keys="joints constant together sigma alone sigma_alone 
         )
 
     def table(self) -> Table:
-        """Return the table of the factors, with one line per motor."""
+        """Return the table of the correction factors, with one line per motor."""
         columns = (self.together, self.sigma, self.alone, self.sigma_alone)
         return Table(
             "Factors on the torque constants by which the records were read",
@@ -126,7 +127,7 @@ class DriveGains(Result, keys="joints constant together sigma alone sigma_alone 
         )
 
     def to_table(self) -> str:
-        """Return the table of the factors as text."""
+        """Return the table of the correction factors as text."""
         return self.table().to_text()
 
 
@@ -151,8 +152,8 @@ def drive_gains(
     """
     if not without or not loaded or "M" not in settings.known:
         raise InputError(
-            "drive gains need a record without the load, one with it, and its weighed mass "
-            "(payload.known: {M: ...})"
+            "drive gains need a record without the load, a record with the load, and the weighed "
+            "mass of the load (payload.known: {M: ...})"
         )
     drives = _drives(model)
     constants = []
@@ -161,8 +162,8 @@ def drive_gains(
         constants.append(drives.torque_constant if constant is None else constant)
     if any(not np.array_equal(constant, constants[0]) for constant in constants):
         raise InputError(
-            "the records were read with different torque constants; give them the same "
-            "record.torque_constant: one factor a motor is sought for all of them"
+            "the records were read with different torque constants; give all records "
+            "the same record.torque_constant, since one factor per motor is estimated for all records"
         )
     observation = stack(
         [
@@ -281,7 +282,7 @@ def _together(
     drives: Drives,
     seed: int,
 ) -> tuple[Array, Array]:
-    """Estimate g, X and the load together by total least squares with exact columns.
+    """Estimate g, X and the load by total least squares, with errors in the motor torques only.
 
     Returns the values and their standard deviations over resampled blocks of time, for g, X and the
     load in this order; nan for columns that depend on others.
@@ -305,9 +306,9 @@ def _together(
 
 
 def _gains(R: Array, D: Array) -> Array:
-    """Compute g and the parameters of the exact columns from the factor R of all columns.
+    """Compute g and the parameters of the error-free columns from the QR factor R.
 
-    Columns of R: exact columns, known load, V.
+    Columns of R: columns without errors, known load, motor torques V.
     """
     n = len(D)
     e = len(R) - n - 1
@@ -318,7 +319,7 @@ def _gains(R: Array, D: Array) -> Array:
 
 
 def _column_deviations(rows: Sequence[int], deviation: Array, drives: Drives) -> Array:
-    """Compute the standard deviations of the errors in the columns of V, with weighted rows.
+    """Compute the standard deviations of errors in the motor torque columns V, with weighted rows.
 
     Rows of joint j are divided by s_j, and s_j^2 = sum_m (R_mj sigma_m)^2.
     """
@@ -340,7 +341,7 @@ def _independent(A: Array) -> Array:
 
 
 def scaled(model: GeneratedModel, record: Prepared, gains: DriveGains) -> Observation:
-    """Build the rows of a record, with the torque of every motor multiplied by its factor g."""
+    """Build the system Y = W X + rho of a record, with motor torques times their factors g."""
     n = len(model.JOINTS)
     motors = _with_motors(model, record, _drives(model))
     Y = motors.W[:, -n:] @ gains.factors

@@ -80,7 +80,7 @@ class Payload(Result):
         )
 
     def __getitem__(self, family: str) -> float:
-        """Return the value of one parameter by its family, such as payload["M"] for the mass."""
+        """Return the value of one parameter of the load, such as payload["M"] for the mass."""
         return (
             float(self.given[family])
             if family in self.given
@@ -139,7 +139,7 @@ def payload(
     """
     if not without or not loaded:
         raise InputError(
-            "a payload needs a record without it and one with it (record, payload.record)"
+            "a payload needs a record without the load (record) and a record with the load (payload.record)"
         )
     physical = physical_model(model)
     load = load_columns(model, physical, settings)
@@ -151,7 +151,7 @@ def payload(
     )
 
     def extended(rows: Observation, mounted: float) -> Observation:
-        """Add the columns of the load to W; they are zero if it is not mounted.
+        """Add the columns of the load to W; they are zero if the load is not mounted.
 
         The torque of its known parameters is moved to Y.
         """
@@ -183,7 +183,7 @@ def payload(
 
 
 def friction_columns(model: GeneratedModel, physical: PhysicalModel) -> list[int]:
-    """List the numbers of the base parameters that consist only of viscous and Coulomb friction."""
+    """List the indices of the base parameters that consist only of viscous and Coulomb friction."""
     elements = elements_of(model)
     friction = np.array(
         [name in elements and elements[name][0] in FRICTION for name in physical.standard]
@@ -193,7 +193,7 @@ def friction_columns(model: GeneratedModel, physical: PhysicalModel) -> list[int
 
 @dataclass(frozen=True, eq=False)
 class LoadColumns:
-    """Columns by which the parameters of a load change the base parameters.
+    """Derivatives of the base parameters with respect to the parameters of a load, as columns.
 
     Attributes
     ----------
@@ -216,7 +216,7 @@ class LoadColumns:
 def load_columns(
     model: GeneratedModel, physical: PhysicalModel, settings: PayloadSettings
 ) -> LoadColumns:
-    """Compute the columns by which the load of the settings changes the base parameters.
+    """Compute the derivatives of the base parameters with respect to the parameters of a load.
 
     SettingsError if there is no such link or frame.
     """

@@ -26,7 +26,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Mount:
-    """The link to which a load is fixed, and the frame of the load's parameters.
+    """The link to which a load is fixed, and the frame in which its parameters are given.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Mount:
 
     @property
     def action(self) -> Array:
-        """Matrix A, shape (10, 10), from ten parameters at `frame` to those at the link's frame.
+        """Matrix A, shape (10, 10), from inertial parameters in `frame` to those in the link frame.
 
         Their order is that of INERTIAL.
         """
@@ -62,7 +62,10 @@ class Mount:
         )
 
     def columns(self, physical: PhysicalModel) -> Array:
-        """Compute the derivative of X by the load's parameters at `frame`, shape (b, 10)."""
+        """Compute the derivatives of X with respect to the parameters of the load, shape (b, 10).
+
+        The parameters are those in the frame `frame`.
+        """
         own = physical.K[:, physical.link(self.link)]
         if self.frame == self.link:
             return own
@@ -134,7 +137,7 @@ def load_effect(
     link: int | None = None,
     **constants: float,
 ) -> Array:
-    """Compute the change of the base parameters by a known load, shape (b,).
+    """Compute the change of the base parameters that a known load causes, shape (b,).
 
     X + load_effect(...) are the parameters of the robot with the load, in the order of
     BASE_PARAMETERS.
@@ -192,17 +195,17 @@ def load_of_body(
     R = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
     if c.shape != (3,) or I.shape != (3, 3) or R.shape != (3, 3) or not np.allclose(I, I.T):
         raise InputError(
-            f"centre {c.shape}, inertia {I.shape}, rotation {R.shape}; expected (3,), a symmetric "
-            "(3, 3), (3, 3)"
+            f"centre {c.shape}, inertia {I.shape}, rotation {R.shape}; expected the shapes (3,), "
+            "(3, 3) and (3, 3), and a symmetric inertia"
         )
     if not mass > 0:
-        raise InputError(f"mass {mass} kg; expected a positive one")
+        raise InputError(f"mass {mass} kg; expected a positive mass")
     J = R @ I @ R.T + mass * (c @ c * np.eye(3) - np.outer(c, c))
     return dict(zip(INERTIAL, map(float, (*J[np.triu_indices(3)], *(mass * c), mass)), strict=True))
 
 
 def ten_parameters(P: Array) -> Array:
-    """Return the ten inertial parameters of a pseudo-inertia, in the order of INERTIAL.
+    """Compute the ten inertial parameters from a pseudo-inertia P, in the order of INERTIAL.
 
     J = tr(S) 1 - S, with S its matrix of second moments.
     """

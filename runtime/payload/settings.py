@@ -40,7 +40,10 @@ class PayloadSettings(Settings):
     def __post_init__(self) -> None:
         for family in self.known:
             require(
-                family in LOAD, f"unknown parameter; a load has {', '.join(LOAD)}", "known", family
+                family in LOAD,
+                f"unknown parameter of a load; expected some of {', '.join(LOAD)}",
+                "known",
+                family,
             )
         require(
             self.known.get("M", 1.0) > 0,

@@ -130,5 +130,5 @@ def payload_study(problem: Problem, loaded: Sequence[Record]) -> PayloadStudy:
 
 
 def _rows(model: GeneratedModel, record: Prepared, gains: DriveGains | None) -> Observation:
-    """Build the rows of a record, with corrected torques if torque constants were estimated."""
+    """Build the system Y = W X + rho of a record, with torque constants corrected if estimated."""
     return record.observation(model) if gains is None else scaled(model, record, gains)

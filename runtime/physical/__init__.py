@@ -1,1 +1,1 @@
-"""Conditions that the parameters of a physical robot meet, and the nearest values that do."""
+"""Conditions on the parameters of a physical robot, and the nearest parameters that fulfil them."""

@@ -47,7 +47,7 @@ class Consistency(Part):
         return "standard" in self.fit.details
 
     def text(self) -> str:
-        """Write whether the parameters are physical.
+        """Write whether a physical robot can have the parameters.
 
         If `fit` was made under the conditions of a physical robot, the text also gives these
         conditions.
@@ -56,11 +56,11 @@ class Consistency(Part):
         return "\n".join([*fitted, self.brief()]).strip()
 
     def brief(self) -> str:
-        """Write one sentence: whether the parameters are physical; "" if this was not requested."""
+        """Write in one sentence whether the parameters are physical; "" if this was not checked."""
         return "" if self.judged is None else f"The parameters are {self.judged.text}."
 
     def tables(self) -> list[Table]:
-        """Make tables of the physical conditions and the standard parameters, if `fit` has them.
+        """Make tables of physical conditions and standard parameters, if the fit used conditions.
 
         The first table gives the smallest eigenvalue of each condition. If the parameters were not
         fitted under these conditions, the list is empty.
@@ -80,7 +80,7 @@ class Consistency(Part):
         ]
 
     def checks(self) -> tuple[Check, ...]:
-        """Return the check whether a physical robot can have all parameters."""
+        """Return one check: whether a physical robot can have the estimated parameters."""
         return (physical(self),)
 
     def summary(self) -> dict[str, Any] | None:
@@ -107,7 +107,7 @@ class Consistency(Part):
     "every pseudo-inertia positive semidefinite, friction and motor inertia not negative",
 )
 def physical(part: Consistency) -> Answer:
-    """Answer whether a physical robot can have all parameters."""
+    """Answer whether a physical robot can have all estimated parameters."""
     if part.fitted or "standard" in part.estimate.details:
         return Answer("good", "Yes: they were fitted under these conditions")
     judged = part.judged
@@ -125,7 +125,7 @@ def physical(part: Consistency) -> Answer:
 
 
 def as_fitted(result: Identification) -> Consistency:
-    """Make the part on physical consistency of a result whose physical check was not requested.
+    """Make the result part on physical consistency without running the physical check.
 
     The part still shows parameters that were fitted under the conditions of a physical robot.
     """
@@ -140,7 +140,9 @@ def consistency(result: Identification) -> Consistency:
     """
     if not result.determined:
         groups = "; ".join(", ".join(group) for group in result.estimate.groups)
-        raise InputError(f"the record does not separate {groups}")
+        raise InputError(
+            f"the record does not determine {groups} separately; record a richer motion"
+        )
     return Consistency(result.estimate, result.model_estimate, _judged(result))
 
 

@@ -286,7 +286,7 @@ def limit_rows(physical: PhysicalModel, limits: RobotLimits | None) -> LinearBou
 
 
 def scales(physical: PhysicalModel) -> Array:
-    """Return the sizes of the standard parameters, shape (p,), to scale the unknowns.
+    """Return typical sizes of the standard parameters, shape (p,), to scale the solver's unknowns.
 
     They are the absolute values of the robot file, but at least a hundredth of a typical size; if
     the file has no values, they are typical sizes.
@@ -324,7 +324,7 @@ def pull_to_file(physical: PhysicalModel, kind: Distance, weight: float) -> Prio
     numbers = known_inertia(physical)
     if not numbers:
         raise SettingsError(
-            "the robot file has no values of links; give them, or use prior: none",
+            "the robot file has no inertial values of links; give these values, or use prior: none",
             path=("estimate", "options", "prior"),
         )
     chi0 = np.array([physical.values.get(name, 0.0) for name in physical.standard])
@@ -350,14 +350,14 @@ def unsolved(status: str, rows: LinearBounds, attempt: Callable[[LinearBounds], 
     helps = [name for name in dict.fromkeys(rows.names) if attempt(rows.without(name)).solved]
     if helps:
         return (
-            "no physical robot within the limits; there is one without "
-            f"{' or without '.join(helps)}: widen it or leave it out"
+            "no physical robot is within the limits, but a solution exists without "
+            f"{' or without '.join(helps)}: widen or remove this limit"
         )
     if status.startswith("infeasible") and rows.names:
         named = ", ".join(dict.fromkeys(rows.names))
         return (
-            f"no physical robot within the limits ({named}); more than one of them contradicts "
-            "the others: leave them out one by one"
+            f"no physical robot is within the limits ({named}); several of these limits contradict "
+            "the others: remove the limits one by one"
         )
     return (
         f"the semidefinite program was not solved ({status}); try another margin, a prior, or "

@@ -201,7 +201,7 @@ def fit(start: Beginning) -> Fitted:
 
 
 def conditions_of(judged: Feasibility | None) -> dict[str, Any]:
-    """Return the physical conditions that least squares breaks, for JSON; {} if not requested."""
+    """Return the physical conditions that least squares violates, for JSON; {} if not checked."""
     if judged is None:
         return {}
     blocking = [{"condition": name, "margin": t} for name, t in judged.blocking]
@@ -233,7 +233,7 @@ def solve_with_weight(
     options: FeasibleOptions,
     without_prior: Array | None = None,
 ) -> tuple[Array, float]:
-    """Find the standard parameters chi, and the weight of their distance D from the prior values.
+    """Find the standard parameters chi, and the weight of the prior (values of the robot file).
 
     rows : the factored system. without_prior : chi of weight 0, if it is known. Returns chi, shape
     (p,), and the weight.
@@ -264,7 +264,7 @@ def solve_with_weight(
 def held_out_weight(
     observation: Observation, system: System, physical: PhysicalModel, options: FeasibleOptions
 ) -> float:
-    """Choose the weight of the prior that predicts each fifth of the record best from the others.
+    """Choose the prior weight with which four fifths of the record predict the other fifth best.
 
     The squared errors of the five predictions are added; if two weights are equally good, the
     larger is chosen. A weight is abandoned as soon as it cannot be the best, since no prediction
@@ -321,8 +321,8 @@ def decide_options(
         else options.prior
     )
     message = (
-        f"{options.weight}, but {model.NAME} has no values of links; give them in the robot "
-        "file, or leave this out"
+        f"{options.weight}, but {model.NAME} has no inertial values of links; give these values "
+        "in the robot file, or remove this key"
     )
     require(
         prior != "none" or isinstance(options.weight, str), message, "estimate", "options", "weight"
@@ -344,7 +344,7 @@ def decide_options(
 
 
 def reach_text(options: FeasibleOptions) -> str:
-    """Write a sentence on bounds guessed from the size of the robot; "" if there are none."""
+    """Write a sentence on the mass and centre bounds guessed from the robot size, if any."""
     if options.reach is None or options.reach == "auto":
         return ""
     mass = options.total_mass[1] if isinstance(options.total_mass, tuple) else np.inf
@@ -358,10 +358,10 @@ def reach_text(options: FeasibleOptions) -> str:
 def by_reach(
     rows: Factor, physical: PhysicalModel, unbounded: FeasibleOptions, bounded: FeasibleOptions
 ) -> tuple[Array | None, Array | None]:
-    """Fit chi twice without a prior: without and with the bounds guessed from the robot's size.
+    """Fit chi twice: without and with mass and centre bounds guessed from the robot size.
 
-    Returns both standard parameter vectors chi; None for a fit without solution, for instance if no
-    robot is within the bounds.
+    No prior is used. Returns both standard parameter vectors chi; None for a fit without solution,
+    for instance if no robot is within the bounds.
     """
     found: list[Array | None] = []
     for limits in (unbounded, bounded):
@@ -376,7 +376,7 @@ def by_reach(
 def bounds_contradict(
     rows: Factor, physical: PhysicalModel, unbounded: Array | None, bounded: Array | None
 ) -> bool:
-    """Whether guessed bounds contradict the record.
+    """Whether the mass and centre bounds guessed from the robot size contradict the record.
 
     They do if they raise the residual norm by more than the factor LIMIT.WEIGHT_INCREASE, or if no
     robot is within them.
@@ -390,7 +390,7 @@ def bounds_contradict(
 
 
 def prior_text(physical: PhysicalModel, options: FeasibleOptions, weight: float) -> str:
-    """Write a sentence on the prior: its kind, its weight, and how many values are missing."""
+    """Write a sentence on the prior: its kind, its weight, number of parameters without value."""
     if options.prior == "none":
         return ""
     missing = len(physical.links) * 10 - len(known_inertia(physical))
@@ -399,7 +399,7 @@ def prior_text(physical: PhysicalModel, options: FeasibleOptions, weight: float)
 
 
 def part_factor(part: Observation, system: System) -> Factor:
-    """Compute the triangular factor of a part of the rows, with the joint weights of all rows."""
+    """Compute the QR factor of a subset of the rows, weighted by joint as all rows are."""
     chosen = part.columns(system.names)
     return factor(chosen.W, chosen.Y, chosen.rows, chosen.names).weighted(
         1 / np.array(system.scales)
@@ -428,5 +428,5 @@ def solve_feasible(
 
 
 def residual_norm(rows: Factor, X: Array) -> float:
-    """Compute ||Y - W X|| of a factored system."""
+    """Compute ||Y - W X|| from the QR factor of the system Y = W X + rho."""
     return float(np.hypot(rows.r22, np.linalg.norm(rows.R11 @ X - rows.r12)))

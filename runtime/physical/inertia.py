@@ -72,7 +72,10 @@ class Condition:
         return np.asarray(np.tensordot(chi[list(self.numbers)], self.B, axes=1))
 
     def smallest(self, chi: Array) -> float:
-        """Compute the smallest eigenvalue of P in units of `size`: the largest t with P >= t S."""
+        """Compute the smallest eigenvalue of P relative to S = diag(size).
+
+        It is the largest t for which P - t S is positive semidefinite.
+        """
         P = np.tensordot(chi[list(self.numbers)], self.scaled, axes=1)
         return float(np.linalg.eigvalsh(P)[0])
 
@@ -118,9 +121,9 @@ class PhysicalModel:
         return {name: float(value) for name, value in zip(self.standard, chi, strict=True)}
 
     def smallest(self, chi: Array) -> dict[str, float]:
-        """Compute the smallest eigenvalue of every condition, in units of its size, by name.
+        """Compute the smallest eigenvalue of each physical condition, by name.
 
-        No value is negative for a physical robot.
+        Each is relative to the scale of its condition. No value is negative for a physical robot.
         """
         return {condition.name: condition.smallest(chi) for condition in self.conditions}
 
@@ -149,7 +152,8 @@ def physical_model(
     elements = elements_of(model, constants)
     if missing := [name for name in ("STANDARD_PARAMETERS", "LINKS") if not hasattr(model, name)]:
         raise ModelError(
-            f"no {', '.join(missing)}; emit it again with this version of symgen", file=model.NAME
+            f"no {', '.join(missing)}; emit the model again with this version of symgen",
+            file=model.NAME,
         )
     emitted = cast(Any, model)
     standard: tuple[str, ...] = tuple(emitted.STANDARD_PARAMETERS)
@@ -222,7 +226,7 @@ def _forms(
 def _signs(
     elements: Mapping[str, Any], standard: Sequence[str], least: float
 ) -> Iterator[Condition]:
-    """Yield the conditions c >= 0 on elements that act along one row G: inertia and friction.
+    """Yield the conditions c >= 0 on motor inertias and friction that act along one direction G.
 
     If friction of one direction adds to friction of both directions, their sum must be >= 0 in each
     direction.
@@ -244,7 +248,7 @@ def _signs(
 
 
 def _form(acts: Mapping[Any, float]) -> dict[tuple[int, int], float]:
-    """Return the quadratic form q'Bq of an element as {(i, j): B_ij}, i <= j.
+    """Return the quadratic form q'Bq of an inertia or friction element as {(i, j): B_ij}, i <= j.
 
     For an element along s = G q the form is (G q)**2.
     """

@@ -53,7 +53,7 @@ SOLVED = ("optimal", "optimal_inaccurate")
 
 
 def _clarabel() -> Any:
-    """Import the solver Clarabel, not before a program is solved."""
+    """Import the solver Clarabel, only when a program is solved."""
     import clarabel
 
     return clarabel
@@ -61,7 +61,7 @@ def _clarabel() -> Any:
 
 @dataclass(frozen=True, eq=False)
 class LinearBounds:
-    """Linear inequalities lower <= A chi <= upper, a name per row; infinite if without a bound."""
+    """Named linear inequalities lower <= A chi <= upper; a missing bound is infinite."""
 
     names: tuple[str, ...]
     A: Array
@@ -78,7 +78,10 @@ class LinearBounds:
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """The set of all chi = origin + basis w with free w; origin has shape (p,), basis (p, m)."""
+    """Set of the standard parameters chi = origin + basis w with free w.
+
+    origin has shape (p,), basis (p, m).
+    """
 
     origin: Array
     basis: Array
@@ -97,7 +100,7 @@ def solutions(K: Array, X: Array, scale: Array) -> Space:
 
 
 def within(space: Space, rows: LinearBounds) -> tuple[Space, LinearBounds]:
-    """Restrict `space` to the chi that fulfil the equations among the rows (lower = upper).
+    """Restrict a set of chi to the solutions of the equations in `rows` (rows with lower = upper).
 
     Returns the restricted space and the other rows. If the equations contradict the space, the
     points of the space that come nearest to the equations are used.
@@ -120,7 +123,7 @@ def within(space: Space, rows: LinearBounds) -> tuple[Space, LinearBounds]:
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Pull of the inertial parameters towards the values chi0.
+    """Penalty that pulls the inertial parameters towards given values chi0.
 
     Attributes
     ----------
@@ -169,7 +172,7 @@ class Optimum:
 
 
 class Program:
-    """A cone program in w of chi = origin + basis w, built constraint by constraint.
+    """A cone program over w, with chi = origin + basis w, built constraint by constraint.
 
     It starts with the constraint P >= least S of every condition, or P >= t S with an unknown t,
     and with the linear rows. The criterion may add further unknowns.
@@ -305,7 +308,7 @@ def closest(
 
 
 def margin(conditions: Sequence[Condition], rows: LinearBounds, space: Space) -> Optimum:
-    """Find the largest t for which P - t S of every condition is positive semidefinite.
+    """Find the largest t for which P - t S of every physical condition is positive semidefinite.
 
     t is negative if there is no physical robot in `space`.
     """
@@ -364,7 +367,7 @@ class Quadratic:
         return self.scale * np.where(np.isfinite(x), x, 0.0)
 
     def _solver(self, squares: Array, linear: Array, *, scaled: bool) -> Any:
-        """Make a Clarabel solver whose criterion can be changed later.
+        """Make a Clarabel solver whose quadratic criterion can be changed later.
 
         So Clarabel must not remove anything from the program. scaled : the unknowns are near one,
         and Clarabel does not scale them again, which saves half of the time.

@@ -1,5 +1,5 @@
-"""Checks whether the record, the robot file or the study is wrong.
+"""Check whether the record, the robot file or the study (its settings) is wrong.
 
-Some checks are made before the fit, others after it. If one of them is doubtful, possible causes
-are tried, for instance a wrong sign or unit.
+Some checks are made before the fit, others after it. If one of them is doubtful, possible errors
+(causes) are tried, for instance a wrong sign or unit.
 """

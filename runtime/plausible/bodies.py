@@ -1,4 +1,4 @@
-"""Fit the samples with free parameters, or with parameters of bodies that can exist.
+"""Fit selected samples of a record, with free parameters or with those of bodies that can exist.
 
 Bodies stay near the values that are known. Rows of a joint are weighted by its own residuals, so
 that a wrist counts as much as a shoulder. The score is the negative logarithm of the likelihood
@@ -58,7 +58,7 @@ class Grams:
 
     @classmethod
     def of(cls, D: Array, Y: Array, mask: Array, tau: Array | None = None) -> Grams:
-        """Form the normal equations from the regressor D, the torques Y and a mask of rows.
+        """Form the normal equations from the regressor D, the torques Y and a mask of used rows.
 
         D : shape (K, n, b).
         Y : shape (K, n).
@@ -74,7 +74,7 @@ class Grams:
         return cls(np.array(grams), mask.sum(axis=0), measured)
 
     def mapped(self, K: Array) -> Grams:
-        """Transform the normal equations to the columns W K, with K of shape (b, p)."""
+        """Replace the unknowns X of the normal equations by chi: X = K chi, K of shape (b, p)."""
         M = np.zeros((K.shape[0] + 1, K.shape[1] + 1))
         M[:-1, :-1], M[-1, -1] = K, 1.0
         return Grams(M.T @ self.of_joints @ M, self.rows, self.measured)
@@ -95,7 +95,7 @@ class Grams:
         return np.asarray(np.where(square > 0, np.sqrt(square), 1.0), dtype=float)
 
     def weighted(self, sigma: Array) -> tuple[Array, Array]:
-        """Add the normal equations of all joints, each divided by sigma_j^2.
+        """Add up the normal equations of all joints, each divided by sigma_j^2.
 
         Return A = sum_j W_j'W_j / sigma_j^2 and g = sum_j W_j'Y_j / sigma_j^2.
         """
@@ -105,7 +105,7 @@ class Grams:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Result of one fit: parameters, residuals of each joint, and the score in nats.
+    """Result of one fit: parameters, residuals of each joint, and the score (minus log-likelihood).
 
     Attributes
     ----------
@@ -127,7 +127,7 @@ class Fit:
 
 
 def fit_of(grams: Grams, X: Array, N: float, penalty: float = 0.0) -> Fit:
-    """Evaluate the parameters X: residuals and error of each joint, and the score.
+    """Compute, for given parameters X, the residual and the error of each joint, and the score.
 
     N : number of independent rows of a joint.
     penalty : added to the score, nats.
@@ -148,7 +148,7 @@ def solve_scaled(A: Array, g: Array, ridge: float = LIMIT.RIDGE) -> Array:
 
 
 def least_squares(grams: Grams, N: float, bodies: Bodies | None = None) -> Fit:
-    """Fit by least squares, with the rows of each joint weighted by its own residuals.
+    """Fit by least squares, with the rows of each joint divided by the residual of this joint.
 
     If `bodies` is given, the parameters are the standard parameters, and they are drawn towards the
     values of the robot file.
@@ -164,7 +164,7 @@ def least_squares(grams: Grams, N: float, bodies: Bodies | None = None) -> Fit:
 
 
 class Bodies:
-    """Conditions and known values under which the standard parameters of a robot are fitted.
+    """Conditions and penalties of a fit that keep the parameters physical and near known values.
 
     Parameters
     ----------
@@ -273,7 +273,7 @@ class Bodies:
         return self.physical.values.get(names[0], 0.0) if single else 0.0
 
     def _pull(self, numbers: list[int], near: Array, linear: Array, size: float) -> None:
-        """Add a penalty that draws the parameters with these numbers towards known values.
+        """Add a penalty that draws some parameters, given by their indices, towards known values.
 
         It is 1/2 x'near x - linear'x + size/2/tolerance^2, x the parameters.
         """
@@ -287,11 +287,11 @@ class Bodies:
         return bool(self.known_links.any())
 
     def distance(self, chi: Array) -> float:
-        """Compute the distance of the parameters chi from the values of the robot file, nats."""
+        """Compute the penalty on the distance of chi from the values of the robot file, nats."""
         return float(0.5 * chi @ self.H @ chi - self.h @ chi + self.constant)
 
     def penalty(self, chi: Array) -> float:
-        """Compute D(chi): the distance from the known values and the price of the masses, nats."""
+        """Compute D(chi), nats: penalty on the distance from known values and on unknown masses."""
         return self.distance(chi) + float(self.heavy @ chi)
 
     def minimum(self, A: Array, g: Array) -> Array:
@@ -303,7 +303,7 @@ class Bodies:
         return self.program.minimum(A + self.H, g + self.h - self.heavy - self.price)
 
     def stiffness(self, chi: Array) -> Array:
-        """Compute the second derivatives of the penalty D plus those of a barrier.
+        """Compute the second derivatives of the penalty D, and of a barrier against unphysical chi.
 
         The barrier is logarithmic, has the weight LIMIT.WEAK_PRICE, and bounds the parameters by
         the physical conditions. It makes the matrix large in the directions in which parameters
@@ -325,7 +325,7 @@ class Bodies:
 
 
 def physical_fit(grams: Grams, bodies: Bodies, N: float, sigma: Array, rounds: int = 8) -> Fit:
-    """Fit the parameters of a physical robot, near the known values of `bodies`.
+    """Fit the standard parameters of a robot that can exist, near known values if there are any.
 
     N : number of independent rows of a joint.
     sigma : residuals of the joints that give the first weights; each fit gives new ones, at most
@@ -340,5 +340,8 @@ def physical_fit(grams: Grams, bodies: Bodies, N: float, sigma: Array, rounds: i
 
 
 def quick_fit(grams: Grams, bodies: Bodies, N: float, sigma: Array) -> Fit:
-    """Fit a physical robot in one round; the score is at most a few nats above `physical_fit`."""
+    """Fit a physical robot with weights that are computed only once.
+
+    The score is at most a few nats above that of `physical_fit`.
+    """
     return physical_fit(grams, bodies, N, sigma, rounds=1)

@@ -32,7 +32,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """The records, the study and the robot model of one problem, as the checks use them.
+    """Records, settings (study) and robot model of one identification, as the checks use them.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Case:
 
     @property
     def records(self) -> list[Record]:
-        """The records, in which counters that wrap around are made continuous."""
+        """Records of the study, in which encoder counters that wrap around are made continuous."""
         return [one.record for one in self.straight]
 
     @cached_property
@@ -80,7 +80,7 @@ class Case:
         return list(joint_units(self.model))
 
     def grams(self, mask: Array) -> Grams:
-        """Compute the normal equations over the samples that the mask selects, bool (K, n)."""
+        """Form the normal equations from the samples that a mask, bool (K, n), selects."""
         tau = self.samples.tau
         return Grams.of(self.D, tau - self.samples.tau_known, mask, tau)
 
@@ -102,7 +102,7 @@ class Case:
         return ", ".join(self.labels[j] for j in np.flatnonzero(chosen))
 
     def reaching(self, values: Array, units: Sequence[str], chosen: Array) -> str:
-        """Write the values of the selected joints, for instance "They reach 3.1 rad (joint 2)".
+        """Write the values that the selected joints reach, such as "They reach 3.1 rad (joint 2)".
 
         At most four joints are named. If the mask selects none, the joint with the largest value is
         named.
@@ -135,12 +135,12 @@ class Case:
 
     @property
     def silent(self) -> str:
-        """Reason why no cause is tried; an empty string if causes can be tried."""
+        """Reason why possible errors (causes) cannot be tried; an empty string if they can."""
         return self.unfit or self.few
 
     @cached_property
     def few(self) -> str:
-        """Reason why the samples are too few to try causes; an empty string if they suffice.
+        """Remark that the samples are too few to try possible errors; an empty string if enough.
 
         Too few samples do not prevent the check of the robot file's values, because gravity needs
         no motion.
@@ -166,7 +166,7 @@ class Case:
 
     @cached_property
     def sides(self) -> tuple[str, str]:
-        """Sides of the positions and of the torques in the files: "joint" or "motor".
+        """Sides, "joint" or "motor", on which the files give the positions and the torques.
 
         The side of the torques is "law" if the control law of a controller computed them.
         """
@@ -176,12 +176,12 @@ class Case:
 
     @cached_property
     def baseline(self) -> Baseline | None:
-        """Fit of the study as given, to which changes are compared; None if nothing is fitted."""
+        """Reference fit, with the study (settings) as given; None if nothing can be fitted."""
         return None if self.silent else self._baseline(values=True)
 
     @cached_property
     def validation(self) -> Baseline | None:
-        """The fit `baseline`, with the samples and the regressor of the validation records.
+        """The reference fit `baseline`, with the samples and regressor of the validation records.
 
         None if there are no validation records, or if they cannot be used.
         """
@@ -198,7 +198,7 @@ class Case:
 
     @cached_property
     def alone(self) -> Baseline | None:
-        """Fit of the study without the values of the robot file.
+        """Reference fit that is not drawn towards the values of the robot file.
 
         If the file has no values, this is the fit `baseline`.
         """
@@ -240,7 +240,7 @@ class Case:
 
     @cached_property
     def late(self) -> Delay | None:
-        """Estimated delay of the torques in the longest record.
+        """Estimated delay of the torques against the positions, in the longest record.
 
         None if it cannot be estimated, for instance because the record is too short.
         """

@@ -1,4 +1,4 @@
-"""Two tables of causes: what may be wrong with a study, a robot file or a log, one thing at a time.
+"""Two tables of possible errors (causes) of a study, a robot file or a log, each tried alone.
 
 Each row gives the kind of a cause, for which items it is tried (joints, pairs of joints, frames,
 ...), the sentences of the finding and of the remedy, and the change of the samples or of the table
@@ -102,25 +102,25 @@ class Cause:
 
     @property
     def on_torques(self) -> bool:
-        """Whether only torques change: positions, rate and table of frames stay, and so does W."""
+        """Whether the correction changes only torques, and not the observation matrix W."""
         still = np.array_equal(self.P, np.eye(len(self.p))) and not self.p.any()
         return still and self.rate == 1 and not self.constants
 
     def states(self, samples: Samples) -> tuple[Array, Array, Array]:
-        """Compute the changed states q, qd and qdd of the samples, shape (K, n) each."""
+        """Compute q, qd and qdd of the samples after the correction, shape (K, n) each."""
         q = samples.q @ self.P.T + self.p
         qd = self.rate * samples.qd @ self.P.T
         qdd = self.rate**2 * samples.qdd @ self.P.T
         return q, qd, qdd
 
     def torque(self, samples: Samples) -> Array:
-        """Compute the changed torques that the model has to explain, shape (K, n)."""
+        """Compute the torques that the model has to explain after the correction, shape (K, n)."""
         return np.asarray(samples.tau @ self.T.T - self.subtracted(samples))
 
     def subtracted(self, samples: Samples) -> Array:
-        """Compute the torques outside the model that are subtracted, shape (K, n).
+        """Compute the torques to subtract from the measured ones: the model does not contain them.
 
-        They are s known + rho.
+        They are s known + rho, shape (K, n).
         """
         known = np.asarray(self.known_factor * samples.tau_known)
         if np.ndim(self.unmodelled) == 0:
@@ -129,10 +129,11 @@ class Cause:
 
 
 def unmodelled_torques(samples: Samples) -> Array:
-    """Compute two torques of unit size that the model may lack, shape (K, n, 2).
+    """Compute two torques that a model may lack: a constant, and friction at low speed.
 
-    The first is constant: 1. The second is dry friction at low speed: sign(qd) exp(-(qd/v)^2), with
-    v the share LIMIT.SLOW of the largest speed.
+    Both have unit size; the shape is (K, n, 2). The constant is 1, the friction
+
+    sign(qd) exp(-(qd/v)^2), with v the share LIMIT.SLOW of the largest speed.
     """
     qd = samples.qd
     v = np.maximum(LIMIT.SLOW * np.abs(qd).max(axis=0), 1e-12)
@@ -141,13 +142,13 @@ def unmodelled_torques(samples: Samples) -> Array:
 
 
 def unchanged_study(n: int, **changed: Any) -> Cause:
-    """Make a cause for n joints that changes nothing except the given fields."""
+    """Make a `Cause` that leaves a study of n joints unchanged, except for the given fields."""
     plain = {"kind": "", "says": "", "remedy": "", "subject": ""}
     return Cause(**plain | {"P": np.eye(n), "p": np.zeros(n), "T": np.eye(n)} | changed)
 
 
 class Robot:
-    """Joints, drives and frame table of a robot with n joints, from which causes are made.
+    """Joints, drives and table of frames of a robot, from which its possible errors are listed.
 
     Parameters
     ----------
@@ -189,10 +190,12 @@ class Robot:
         return np.where(np.arange(self.n) == j, value, others)
 
     def positions(self, E: Array) -> Maps:
-        """Convert a change E of the position columns of the files into a change of joint positions.
+        """Convert a correction E of the position columns in the files to joint positions.
 
-        For files on the side of the motors, q' = R^-1 E R (q - offset) + offset, with R the gear
-        ratio.
+        Return P of q' = P q + p, and p for files on the side of the motors. For these files,
+        with R the gear ratio,
+
+        q' = R^-1 E R (q - offset) + offset.
         """
         if self.sides[0] == "motor":
             E = np.linalg.inv(self.R) @ E @ self.R
@@ -200,9 +203,12 @@ class Robot:
         return {"P": E}
 
     def torques(self, E: Array) -> Maps:
-        """Convert a change E of the torque columns of the files into a change of joint torques.
+        """Convert a correction E of the torque columns in the files to joint torques.
 
-        For files on the side of the motors, T = R' E R'^-1, with R the gear ratio.
+        Return T of the correction tau' = T tau. For files on the side of the motors, with R the
+        gear ratio,
+
+        T = R' E R'^-1.
         """
         if self.sides[1] == "motor":
             E = self.R.T @ E @ np.linalg.inv(self.R.T)
@@ -210,7 +216,7 @@ class Robot:
 
     @property
     def gravity(self) -> Array:
-        """Gravity of the robot file in frame 0, shape (3,), m/s^2; zeros without `variants`."""
+        """Gravity vector of the robot file in frame 0, shape (3,), m/s^2; 0 without `variants`."""
         return np.array([self.free.get(key, 0.0) for key in GRAVITY])
 
     @property
@@ -224,7 +230,7 @@ class Robot:
 
     @property
     def whole_table(self) -> bool:
-        """Whether the table entries of all frames with links can be changed."""
+        """Whether the table entries of every frame that has a link can be changed."""
         return {*self.links} <= {*self.frames} and bool(self.frames)
 
 
@@ -260,7 +266,10 @@ class Row:
     change: Callable[[Robot, Item], Mapping[str, Any]] = lambda robot, item: {}
 
     def cause(self, robot: Robot, item: Item, *xi: float) -> Cause:
-        """Make the cause for one item, for instance one joint; rows of NUMBERS also need xi."""
+        """Make the possible error (cause) for one item, for instance for one joint.
+
+        Rows of NUMBERS also need xi, the unknown number.
+        """
         words = {**item, **(self.words(robot, item, *xi) if xi else {})}
         says = self.says.format(**words)
         return unchanged_study(
@@ -278,32 +287,29 @@ class Row:
 
 
 def study(robot: Robot) -> Iterator[Item]:
-    """Yield one empty item, for a cause that concerns the whole study and not single joints."""
+    """Yield one empty item: the error is tried once, for the whole study."""
     yield {}
 
 
 def several_joints(robot: Robot) -> Iterator[Item]:
-    """Yield one empty item if the robot has more than one joint.
-
-    The cause then concerns all joints together.
-    """
+    """Yield one empty item, for an error of all joints together, if there are several joints."""
     yield from [{}] if robot.n > 1 else []
 
 
 def joints(robot: Robot) -> Iterator[Item]:
-    """Yield each joint: its number from 0, and its label."""
+    """Yield an item for each joint, with its number from 0 and its label."""
     for j, label in enumerate(robot.labels):
         yield {"j": j, "joint": label}
 
 
 def senses(robot: Robot) -> Iterator[Item]:
-    """Yield each joint with the matrix E that reverses its sense."""
+    """Yield each joint, with the matrix E that reverses the sign of its column in the files."""
     for item in joints(robot):
         yield {**item, "E": np.diag(robot.one(item["j"], -1.0))}
 
 
 def joints_of_several(robot: Robot) -> Iterator[Item]:
-    """Yield each joint if the robot has more than one."""
+    """Yield each joint of a robot with several joints; nothing if there is only one."""
     yield from joints(robot) if robot.n > 1 else ()
 
 
@@ -313,14 +319,14 @@ def turning_joints(robot: Robot) -> Iterator[Item]:
 
 
 def turns(robot: Robot) -> Iterator[Item]:
-    """Yield each revolute joint with 90, -90 and 180 degrees, by which its zero may be wrong."""
+    """Yield each revolute joint three times: its zero may be wrong by 90, -90 or 180 degrees."""
     for item in turning_joints(robot):
         for text, angle in TURNS.items():
             yield {**item, "turn": text, "angle": angle}
 
 
 def pairs(robot: Robot) -> Iterator[Item]:
-    """Yield each pair of joints with the matrix E that exchanges them."""
+    """Yield each pair of joints, with the matrix E that exchanges their columns in the files."""
     for i, k in combinations(range(robot.n), 2):
         E = np.eye(robot.n)
         E[[i, k]] = E[[k, i]]
@@ -328,7 +334,7 @@ def pairs(robot: Robot) -> Iterator[Item]:
 
 
 def orders(robot: Robot) -> Iterator[Item]:
-    """Yield matrices E that put all columns in another order: reversed, or moved by one joint.
+    """Yield matrices E that reorder the columns of the files: reversed, or moved by one joint.
 
     Nothing is yielded for fewer than three joints.
     """
@@ -340,7 +346,7 @@ def orders(robot: Robot) -> Iterator[Item]:
 
 
 def torque_units(robot: Robot) -> Iterator[Item]:
-    """Yield each unit in which torques may have been recorded, with its factor to N m.
+    """Yield each unit in which torques may have been recorded, with its value in N m.
 
     Nothing is yielded if a joint is prismatic, or if the law of a controller gives the torques.
     """
@@ -350,7 +356,7 @@ def torque_units(robot: Robot) -> Iterator[Item]:
 
 
 def position_units(robot: Robot) -> Iterator[Item]:
-    """Yield each mistake of the unit of positions, for instance degrees that are read as rad.
+    """Yield each possible mistake in the unit of all positions, such as degrees read as rad.
 
     It concerns all revolute joints or all prismatic joints.
     """
@@ -367,7 +373,7 @@ def position_units(robot: Robot) -> Iterator[Item]:
 
 
 def position_unit_of_joints(robot: Robot) -> Iterator[Item]:
-    """Yield each mistake of the unit of a single joint position, such as degrees read as rad.
+    """Yield each possible mistake in the unit of one joint position, such as degrees read as rad.
 
     Only if the robot has several joints of this kind (revolute or prismatic).
     """
@@ -390,7 +396,7 @@ def times(factor: float) -> str:
 
 
 def neighbours(robot: Robot) -> Iterator[Item]:
-    """Yield each pair of neighbouring joints of the same unit whose drives may be coupled.
+    """Yield each pair of neighbouring joints of the same kind: their drives may be coupled.
 
     Each pair is tried with both senses in which the motor of the second joint may turn with the
     first joint.
@@ -403,32 +409,32 @@ def neighbours(robot: Robot) -> Iterator[Item]:
 
 
 def known_torques(robot: Robot) -> Iterator[Item]:
-    """Yield each joint with a known torque in the record."""
+    """Yield each joint for which the record contains a known torque (tau_known)."""
     if robot.samples is not None:
         for j in np.flatnonzero(robot.samples.tau_known.any(axis=0)):
             yield {"j": j, "joint": robot.labels[j]}
 
 
 def geared(robot: Robot) -> Iterator[Item]:
-    """Yield one empty item if the robot has gears, whose ratio may be missing or applied twice."""
+    """Yield one empty item if the robot has gears: a ratio may be missing or applied twice."""
     yield from [{}] if not np.allclose(robot.R, np.eye(robot.n)) else []
 
 
 def with_constants(robot: Robot) -> Iterator[Item]:
-    """Yield one empty item if the drives have torque constants.
+    """Yield one empty item if the drives have torque constants, which may be wrongly applied.
 
-    They may be missing, or applied by mistake.
+    They may be missing, or applied to signals that are torques already.
     """
     yield from [{}] if not np.allclose(robot.constant, np.eye(robot.n)) else []
 
 
 def with_offsets(robot: Robot) -> Iterator[Item]:
-    """Yield one empty item if the drives have position offsets, which may be missing or wrong."""
+    """Yield one empty item if the drives have position offsets: they may be missing or wrong."""
     yield from [{}] if robot.offset.any() else []
 
 
 def other_ratios(robot: Robot) -> Iterator[Item]:
-    """Yield each pair of joints whose gear ratios differ, and so may have been exchanged.
+    """Yield each pair of joints with different gear ratios: they may have been exchanged.
 
     Only if positions or torques of the files are on the side of the motors.
     """
@@ -441,14 +447,14 @@ def other_ratios(robot: Robot) -> Iterator[Item]:
 
 
 def other_gravity(robot: Robot) -> Iterator[Item]:
-    """Yield gravity of 9.81 m/s^2 if the robot file gives another size."""
+    """Yield gravity with the size 9.81 m/s^2 if that of the robot file has another size."""
     size = float(np.linalg.norm(robot.gravity))
     if size and abs(size / 9.81 - 1) > LIMIT.GRAVITY_VARIES:
         yield {"size": f"{size:.4g}", "g": 9.81 / size * robot.gravity}
 
 
 def axes(robot: Robot) -> Iterator[Item]:
-    """Yield gravity along each of the six axes of frame 0, except its present direction."""
+    """Yield gravity along +-x, +-y and +-z of frame 0, except the vector of the robot file."""
     size = float(np.linalg.norm(robot.gravity))
     for k, axis in enumerate("xyz"):
         for sign in (1.0, -1.0):
@@ -493,10 +499,7 @@ def lengths(robot: Robot) -> Iterator[Item]:
 
 
 def odd_lengths(robot: Robot) -> Iterator[Item]:
-    """Yield each length of unusual size with the factors 1000 and 1/1000.
-
-    Such a length may have been given in mm instead of m, or in m instead of mm.
-    """
+    """Yield each unusual length with the factors 1000 and 1/1000: mm and m may be confused."""
     for item in lengths(robot):
         if not LIMIT.MM_BELOW < abs(item["length"]) < LIMIT.MM_ABOVE:
             for text, factor in LENGTHS.items():
@@ -512,9 +515,9 @@ def exchanged_lengths(robot: Robot) -> Iterator[Item]:
 
 
 def odd_tables(robot: Robot) -> Iterator[Item]:
-    """Yield all lengths of the table of frames, multiplied by 1000 and by 1/1000.
+    """Yield all lengths of the table of frames, times 1000 and 1/1000: mm and m may be confused.
 
-    Only if the longest length is too long or too short for an arm: mm and m may be confused.
+    Only if the longest length is too long or too short for an arm.
     """
     given = {
         key: x for key, x in robot.free.items() if key[:6] in ("free_d", "free_r", "free_b") and x
@@ -526,9 +529,10 @@ def odd_tables(robot: Robot) -> Iterator[Item]:
 
 
 def conventions(robot: Robot) -> Iterator[Item]:
-    """Yield the frame table with alpha and d of each frame copied from the frame before or after.
+    """Yield the table of frames converted to the other convention, distal or Khalil's.
 
-    This corrects a table in the distal convention that is read as Khalil's, or the reverse.
+    To convert it, alpha and d of each frame are copied from the frame before or after. This
+    corrects a table in the distal convention that is read as Khalil's, or the reverse.
     """
     for step, mistake, remedy in (
         (
@@ -552,7 +556,10 @@ def conventions(robot: Robot) -> Iterator[Item]:
 
 
 def entries(robot: Robot, names: str) -> Iterator[Item]:
-    """Yield the entries of the table of frames with these names; lengths only if not zero."""
+    """Yield each entry of the table of frames that has one of the given names, such as alpha.
+
+    Lengths are yielded only if they are not zero.
+    """
     for key, value in robot.free.items():
         entry = ENTRY.fullmatch(key)
         if entry and entry[1] in names.split() and (value or entry[1] == "alpha"):
@@ -560,7 +567,7 @@ def entries(robot: Robot, names: str) -> Iterator[Item]:
 
 
 def slow_joints(robot: Robot) -> Iterator[Item]:
-    """Yield one item: all joints with friction at low speed that the model lacks.
+    """Yield one item with all joints whose friction at low speed is missing in the model.
 
     Nothing is yielded if no joint certainly has such friction.
     """
@@ -573,22 +580,22 @@ def slow_joints(robot: Robot) -> Iterator[Item]:
 
 
 def in_positions(robot: Robot, item: Item) -> Maps:
-    """Change the position columns by the matrix E of an item, for instance a reversed sign."""
+    """Correct the position columns by the matrix E of an item, which may reverse a sign."""
     return robot.positions(item["E"])
 
 
 def in_torques(robot: Robot, item: Item) -> Maps:
-    """Change the torque columns by the matrix E of an item, for instance a reversed sign."""
+    """Correct the torque columns by the matrix E of an item, which may reverse a sign."""
     return robot.torques(item["E"])
 
 
 def in_both(robot: Robot, item: Item) -> Maps:
-    """Change position and torque columns by the matrix E of an item, such as a reversed sign."""
+    """Correct position and torque columns by the matrix E of an item, which may reverse a sign."""
     return robot.positions(item["E"]) | robot.torques(item["E"])
 
 
 def turned(*quantities: str) -> Callable[[Robot, Item], Mapping[str, Any]]:
-    """Make a function that states a reversed sign as settings of the study (record.scale).
+    """Make a function that writes a reversed sign as settings of the study (record.scale).
 
     The sign is that of the joint of the item, or of all joints if the item has none.
 
@@ -630,7 +637,7 @@ def constants_as_currents(robot: Robot) -> Array:
 
 
 def exchanged_ratios(robot: Robot, item: Item) -> Maps:
-    """Exchange the gear ratios of two joints in the signals that the files give for the motors.
+    """Correct positions and torques of the motors if the gear ratios of two joints are exchanged.
 
     Only torques or positions on the side of the motors change.
     """
@@ -640,12 +647,15 @@ def exchanged_ratios(robot: Robot, item: Item) -> Maps:
 
 
 def gravity(item: Item) -> Maps:
-    """Change gravity in frame 0 to the vector g of an item, m/s^2."""
+    """Set gravity in frame 0 to the vector g of an item, m/s^2."""
     return {"constants": dict(zip(GRAVITY, map(float, item["g"]), strict=True))}
 
 
 def chosen(item: Item) -> Array:
-    """Make the diagonal matrix that multiplies the positions of some joints by a unit factor."""
+    """Make the diagonal matrix that converts the unit of some joint positions.
+
+    Its elements are the unit-conversion factor for these joints, and 1 for the others.
+    """
     return np.diag(np.where(item["chosen"], item["factor"], 1.0))
 
 
@@ -1084,5 +1094,5 @@ NUMBERS = (
 
 
 def causes(robot: Robot) -> list[Cause]:
-    """Make all causes of the table CAUSES for a robot."""
+    """Make, for a robot, every possible error of study or table (cause) that CAUSES lists."""
     return [row.cause(robot, item) for row in CAUSES for item in row.of(robot)]

@@ -37,7 +37,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Delay(Result):
-    """Delays of the torques, one for each joint; it is positive if the torque is late.
+    """Delay of the torque of each joint against its position; positive if the torque is late.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Delay(Result):
     after: Array
 
     def table(self) -> Table:
-        """Tabulate the delays in ms and the relative errors in %, one line for each joint."""
+        """Tabulate, for each joint, the delay in ms and the fit error before and after correction."""
         columns = (1e3 * self.shift, 1e3 * self.sigma, self.before, self.after)
         return Table(
             "Delay of the torques against the positions",
@@ -104,12 +104,12 @@ def delay(problem: Problem, *, longest: float = LIMIT.LONGEST_DELAY) -> Delay:
 
 
 def delay_of(model: GeneratedModel, through: Filtered, longest: float) -> Delay:
-    """Estimate the delays of the torques in a record that is filtered already."""
+    """Estimate the delay of the torque of each joint in a record whose signals are filtered."""
     record = through.record
     duration = float(record.t[-1] - record.t[0])
     if not 0 < longest <= duration / 10:
         raise InputError(
-            f"delays up to {longest:g} s in a record of {duration:g} s; expected at most a tenth of it",
+            f"delays up to {longest:g} s in a record of {duration:g} s; expected at most a tenth of the record",
             file=record.name,
         )
     shifts = Shifts(model, through, longest)
@@ -203,13 +203,13 @@ class Shifts:
         self.mask = moving & ~(np.any(steps, axis=0) & flat).any(axis=2)
 
     def shifted(self, shift: Array) -> Array:
-        """Interpolate the torque of each joint at the instants t + delta_j, shape (K, n)."""
+        """Interpolate the torque of each joint at times later by its `shift`, s; shape (K, n)."""
         return np.column_stack(
             [torque(self.t + d) for torque, d in zip(self.torques, shift, strict=True)]
         )
 
     def fit(self, shift: Array) -> tuple[Array, Array, Array]:
-        """Fit X to torques that are shifted by `shift`, s.
+        """Fit the base parameters X to torques that are shifted in time by `shift`, s.
 
         Return X, the residual of each joint (root mean square), and all residuals, shape (K, n).
         """
@@ -223,7 +223,7 @@ class Shifts:
         return X, sigma, (Y - self.D @ X) * self.mask
 
     def errors(self, shift: Array) -> Array:
-        """Compute the relative error of each joint, %, if its torque is shifted by `shift`, s."""
+        """Compute the fit error of each joint, %, with torques shifted in time by `shift`, s."""
         size = np.linalg.norm(self.shifted(shift) * self.mask, axis=0)
         left = np.linalg.norm(self.fit(shift)[2], axis=0)
         return np.asarray(100 * left / np.maximum(size, 1e-300))

@@ -134,7 +134,7 @@ def _frozen(steps: Array, sharp: Array) -> Array:
 
 
 def _runs(high: Array, median: int) -> tuple[Array, Array]:
-    """Find the first and the last step of each jump.
+    """Find, for each jump, the first and the last of the steps between samples that form the jump.
 
     Resampling may spread a jump over several steps.
     """
@@ -144,7 +144,7 @@ def _runs(high: Array, median: int) -> tuple[Array, Array]:
 
 
 def _wrap(q: Array, high: Array, usual: Array, median: int) -> bool:
-    """Whether the jumps of each joint have one size, as if an angle or a counter wraps around.
+    """Whether each joint that jumps does so by one size, as if an angle or counter wraps around.
 
     A joint that jumps must do so more than once.
     """
@@ -227,7 +227,7 @@ def cut_torques(case: Case) -> Answer | None:
 
 
 def _at_bound(tau: Array) -> Array:
-    """Whether each sample has the largest or the smallest torque, bool (N,).
+    """Whether each sample has the largest or the smallest torque of the record, bool (N,).
 
     True only if the record repeats this value far more often than the values next to it.
     """

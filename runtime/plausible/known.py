@@ -64,7 +64,7 @@ class KnownValues(Result):
     complete: bool
 
     def table(self) -> Table:
-        """Tabulate the ratios and the error of the computed torques, one line for each joint."""
+        """Tabulate, for each joint, measured over computed torque, and the error of the latter."""
         rows = zip(self.joints, self.gravity, self.inertia, self.error, strict=True)
         return Table(
             "Values of the robot file against the record, friction fitted",
@@ -79,7 +79,7 @@ class KnownValues(Result):
 
     @property
     def heavy(self) -> bool:
-        """Whether the gravity torques of all joints are far larger than computed, or far smaller.
+        """Whether measured gravity torques of all joints are far above computed ones, or far below.
 
         All ratios are then on the same side of the range LIMIT.CAD_RATIOS. Wrong time stamps cannot
         cause this.
@@ -170,7 +170,7 @@ class TorqueUnit(Part):
     title = "Unit of the torques"
 
     def warnings(self) -> tuple[str, ...]:
-        """Return the question whether the torques have another unit, as a tuple."""
+        """Return the warning, as a tuple: the question whether the torques have another unit."""
         return (self.sentence,)
 
 
@@ -182,7 +182,7 @@ def torque_unit(result: Identification) -> TorqueUnit | None:
 
 
 def torque_unit_doubt(model: GeneratedModel, observation: Observation, by_law: bool) -> str:
-    """Ask the user whether the torques are in N m, if their size contradicts the robot file.
+    """Write the question whether torques are in N m, if their size contradicts the robot file.
 
     An empty string if nothing contradicts the unit, or if the file lacks values.
     """

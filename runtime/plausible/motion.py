@@ -131,7 +131,7 @@ def motion_excites(case: Case) -> Answer | None:
 
 
 def excited(observation: Observation, signals: Signals, rate: float) -> Answer | None:
-    """Check whether the rows of one observation determine every parameter.
+    """Check whether the rows of an observation matrix W determine every parameter.
 
     None if W is rank-deficient, which the fit itself reports, or if a torque is zero throughout.
     """
@@ -153,7 +153,7 @@ def excited(observation: Observation, signals: Signals, rate: float) -> Answer |
 
 
 def unexcited_shares(observation: Observation, signals: Signals, rate: float) -> dict[str, float]:
-    """Predict the standard deviation of each parameter, in % of its largest possible value.
+    """Predict the standard deviation of each parameter, % of the largest value the torques allow.
 
     It is share_i of the module docstring, by parameter name. Raises LinAlgError if W is
     rank-deficient, and InputError if a torque is zero throughout.
@@ -166,7 +166,7 @@ def unexcited_shares(observation: Observation, signals: Signals, rate: float) ->
         ]
     )
     if not s.all():
-        raise InputError("torques that are zero throughout")
+        raise InputError("all torques are zero; a record needs measured torques")
     columns = np.linalg.norm(observation.W / s[observation.joints][:, None], axis=0)
     if not columns.all():
         raise np.linalg.LinAlgError("a column is zero")

@@ -1,4 +1,4 @@
-"""Checks after the fit: can a physical robot explain the record, and would another study do better?
+"""Checks after the fit: can a physical robot explain the record, or do other settings fit better?
 
 Other checks are the mass and the values of the robot, noise and friction in the torques, and the
 delay between positions and torques.
@@ -24,7 +24,7 @@ Array = np.ndarray
     "Does physics agree?", "", "record a longer motion, or give a higher signals.lowpass.cutoff"
 )
 def not_asked(case: Case) -> Answer | None:
-    """State the reason why no cause is tried; None if causes are tried.
+    """Report why possible errors (causes) are not tried; None if they are tried.
 
     Too few samples are a doubt, because a wrong sign or unit would not be detected.
     """
@@ -42,7 +42,7 @@ def not_asked(case: Case) -> Answer | None:
     "alternatives below",
 )
 def physics(case: Case) -> Answer | None:
-    """Compare the error of the best physical robot with that of free parameters, joint by joint.
+    """Compare, joint by joint, the error of a physical robot with that of a fit of free parameters.
 
     None if nothing is fitted.
     """
@@ -206,7 +206,7 @@ def _from_to(text: str, before: float, after: float) -> str:
 
 
 def late_joints(late: Delay) -> Array:
-    """Whether the delay of each joint is certain, bool (n,).
+    """Whether the delay of each joint is large against its standard deviation, bool (n,).
 
     If one delay suits all joints, all are marked; otherwise only joints whose delays have the same
     sign.
@@ -224,13 +224,13 @@ def late_joints(late: Delay) -> Array:
 
 
 def gain_of_delays(case: Case, late: Delay) -> float:
-    """Compute the log-likelihood gained by correcting the delays `late`, in nats."""
+    """Compute the log-likelihood gained by correcting the given delays of the torques, in nats."""
     N = 0.0 if case.baseline is None else case.baseline.N
     return N * float(np.log(late.before / np.maximum(late.after, 0.1)).sum())
 
 
 def gain_of_alternative(case: Case, trial: Trial) -> float:
-    """Compute the log-likelihood gained by a change of the study, in nats.
+    """Compute the log-likelihood gained by correcting one possible error of the study, in nats.
 
     The number of rows that count is the same as in `gain_of_delays`, so that both gains can be
     compared.
@@ -240,17 +240,14 @@ def gain_of_alternative(case: Case, trial: Trial) -> float:
 
 
 def late_gain(case: Case) -> float:
-    """Compute the log-likelihood gained by correcting the delays of the torques, in nats.
-
-    0 if no joint is certainly late.
-    """
+    """Compute the log-likelihood gained by correcting torque delays, nats; 0 if none is certain."""
     if case.baseline is None or case.late is None:
         return 0.0
     return gain_of_delays(case, case.late) if certain_joints(case).any() else 0.0
 
 
 def certain_joints(case: Case) -> Array:
-    """Whether the torques of each joint are certainly late, bool (n,).
+    """Whether the torque of each joint is late beyond doubt, bool (n,).
 
     All are false if correcting the delays gains less than LIMIT.LATE_GAIN.
     """
@@ -263,7 +260,7 @@ def certain_joints(case: Case) -> Array:
     f"no single change explains it decisively better ({LIMIT.DECISIVE:g} nats)",
 )
 def better(case: Case, named: Sequence[Trial]) -> Answer:
-    """Report the changes of the study that explain the record decisively better than the study.
+    """Report the corrections that explain the record decisively better than the study as given.
 
     If the best of them is friction that the model lacks, the study is not wrong and the answer is
     good.

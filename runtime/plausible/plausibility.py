@@ -87,7 +87,7 @@ class Plausibility(
     Part,
     keys="checks:answers named:named_causes equivalent delay known_values:robot_values",
 ):
-    """Results of the checks of a record, a study and a robot file, with causes that were tried.
+    """Results of the checks of a record, a study and a robot file, with the corrections tried.
 
     Attributes
     ----------
@@ -115,12 +115,12 @@ class Plausibility(
 
     @property
     def worst(self) -> Check | None:
-        """The worst finding; None if all findings are good."""
+        """Check with the worst finding; None if all findings are good."""
         return worst_of(self.answers)
 
     @property
     def named_causes(self) -> list[dict[str, Any]]:
-        """Causes that explain the record decisively better than the study.
+        """Possible errors (causes) whose correction explains the record decisively better.
 
         Each has the keys cause, remedy, gain (nats) and change (of the study).
         """
@@ -140,7 +140,7 @@ class Plausibility(
         return "" if self.worst is None else self.worst.sentence
 
     def checks(self) -> tuple[Check, ...]:
-        """Return the questions with their answers."""
+        """Return all checks: the questions with their answers."""
         return self.answers
 
     def text(self) -> str:
@@ -154,13 +154,13 @@ class Plausibility(
         return told or "Record, study and robot file suit each other, as far as judged."
 
     def tables(self) -> list[Table]:
-        """Tabulate causes, delays, and values of the robot file, as far as they were judged."""
+        """Make the tables of the corrections tried, of delays, and of the robot file's values."""
         judged = (self.delay, self.robot_values)
         tried = [self.table()] if any(trial.fit is not None for trial in self.trials) else []
         return [*tried, *(own.table() for own in judged if own is not None)]
 
     def table(self) -> Table:
-        """Tabulate the best ten causes: gain in nats, and error of each joint in %."""
+        """Tabulate the ten best corrections tried: gain in nats, and error of each joint in %."""
         rows = [
             (t.cause.says, f"{t.gain:+.0f}", *(f"{e:.1f}" for e in t.fit.errors))
             for t in self.trials
@@ -185,13 +185,13 @@ def plausibility_of(result: Identification, variants: GeneratedModel | None = No
         raise InputError("not judged for poses at rest")
     if any(is_axis(joint) for joint in result.model.JOINTS):
         raise InputError(
-            "not judged for a robot with force sensors; identify once without their columns"
+            "not judged for a robot with force sensors; identify once without record.columns.wrench"
         )
     return plausibility(result.problem, variants=variants)
 
 
 def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) -> Plausibility:
-    """Check whether record, study and robot file agree, and search for causes if they do not.
+    """Check whether record, study and robot file agree; if not, search for the possible error.
 
     A cause is a single change of the study, for instance another sign, that explains the record
     better.
@@ -208,7 +208,7 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
     if any(is_axis(joint) for joint in problem.model.JOINTS):
         raise InputError(
             "plausibility of the record: not judged for a robot with force sensors; identify once "
-            "without their columns"
+            "without record.columns.wrench"
         )
     at("plausibility of the record")
     first = times(problem.records)

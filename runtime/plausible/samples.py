@@ -1,4 +1,4 @@
-"""Selected instants of the records, filtered once, on which all checks and causes are evaluated.
+"""Selected instants of the records, filtered once, which all checks and trials of errors use.
 
 Filters are linear: a change of sign, scale or column order has the same effect before and after
 filtering, and a wrong sampling rate scales velocities and accelerations. So a cause needs only the
@@ -95,7 +95,7 @@ class Samples:
         return np.asarray((np.ptp(self.tau, axis=0) <= 1e-9 * size) & ~self.without_motor())
 
     def thinned(self, most: int) -> Samples:
-        """Keep at most `most` instants, at equal distances."""
+        """Reduce the samples to at most `most` instants, at equal distances."""
         kept = np.arange(0, len(self), -(-len(self) // most))
         return replace(self, **{name: getattr(self, name)[kept] for name in SIGNALS})
 
@@ -109,7 +109,7 @@ def moving(qd: Array) -> Array:
 
 
 def excerpts(reading: Prepared) -> list[Prepared]:
-    """Cut a long record to a few excerpts that are spread evenly over the window.
+    """Cut a long record to a few excerpts that are spread evenly over its time window.
 
     Their number and length are LIMIT.EXCERPTS. A shorter record stays whole.
     """
@@ -137,7 +137,7 @@ def excerpts(reading: Prepared) -> list[Prepared]:
 
 @dataclass(frozen=True, eq=False)
 class Filtered:
-    """A record, and its states filtered by a low-pass that is chosen by the motion.
+    """A record, with q, qd and qdd filtered by a low-pass whose cut-off suits the motion.
 
     Attributes
     ----------
@@ -156,13 +156,13 @@ class Filtered:
     states: States
 
     def torque(self, tau: Array) -> Array:
-        """Filter torques with the same low-pass, shape (N, n)."""
+        """Filter torques with the low-pass that filtered the positions, shape (N, n)."""
         smooth = median_filtered(tau, self.study.signals.window_of_torques)
         return lowpass_filtered(smooth, self.record.rate, self.low)
 
 
 def filtered(reading: Prepared, study: Study) -> Filtered:
-    """Filter the record with a low-pass that is chosen by its motion."""
+    """Filter a record with a low-pass whose cut-off suits its motion."""
     record = reading.record
     low = Lowpass(cutoff=motion_cutoff(record, reading.study))
     signals = replace(study.signals, lowpass=low)
@@ -206,7 +206,7 @@ def motion_cutoff(record: Record, study: Study) -> float:
 
 
 def usable(record: Record, study: Study, before: int, after: int) -> Array:
-    """Whether each sample is in the window and far enough from missing samples, bool (N,)."""
+    """Whether each sample is in the time window and far from missing samples, bool (N,)."""
     t0, t1 = study.rows.window
     inside = (record.t >= (-np.inf if t0 is None else t0)) & (
         record.t <= (np.inf if t1 is None else t1)
@@ -217,7 +217,7 @@ def usable(record: Record, study: Study, before: int, after: int) -> Array:
 
 
 def _instants(through: Filtered, number: int) -> Samples:
-    """Choose the instants of one record: one for about 0.8 rate/(2 cutoff) samples.
+    """Select filtered samples of one record, spaced by about 0.8 rate/(2 cutoff) samples.
 
     If these are fewer than LIMIT.INSTANTS_LEAST in a long record, twice as many are chosen. A time
     of 2/cutoff is left out at each end.
@@ -231,7 +231,9 @@ def _instants(through: Filtered, number: int) -> Samples:
     finer = 2 if few else 1
     kept = inside[:: max(1, step // finer)]
     if len(kept) < 2:
-        raise InputError("no sample in the window", file=record.name)
+        raise InputError(
+            "too few samples in rows.window; use a longer window or record", file=record.name
+        )
     steady = np.stack([_steady(qd, record.rate / cutoff) for qd in states.qd.T], axis=1)
     motion = (record.t, states.q, states.qd, states.qdd)
     signals = (*motion, through.torque(record.tau), through.torque(known), steady)
@@ -242,7 +244,7 @@ def _instants(through: Filtered, number: int) -> Samples:
 
 
 def _steady(qd: Array, reach: float) -> Array:
-    """Whether a velocity keeps its sign from `reach` samples before to `reach` after, bool (N,).
+    """Whether a velocity keeps its sign within `reach` samples of each sample, bool (N,).
 
     If less than half of the samples do so, the reach is halved, then set to zero.
     """

@@ -1,4 +1,4 @@
-"""Checks before any fit: are positions, speeds, torques and lengths those of this robot?
+"""Checks before any fit: are positions, speeds, torques and lengths plausible for this robot?
 
 Values are compared with `limits` of the robot file if it has them, otherwise with usual sizes.
 Usual sizes are conventions: an industrial joint turns at a few rad/s, and by less than a turn or

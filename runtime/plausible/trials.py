@@ -1,4 +1,4 @@
-"""Try the causes of `runtime.plausible.causes`: which one explains the record decisively better?
+"""Try the possible errors of `runtime.plausible.causes`: which one explains the record best?
 
 A cause is a possible error of the study, tried as a change that corrects it. Every cause is first
 fitted by weighted least squares: no physical robot can have a better score. Only causes whose bound
@@ -81,7 +81,7 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
-    """Fit of the study as given, to which the fits of the causes are compared.
+    """Reference fit, with the study as given; a fit with an error corrected is compared to it.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ class Baseline:
     F: Array
 
     def regressor(self, cause: Cause) -> Array | None:
-        """Evaluate the regressor of the study after one cause of error is corrected.
+        """Evaluate the regressor with one possible error (cause) corrected.
 
         Its columns are the standard parameters if the table of frames changes. Its shape is (K, n,
         b); None if it cannot be evaluated.
@@ -130,13 +130,12 @@ class Baseline:
             return None
 
     def rows(self, cause: Cause) -> tuple[Array, Array, Array] | None:
-        """Form the regressor and the torques of the study after one cause of error is corrected.
+        """Form the regressor and the torques with one possible error (cause) corrected.
 
         On the side of the files, return the regressor F T^-1 W', the torques F tau - F T^-1 known,
-        and the rows used, bool
-        (K, n). Together they are T tau - known = W' X', multiplied by F T^-1. So every cause
-        explains the same measured torques F tau, and residuals of coupled motors are not mixed.
-        None if the regressor cannot be evaluated.
+        and the rows used, bool (K, n). Together they are T tau - known = W' X', multiplied by F
+        T^-1. So every cause explains the same measured torques F tau, and residuals of coupled
+        motors are not mixed. None if the regressor cannot be evaluated.
         """
         D = self.regressor(cause)
         if D is None:
@@ -151,19 +150,19 @@ class Baseline:
 
     @cached_property
     def tau(self) -> Array:
-        """Measured torques on the side of the files, shape (K, n)."""
+        """Measured torques of the joints or motors, as in the files, shape (K, n)."""
         return np.asarray(self.samples.tau @ self.F.T)
 
     @cached_property
     def as_given(self) -> tuple[Array, Array, Array]:
-        """Rows of the study as given: regressor, torques, and mask of the rows used."""
+        """Regressor, torques and mask of the rows used, with no error corrected."""
         rows = self.rows(unchanged_study(self.samples.n))
         assert rows is not None
         return rows
 
     @cached_property
     def basis(self) -> Array:
-        """Orthonormal basis of the span of W, shape (K*n, rank).
+        """Orthonormal basis of the column space of the observation matrix W, shape (K*n, rank).
 
         Each row of W is first divided by the residual of its joint.
         """
@@ -173,7 +172,7 @@ class Baseline:
         return np.asarray(Q[:, np.abs(np.diag(R)) > 1e-9])
 
     def grams(self, cause: Cause) -> Grams | None:
-        """Form the normal equations of the study after one cause of error is corrected.
+        """Form the normal equations with one possible error (cause) corrected.
 
         None if the regressor cannot be evaluated.
         """
@@ -181,12 +180,12 @@ class Baseline:
         return None if rows is None else Grams.of(*rows, self.tau)
 
     def standard(self, grams: Grams) -> Grams:
-        """Transform normal equations to the standard parameters, unless they have these already."""
+        """Transform normal equations of base parameters to the standard parameters, if needed."""
         p = len(self.physical.standard)
         return grams if grams.of_joints.shape[1] == p + 1 else grams.mapped(self.physical.K)
 
     def bound(self, grams: Grams) -> Fit:
-        """Fit by least squares: a physical robot can have no better score on these rows.
+        """Fit by least squares: no physical robot can have a better score on the same rows.
 
         If the robot file has values of links, the parameters are drawn towards them.
         """
@@ -206,7 +205,7 @@ class Baseline:
         return how(self.standard(grams), self.bodies, self.N, sigma)
 
     def trial(self, cause: Cause, sigma: Array | None = None) -> Trial:
-        """Fit a physical robot after one cause of error is corrected, and compute the gain.
+        """Fit a physical robot with one possible error (cause) corrected, and compute the gain.
 
         The gain is that of the score, in nats. The number of independent rows is the larger one of
         the study and of the cause.
@@ -225,7 +224,7 @@ class Baseline:
         return Trial(cause, fit, gain)
 
     def unseen(self, cause: Cause) -> float:
-        """Compute how well a study with one cause corrected predicts rows that were not fitted.
+        """Compute how well a fit with one possible error corrected predicts rows it has not used.
 
         The rows are divided into two parts, of alternating blocks of time. The fit of each part
         predicts the other part; the result is the score in nats, and smaller is better.
@@ -243,9 +242,9 @@ class Baseline:
         return score
 
     def beyond(self, V: Array) -> float:
-        """Compute the largest relative part of the torques V outside the span of W.
+        """Compute the largest relative part of the torques V that no parameters explain.
 
-        No parameters of the study explain this part.
+        This part is outside the span of W.
 
         V : m sets of torques on the side of the files, shape (K, n, m).
         """
@@ -255,7 +254,7 @@ class Baseline:
         return float((left / np.where(size > 0, size, 1.0)).max(initial=0.0))
 
     def hides(self, cause: Cause) -> bool:
-        """Whether no fit can distinguish a study with one cause corrected from the study as given.
+        """Whether the record fits equally well with and without correcting one possible error.
 
         If so, the rows of the cause are in the span of W, and a physical robot explains both
         equally well. The columns are tested in random combinations, together with the change of the
@@ -279,10 +278,10 @@ class Baseline:
 
     @cached_property
     def normal(self) -> tuple[Array, Array, Array, Array]:
-        """Linearisation of the physical fit of the study, to estimate an unknown number xi.
+        """Linearised fit of a physical robot, to estimate an unknown number xi such as an offset.
 
-        These are W over the standard parameters, shape (K, n, p), the torques it explains, shape
-        (K, n), the residuals e divided by sigma, shape (K, n), and the matrix A + B.
+        It consists of W over the standard parameters, shape (K, n, p), the torques that W explains,
+        shape (K, n), the residuals e divided by sigma, shape (K, n), and the matrix A + B.
         """
         D, Y, mask = self.as_given
         W = D @ self.physical.K
@@ -292,7 +291,7 @@ class Baseline:
         return W, explained, e, A + self.bodies.stiffness(self.given.X)
 
     def effect(self, change: Callable[[float], Cause]) -> Array:
-        """Compute the derivative of the study's torques by an unknown number xi, shape (K, n).
+        """Compute the derivative of the torques with respect to an unknown number xi, shape (K, n).
 
         The number is for instance a factor or a zero; J = d tau/d xi is a finite difference.
 
@@ -310,7 +309,7 @@ class Baseline:
         return np.asarray((moved - plain) / LIMIT.DIFFERENCE_STEP)
 
     def first_step(self, J: Array) -> tuple[Array, Array] | None:
-        """Estimate unknown numbers of causes, such as a zero, to first order.
+        """Estimate unknown numbers, such as the error of a joint's zero, to first order.
 
         The parameters of the model are free.
 
@@ -345,7 +344,7 @@ def baseline_of(
     torque_side: str = "joint",
     values: bool = True,
 ) -> Baseline:
-    """Fit the study as given, with free parameters and as a physical robot.
+    """Fit the samples with the study as given: with free parameters, and as a physical robot.
 
     D : regressor at the samples, shape (K, n, b).
     torque_side : side of the torques in the files, motor or joint.
@@ -368,7 +367,7 @@ def baseline_of(
 
 
 def regressor(model: GeneratedModel, states: tuple[Array, Array, Array], **constants: Any) -> Array:
-    """Evaluate the regressor D at given states, shape (K, n, b).
+    """Evaluate the regressor D at given states q, qd, qdd, shape (K, n, b).
 
     Columns that contain only rounding errors, such as those of cos(pi/2), are set to zero.
 
@@ -387,7 +386,7 @@ def regressor(model: GeneratedModel, states: tuple[Array, Array, Array], **const
 
 
 def bodies_of(physical: PhysicalModel, size: float, Y: Array, values: bool) -> Bodies:
-    """Make the `Bodies` of a robot from its length `size`, m, and its torques Y, shape (K, n).
+    """Make the conditions on the bodies of a robot from its length `size`, m, and its torques Y.
 
     The usual mass of a link follows from the largest torque.
     """
@@ -425,7 +424,7 @@ def reach(model: GeneratedModel, q: Array) -> float:
 
 
 def try_causes(baseline: Baseline, sides: Sequence[str] = ("joint", "joint")) -> list[Trial]:
-    """Try all causes, which are possible errors of the study; return the trials, the best first.
+    """Try every possible error of the study (cause), and return the fits, the best first.
 
     A wrong sampling rate, coupling, scale of a position or constant torque must gain
     LIMIT.RATE_GAIN more than the others, because it gives the parameters more freedom.
@@ -444,9 +443,9 @@ def try_causes(baseline: Baseline, sides: Sequence[str] = ("joint", "joint")) ->
 
 
 def _of_causes(baseline: Baseline, which: Sequence[Cause]) -> list[Trial]:
-    """Try the causes without an unknown number, for instance a wrong sign.
+    """Try the possible errors that have no unknown number, for instance a wrong sign.
 
-    Causes that cannot win are not fitted under the conditions of a physical robot.
+    Errors whose correction cannot win are not fitted under the conditions of a physical robot.
     """
     given, least = baseline.given, baseline.samples.moving().sum(axis=0) // 2
     trials: list[Trial] = []
@@ -480,9 +479,9 @@ def _of_causes(baseline: Baseline, which: Sequence[Cause]) -> list[Trial]:
 
 
 def _of_numbers(baseline: Baseline, robot: Robot) -> list[Trial]:
-    """Try the causes with an unknown number, for instance a factor, each at its best value.
+    """Try the possible errors that have an unknown number, such as a factor, at its best value.
 
-    Only causes whose first step gains enough are searched. Causes that no fit can distinguish from
+    Only errors whose first step gains enough are searched. Errors that no fit can distinguish from
     the study are returned, too.
     """
     trials: list[Trial] = []
@@ -514,7 +513,7 @@ def _of_numbers(baseline: Baseline, robot: Robot) -> list[Trial]:
 
 
 def _search_number(baseline: Baseline, row: Row, change: Change, first: float) -> Trial | None:
-    """Search the best value of the unknown number of a cause; None if no value gains enough.
+    """Search the best value of the unknown number of a possible error; None if none gains enough.
 
     A coarse grid uses the weights of the study, then a golden section search uses the weights of
     each value: far from the best value its own weights may mislead. Each parameter of the cause
@@ -553,7 +552,7 @@ def _search_number(baseline: Baseline, row: Row, change: Change, first: float) -
 
 
 def slow_friction(baseline: Baseline) -> Array | None:
-    """Estimate, to first order, the friction at low speed that the model lacks, by joint, N m or N.
+    """Estimate for each joint the friction at low speed that the model lacks, N m or N.
 
     It is zero for joints in which it is uncertain, and None if this is so for all joints.
     """
@@ -575,7 +574,7 @@ def decisive(
     other: Baseline | None = None,
     alone: Baseline | None = None,
 ) -> list[Trial]:
-    """Select the trials that explain the record decisively better than the study as given.
+    """Select the corrections that explain the record decisively better than the study as given.
 
     They must also predict better the rows that were not fitted. The best trial is first, then those
     with a similar gain.
@@ -628,13 +627,13 @@ def decisive(
 
 
 def takes_away(given: Fit, fit: Fit) -> Array:
-    """Whether `fit` reduces the error of each joint by a good part against `given`, bool (n,)."""
+    """Whether the error of each joint is clearly smaller in `fit` than in `given`, bool (n,)."""
     ratio = given.errors / fit.errors.clip(0.1)
     return np.asarray((ratio > LIMIT.VISIBLE) & (given.errors - fit.errors > 0.2))
 
 
 def leaves_values(fit: Fit, baseline: Baseline) -> bool:
-    """Whether a fit needs far larger or far smaller torques than the robot file's bodies.
+    """Whether the fitted bodies need far larger or smaller torques than those of the robot file.
 
     The ratio of the torques is then outside LIMIT.CAD_RATIOS. False if the file does not give every
     body.
@@ -650,7 +649,7 @@ def leaves_values(fit: Fit, baseline: Baseline) -> bool:
 
 
 def helps(trial: Trial, baseline: Baseline, other: Baseline) -> bool:
-    """Whether the parameters of a cause predict the validation records better than the study's own.
+    """Whether parameters fitted with a correction predict the validation records better.
 
     A validation record may or may not have the same error: the better result counts.
 
@@ -668,12 +667,12 @@ def helps(trial: Trial, baseline: Baseline, other: Baseline) -> bool:
 
 
 def _misfit(grams: Grams, X: Array) -> float:
-    """Add the logarithms of the root mean square residuals of all joints, for parameters X."""
+    """Sum the logarithms of the root mean square residuals of all joints, for parameters X."""
     return fit_of(grams, X, 1.0).score
 
 
 def loads(baseline: Baseline) -> list[Trial]:
-    """Fit other values of the last link than those of the robot file, as if the robot had a load.
+    """Fit free values of the last link in place of those of the robot file, as if it held a load.
 
     The ten parameters of this link cost half of log N each. The list is empty if the file does not
     give them.

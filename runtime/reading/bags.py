@@ -77,7 +77,7 @@ class JointTable(Table):
     messages: tuple[JointState, ...]
 
     def chosen(self, names: Sequence[str]) -> Table:
-        """Make the table of the messages that contain a joint of these columns.
+        """Make the table of these columns, from the messages that contain one of their joints.
 
         If no message contains such a joint, all messages are used, so that the error names the
         missing joint.
@@ -114,7 +114,7 @@ class JointTable(Table):
     def _value(self, message: JointState, joint: str, quantity: str) -> float:
         values = getattr(message, quantity)
         if joint not in message.joints:
-            reason = f"no joint {joint}; it has {', '.join(message.joints) or 'none'}"
+            reason = f"no joint {joint} among the joints {', '.join(message.joints) or 'none'}"
         elif len(values) != len(message.joints):
             reason = f"{len(values)} values of {quantity} for {len(message.joints)} joints"
         elif message.joints.count(joint) > 1:
@@ -122,7 +122,7 @@ class JointTable(Table):
         else:
             return float(values[message.joints.index(joint)])
         raise InputError(
-            f"{reason}; expected in every message the joints and quantities that record.columns names",
+            f"{reason}; every message must contain the joints and quantities of record.columns",
             file=self.file,
             row=self._row(message),
         )
@@ -144,7 +144,10 @@ def read_bag(path: Path, options: Options) -> JointTable:
             topic = _topic(reader.connections, options.topic, path.name)
             messages = tuple(_messages(reader, topic, decode))
     if not messages:
-        raise InputError(f"no message on {topic}", file=path.name)
+        raise InputError(
+            f"no message on topic {topic}; give a bag with messages, or another record.topic",
+            file=path.name,
+        )
     names = {"t": None}
     joints: dict[str, None] = {}
     for message in messages:
@@ -195,7 +198,9 @@ def stored_files(folder: Path) -> list[Path]:
         )
     names = bag.get("relative_file_paths")
     if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
-        raise InputError("relative_file_paths names no file; expected those of the bag", file=where)
+        raise InputError(
+            "relative_file_paths lists no file; expected the files of the bag", file=where
+        )
     return [_inside(folder, name, where) for name in names]
 
 
@@ -212,11 +217,12 @@ def _inside(folder: Path, name: str, where: str) -> Path:
         or not path.resolve().is_relative_to(folder.resolve())
     ):
         raise InputError(
-            f"relative_file_paths names {name[:80]!r}; expected a file of this folder", file=where
+            f"relative_file_paths contains {name[:80]!r}; expected a file of this folder",
+            file=where,
         )
     if not path.is_file():
         raise InputError(
-            f"relative_file_paths names {name!r}; there is no such file in the folder", file=where
+            f"relative_file_paths contains {name!r}, but this file is not in the folder", file=where
         )
     return path
 
@@ -236,13 +242,15 @@ def _topic(connections: list[Any], wanted: str | None, file: str) -> str:
     if not topics or (wanted is not None and wanted not in topics):
         what = f"no topic {wanted} of {MESSAGE}" if wanted else f"no topic of {MESSAGE}"
         raise InputError(
-            f"{what}; the bag has {', '.join([*topics, *others][:20]) or 'none'}", file=file
+            f"{what}; the topics of the bag are {', '.join([*topics, *others][:20]) or 'none'}",
+            file=file,
         )
     name = wanted or topics[0]
     for c in connections:
         if c.topic == name and (c.digest not in HASHES or not _as_defined(c.msgdef)):
             raise InputError(
-                f"{name} holds messages that are called {MESSAGE} and defined otherwise", file=file
+                f"the messages on {name} are called {MESSAGE}, but their definition is different; record messages with the definition of ROS",
+                file=file,
             )
     return name
 

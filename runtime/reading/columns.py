@@ -34,7 +34,7 @@ def column_names(
     joints: Sequence[str] = (),
     motors: Sequence[bool] = (),
 ) -> Columns:
-    """Find the names of the columns that are read: those in the settings, or the default names.
+    """Find the names of the columns to read: given in the settings, or default names.
 
     Default names are t, q1 ... qn, tau1 ... taun; in a bag, the joints of its messages.
 
@@ -59,7 +59,7 @@ def column_names(
         q_ref = _numbered("qr", first, joints)
     if first.joints is not None and settings.units.t != "s":
         raise InputError(
-            f"record.units.t is {settings.units.t}; time stamps of bags are read in s",
+            f"record.units.t is {settings.units.t}, but time stamps of bags are in s; remove record.units.t",
             file=first.file,
         )
     q = _meant(first, "q", "position", given.q, joints)
@@ -67,7 +67,7 @@ def column_names(
     by_wrench = given.wrench and not given.tau and "tau1" not in last.names
     if settings.by_law and settings.controller is None:
         raise InputError(
-            "record.columns name q_ref and no tau: set controller: {kp: ..., kd: ...}, whose law then is the torque, or record.columns.tau",
+            "record.columns has q_ref but no tau; set record.columns.tau, or record.controller: {kp: ..., kd: ...} to compute the torque from this law",
             file=last.file,
         )
     if not by_wrench and not settings.by_law:
@@ -75,18 +75,18 @@ def column_names(
         tau = _meant(last, "tau", "effort", given.tau or (given.q if as_q else ()), joints)
     if given.q == BY_NAME and first is last and set(q) & set(tau):
         raise InputError(
-            f"columns {', '.join(q)} would be positions and torques; name those of the torques, record.columns.tau",
+            f"columns {', '.join(q)} would be both positions and torques; give the columns of the torques in record.columns.tau",
             file=first.file,
         )
     if not {*q} <= {*first.names} and {*q} <= {*last.names} and {*tau} <= {*first.names}:
         raise InputError(
-            f"{first.file} holds the torques and {last.file} the positions; `files` are the positions, then the torques"
+            f"{first.file} contains the torques and {last.file} the positions; in record.files, list the file of positions first"
         )
     return replace(given, t=t, q=q, tau=_of_motors(tau, motors), q_ref=q_ref)
 
 
 def _of_motors(names: tuple[str, ...], motors: Sequence[bool]) -> tuple[str, ...]:
-    """Add the mark NONE to the torque columns for each joint without a motor.
+    """Insert the mark NONE in the list of torque columns for each joint without a motor.
 
     names : columns of all joints, or of the joints with a motor only. Other names are returned
     unchanged.
@@ -102,13 +102,13 @@ def _of_motors(names: tuple[str, ...], motors: Sequence[bool]) -> tuple[str, ...
 def _meant(
     table: Table, key: str, quantity: str, names: Sequence[str], joints: Sequence[str]
 ) -> tuple[str, ...]:
-    """Find the columns that the setting `names` means, for positions, torques or references.
+    """Find the columns of positions, torques or references that the setting `names` means.
 
     key : "q", "tau" or "qr". quantity : name of the same quantity in bags, such as "effort".
     """
     if names == BY_NAME and not joints:
         raise InputError(
-            f"record.columns.{key} is {BY_NAME[0]}, but the robot has no name for every joint; add labels to the robot file",
+            f"record.columns.{key} is {BY_NAME[0]}, but some joints of the robot have no name; add labels to the robot file",
             file=table.file,
         )
     if table.joints is not None and quantity:
@@ -126,7 +126,7 @@ def _numbered(quantity: str, table: Table, joints: Sequence[str]) -> tuple[str, 
     numbered = sorted((int(match[1]), match[0]) for match in matches if match)
     if not numbered:
         raise InputError(
-            f"no columns {quantity}1, {quantity}2 ... among {', '.join(table.names)}; name them in a study file, record.columns.{quantity}",
+            f"no columns {quantity}1, {quantity}2 ... among {', '.join(table.names)}; give the column names in a study file, record.columns.{quantity}",
             file=table.file,
             remedy=likely_columns(table.names, joints),
         )
@@ -145,7 +145,7 @@ def _numbered_joints(table: Table) -> tuple[str, ...]:
     expected = [(stem, start + k) for k in range(len(joints))]
     if start > 1 or [(other, k) for other, k, _ in numbers] != expected:
         raise InputError(
-            f"{table.topic} has the joints {', '.join(joints) or '(none)'}; name those of the robot, in its order, in record.columns: {{q: [...], tau: [...]}}",
+            f"{table.topic} has the joints {', '.join(joints) or '(none)'}; list the joints of the robot, in the order of the robot file, in record.columns: {{q: [...], tau: [...]}}",
             file=table.file,
         )
     return tuple(joint for *_, joint in numbers)
@@ -171,7 +171,7 @@ def _of_joint(table: Table, key: str, joint: str) -> str:
     if hits:
         what = f"columns {', '.join(hits)}"
     raise InputError(
-        f"{what}; expected one for {joint}, name the columns in record.columns.{key}",
+        f"{what}; expected one column for joint {joint}, give the columns in record.columns.{key}",
         file=table.file,
     )
 
@@ -261,7 +261,7 @@ def conversion(
         return Conversion(positions, scale * factors, None, None, drives, constant, turns)
     if drives is None:
         raise InputError(
-            "side is motor but the robot has no drives; give them in the robot file, or a record of the joint side",
+            "side is motor but the robot has no drives; give drives in the robot file, or use a record of the joint side",
             file=first.file,
         )
     motors = replace(drives, torque_constant=factors, coupling=settings.coupling)
@@ -292,11 +292,11 @@ def require_alike(
         and {*names.q} <= {*last.names}
     ):
         raise InputError(
-            f"{first.file} and {last.file} hold positions and torques each; two `files` are the positions and the torques of one record, further records are named by `also: [{last.file}]`"
+            f"{first.file} and {last.file} both contain positions and torques, but two record.files are the positions and the torques of one record; list a further record in `also: [{last.file}]`"
         )
     if q[1:] != tau[1:]:
         raise InputError(
-            f"{q[1]} columns of positions ({', '.join(names.q)}), {tau[1]} of torques ({', '.join(names.tau)}); expected one of each per joint",
+            f"{q[1]} columns of positions ({', '.join(names.q)}), {tau[1]} of torques ({', '.join(names.tau)}); expected one column of positions and one of torques per joint",
             file=first.file,
         )
     if q != tau:
@@ -361,12 +361,12 @@ def _torque_constant(
     elif drives is not None and settings.sides[1] == "motor":
         if not drives.declared:
             raise InputError(
-                f"tau is in {', '.join(dict.fromkeys(names))} but the robot file has no drives.torque_constant (N*m/A); set it there or as record.torque_constant, from the data sheet of the motors. 1 fits in amperes: values are then per A"
+                f"tau is in {', '.join(dict.fromkeys(names))} but the robot file has no drives.torque_constant (N*m/A); set this constant in the robot file or as record.torque_constant, from the data sheet of the motors. With 1 the torque unit is A, and values are per A"
             )
         constant = drives.torque_constant
     else:
         raise InputError(
-            f"tau is in {', '.join(dict.fromkeys(names))} but there is no torque constant; for currents of the motors set record.torque_side: motor, then gears and torque constants are those of the robot's drives; else set record.torque_constant (N*m/A) of every joint with the gears in it; 1 is no constant of a motor",
+            f"tau is in {', '.join(dict.fromkeys(names))} but there is no torque constant; for currents of the motors set record.torque_side: motor, to use the gears and torque constants of the robot file; else set record.torque_constant (N*m/A) of every joint, including the gear; 1 is no constant of a motor",
             remedy={"torque_side": "motor"} if drives is not None and drives.declared else None,
         )
     return factors, np.where(commands, constant, 1.0)

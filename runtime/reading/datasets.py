@@ -147,12 +147,12 @@ def listing() -> list[dict[str, Any]]:
 
 
 def dataset_study(name: str) -> dict[str, Any]:
-    """Return a copy of the settings of a dataset, a mapping for `study_from_mapping`."""
+    """Return a copy of the study settings of a public dataset, for `study_from_mapping`."""
     return copy.deepcopy(dict(_dataset(name).study))
 
 
 def locate(name: str, file: str, *, cache: Path | None = None) -> Path | None:
-    """Return the path of a file of a dataset that is on this machine; None if it is not here.
+    """Return the path of a file of a public dataset on this machine; None if it is not here.
 
     The hash of the file is checked.
     """
@@ -201,7 +201,7 @@ def _local(name: str, file: str, cache: Path | None) -> tuple[Path | None, list[
                 digest = sha256_of(path)
                 if digest != expected:
                     raise InputError(
-                        f"SHA-256 {digest}; expected {expected}, that of the public record: replace or remove the file",
+                        f"SHA-256 {digest}; expected {expected}, the hash of the public record: replace or remove the file",
                         file=str(path),
                     )
                 return path, tried

@@ -30,10 +30,10 @@ def is_file(path: Path) -> bool:
 
 
 def require_size(unpacked: int, size: int, file: str) -> None:
-    """Raise InputError if a file of `size` bytes unpacks to too many bytes for a record."""
+    """Raise InputError if a file of `size` bytes unpacks to more bytes than a record may have."""
     if unpacked > max(ALWAYS, RATIO * size):
         raise InputError(
-            f"unpacks to {unpacked / 2**20:.0f} MiB or more from {size / 2**20:.3g} MiB; a record may be {ALWAYS // 2**20} MiB or {RATIO} times the size of its file: store it without compression if it is genuine",
+            f"unpacks to {unpacked / 2**20:.0f} MiB or more from {size / 2**20:.3g} MiB; the limit is the larger of {ALWAYS // 2**20} MiB and {RATIO} times the file size: store the record without compression if the file is genuine",
             file=file,
         )
 
@@ -50,7 +50,7 @@ def opened(path: Path) -> Iterator[BinaryIO]:
             with gzip.GzipFile(fileobj=plain) as stream:
                 yield cast(BinaryIO, stream)
     except (gzip.BadGzipFile, EOFError, zlib.error) as e:
-        raise InputError(f"damaged gzip file ({e}); copy it again", file=str(path)) from e
+        raise InputError(f"damaged gzip file ({e}); copy the file again", file=str(path)) from e
     except OSError as e:
         raise InputError(f"cannot be read: {e.strerror or e}", file=str(path)) from e
 
@@ -69,7 +69,7 @@ def read_bytes(path: Path) -> bytes:
     """Read the uncompressed bytes of a file."""
     if require_file(path) > WHOLE:
         raise InputError(
-            f"more than {WHOLE // 2**30} GiB; cut it into shorter records", file=str(path)
+            f"more than {WHOLE // 2**30} GiB; cut the file into shorter records", file=str(path)
         )
     return b"".join(_parts(path))
 

@@ -74,12 +74,12 @@ def read_table(path: Path, topic: str | None = None, decimal: str = ".") -> Tabl
     """
     format_ = format_of(path)
     if path.suffix.lower() == ".gz" and not format_.packed:
-        raise InputError("a bag within .gz; uncompress it", file=str(path))
+        raise InputError("a bag within .gz is not supported; uncompress the file", file=str(path))
     if not path.exists():
         raise InputError("cannot be read: no such file", file=str(path))
     if path.is_dir() and not (path / "metadata.yaml").is_file():
         raise InputError(
-            "a folder without metadata.yaml, hence no ROS 2 bag; name the measured or study file in it",
+            "a folder without metadata.yaml, hence no ROS 2 bag; give a measured file or study file in this folder",
             file=str(path),
         )
     digest = format_.digest(path)
@@ -105,7 +105,7 @@ def endings(*, packed: bool | None = None) -> tuple[str, ...]:
 
 
 def is_measured(path: Path) -> bool:
-    """Whether the name is that of a measured file, or of a folder, which may be a ROS 2 bag."""
+    """Whether a path is a folder (perhaps a ROS 2 bag) or has the ending of a measured file."""
     return path.is_dir() or any(suffix.lower() in endings() for suffix in path.suffixes)
 
 

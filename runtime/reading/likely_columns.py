@@ -99,7 +99,7 @@ class Family:
 
     @property
     def order(self) -> tuple[int, int, int, int, str]:
-        """Sort key: the family with the smallest key is the best candidate.
+        """Sort key: the columns with the smallest key are the likeliest ones of their quantity.
 
         Preferred are, in this order, measured columns, a better word, more columns, and a shorter
         stem.
@@ -118,7 +118,7 @@ def likely_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str
 
 
 def known_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str, Any]:
-    """Propose settings of a record from its column names, even if they show some quantities only.
+    """Propose record settings from column names, even if only some of t, q, tau are recognised.
 
     Torques are left out if their number differs from that of the positions.
     """
@@ -159,7 +159,7 @@ def candidates(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str, li
 
 
 def families_of(names: Sequence[str], joints: Sequence[str] = ()) -> Iterator[Family]:
-    """Yield families of column names that differ only by the name or number of a joint.
+    """Yield groups of column names that differ only by the name or number of a joint.
 
     Another name with a known word is a family of one column.
     """

@@ -52,7 +52,7 @@ def read_mat(path: Path, options: Options) -> Table:
                 _flatten("", _members(archive), _of_hdf5, arrays, others)
         else:
             _flatten("", _by_scipy(path, others), _of_scipy, arrays, others)
-    expected = "expected numbers, a time in seconds (or record.rate without columns.t)"
+    expected = "expected numbers, and a time in seconds (or record.rate without columns.t)"
     refused = {
         name: InputError(f"{what}; {expected}", file=path.name, column=name)
         for name, what in others.items()
@@ -93,7 +93,7 @@ def _flatten(
     others: dict[str, str],
     depth: int = 0,
 ) -> None:
-    """Collect the numeric arrays of a MATLAB file, also those inside structures, as rec.pos.
+    """Collect the numeric arrays of a MATLAB file, also those in structures, for instance rec.pos.
 
     They are added to `arrays`. Members that cannot be read are described in `others`. read :
     function that returns the value of a member.
@@ -112,9 +112,9 @@ def _flatten(
 
 
 def _of_scipy(x: Any) -> Member:
-    """Return a variable of a MATLAB file (versions 4 to 7) as array, structure or description.
+    """Convert a variable of a MATLAB file (versions 4 to 7) to an array, a mapping or a text.
 
-    A description, in words, is for a variable that is neither.
+    A mapping stands for a structure. The text describes a variable that cannot be read.
     """
     if isinstance(x, np.ndarray) and is_numeric(x):
         return x
@@ -130,11 +130,11 @@ def _members(group: Any) -> dict[str, tuple[Any, str]]:
 
 
 def _of_hdf5(member: tuple[Any, str]) -> Member:
-    """Return a variable of a MATLAB file (version 7.3) as array, structure or description.
+    """Convert a variable of a MATLAB file (version 7.3) to an array, a mapping or a text.
 
-    A description, in words, is for a variable that is neither. Links to other files are not
-    followed. An empty array has the attribute MATLAB_empty, because the file holds its dimensions
-    in place of numbers.
+    A mapping stands for a structure. The text describes a variable that cannot be read. Links to
+    other files are not followed. An empty array has the attribute MATLAB_empty, because the file
+    holds its dimensions in place of numbers.
     """
     import h5py
 

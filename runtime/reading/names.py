@@ -13,7 +13,7 @@ from runtime.reading.settings import RecordSettings
 
 @dataclass(frozen=True)
 class Label:
-    """Name of a record, and the names of its files in the provenance of results."""
+    """Name of a record, and the names of its files, as they appear in results."""
 
     name: str
     files: tuple[str, ...]

@@ -52,7 +52,7 @@ def archive_of(path: Path) -> dict[str, Array]:
             held = sum(member.file_size for member in archive.infolist())
         require_size(held, path.stat().st_size, file)
         if len(members) > WIDEST:
-            raise InputError(f"{len(members)} arrays; at most {WIDEST} are read", file=file)
+            raise InputError(f"{len(members)} arrays; expected at most {WIDEST}", file=file)
         if len({name.removesuffix(".npy") for name in members}) < len(members):
             raise InputError(
                 "contains two arrays of the same name; store each name once", file=file
@@ -66,9 +66,11 @@ def archive_of(path: Path) -> dict[str, Array]:
 
 
 def _plain(arrays: Any, name: str) -> Array:
-    """Return one array of an archive; raise ValueError for pickled objects and damage."""
+    """Return one array of an archive; raise ValueError for pickled objects and damaged data."""
     try:
         return np.asarray(arrays[name])
     except ValueError as e:
         key = name.removesuffix(".npy")
-        raise ValueError(f"{key} holds pickled objects or other than numbers: {e}") from e
+        raise ValueError(
+            f"{key} contains pickled objects or values that are not numbers: {e}"
+        ) from e

@@ -24,7 +24,7 @@ def read_parquet(path: Path, options: Options) -> Table:
         for name, kind in kinds.items():
             if not (kind.is_numeric() or kind == polars.Boolean):
                 refused[name] = InputError(
-                    f"it holds {kind}; expected numbers, a time in seconds (or record.rate without columns.t)",
+                    f"the column contains {kind}; expected numbers, and a time in seconds (or record.rate without columns.t)",
                     file=path.name,
                     column=name,
                 )

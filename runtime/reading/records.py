@@ -71,7 +71,7 @@ def _pieces(
     folder: Path,
     missing: bool,
 ) -> list[Record]:
-    """Read the record of these settings; return it alone, or the pieces into which it is split.
+    """Read one record; return it alone, or the pieces into which it is split at gaps of time.
 
     `resample` splits a record at gaps and where time goes back.
     """
@@ -88,7 +88,7 @@ def _pieces(
     _require_shapes(columns, signals, first, last)
     if model is not None and n != len(model.JOINTS):
         raise InputError(
-            f"{n} joints; {model.NAME} has {len(model.JOINTS)}, {model.JOINTS}; if the record has further joints, name the columns of these in a study (record.columns.q, tau)",
+            f"the record has {n} joints, but {model.NAME} has {len(model.JOINTS)}, {model.JOINTS}; if the record has further joints, give the columns of the joints {model.JOINTS} in a study (record.columns.q, tau)",
             file=", ".join(hashes),
         )
     drives = None if model is None else drives_of(model)
@@ -225,7 +225,7 @@ def _joint_side(
     side: Conversion,
     missing: bool,
 ) -> dict[str, Array]:
-    """Convert the signals to joint side and SI.
+    """Convert the signals to the joint side of the gears and to SI units.
 
     The result also has the entry `missing`, True for each missing position, if there are any.
     """
@@ -265,7 +265,7 @@ def _columns_of_joints(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def _spread(values: Array, names: Sequence[str], absent: float) -> Array:
-    """Arrange the columns for all joints, shape (N, n); a joint without a column gets `absent`."""
+    """Arrange columns for all joints, shape (N, n); a joint without a column gets `absent`."""
     present = [name != NONE for name in names]
     if all(present):
         return values
@@ -298,7 +298,7 @@ def _uniform(
     regularity = time_stamps(t, gap=settings.resample.longest, file=table.file)
     if settings.rate is not None and abs(1 / regularity.period / settings.rate - 1) > IRREGULAR:
         raise InputError(
-            f"time runs at {1 / regularity.period:g} Hz, record.rate is {settings.rate:g} Hz; correct one, or the unit of time",
+            f"time runs at {1 / regularity.period:g} Hz, but record.rate is {settings.rate:g} Hz; correct record.rate, the time or the unit of time",
             file=table.file,
         )
     try:
@@ -342,7 +342,7 @@ def record_files(settings: RecordSettings, folder: Path) -> list[Path]:
 
 
 def _names_of(model: Any) -> tuple[str, ...]:
-    """Return the names of the joints of an emitted model, in the order of JOINTS.
+    """Return the names of the joints of a generated model, in the order of JOINTS.
 
     The result is empty if the robot file does not name every joint.
     """

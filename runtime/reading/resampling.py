@@ -119,7 +119,7 @@ def resampled(
     *,
     file: str,
 ) -> tuple[list[Stretch], float, str]:
-    """Resample the signals; return stretches without gaps, their rate in Hz, and a sentence.
+    """Resample signals; return stretches without gaps, the rate in Hz, a text on what was done.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def resampled(
     wanted = settings.rate or rate or mean_rate
     if wanted < LOWEST * mean_rate:
         raise InputError(
-            f"record.resample.rate {wanted:g} Hz, below the {mean_rate:g} Hz of the record: frequencies above {wanted / 2:g} Hz would be aliased; resample at its rate or above, signals.decimate lowers it afterwards",
+            f"record.resample.rate {wanted:g} Hz, below the {mean_rate:g} Hz of the record: frequencies above {wanted / 2:g} Hz would be aliased; resample at the rate of the record or above, and lower the rate afterwards by signals.decimate",
             file=file,
         )
     cuts = [0, *sorted(s.sample for s in (*stamps.gaps, *stamps.resets)), len(t)]
@@ -163,7 +163,7 @@ def resampled(
             stretches.append(_uniform(t[a:b][keep], piece, wanted, settings.method))
     if not stretches:
         raise InputError(
-            f"no stretch of {settings.shortest:g} s without a gap; lower record.resample.shortest",
+            f"no part of the record lasts {settings.shortest:g} s without a gap; lower record.resample.shortest",
             file=file,
         )
     samples = sum(len(stretch.t) for stretch in stretches)
@@ -188,7 +188,7 @@ def _counted(t: Array, signals: Sequence[Array], rate: float, file: str) -> Stre
     last = float(t[-1] - t[0])
     if abs(last * rate - (N - 1)) > 1 + DRIFT * N:
         raise InputError(
-            f"{N} samples from t = {t[0]:g} s on last {(N - 1) / rate:.6g} s at {rate:.6g} Hz, their stamps {last:.6g} s: the rate is different, or samples are missing; state record.rate, or cut at shorter gaps by record.resample.longest",
+            f"{N} samples from t = {t[0]:g} s on last {(N - 1) / rate:.6g} s at {rate:.6g} Hz, but their time stamps span {last:.6g} s: the rate is different, or samples are missing; set record.rate, or cut the record at shorter gaps by record.resample.longest",
             file=file,
         )
     return Stretch(t[0] + np.arange(N) / rate, tuple(signals))
@@ -203,7 +203,7 @@ def _uniform(t: Array, signals: Sequence[Array], rate: float, method: str) -> St
 
 
 def _interpolated(t: Array, x: Array, at: Array, method: str) -> Array:
-    """Interpolate x, shape (N, n), at other instants.
+    """Interpolate x, shape (N, n), from the instants t to the instants `at`.
 
     For a mask, the result is True if a neighbouring sample is marked.
     """

@@ -30,7 +30,7 @@ from runtime.reading.units import COMMANDS, position_unit, time_unit, torque_uni
 def _one_by_one(names: Any) -> Any:
     if isinstance(names, Mapping):
         raise ValueError(
-            f"a table of {', '.join(map(str, names))}; expected a list, one column per joint in "
+            f"a mapping of {', '.join(map(str, names))}; expected a list, one column per joint in "
             "the order of the robot file"
         )
     return names
@@ -122,17 +122,22 @@ class Columns(Settings):
 
     @property
     def further(self) -> dict[str, tuple[str, ...]]:
-        """Columns of signals that do not belong to a joint, by name of the channel or wrench."""
+        """Columns of quantities that belong to no joint: channels (temperature ...) and wrenches.
+
+        They are listed by name of the channel or wrench.
+        """
         own = {name: (column,) for name, column in self.channels.items()}
         return own | {f"{WRENCH}{frame}": names for frame, names in self.wrench.items()}
 
     def __post_init__(self) -> None:
         require(
-            not {*self.channels} & {*QUANTITIES}, "channels are called as constants are", "channels"
+            not {*self.channels} & {*QUANTITIES},
+            "a channel must not have the name of another signal of a record; rename the channel",
+            "channels",
         )
         require(
             not (self.qr and self.q_ref),
-            "given together with q_ref, which is the same; leave qr out",
+            "given together with q_ref, which means the same; remove qr",
             "qr",
         )
         object.__setattr__(self, "q_ref", self.q_ref or self.qr)
@@ -287,7 +292,11 @@ class RecordSettings(Settings):
 
     def __post_init__(self) -> None:
         no_law = self.controller is not None and not self.by_law
-        require(not no_law, "given, but no law is needed: name q_ref, and no tau", "controller")
+        require(
+            not no_law,
+            "given, but the torque needs no control law; remove controller, or give columns.q_ref and no columns.tau",
+            "controller",
+        )
         most = 3 if self.columns.tau_known else 2
         message = f"{len(self.files)} files; expected one, or two (positions, then torques)"
         require(
@@ -304,7 +313,7 @@ class RecordSettings(Settings):
         commands = any(torque_unit(unit)[0] in COMMANDS for unit in _each(self.units.tau))
         require(
             self.counts_per_revolution is not None or not counts,
-            "missing; positions in counts need it",
+            "missing; positions in counts need this key",
             "counts_per_revolution",
         )
         for key, used, unit, units in (
@@ -313,25 +322,25 @@ class RecordSettings(Settings):
         ):
             message = (
                 f"given, but units.{unit} is {', '.join(_each(getattr(self.units, unit)))}; "
-                f"say {units} there, or leave this out"
+                f"set units.{unit} to {units}, or remove this key"
             )
             require(getattr(self, key) is None or used, message, key)
 
     @property
     def by_law(self) -> bool:
-        """Whether the torque is computed by the law of a controller: q_ref is named, tau is not."""
+        """Whether a control law gives the torque: q_ref is named, tau is not."""
         return bool(self.columns.q_ref) and not self.columns.tau
 
     @property
     def sides(self) -> tuple[str, str]:
-        """Sides of the positions and of the torques: motor, joint or link."""
+        """Sides on which positions and torques were measured, each motor, joint or link."""
         return self.side, self.torque_side or self.side
 
 
 def with_law(
     records: Sequence[RecordSettings], controller: Controller | None
 ) -> tuple[RecordSettings, ...]:
-    """Set `controller` in each record whose torque is computed by the law of a controller.
+    """Set `controller` in each record whose torque is computed by a control law.
 
     A record that names its own controller is not changed.
     """

@@ -18,7 +18,7 @@ WIDEST = 10_000  # columns of a file; a wider one is no table of samples
 
 @dataclass(frozen=True)
 class Options:
-    """Settings of a record that concern its files.
+    """Settings for reading the files of a record: topic of a bag, decimal sign of a text file.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class Table:
         return tuple(self.columns)
 
     def chosen(self, names: Sequence[str]) -> Table:
-        """Return the table without the rows in which all these columns are empty.
+        """Return the table without the rows in which all the columns `names` are empty.
 
         The time may be filled in such rows, which come from another source. For most files, the
         table is returned unchanged.
@@ -105,7 +105,7 @@ class Table:
         )
 
     def read(self, names: Sequence[str], *, empty: bool = False, hint: str = "") -> Array:
-        """Return the columns of these names side by side, shape (N, k).
+        """Return the columns called `names` side by side, shape (N, k).
 
         Raise InputError for a name that the file does not have, and for values that are not
         numbers.
@@ -138,7 +138,10 @@ class Table:
         lengths = {name: len(x) for name, x in zip(names, columns, strict=True)}
         if len(set(lengths.values())) > 1:
             listed = ", ".join(f"{name} {N}" for name, N in lengths.items())
-            raise InputError(f"columns of different lengths: {listed}", file=self.file)
+            raise InputError(
+                f"columns of different lengths: {listed}; expected the same number of samples",
+                file=self.file,
+            )
         return columns[0] if len(columns) == 1 else np.hstack(columns)
 
     def scalar(self, name: str) -> float:
@@ -158,7 +161,7 @@ class Table:
         return float(x.reshape(()))
 
     def _by_samples(self, name: str) -> Array:
-        """Return the array of that name as columns of samples, shape (N, k); else InputError."""
+        """Return the array called `name` with one row per sample, shape (N, k); else InputError."""
         x = self.columns[name]
         problem = ""
         if x.ndim > 2:
@@ -181,7 +184,7 @@ def is_numeric(x: Array) -> bool:
 
 @contextmanager
 def damage_named(title: str, file: str) -> Iterator[None]:
-    """Turn errors of a library about damaged bytes into one InputError, within the block.
+    """Convert errors of a library on damaged files into InputError, for the duration of the block.
 
     title : what the file should be, for the message.
     """
@@ -190,8 +193,8 @@ def damage_named(title: str, file: str) -> Iterator[None]:
     except (InputError, ImportError, KeyboardInterrupt, SystemExit):
         raise
     except MemoryError as e:
-        message = f"needs more memory than there is; store it without compression, or cut it, if it is {title}"
+        message = f"needs more memory than available; if the file is {title}, store the file without compression, or cut the record"
         raise InputError(message, file=file) from e
     except BaseException as e:  # panics of Rust are no Exceptions
-        message = f"damaged, or not {title} ({first_line(e)[:200]}); write it again"
+        message = f"damaged, or not {title} ({first_line(e)[:200]}); write the file again"
         raise InputError(message, file=file) from None

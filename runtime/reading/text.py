@@ -40,7 +40,7 @@ def read_text(path: Path, options: Options) -> Table:
     delimiter = next((mark for mark in ";\t," if mark in first and mark != decimal), None)
     if _width(first, delimiter) > WIDEST:
         raise InputError(
-            f"{_width(first, delimiter)} columns; at most {WIDEST} are read, write those you need into a file of their own",
+            f"{_width(first, delimiter)} columns; expected at most {WIDEST}, write the needed columns into a separate file",
             file=file,
         )
     header = _fields(first, delimiter)
@@ -48,7 +48,9 @@ def read_text(path: Path, options: Options) -> Table:
     names = tuple(header) if has_header else tuple(str(k + 1) for k in range(len(header)))
     double = sorted(name for name, count in Counter(names).items() if count > 1)
     if double:
-        raise InputError(f"header names {', '.join(double)} more than once", file=file)
+        raise InputError(
+            f"header names {', '.join(double)} more than once; rename the columns", file=file
+        )
     refused: dict[str, InputError] = {}
     empty: dict[str, str] = {}
     values = _parsed(path, has_header, delimiter, decimal)
@@ -83,7 +85,7 @@ def _lines(path: Path) -> Lines:
 
 
 def _not_utf8(path: Path) -> InputError:
-    """Make the error for a file that is not UTF-8: its first wrong byte, and the line of it."""
+    """Make the error for a file that is not UTF-8; it names the first wrong byte and its line."""
     with opened(path) as stream:
         for number, line in enumerate(stream, 1):
             try:
@@ -141,7 +143,7 @@ def _by_fields(
     refused: dict[str, InputError],
     empty: dict[str, str],
 ) -> Array:
-    """Read the numbers of the lines field by field, shape (N, k), with nan for other texts.
+    """Read the numbers of the lines field by field, shape (N, k), with nan for all other texts.
 
     Columns with other texts are added to `refused`, columns with empty fields to `empty`.
     """
@@ -150,7 +152,7 @@ def _by_fields(
         row = f"line {number}"
         width = _width(line, delimiter)
         if line.count('"') % 2:
-            message = "a quotation mark that its line does not close; expected one sample a line"
+            message = "a quotation mark is not closed on this line; expected one sample per line"
             raise InputError(message, file=file, row=row)
         if width != len(names):
             raise InputError(
@@ -206,15 +208,13 @@ def _no_number(
     hint = ""
     remedy = None
     if decimal != "." and "." in field:
-        what = f"{field!r} holds a point, decimals are said to have a comma"
+        what = f"{field!r} contains a point, but record.decimal is a comma"
         hint = "; write numbers without separators of thousands, or set record.decimal: '.'"
     elif "," in field:
         hint = "; write decimals with a point, or set record.decimal: ','"
         remedy = {"decimal": ","}
     elif CLOCK.search(field):
-        hint = (
-            "; no date or time of day is read: write seconds, or give record.rate without columns.t"
-        )
+        hint = "; dates and times of day are not supported: write seconds, or give record.rate without columns.t"
     elif first:
         hint = "; put # before a second line of names or units"
     return InputError(what + hint, file=file, column=name, row=row, remedy=remedy)

@@ -85,16 +85,15 @@ QUANTITY = re.compile(r"\s*([-+]?[0-9.]{1,30}(?:[eE][-+]?[0-9]{1,3})?)\s*([^\W\d
 
 
 def position_unit(text: str) -> Unit:
-    """Return the kind of a unit of positions and its factor to rad or m.
+    """Return the kind of a position unit (angle, length, counts) and its factor to rad or m.
 
-    The kind is "angle", "length" or "counts". The factor of counts must still be divided by the
-    counts per revolution.
+    The factor of counts must still be divided by the counts per revolution.
     """
     return _unit(text, POSITIONS)
 
 
 def torque_unit(text: str) -> Unit:
-    """Return the kind of a unit of torques and its factor to N m, N, A or V.
+    """Return the kind of a torque unit (torque, current ...) and its factor to N m, N, A or V.
 
     The kind is "torque", "force", "current" or "voltage".
     """
@@ -102,7 +101,7 @@ def torque_unit(text: str) -> Unit:
 
 
 def time_unit(text: str) -> float:
-    """Return the factor of a unit of time to s."""
+    """Return the factor that converts a unit of time to s."""
     return _unit(text, TIMES)[1]
 
 
@@ -128,12 +127,11 @@ def speed(value: Any) -> Any:
 def _unit(text: str, kinds: tuple[str, ...]) -> Unit:
     if text == "grad":
         raise InputError(
-            "'grad' is a 400th of a turn to some and a degree to others; write units such as gon "
-            "or deg"
+            "'grad' can mean 1/400 of a turn or a degree; write units such as gon or deg"
         )
     if kinds == TORQUES and text.strip() in ("%", "percent", "per cent"):
         raise InputError(
-            f"{text!r} does not say of which quantity; write the unit of the rated value, such as A "
+            f"{text!r} does not say the rated quantity; write the unit of the rated value, such as A "
             "or N*m, and a hundredth of the rated value of each joint in record.scale"
         )
     kind, factor = TABLE[text] if text in TABLE else _of_pint(text)
@@ -153,7 +151,7 @@ def _unit(text: str, kinds: tuple[str, ...]) -> Unit:
 
 @cache
 def _of_pint(text: str) -> Unit:
-    """Find the kind and the factor of a unit that is not in the table, by pint.
+    """Find the kind and the SI factor of a unit that is not in the table, by the library pint.
 
     Return ("", nan) if pint does not have the unit, or if its kind is none of those in SI.
     """

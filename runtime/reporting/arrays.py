@@ -88,7 +88,7 @@ def npz(arrays: Mapping[str, Array]) -> bytes:
     """Write the arrays as a NumPy archive (.npz) without Python objects."""
     for name, array in arrays.items():
         if array.dtype.hasobject:
-            raise TypeError(f"{name} holds Python objects; an archive holds numbers and texts")
+            raise TypeError(f"{name} contains Python objects; expected numbers or texts")
     content: dict[str, Any] = dict(arrays)
     stream = BytesIO()
     np.savez_compressed(stream, **content)

@@ -149,7 +149,7 @@ def spectra_figure(
 
 
 def _torques(upper: Axes, lower: Axes, joint: JointComparison, source: str) -> None:
-    """Plot measured torque, predicted torque and error of one joint, thinned to the instants shown.
+    """Plot measured torque, predicted torque and error of a joint, at the instants that are shown.
 
     Lines break where rows were left out or another record starts.
     """

@@ -84,7 +84,7 @@ class Image:
 
     @property
     def data(self) -> str:
-        """The SVG in base64, for a data: address."""
+        """The SVG encoded in base64, so that the page can contain it as a data: address."""
         return b64encode(self.svg).decode("ascii")
 
 
@@ -115,7 +115,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Page:
-    """A report page: its verdict, numbers and sections.
+    """Content of a report page: its verdict, numbers and sections.
 
     Attributes
     ----------
@@ -159,7 +159,7 @@ class Page:
 
 
 def state_mark(state: State) -> Markup:
-    """Write a state as a coloured sign and word, such as "✓ good"."""
+    """Write the state of a check as a coloured sign and word, such as "✓ good"."""
     return element(
         "span", f"{SIGNS[state]} {WORDS[state]}" if state else "", class_=f"state {state}"
     )

@@ -1,4 +1,4 @@
-"""Build the HTML pages of results.
+"""Build the HTML report pages of identifications, resolution studies and single analyses.
 
 The page of an identification shows verdict, figures and parameter values first; the other sections
 are folded.
@@ -36,7 +36,7 @@ def identification_page(
     verdict: str = "",
     sections: Sequence[Section] = (),
 ) -> Page:
-    """Build the page of an identification.
+    """Build the HTML report page of an identification.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def identification_page(
 
 
 def resolution_page(result: Cestac, study: str) -> Page:
-    """Build the page of a study of the encoder resolution.
+    """Build the HTML report page of a study of the encoder resolution.
 
     study : text of study.yaml.
     """
@@ -101,7 +101,7 @@ def resolution_page(result: Cestac, study: str) -> Page:
 def part_page(
     part: Part, subject: str, verdict: str, provenance: Mapping[str, Any], study: str
 ) -> Page:
-    """Build the page of a single analysis, such as the advice on encoder resolution.
+    """Build the HTML report page of a single analysis, such as the advice on encoder steps.
 
     subject : words of the title between the robot and the records.   study : text of study.yaml.
     """

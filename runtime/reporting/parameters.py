@@ -43,7 +43,7 @@ def cad_values(model: GeneratedModel) -> dict[str, float]:
 
 
 def parameter_section(result: Identification) -> Section:
-    """Build the section of the parameters that are used: value, 95 % interval, unit."""
+    """Build the section of the parameters to use: value, 95 % interval, unit."""
     fit = result.model_estimate
     rows = [
         (symbol(name), *_with_interval(fit, name), unit(fit.units.get(name, "")))
@@ -60,7 +60,7 @@ def parameter_section(result: Identification) -> Section:
 
 
 def every_section(result: Identification) -> Section:
-    """Build the section of all base parameters: values, values of the robot file, and formulas."""
+    """Build the section of all base parameters: fitted value, robot file's value, and formula."""
     fit, estimate, cad = result.model_estimate, result.estimate, cad_values(result.model)
     formulas: Mapping[str, str] = getattr(result.model, "FORMULAS", {})
     columns: list[tuple[str, list[str]]] = [
@@ -123,7 +123,7 @@ def _half(fit: Estimate, name: str) -> float:
 
 
 def _difference(fit: Estimate, name: str, given: float) -> str:
-    """Write the difference of a fitted value from the value of the robot file, % of the latter.
+    """Write how far a fitted value is from the value of the robot file, in % of the latter.
 
     The text is empty if the value of the robot file is smaller than half the width of the 95 %
     interval.

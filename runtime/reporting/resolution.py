@@ -19,7 +19,7 @@ def resolution_section(
     curve: Cestac | None = None,
     names: Sequence[str] = (),
 ) -> Section:
-    """Build the section on all encoder steps: %e, %sigma, %e(rho), and the curve of %e over Delta.
+    """Build the section of a study of encoder steps: tables of errors, curve of %e over Delta.
 
     The table is Table 3 of the chapter, with both definitions of %e(rho).
 

@@ -79,7 +79,7 @@ class Results:
                 shutil.rmtree(unfinished, ignore_errors=True)
         finished = self.folder / FINISHED
         if finished.is_symlink() or (finished.exists() and not finished.is_dir()):
-            raise OutputError(f"{finished}: not a folder of this program; remove it")
+            raise OutputError(f"{finished}: not a folder of symgen; remove or rename this file")
         if finished.is_dir():
             with suppress(FileNotFoundError):  # moved by another command
                 for path in sorted(finished.iterdir()):
@@ -88,7 +88,7 @@ class Results:
                 finished.rmdir()
 
     def _finish(self, contents: Mapping[str, str | bytes]) -> None:
-        """Write all files to disk in a new folder, then rename this folder to FINISHED."""
+        """Write all files to disk in a new folder, then rename this folder to .symgen-finished."""
         unfinished = Path(mkdtemp(prefix=UNFINISHED, dir=self.folder))
         try:
             for name, content in contents.items():
@@ -136,7 +136,7 @@ def _require_plain(path: Path) -> None:
     else:
         return
     raise OutputError(
-        f"{path}: {what} is where a file is to be written; rename it, or choose another place"
+        f"{path}: a file is to be written here, but {what} has this name; rename {what}, or choose another folder"
     )
 
 
@@ -185,7 +185,7 @@ def _sync(folder: Path) -> None:
 
 @contextmanager
 def _clear_errors(folder: Path) -> Iterator[None]:
-    """Turn errors of the file system inside the block into messages with the folder and advice."""
+    """Turn file-system errors inside the block into an OutputError with the folder and a remedy."""
     try:
         yield
     except OSError as e:
@@ -193,13 +193,13 @@ def _clear_errors(folder: Path) -> Iterator[None]:
         with suppress(OSError):
             if (folder / FINISHED).is_dir():
                 left = (
-                    f"the new files are whole in {folder / FINISHED} and the next command that "
-                    "writes here moves them up"
+                    f"the new files are complete in {folder / FINISHED}, and the next command that "
+                    "writes to this folder moves the new files up"
                 )
                 raise OutputError(
                     f"{place}: not all files could be replaced: {reason} ({e.filename}); {left}"
                 ) from e
-        advice = ADVICE.get(e.errno or 0, "choose another place, or mend this one")
+        advice = ADVICE.get(e.errno or 0, "choose another folder, or repair this folder")
         raise OutputError(
             f"{place}: cannot be written: {reason}; nothing was changed; {advice}"
         ) from e

@@ -20,7 +20,7 @@ FIGURES_SHOWN = 8  # of joints, before the table of parameters
 
 
 def detail_sections(result: Identification) -> list[Section]:
-    """Build the folded sections with the details behind the parameters that are used."""
+    """Build the folded report sections with details: errors, removals, validation, residuals."""
     trust = result.uncertainty
     sections = [
         *other_torques_section(result),
@@ -188,7 +188,7 @@ def motion_section(result: Identification) -> Section:
 
 
 def trail_section(result: Identification) -> Section:
-    """Build the section on the essential parameters: the removals and their F-tests.
+    """Build the section on the essential parameters: which ones were removed, with F-tests.
 
     The table lists each removed parameter, in order, with the ratio of sigma_rho after its removal.
     """

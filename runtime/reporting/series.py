@@ -43,7 +43,7 @@ class Series:
 
     @property
     def data(self) -> Mapping[str, Any]:
-        """The lines for JSON; times are counted from `start`, s, and nan breaks a line."""
+        """The lines for JSON; times are counted from the first instant, and nan breaks a line."""
         start = float(np.nanmin(self.t)) if len(self.t) else 0.0
         arrays = {"t": self.t - start, "first": self.first, "second": self.second}
         return {

@@ -1,4 +1,4 @@
-"""Call functions of a compiled C file in a process of its own, which a wrong index may crash.
+"""Call functions of a compiled C file in a separate process, so that a crash does no harm.
 
 `python call_c.py` reads {"library": path, "calls": [[name, arguments, size, before]]} as JSON. The
 argument null stands for the result. Its `size` numbers are all equal to `before` when the call

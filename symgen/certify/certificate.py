@@ -1,4 +1,4 @@
-"""The certificate of regrouping formulas: one exact check over finite fields, one numeric check.
+"""The certificate of the regrouping formulas: an exact check modulo primes, and a check in floats.
 
 Exact, over F_p at new random lengths and states, for two or more primes:
 
@@ -121,12 +121,12 @@ class Certificate:
 
     @property
     def numeric_valid(self) -> bool:
-        """Whether the numeric rank and the torques agree with the formulas."""
+        """Whether the rank by SVD and the torques, both in floats, agree with the formulas."""
         return self.numeric_rank == self.count and self.torque_error < TOLERANCE
 
     @property
     def valid(self) -> bool:
-        """Whether every check holds."""
+        """Whether every check of the certificate holds."""
         return (
             not self.failures and self.numeric_valid and all(t.valid for t in self.texts.values())
         )
@@ -152,7 +152,7 @@ class Certificate:
 
     @property
     def checks(self) -> list[tuple[bool, str]]:
-        """List of all checks: whether each holds, and a text that describes it."""
+        """List of all checks as pairs: whether the check holds, and a text that describes it."""
         where = "in floats" if self.rank_in_floats or not self.primes else "modulo the primes"
         columns = any(text.startswith("column") for text in self.failures)
         checks = [
@@ -180,7 +180,7 @@ class Certificate:
         return dict(_plain(values))
 
     def brief(self) -> str:
-        """Return the verdict in one line, then one line for each failed check."""
+        """Return a text: one line with the verdict (valid or FALSE), one for each failed check."""
         verdict = "valid" if self.valid else "FALSE"
         head = (
             f"{self.name}: certificate {verdict}, {self.count} base parameters of "
@@ -299,7 +299,7 @@ def certify_formulas(
 
 
 def _special(robot: Robot, gap: float, W: Array) -> str:
-    """Explain why the base columns W lose rank at the constants of the robot file."""
+    """Explain why the base parameter columns W lose rank at the constants of the robot file."""
     if roots := independent_roots(robot):
         return (
             f"{', '.join(roots)} {'count' if len(roots) > 1 else 'counts'} as any number: the rank "
@@ -334,10 +334,9 @@ def _too_small(W: Array) -> str:
 
 
 def hair_off(robot: Robot, what: str) -> str:
-    """Write the message for a geometry that is almost, but not exactly, a special geometry.
+    """Write the message for a geometry that is almost special: 1.570796 rad instead of pi/2.
 
-    An example is an angle of 1.570796 rad in place of pi/2. The difference has an effect that no
-    record can show.
+    The difference from the special geometry has an effect that no record can show.
     """
     angles = "; ".join(nearly_round(robot, WITHIN)) or "round the numbers that are meant round"
     return (
@@ -416,7 +415,7 @@ def degree(regrouping: Regrouping) -> int:
 def _modulo(
     regrouping: Regrouping, seed: int, p: int, sampler: Sampler
 ) -> tuple[int | None, list[str]]:
-    """Check the rank of the base columns and all regrouping formulas modulo a prime p.
+    """Check, modulo a prime p, the rank of the base parameter columns and all formulas.
 
     Return the rank (None if the loops cannot be closed exactly modulo p), and the columns that
     differ from their formulas.
@@ -448,7 +447,7 @@ def _modulo(
 
 
 def _false_in_floats(regrouping: Regrouping, W: Array, base: list[int]) -> list[str]:
-    """List the columns of the independent regressor W that the formulas do not reproduce.
+    """List the columns of the regressor W (derived from energies) that contradict the formulas.
 
     A column is listed if its error exceeds ROUNDED times the largest entry.
     """
@@ -461,7 +460,7 @@ def _false_in_floats(regrouping: Regrouping, W: Array, base: list[int]) -> list[
 
 @lru_cache(maxsize=4)
 def independent(robot: Robot) -> Sample:
-    """Compute the regressor of `robot` from its energies, at random states; it is cached."""
+    """Compute the regressor of `robot` from its energies, at random states; cache the result."""
     from symgen.derive.lagrange import (
         in_one_mode,
         sampled,

@@ -17,10 +17,10 @@ ENTRIES_OF_FRAMES = ("gamma", "b", "alpha", "d", "theta", "r")
 
 
 def claim(regrouping: Regrouping, certificate: Certificate) -> dict[str, Any]:
-    """Return all that a certificate states, as plain values that others can check.
+    """Return the statements of a certificate as plain values that other programs can verify.
 
-    These are the robot, relations, rank, primes, formulas, and for each emitted file its hash and
-    its check.
+    These are the robot, the relations of its joints, rank, primes, formulas, and for each emitted
+    file its hash and its check.
 
     Expressions are texts in the grammar of robot files. The identities are those of the columns of
     all standard parameters, D_chi = sum_k coefficient_k,chi D_own,k, at random points over F_p.
@@ -85,5 +85,5 @@ def _element(robot: Robot, e: Element) -> dict[str, Any]:
 
 
 def _has_energy(e: Element) -> bool:
-    """Whether the robot file defines the law of an element by an energy."""
+    """Whether the robot file defines an element, for instance a spring, by its energy."""
     return e.is_own and any(str(e.potential(j)) != "0" for j in e.along)

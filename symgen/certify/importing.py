@@ -34,7 +34,7 @@ CERTIFICATE = re.compile(
 
 
 def cache_folder() -> Path:
-    """Return the folder of the emitted modules.
+    """Return the cache folder in which emitted modules are stored.
 
     It is SYMGEN_CACHE/modules, or else a folder in the cache folder of the platform.
     """

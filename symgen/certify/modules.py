@@ -27,7 +27,7 @@ def certify(
     files: Mapping[str, str] | None = None,
     options: Sequence[str] = (),
 ) -> Certificate:
-    """Check the formulas of `regrouping` and the code made from them, as `symgen check` does.
+    """Check the regrouping formulas of a robot and the emitted code, as `symgen check` does.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def _certified(
 
 
 def require_valid(certificate: Certificate) -> None:
-    """Raise CertificateError unless the certificate holds."""
+    """Raise CertificateError unless all checks of the certificate hold."""
     if not certificate.valid:
         wrong = [text for holds, text in certificate.checks if not holds]
         reasons = [t for t in certificate.failures if not t.startswith(("column", "rank"))]
@@ -134,7 +134,7 @@ def model(robot: str | Path | Robot, *, options: Sequence[str] = ()) -> ModuleTy
 
 
 def _certified_path(robot: Robot, target: str, options: Sequence[str] = ()) -> Path | None:
-    """Return the path of the certified file of a robot for one target, in the cache.
+    """Return the cache path of a certified file of a robot; `target` is its kind, such as c.
 
     Return None if the target cannot serve the robot.
     """

@@ -1,4 +1,4 @@
-"""Expected values of the functions that are emitted only on request.
+"""Expected results of the functions that the code generator writes only on request.
 
 They follow from the regressor and the energies of Lagrange's equations alone.
 """
@@ -27,7 +27,9 @@ States = tuple[Array, Array, Array]
 def requested_values(
     model: Lagrange, regrouping: Regrouping, chi: Array, states: States, tree: States, qddr: Array
 ) -> dict[str, Callable[[], Array]]:
-    """Return functions that compute expected values, (N, ...), of models emitted on request.
+    """Return functions that compute the expected results of models written only on request.
+
+    The results have shape (N, ...).
 
     `states` are q, qd, qdd of the actuated joints, shape (N, n); qdd serves as qdr too. `tree` are
     the positions, rates and accelerations of all moving joints. `qddr` are reference accelerations.
@@ -56,7 +58,7 @@ def requested_values(
         return np.asarray(columns(q, zero, qd) - columns(q, zero, zero))
 
     def momentum_rate() -> Array:
-        """Compute the regressor of d(qd' p)/dq / 2 - Q - friction, with the momentum p = A qd."""
+        """Compute the regressor of (1/2) d(qd' p)/dq - Q - friction, with p = A qd (momentum)."""
         slope = np.zeros((*q.shape, len(own)))
         for i, e in enumerate(np.eye(q.shape[1])):
             for m, c in SIX_POINTS.items():
@@ -80,9 +82,9 @@ def requested_values(
 
 
 def of_elements(robot: Robot, which: Callable[[Element], bool]) -> Array:
-    """Whether each standard parameter belongs to an element, such as friction, of a given kind.
+    """Whether each standard parameter belongs to an element that `which` selects, e.g. friction.
 
-    `which` selects the elements; the result has shape (p,).
+    The result has shape (p,).
     """
     own = {parameter(e.family, j) for e in robot.elements if which(e) for j in e.keys}
     return np.array([name in own for name in robot.parameters])

@@ -96,7 +96,7 @@ class TextCheck:
         return not self.wrong and bool(self.errors or self.not_run)
 
     def checks(self, file: str) -> list[tuple[bool, str]]:
-        """List whether each function agrees with independent values, and a text with its error."""
+        """List, for each function, whether it agrees with independent values, and its error."""
         if self.not_run:
             return [(True, f"{file} {self.sentence}")]
         return [
@@ -184,8 +184,8 @@ def module_errors(
         module, stacked = imported(path), imported(path)
     except (RecursionError, MemoryError) as error:
         raise SymgenError(
-            f"{path.name} has expressions that are too long for Python; name long sums of the "
-            "robot file as one constant"
+            f"{path.name} has expressions that are too long for Python; in the robot file, replace "
+            "each long sum by one constant"
         ) from error
     except Exception as error:  # a text may fail in any way
         return {"import": float("inf")}, {"import": repr(error)}, ()
@@ -242,7 +242,10 @@ def largest(
         ]
         given, own = (outcome(call, module, name, checks[0], k) for k in (witness.defaults, {}))
         if given != own:
-            return float("inf"), "other values without constants than with those of the file"
+            return (
+                float("inf"),
+                "values without given constants differ from values with the constants of the robot file",
+            )
     except Exception as error:  # a text may fail in any way
         return float("inf"), str(error) or repr(error)
     return max(errors), ""
@@ -251,7 +254,7 @@ def largest(
 def outcome(
     call: Use, module: ModuleType, name: str, check: Check, constants: Mapping[str, float]
 ) -> bytes | str:
-    """Return the result of a function as bytes, or the message of its exception."""
+    """Call a function; return its result as bytes, or the message of its exception."""
     try:
         return call(module, name, check, constants).tobytes()
     except Exception as error:  # a text may fail in any way
@@ -301,7 +304,7 @@ def _function(module: ModuleType, name: str, *frame: int) -> Any:
 
 
 def _derivative_error(module: ModuleType, witness: Witness) -> float:
-    """Compare the derivatives of the torques by qdd and by X with the known values A and D.
+    """Compare emitted derivatives of the torques by qdd and X with inertia matrix A, regressor D.
 
     Return the larger of the two errors.
     """
@@ -353,7 +356,7 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
             return {f"{CLOSED}1": float("inf")}
 
         def given(f: str, check: Check, k: Any) -> list[list[float]]:
-            """List the arguments of a C function at the states k.
+            """List the argument values for calling a C function at the samples k.
 
             A closed mechanism has one struct with all its states.
             """
@@ -425,13 +428,13 @@ def _closed(library: Path, witness: Witness, constants: list[float]) -> Array:
 
 
 def _results(library: Path, calls: list[Call]) -> Any:
-    """Call functions of a C library in another process; return status and numbers of each call."""
+    """Call functions of a C library in another process; return status and result of each call."""
     job = {"library": str(library), "calls": calls}
     return json.loads(_run([sys.executable, "-I", call_c.__file__], json.dumps(job)))
 
 
 def _of_one_state(name: str, text: str, witness: Witness) -> Iterator[tuple[str, Check]]:
-    """Yield each C function that has one state as input, with its expected values.
+    """Yield each C function that computes one sample per call, with its expected values.
 
     A function with a frame as argument has one check per frame.
     """

@@ -60,7 +60,10 @@ def variants(robot: str | Path | Robot) -> ModuleType:
     if path is None:
         check = text_check(file, text, "numpy", Witness(regrouping))
         if check.wrong:
-            raise CertificateError(f"{robot.name}: {', '.join(check.wrong)} of variants", check)
+            raise CertificateError(
+                f"{robot.name}: {', '.join(check.wrong)} of the variant module differ from independent values",
+                check,
+            )
         path = stored_path(file, with_certificate(text, check, "of standard parameters"))
     return imported(path)
 

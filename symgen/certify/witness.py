@@ -130,17 +130,17 @@ class Witness:
 
     @property
     def keywords(self) -> dict[str, float]:
-        """Constants that the functions accept as keyword arguments, with values for the tests."""
+        """Values, for the tests, of the constants that the functions accept as keywords."""
         return {name: self.constants[name] for name in self.regrouping.constants}
 
     @property
     def defaults(self) -> dict[str, float]:
-        """Values in the robot file of the constants that the functions accept as keywords."""
+        """Default values, from the robot file, of constants that functions accept as keywords."""
         return {name: self.robot.constants[name] for name in self.regrouping.constants}
 
     @property
     def tied(self) -> bool:
-        """Whether some joints are tied to others by closure equations alone, not by a formula."""
+        """Whether some joint positions follow only from closure equations, not from a formula."""
         return bool(close(self.robot).tied)
 
     @cached_property
@@ -310,7 +310,7 @@ class Witness:
 
 
 def ungrouped(robot: Robot) -> Regrouping:
-    """Make a regrouping in which every standard parameter is a base parameter by itself."""
+    """Make a regrouping without combinations: each standard parameter is a base parameter."""
     return Regrouping(
         robot, tuple(BaseParameter(name, name, {name: ONE}) for name in robot.parameters), ()
     )
@@ -322,7 +322,7 @@ def is_assumed(robot: Robot) -> Array:
 
 
 def bodies(robot: Robot, rng: np.random.Generator) -> Array:
-    """Draw random standard parameters of real bodies, shape (p,).
+    """Draw random standard parameters that are possible for rigid bodies, shape (p,).
 
     Every link is made of four points of mass. All other parameters lie between 0.1 and 1, except
     those that the robot file assumes zero.

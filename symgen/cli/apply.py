@@ -50,7 +50,9 @@ def apply(
         from symgen.update.apply import apply as applied_to
 
         if output is not None and in_place:
-            fail("-o writes a file of its own, --in-place MODEL itself; leave one of them out")
+            fail(
+                "-o FILE writes a new file and --in-place changes MODEL; give only one of the two options"
+            )
         if output is not None and output.exists() and not force:
             fail(f"{output} exists already; choose another name or add --force")
         locked = dict(assignment(text, "--lock") for text in lock or ())

@@ -1,4 +1,4 @@
-"""The command `symgen check ROBOT`: certificate of the formulas and of the emitted module."""
+"""The command `symgen check ROBOT`: verify the formulas of a robot and its generated module."""
 
 from __future__ import annotations
 

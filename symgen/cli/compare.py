@@ -1,4 +1,4 @@
-"""The command `symgen compare ROBOT STUDY ...`: rank treatments of records by prediction error."""
+"""The command `symgen compare ROBOT STUDY ...`: rank studies by their prediction error."""
 
 from __future__ import annotations
 

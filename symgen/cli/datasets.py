@@ -1,4 +1,4 @@
-"""The command `symgen datasets`: list the known measured records and the places of their files."""
+"""The command `symgen datasets`: list the known measured records, and where their files are."""
 
 from __future__ import annotations
 

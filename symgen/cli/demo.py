@@ -1,4 +1,4 @@
-"""The command `symgen demo`: identify the TX40 of the chapter from end to end, with a report."""
+"""The command `symgen demo`: identify the robot TX40 of the book chapter, with a report."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ def _among(known: Collection[str], what: str, text: str) -> tuple[str, ...]:
     """
     words = tuple(dict.fromkeys(map(str.strip, text.split(","))))
     if unknown := [word for word in words if word not in known]:
-        fail(f"{what} {', '.join(map(repr, unknown))}; there is {', '.join(known)}")
+        fail(f"{what} {', '.join(map(repr, unknown))}; expected one of {', '.join(known)}")
     return words
 
 
@@ -107,7 +107,9 @@ def emitted(
         command += f" --with {','.join(requested)}" * bool(requested)
         files = certified_files(robot, targets=targets, command=command, options=requested)
         if modules.keys() & files.keys():
-            fail(f"two robots are called {robot.name}; their modules would overwrite each other")
+            fail(
+                f"two robots have the name {robot.name}, so their modules would overwrite each other; rename one robot"
+            )
         tied = bool(close(robot).tied)
         for name in targets:
             target = TARGETS[name]

@@ -141,7 +141,7 @@ def show(
 
 
 def on_terminal(text: str, width: int, verdict: Any = None) -> str:
-    """Wrap a text between words at the width of a terminal, and colour the verdict's answer."""
+    """Wrap a text to the width of the terminal, and colour the verdict (Yes, With care, No)."""
     text = "\n".join(_wrapped(line, width) for line in text.split("\n"))
     if verdict is None:
         return text
@@ -170,7 +170,7 @@ def model_of(
     exact: bool = False,
     records: Sequence[str] = (),
 ) -> GeneratedModel:
-    """Load the model of a ROBOT argument.
+    """Load the model for the argument ROBOT of a command: a name, a robot file or a module.
 
     trust : whether to run a module that was not emitted on this machine.
     exact : as for `load_robot`.
@@ -182,10 +182,7 @@ def model_of(
 
     path = Path(robot)
     if path.suffix != ".py" and path.is_file() and is_measured(path):
-        fail(
-            f"{robot}: a measured file, where a robot is expected; the robot comes first, then the "
-            "record"
-        )
+        fail(f"{robot} is a measured file; the robot comes first, then the record")
     if path.suffix == ".py":
         model = load_model(path, trust=trust)
     else:
@@ -196,7 +193,7 @@ def model_of(
 
 
 def described_robot(source: str, at_values: bool = False, exact: bool = False) -> Robot:
-    """Load a robot from a name or a file; print notes on it to the error stream.
+    """Load a robot by its name or from a file, and print notes on the robot to the error stream.
 
     at_values : whether to replace its constants by their values.
     """
@@ -211,7 +208,7 @@ def described_robot(source: str, at_values: bool = False, exact: bool = False) -
 
 
 def variants_of(robot: str, *, exact: bool = False) -> GeneratedModel | None:
-    """Load the module of a ROBOT argument whose frame table can be varied.
+    """Load the model for the argument ROBOT as a module in which the frame table can be changed.
 
     None for a generated module, which has no robot file.
     """
@@ -248,10 +245,11 @@ def assumptions_of(robot: str, records: Any, study: Study, *, exact: bool = Fals
 
 
 def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Study:
-    """Build the study of RECORD arguments, with file names relative to the current folder.
+    """Build the study (settings of an identification) from the arguments RECORD of a command.
 
-    The first argument is a study file, a dataset or a measured file. Each further argument is a
-    measured file with the same columns, units and side, and is a separate record.
+    File names are relative to the current folder. The first argument is a study file, a dataset or
+    a measured file. Each further argument is a measured file with the same columns, units and side,
+    and is a separate record.
 
     recorded : whether the study must name a record.
     """
@@ -271,15 +269,15 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
     for record in records[1:]:
         if Path(record).suffix.lower() in (".yaml", ".yml") or not is_measured(Path(record)):
             raise InputError(
-                "expected a measured file after the first RECORD: its columns, units and side are "
-                "those of the first",
+                "expected a measured file after the first RECORD, with the same columns, units and "
+                "side as the first",
                 file=record,
             )
         like = study.record[-1]
         if len(like.files) > 1:
             raise InputError(
-                "the first RECORD has its positions and torques in two files; name further pairs "
-                "in record.also",
+                "the first RECORD has its positions and torques in two files; give further pairs "
+                "of files in record.also of a study file",
                 file=record,
             )
         further = replace(like, files=(record,), dataset=None, name=None)
@@ -327,7 +325,7 @@ def require_record(study: Study, file: str) -> None:
 
 
 def changed(study: Study, **sections: Mapping[str, Any]) -> Study:
-    """Replace some settings of a study, checked like those of a file; None: the setting stays."""
+    """Replace settings of a study, with the same checks as for a file; None changes nothing."""
     from runtime.core.settings import to_mapping
     from runtime.study import study_from_mapping
 
@@ -339,7 +337,7 @@ def changed(study: Study, **sections: Mapping[str, Any]) -> Study:
 
 
 def names_of(text: str | None) -> str | list[str] | None:
-    """Split names at commas into a list; the words essential and all stay as they are."""
+    """Split a text of names at its commas; the texts "essential" and "all" stay as they are."""
     return text if text in (None, "essential", "all") else text.split(",")
 
 
@@ -354,7 +352,7 @@ def map_of(workers: int, scheduler: str | None = None) -> Iterator[Any]:
     from runtime.parallel.processes import processes
 
     if scheduler and workers:
-        raise InputError("a scheduler has workers of its own; leave out workers")
+        raise InputError("a scheduler uses its own workers; leave out --workers")
     with cluster(scheduler) if scheduler else processes(workers) as own_map:
         yield own_map
 

@@ -110,13 +110,14 @@ def show(
         "--html shows everything; leave out --format, --only, --recursive, --json and --model": (
             html and (formulas or model or kind != "text")
         ),
-        "-o names the file of --html; the other formats are printed": output and not html,
+        "-o is only for --html; the other formats are printed, so leave out -o": output
+        and not html,
         f"format {kind!r}; expected one of {', '.join(FORMATS)}"
-        f"{'; the page is --html' * (kind == 'html')}": kind not in FORMATS,
+        f"{'; for a page use --html' * (kind == 'html')}": kind not in FORMATS,
         "--recursive prints every step as text; leave out --format and --only": (
             recursive and not model and (kind != "text" or only)
         ),
-        "--only and --recursive are for base parameters; a model has --form recursive": (
+        "--only and --recursive are for base parameters; for a model use --form recursive": (
             model and formulas
         ),
         "--frame, --of, --rows, --form, --parameters, --value, --passive and --format sympy or "

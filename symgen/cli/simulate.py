@@ -43,8 +43,8 @@ def simulate(
         settings = session.study_of_arguments([study], recorded=False)
         if settings.controller is None:
             session.fail(
-                f"{study} has no section `controller`; it says law, rate and reference of the "
-                "closed loop"
+                f"{study} has no section `controller`; add this section, with law, rate and reference "
+                "of the closed loop"
             )
         result = runtime.simulate(model, settings, ideal=ideal)
         if results is not None:

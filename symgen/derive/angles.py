@@ -1,4 +1,4 @@
-"""Fixed angles and square roots of a robot, prepared for exact arithmetic in a finite field F_p.
+"""Fixed angles and square roots of a robot, for exact arithmetic modulo a prime p (field F_p).
 
 A fraction of pi with a moderate denominator is a whole multiple of pi/D, which is a root of unity
 of F_p. Every other fixed angle is a sum of monomials in constants and in numbers kept as written
@@ -29,7 +29,7 @@ Variable = str | Number | Call | Unit
 
 
 def fixed_angles(robot: Robot) -> tuple[Expression, ...]:
-    """Return the constant angles of a robot, such as alpha, without whole quarter turns.
+    """Return the constant angles of a robot, such as alpha, after removal of whole quarter turns.
 
     An angle and its opposite count once. An angle that is only a number of quarter turns is left
     out.
@@ -43,7 +43,7 @@ def fixed_angles(robot: Robot) -> tuple[Expression, ...]:
 
 
 class Units:
-    """The unit angles of a robot, such as pi/12: each fixed angle is a sum of their multiples.
+    """Unit angles of a robot, such as pi/12: every fixed angle is a sum of their whole multiples.
 
     The first unit angle is pi/D. D is the common denominator of the fractions of pi with a moderate
     denominator and of the angles that the square roots need.
@@ -66,7 +66,7 @@ class Units:
 
     @property
     def all(self) -> list[Unit]:
-        """All unit angles: pi/D first, then the others."""
+        """All unit angles of a robot: first pi/D (D is a common denominator), then the others."""
         return [(PI, Fraction(1, self.D)), *self.free.items()]
 
     def of(self, angle: Expression) -> list[tuple[Unit, int]]:
@@ -86,19 +86,19 @@ class Units:
         return parts
 
     def _is_turn(self, m: Monomial, c: Fraction) -> bool:
-        """Whether the angle c*m, with m a monomial such as pi, is a whole multiple of pi/D."""
+        """Whether the angle c*m (m is pi or a product of constants) is a whole multiple of pi/D."""
         return m == PI and (c * self.D).denominator == 1
 
 
 def _common(a: Fraction, b: Fraction) -> Fraction:
-    """Return the largest fraction with whole multiples a and b, such as 1/6 for 1/2 and 2/3."""
+    """Return the largest fraction of which a and b are whole multiples: 1/6 for 1/2 and 2/3."""
     d = lcm(a.denominator, b.denominator)
     return Fraction(gcd(int(a * d), int(b * d)), d)
 
 
 @lru_cache(maxsize=64)
 def units_of(robot: Robot) -> Units:
-    """Return the unit angles of a robot (see `Units`), stored after the first call."""
+    """Return the unit angles of a robot (see `Units`); they are computed once and stored."""
     return Units(robot)
 
 
@@ -114,7 +114,7 @@ def _angles(robot: Robot) -> Iterator[Expression]:
 
 
 def _angles_of_laws(robot: Robot) -> Iterator[Expression]:
-    """Yield the constant part of each angle in a cosine or sine of the torque laws of elements.
+    """Yield the constant part of the angle of each cosine and sine in the torque laws of the user.
 
     For instance 0.3 for the law cos(q1 + 0.3).
     """
@@ -135,7 +135,7 @@ def _angles_of_laws(robot: Robot) -> Iterator[Expression]:
 
 
 def varies(a: str | Number | Call) -> bool:
-    """Whether a symbol or function call in a torque law depends on the state or on time.
+    """Whether a symbol or function call in a torque law depends on the joint state or on time.
 
     A function other than cos, sin and 1/x counts as varying, even if its operand is constant.
     """
@@ -146,7 +146,7 @@ def varies(a: str | Number | Call) -> bool:
 
 
 def rows_of(robot: Robot) -> list[Expression]:
-    """Return the coefficients with which all elements (friction, springs...) act on joints.
+    """Return the coefficients with which friction, springs and other elements act on the joints.
 
     They are the entries of the rows `along` and of the quadratic forms `form`.
     """
@@ -155,7 +155,8 @@ def rows_of(robot: Robot) -> list[Expression]:
 
 
 def atoms_of(robot: Robot) -> Iterator[str | Number | Call]:
-    """Yield the symbols, numbers and function calls in the constant expressions of a robot.
+    """Yield the symbols, numbers and function calls in constant expressions (lengths, gravity,
+    ...).
 
     The expressions are lengths, gravity, joint relations and element rows; fixed angles are left
     out. The argument of a function call, such as a square root, is searched too.
@@ -174,7 +175,7 @@ def _calls(robot: Robot) -> Iterator[Call]:
 
 
 def radicands(robot: Robot) -> tuple[int, ...]:
-    """Return the whole numbers whose square roots occur in a robot, in ascending order.
+    """Return the whole numbers whose square roots occur in a robot's description, smallest first.
 
     Each is a prime, or a number that no small prime divides.
     """
@@ -183,7 +184,9 @@ def radicands(robot: Robot) -> tuple[int, ...]:
 
 
 def roots_of(robot: Robot) -> tuple[Call, ...]:
-    """Return the square roots in lengths, gravity, joint relations and element rows, each once."""
+    """Return the square roots that occur in the lengths, gravity, joint relations and elements
+    (friction, springs, ...) of a robot, each once.
+    """
     return tuple(dict.fromkeys(a for a in _calls(robot) if a.function == "sqrt"))
 
 

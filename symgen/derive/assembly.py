@@ -36,10 +36,11 @@ ALL = slice(None)
 
 
 def loop_ends(robot: Robot, algebra: GraphAlgebra, closure: Closure) -> list[tuple[Pose, Pose]]:
-    """Return the poses of the two frames of each loop that must coincide: cut frame and twin.
+    """Return, for each loop, the poses of the two frames that must coincide at its cut joint.
 
-    Each pose is an orientation and an origin in the root frame of the loop. Joints before the root
-    do not change these poses.
+    The first pose is that of the cut frame, the second that of its twin. Each pose is an
+    orientation and an origin in the root frame of the loop. Joints before the root do not change
+    these poses.
     """
     roots = [robot.root(loop) for loop in robot.loops]
     pose = {root: frame_poses(Geometry(robot, algebra, closure, root)) for root in {*roots}}
@@ -48,7 +49,7 @@ def loop_ends(robot: Robot, algebra: GraphAlgebra, closure: Closure) -> list[tup
 
 
 def coincidence(ends: list[tuple[Pose, Pose]]) -> list[Scalar]:
-    """Return twelve differences for each loop, all zero if the cut frame and its twin coincide.
+    """Return twelve pose differences for each loop, all zero if its two frames at the cut coincide.
 
     The differences are P_cut - P_twin and A_cut - A_twin.
     """
@@ -61,10 +62,11 @@ def coincidence(ends: list[tuple[Pose, Pose]]) -> list[Scalar]:
 
 
 def residuals(robot: Robot, algebra: GraphAlgebra, closure: Closure) -> list[Scalar]:
-    """Return six residuals for each loop: P_cut - P_twin, and the axial vector of A_cut' A_twin.
+    """Return six closure residuals for each loop: three of position and three of orientation.
 
-    If the cut joint is not independent, its angle is a sum of other angles, and the orientations
-    agree in all configurations: the last three entries are then 0.
+    They are P_cut - P_twin, and the axial vector of A_cut' A_twin. If the cut joint is not
+    independent, its angle is a sum of other angles, and the orientations agree in all
+    configurations: the last three entries are then 0.
     """
     rows: list[Scalar] = []
     ends = loop_ends(robot, algebra, closure)
@@ -82,9 +84,10 @@ def residuals(robot: Robot, algebra: GraphAlgebra, closure: Closure) -> list[Sca
 def differences(
     residual: Callable[[Array], Array], q: Array, columns: slice | list[int] = ALL
 ) -> tuple[Array, Array]:
-    """Return the residual r at q (..., n), and its derivatives by q from central differences.
+    """Return a residual r(q) and its derivatives dr/dq, computed by central differences.
 
-    r has shape (..., m). The derivatives by the `columns` of q have shape (..., m, columns).
+    q has shape (..., n), r has shape (..., m). The derivatives by the `columns` of q have shape
+    (..., m, columns).
     """
     units = DIFFERENCE * np.eye(q.shape[-1])[columns]
     n = len(units)
@@ -94,7 +97,7 @@ def differences(
 
 
 def inertia_of(torque: Callable[[Array], Array], q: Array) -> Array:
-    """Return the inertia matrix A, shape (..., n, n), from a function that returns A qdd + b.
+    """Compute the inertia matrix A, shape (..., n, n), from a function that returns A qdd + b.
 
     Column i is torque(e_i) - torque(0) for the unit acceleration e_i; q only gives the shape of
     qdd.
@@ -112,7 +115,7 @@ def newton(
     tolerance: float,
     rcond: float = 1e-9,
 ) -> Array:
-    """Solve r(q) = 0 from a start q (..., n), by Newton's method with least squares.
+    """Solve r(q) = 0 by Newton's method with least-squares steps, from a start q (..., n).
 
     Only the `columns` of q change, by at most STEP in each iteration. A state stops below the
     tolerance, or after STALLED iterations without progress, independently of the other states. The
@@ -145,9 +148,9 @@ INDEPENDENT_MOTIONS = 1e-7
 
 
 def declared_relations(robot: Robot) -> dict[int, tuple[dict[int, Expression], Expression]]:
-    """Return the joint constraints of a robot file as linear relations {j: (row, constant)}.
+    """Return the joint constraints of a robot file as linear relations q_j = row q + constant.
 
-    Each constrained joint is q_j = row q + constant, in the joints without a constraint.
+    The result is {j: (row, constant)}; the rows contain only joints without a constraint.
     """
     free = [i for i in robot.moving if i not in robot.constraints]
     relations = {}
@@ -156,7 +159,7 @@ def declared_relations(robot: Robot) -> dict[int, tuple[dict[int, Expression], E
             e = e.substitute({f"q{i}": robot.constraints[i] for i in robot.constraints})
         if any(f"q{i}" in e.symbols for i in robot.constraints):
             raise DescriptionError(
-                f"constraint on q{j} refers to itself: q{j} = {robot.constraints[j]}",
+                f"constraint on q{j} refers to itself: q{j} = {robot.constraints[j]}; write q{j} in joints without a constraint",
                 path=("constraints", f"q{j}"),
             )
         constant = e.substitute({f"q{i}": ZERO for i in free})
@@ -171,7 +174,10 @@ def declared_relations(robot: Robot) -> dict[int, tuple[dict[int, Expression], E
 
 @lru_cache(maxsize=16)
 def open_loops(robot: Robot) -> list[Scalar]:
-    """Return the differences of the cut frame and its twin in each loop, all joints independent."""
+    """Return the pose differences at the cut of each loop, as functions of all moving joints.
+
+    Every moving joint is independent here.
+    """
     return coincidence(loop_ends(robot, GraphAlgebra(robot), open_tree(robot)))
 
 
@@ -209,11 +215,11 @@ class Assembly:
 
     @property
     def unknown(self) -> tuple[int, ...]:
-        """Numbers of the passive joints that no declared relation gives."""
+        """Numbers of the passive joints for which the robot file declares no relation."""
         return tuple(self.free[k] for k in self.passive)
 
     def guess(self, start: Mapping[int, float], rng: np.random.Generator | None) -> Array:
-        """Return a start configuration for the search of a closed configuration.
+        """Return start positions for the search for a configuration that closes the loops.
 
         Joints named in `start` have that position. All others have a random position, or a fixed
         one if there is no random generator.
@@ -226,11 +232,13 @@ class Assembly:
         return np.array([start.get(j, x) for j, x in zip(self.free, drawn, strict=True)])
 
     def configuration(self, q: Array) -> dict[int, float]:
-        """Return the positions {joint: q_j} of all moving joints in one configuration."""
+        """Return {joint: position} for all moving joints, from the positions q of the joints that
+        no relation gives.
+        """
         return dict(zip(self.robot.moving, (self.N @ q + self.c).tolist(), strict=True))
 
     def residual(self, q: Array) -> Array:
-        """Return the differences between cut and twin frames, shape (..., loops, 12).
+        """Return twelve pose differences at the cut of each loop, shape (..., loops, 12).
 
         Positions are divided by the longest length.
         """
@@ -244,15 +252,18 @@ class Assembly:
         return np.asarray(np.moveaxis(r, (0, 1), (-2, -1)) * self.scale)
 
     def rows(self, q: Array) -> Array:
-        """Return the residual of all loops in one vector, shape (..., equations)."""
+        """Return the pose differences of all loops as one vector, shape (..., 12 * loops)."""
         return self.residual(q).reshape(*q.shape[:-1], 12 * len(self.robot.loops))
 
     def gap(self, q: Array) -> float:
-        """Return the largest absolute entry of the residual at configuration q."""
+        """Return the largest absolute closure error of the loops at configuration q.
+
+        Positions are divided by the longest length.
+        """
         return float(np.abs(self.rows(q)).max(initial=0.0))
 
     def widest(self, q: Array) -> tuple[Loop, float]:
-        """Return the loop with the largest residual, and this largest entry."""
+        """Return the loop with the largest closure error at configuration q, and this error."""
         gaps = np.abs(self.residual(q)).max(axis=-1)
         return self.robot.loops[int(gaps.argmax())], float(gaps.max())
 
@@ -267,22 +278,19 @@ class Assembly:
         return min(ends, key=self.gap)
 
     def solve(self, q: Array) -> Array | None:
-        """Close the loops with the passive joints, from configuration q; None if this fails."""
+        """Move the passive joints from configuration q until the loops close; None on failure."""
         closed = newton(self.rows, q, self.passive, steps=STEPS, tolerance=TOLERANCE)
         return closed if self.gap(closed) < 10 * TOLERANCE else None
 
     def rates(self, q: Array) -> Array:
-        """Return G, the rates of the passive joints per rate of the actuated joints.
-
-        Shape (passive, active).
-        """
+        """Return the matrix G = dq_passive/dq_actuated, shape (passive joints, actuated joints)."""
         J = differences(self.rows, q)[1]
         return np.asarray(
             -np.linalg.lstsq(J[:, self.passive], J[:, self.active], rcond=INDEPENDENT_MOTIONS)[0]
         )
 
     def mobility(self, q: Array) -> tuple[int, int]:
-        """Return the number of freedoms, and the number left if all actuators are blocked."""
+        """Return the number of degrees of freedom, and the number left with actuators blocked."""
         J = differences(self.rows, q)[1]
         return len(self.free) - _rank(J), len(self.passive) - _rank(J[:, self.passive])
 

@@ -64,7 +64,7 @@ class Closure:
         return sum((g * Expression.symbol(f"q{i}") for i, g in self.row[j].items()), self.offset[j])
 
     def turn(self, j: int) -> tuple[Turn, Expression]:
-        """Return the angle of revolute joint j as multiples of independent angles, and a constant.
+        """Return the angle of revolute joint j: multiples of independent angles, and a constant.
 
         Raises DescriptionError if a multiple is not a number.
         """
@@ -77,8 +77,8 @@ class Closure:
                     for k in (j, i)
                 )
                 raise DescriptionError(
-                    f"constraints.q{j}: {theirs} turns {g} times with {other}; the ratio of two "
-                    f"angles is a number: write {g.value(self.robot.constants):.12g}",
+                    f"constraints.q{j}: the ratio of {theirs} to {other} is {g}; the ratio of two "
+                    f"angles must be a number, so write {g.value(self.robot.constants):.12g}",
                     path=("constraints", f"q{j}"),
                     file=self.robot.file or None,
                 )
@@ -86,7 +86,7 @@ class Closure:
         return tuple(turn), self.offset[j]
 
     def relation(self, row: Mapping[int, Expression], c: Expression = ZERO) -> Relation:
-        """Rewrite a relation s = row q + c in the independent joints; return its row and constant.
+        """Rewrite s = row q + c with the independent joints only; return the new row and constant.
 
         The given row may contain any moving joints.
         """
@@ -98,11 +98,11 @@ class Closure:
         return {i: g for i, g in sorted(total.items()) if g}, c
 
     def in_independent(self, row: Mapping[int, Expression]) -> ActiveRow:
-        """Return the coefficients of s = row q in the independent joints: (joint, coefficient)."""
+        """Rewrite s = row q with the independent joints only; return pairs (joint, coefficient)."""
         return tuple(self.relation(row)[0].items())
 
     def project(self, algebra: GraphAlgebra, torque: Mapping[int, Scalar]) -> dict[int, Scalar]:
-        """Return the torques G' Gamma_tree of the actuated joints, from the torques of the tree."""
+        """Convert torques of all moving joints to torques G' Gamma_tree of the actuated joints."""
         if not self.robot.passive:
             return dict(torque)
         total: dict[int, Scalar] = dict.fromkeys(self.independent, 0)
@@ -116,10 +116,11 @@ class Closure:
 
 
 def parts(robot: Robot) -> int:
-    """Return an integer D such that every passive angle is a sum of whole multiples of q_i/D.
+    """Return a common denominator D of the ratios between passive and independent joint angles.
 
-    D is the least common denominator of the declared ratios between angles. It is the product of
-    the denominators if one relation is put into another, or if a loop may do so.
+    Every passive angle is a constant plus a sum of whole multiples of q_i/D. D is the least common
+    denominator of the declared ratios between angles. It is the product of the denominators if one
+    relation is put into another, or if a loop may do so.
     """
     joints, relations = {f"q{j}" for j in robot.moving}, robot.constraints
     chained = robot.loops or {f"q{j}" for j in relations} & {
@@ -135,7 +136,7 @@ def parts(robot: Robot) -> int:
 
 
 def open_tree(robot: Robot) -> Closure:
-    """Return the closure of the open tree, its loops cut: every moving joint is independent."""
+    """Return the joint relations of a robot with its loops cut: all moving joints independent."""
     moving = robot.moving
     passive = tuple(j for j in moving if j not in robot.joints)
     return Closure(robot, {j: {j: ONE} for j in moving}, dict.fromkeys(moving, ZERO), passive)

@@ -70,7 +70,7 @@ class CompositeLinks:
                 self._take(f.j, f.ant)
 
     def _name(self, j: int) -> None:
-        """Name the inertial parameters of link j and all links after it, such as JP332 if j = 2."""
+        """Name the inertia of link j with all links after it: JP332, MSP32, MP2 ... for j = 2."""
         for (k, m), x in zip(PLACES, self.JP[j], strict=True):
             self.algebra.name(x, self.named("JP", k, m, j))
         for k, x in enumerate(self.MSP[j], start=1):
@@ -116,7 +116,7 @@ class CompositeLinks:
         return A
 
     def _column(self, k: int) -> dict[int, Scalar]:
-        """Return the entries {i: A_ik} of column k of the inertia matrix, of the links only.
+        """Return the entries {i: A_ik} of column k of the inertia matrix, from the links only.
 
         The joints i are those between the base and joint k.
         """

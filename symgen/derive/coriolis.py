@@ -1,4 +1,4 @@
-"""Coriolis matrix C(q, qd) by composite links, from the Christoffel symbols of A.
+"""Coriolis matrix C(q, qd) by composite links, from the Christoffel symbols of inertia matrix A.
 
 With these, Ad - 2C is skew symmetric. A mass point at r in frame j has the velocity rd = w_j x r
 relative to the origin of the frame. For each composite link (a link with all links mounted on it),
@@ -58,10 +58,11 @@ HALF = Expression.number(Fraction(1, 2))
 
 
 class CompositeRates(CompositeLinks):
-    """The sums HP of m rd and BP of m r rd' over the mass points of a link and all links after it.
+    """The sums HP = sum m rd and BP = sum m r rd' over the mass points m of each link and all links
+    after it, where r is the position and rd the velocity of a point.
 
-    A composite link is a link with all links mounted on it. r is the position of a mass point in
-    the frame of the link, rd its velocity relative to the origin of the frame.
+    A composite link is a link with all links mounted on it. r is in the frame of the link, rd is
+    relative to the origin of the frame.
 
     Parameters
     ----------
@@ -96,7 +97,7 @@ class CompositeRates(CompositeLinks):
         return v
 
     def _link(self, d: Derivation, j: int) -> None:
-        """Compute HP and BP, the sums of m rd and of m r rd', for link j alone."""
+        """Compute HP = sum m rd and BP = sum m r rd' over the mass points of link j alone."""
         w, half = self.motion.link[j].w, self.algebra.constant(HALF)
         XX, XY, XZ, YY, YZ, ZZ = self.own[j][:6]
         K = (
@@ -109,7 +110,7 @@ class CompositeRates(CompositeLinks):
         self.BP[j] = (cross(w, K[0]), cross(w, K[1]), cross(w, K[2]))
 
     def _take_rates(self, j: int, i: int) -> None:
-        """Add HP and BP of link j and all links after it to those of its antecedent i."""
+        """Add the sums HP and BP of link j and all links after it to those of its antecedent i."""
         R, P, PP = self.geometry.rotation[j], self.geometry.P[j], self.PP[j]
         ABA, AH = turned(R, self.BP[j]), R.up(self.HP[j])
         moved = vadd(R.up(self.MSP[j]), scale(self.MP[j], P))
@@ -129,7 +130,7 @@ class CompositeRates(CompositeLinks):
         return C
 
     def _joint(self, k: int) -> dict[tuple[int, int], Scalar]:
-        """Return the entries C_ik and C_ki of the Coriolis matrix for joints i up to joint k."""
+        """Return the entries C_ik and C_ki of the Coriolis matrix, i from the base to joint k."""
         self.algebra.section(f"Unit rate of joint {k}")
         x, y, _ = self.MSP[k]
         B, H = self.BP[k], self.HP[k]

@@ -76,7 +76,7 @@ class Derivation:
     poses: Mapping[int, tuple[Matrix, Vector]]
 
     def actuated(self, torque: Mapping[int, Scalar]) -> dict[int, Scalar]:
-        """Return the torques G' Gamma of the actuated joints, from torques of the moving joints.
+        """Convert torques of the moving joints to torques G' Gamma of the actuated joints.
 
         Every actuated joint has an entry, also if its torque is zero.
         """

@@ -23,7 +23,7 @@ UNLIMITED = 1000.0  # ... unless it stands for none at all
 
 
 def doubts(robot: Robot) -> list[str]:
-    """Return one warning, a sentence, for each doubtful value of a robot.
+    """Return a warning sentence for each value of a robot that is valid but probably wrong.
 
     Raises DescriptionError if a loop does not close.
     """
@@ -58,7 +58,7 @@ def nearly_round(robot: Robot, within: float = CLOSE) -> list[str]:
 
 
 def other_units(robot: Robot) -> list[str]:
-    """Warn of values that no robot has in m and rad: gravity, lengths, drive offsets, limits."""
+    """Warn of gravity, lengths, drive offsets and limits that are too large for m and rad."""
     notes = []
     g = math.hypot(*(e.value(robot.constants) for e in robot.gravity))
     if g > LONGEST:
@@ -89,7 +89,7 @@ def other_units(robot: Robot) -> list[str]:
 
 
 def equal_sides(robot: Robot) -> list[str]:
-    """Warn of equal lengths with different names in a loop without linear relations.
+    """Warn of equal lengths with different names in a loop that may be meant as a parallelogram.
 
     With one name for both lengths, the loop may be a parallelogram.
     """
@@ -128,7 +128,7 @@ def equal_sides(robot: Robot) -> list[str]:
 
 
 def far_starts(robot: Robot) -> list[str]:
-    """Warn of joints whose nearest closed position is far from the `start` of their loop."""
+    """Warn of joints whose `start` is far from the nearest position found that closes the loops."""
     closed, longest = close(robot).start, robot.longest
     units = {j: 1.0 if robot.frame(j).sigma == REVOLUTE else longest for j in robot.start}
     far = [j for j, x in robot.start.items() if abs(closed[j] - x) > FAR * units[j]]

@@ -1,7 +1,10 @@
-"""Regressor columns of elements: friction, springs, actuator inertias, and torque laws of the user.
+"""Regressor columns of the elements: friction, springs, actuator inertias, torque laws of the user.
 
-along G, s = G q:   Gamma += c G' x,   x the law of the element over s, sd, sdd form B:
-Gamma += c B x,    x = qdd | qd | q energy U:           Gamma_i += c dU/dq_i
+An element with parameter c adds one of these torques:
+
+    along G, s = G q:    Gamma += c G' x,    x the law of the element over s, sd, sdd
+    form B:              Gamma += c B x,     x = qdd | qd | q
+    energy U:            Gamma_i += c dU/dq_i
 
 A law is a polynomial in states, constants and function calls. Cosines and sines of whole multiples
 of joint angles and signs of velocities are functions of the robot's geometry and motion, hence
@@ -40,12 +43,12 @@ def element_column(motion: Motion, e: Element, j: int) -> dict[int, Scalar]:
 
 
 def law_value(motion: Motion, e: Element, j: int, law: Expression) -> Scalar:
-    """Return a torque law or an energy of an element as a scalar of the expression graph."""
+    """Convert a torque law or an energy of an element to a node of the expression graph."""
     return _Law(motion, e, j).of(law)
 
 
 class _Law:
-    """The torque law of one element parameter, with methods that write it as graph nodes.
+    """The torque law of one element parameter, such as FV2, and its conversion to graph nodes.
 
     A velocity along several joints is named after the element, since rows of other elements may
     have the same joints.
@@ -56,7 +59,7 @@ class _Law:
         self.name = f"{motion.named('QP')}{parameter(e.family, j)}"
 
     def of(self, e: Expression) -> Scalar:
-        """Return an expression of the torque law as a scalar of the expression graph."""
+        """Convert an expression in the torque law to a node of the expression graph."""
         total: Scalar = 0
         for m, c in e.ordered:
             varying = [(a, n) for a, n in m if varies(a)]
@@ -71,7 +74,7 @@ class _Law:
         return total
 
     def one_sided(self, law: Expression) -> Scalar:
-        """Return sd or sign(sd) for motion in the direction `when`, and zero for other motion."""
+        """Return the velocity sd, or its sign, for motion in the direction `when`, else zero."""
         rate, key = self._atom("qd"), self.motion.geometry.closure.in_independent(self.row)
         if type(rate) is int or not key:
             return 0  # at rest, or the closure holds s still
@@ -140,7 +143,7 @@ def is_opaque(e: Element, j: int) -> bool:
 def linear_in(
     e: Expression, state: str, along: Row
 ) -> tuple[dict[int, Expression], Expression] | None:
-    """Split an expression e linear in joint positions or velocities x: e = row . x + rest.
+    """Split an expression that is linear in joint positions or velocities x into row . x + rest.
 
     Return the row {joint: coefficient} and the constant rest, or None if e is not linear. x are the
     positions if `state` is q, the velocities if it is qd. The name q (or qd) without a joint number

@@ -1,4 +1,4 @@
-"""Energies, link velocities, and regressors of momentum, base wrench and reference torques.
+"""Energies, link velocities, and regressors of momentum, base wrench and Slotine-Li torques.
 
 Energies of link j, with its velocities v_j of the origin and w_j in its frame, gravity g and its
 origin P_0j in frame 0:
@@ -124,7 +124,7 @@ def potential_energy(d: Derivation) -> Scalar:
 
 
 def _square(d: Derivation, e: Element, j: int, x: Mapping[int, Scalar]) -> Scalar:
-    """Return (G x)**2 for an element with a row G, or x' B x for an element with a form B."""
+    """Return the squared motion of an element: (G x)**2 for a row G, or x' B x for a matrix B."""
     if j in e.along:
         s = linear(d.algebra, e.along[j], x)
         return mul(s, s)
@@ -132,7 +132,7 @@ def _square(d: Derivation, e: Element, j: int, x: Mapping[int, Scalar]) -> Scala
 
 
 class AtRates(Motion):
-    """Link accelerations whose joint torques are C qdr, the Coriolis torques of reference rates.
+    """Link accelerations that need the joint torques C qdr: Coriolis torques at reference rates.
 
     These accelerations are sum_k qdr_k (a_k + U_k r), see the head of this module; `joint_torques`
     turns them into C qdr. With qdr_k = 1 as the only rate, the result is column k of C.
@@ -181,10 +181,10 @@ class AtRates(Motion):
 
 
 def _link(z: Vector, zd: Vector, w: Vector, a: Vector, half: Scalar) -> LinkMotion:
-    """Return the accelerations a + U r of a link as a `LinkMotion`, U = skew(zd) + skew(z) skew(w).
+    """Return the accelerations a + U r of the points r of a link, as a `LinkMotion`.
 
-    The antisymmetric part of U replaces wd, the symmetric part replaces w w', and the differences
-    of the diagonal of U replace DW.
+    U = skew(zd) + skew(z) skew(w). The antisymmetric part of U replaces wd, the symmetric part
+    replaces w w', and the differences of the diagonal of U replace DW.
     """
     across = dot(z, w)
     skew = ((0, -zd[2], zd[1]), (zd[2], 0, -zd[0]), (-zd[1], zd[0], 0))
@@ -215,7 +215,7 @@ def _accelerated(d: Derivation, qdd: Mapping[int, Scalar]) -> Motion:
 
 
 def slotine_li(d: Derivation) -> Columns:
-    """Return the regressor columns of A qddr + C qdr + Q + friction(qd), by standard parameter.
+    """Return the Slotine-Li regressor, by parameter: columns of A qddr + C qdr + Q + friction(qd).
 
     The reference rates qdr and accelerations qddr are inputs.
     """
@@ -229,7 +229,7 @@ def slotine_li(d: Derivation) -> Columns:
 
 
 def _together(a: LinkMotion, b: LinkMotion) -> LinkMotion:
-    """Return the sum of two accelerations a and b of one link."""
+    """Add the accelerations of one link in two motions a and b."""
     return LinkMotion(
         b.w,
         vadd(a.wd, b.wd),
@@ -241,7 +241,10 @@ def _together(a: LinkMotion, b: LinkMotion) -> LinkMotion:
 
 
 def momentum_rate(d: Derivation) -> Columns:
-    """Return the regressor columns of dp/dt - Gamma = C' qd - Q - friction, by parameter."""
+    """Return the regressor columns, by parameter, of dp/dt - Gamma, with the momentum p = A qd.
+
+    dp/dt - Gamma = C' qd - Q - friction.
+    """
     at_rest = columns(_accelerated(d, {}), d.robot.parameters)
     found = {name: {i: -x for i, x in D.items()} for name, D in at_rest.items()}
     v, inertial = origin_velocities(d.motion), inertial_names(d.robot)
@@ -255,7 +258,7 @@ def momentum_rate(d: Derivation) -> Columns:
 
 
 def base_wrench(d: Derivation) -> dict[str, tuple[Scalar, ...]]:
-    """Return the regressor of the wrench by which the base moves the robot, in frame 0.
+    """Return the regressor of the wrench that the base exerts on the robot, in frame 0.
 
     For each inertial parameter: the force, then the moment about the origin of frame 0.
     """

@@ -110,7 +110,7 @@ Point = tuple[Array, Array]  # (cos, sin) over F_p
 
 
 class Draw:
-    """A random geometry of a robot and `samples` random states, with exact values in F_p.
+    """A random geometry of a robot and `samples` random states, with exact values modulo a prime p.
 
     It is a domain for `interpret`. `geometry` gives residues, shape (count, 1), for constants by
     name, for numbers and square roots, and for half-angle tangents of the unit angles; this makes
@@ -144,7 +144,7 @@ class Draw:
     # --- a domain ---
 
     def symbol(self, symbol: Symbol) -> Scalar:
-        """Return the values in F_p of an input, such as q1 or a length.
+        """Return the values modulo p of an input of the graph, such as q1 or a length.
 
         A state variable has one residue per state; a constant has one, or one per geometry.
         """
@@ -159,11 +159,11 @@ class Draw:
         return self._fp(self._state(symbol))
 
     def number(self, c: Fraction) -> Fp:
-        """Return the value in F_p of a rational number."""
+        """Return the value modulo p of a rational number."""
         return self._fp(np.array([c.numerator * pow(c.denominator, -1, self.p) % self.p]))
 
     def function(self, node: Node, x: list[Fp]) -> Fp:
-        """Apply the function of a node, such as cos, 1/x or sign, to values x in F_p."""
+        """Apply the function of a graph node, such as cos, 1/x or sign, to values x modulo p."""
         if isinstance(node.value, Angle):
             return self._fp(self._angle(node.value)[node.op == SIN])
         match node.op:
@@ -185,16 +185,16 @@ class Draw:
     # --- constants ---
 
     def constant(self, e: Expression) -> Scalar:
-        """Return the values in F_p of a constant expression, such as a length."""
+        """Return the values modulo p of a constant expression, such as a length."""
         (value,) = interpret([self._algebra.constant(e)], self)
         return value
 
     def residues(self, value: Scalar) -> Array:
-        """Return the values in F_p of a scalar as an array: one, or one per geometry or state."""
+        """Convert a value modulo p to an array, with one entry or one per geometry or state."""
         return value.x if isinstance(value, Fp) else np.array([value % self.p])
 
     def spread(self, value: Scalar) -> Array:
-        """Return the values in F_p of a scalar at all geometries and states, with shape `shape`."""
+        """Repeat a value modulo p for all geometries and states: an array of shape `self.shape`."""
         return np.broadcast_to(self.residues(value), self.shape)
 
     def _fp(self, x: Array) -> Fp:
@@ -205,13 +205,13 @@ class Draw:
         return (np.frombuffer(digest, dtype="<u8") % (self.p - 1) + 1).astype(np.int64)
 
     def _of_geometry(self, key: str | Call) -> Array:
-        """Return the given values in F_p of a constant, pi or a square root, or a random value."""
+        """Return values modulo p, given or random, of a constant, pi or a square root."""
         if key not in self._geometry:
             self._geometry[key] = self._random(str(key), 1)
         return self._geometry[key]
 
     def _state(self, key: object) -> Array:
-        """Return a random value in F_p of a quantity for each state."""
+        """Return random values modulo p of a variable, such as a joint velocity, one per state."""
         if key not in self._residues:
             self._residues[key] = self._random(key, self.samples)
         return self._residues[key]
@@ -227,7 +227,7 @@ class Draw:
         return (a[0] * b[0] - a[1] * b[1] % p) % p, (a[0] * b[1] + a[1] * b[0] % p) % p
 
     def _multiple(self, a: Point, n: int) -> Point:
-        """Return cosine and sine of the angle n a in F_p, from cosine and sine of the angle a."""
+        """Return cosine and sine, modulo p, of n a, from cosine and sine of the angle a."""
         if n < 0:
             a, n = (a[0], -a[1] % self.p), -n
         if n == 1:
@@ -241,13 +241,13 @@ class Draw:
         return result
 
     def _joint(self, j: int) -> Point:
-        """Return cosine and sine in F_p of the angle q_j/D at each state; D is `closure.parts`."""
+        """Return cos(q_j/D) and sin(q_j/D), modulo p, at each state; D is a common denominator."""
         if j not in self._points:
             self._points[j] = self._point_at(self._random(("angle", j), self.samples))
         return self._points[j]
 
     def _unit(self, unit: Unit) -> Point:
-        """Return cosine and sine in F_p of a unit angle, such as pi/D.
+        """Return cosine and sine, modulo p, of a unit angle, such as pi/D.
 
         For pi/D the point is a root of unity of order 2D; for any other unit angle it is random,
         unless the geometry gives it.
@@ -263,7 +263,7 @@ class Draw:
 
     @cached_property
     def half_turn(self) -> Point:
-        """Cosine and sine of the angle pi/D in F_p, a root of unity of order 2D.
+        """Cosine and sine, modulo p, of the smallest unit angle pi/D, a root of unity of order 2D.
 
         Its multiple pi/2 has the cosine 0 and the sine 1.
         """
@@ -281,7 +281,7 @@ class Draw:
                 return root
 
     def _angle(self, angle: Angle) -> Point:
-        """Return cosine and sine in F_p of a constant angle, or an angle with joint positions."""
+        """Return cosine and sine, modulo p, of an angle: a constant plus joint-angle multiples."""
         turns, rest = quarter_turns(angle.offset)
         quarter = ((1, 0), (0, 1), (-1, 0), (0, -1))[turns % 4]
         point: Point = (np.array([quarter[0] % self.p]), np.array([quarter[1] % self.p]))
@@ -289,12 +289,14 @@ class Draw:
             point = self._turned(point, self._multiple(self._unit(unit), k))
         for j, n in angle.turn:
             if (whole := n * self.parts[j]).denominator > 1:
-                raise ArithmeticError(f"a hinge turns {n} times with q{j}, which loops alone tie")
+                raise ArithmeticError(
+                    f"an angle contains {n} times q{j}, a joint that only the loop equations determine"
+                )
             point = self._turned(point, self._multiple(self._joint(j), int(whole)))
         return point
 
     def _sqrt(self, root: Expression) -> Array:
-        """Return the square root of a number in F_p; for the root of a symbol, a random value.
+        """Return the square root of a number modulo p; for the root of a symbol, a random value.
 
         The head of this module has the formulas.
         """
@@ -308,7 +310,7 @@ class Draw:
         return power(self.number(c).x, (self.p + 1) // 4, self.p)
 
     def _sqrt_of_prime(self, l: int) -> Array:
-        """Return the square root in F_p of a small prime l, as a sum of cosines or sines."""
+        """Return the square root, modulo p, of a small prime l, as a sum of cosines or sines."""
         D = self.units.D
         if l == 2:
             return 2 * self._multiple(self.half_turn, D // 4)[0] % self.p
@@ -322,7 +324,7 @@ class Draw:
     # --- laws ---
 
     def forward(self, node: Node, rate: Fp) -> Fp:
-        """Return the variable b in F_p that replaces the direction of a velocity: sign = 2b - 1.
+        """Return random values b modulo p for the direction of a velocity: its sign is 2b - 1.
 
         b is 1 for a forward motion and 0 for a backward motion. Proportional velocities share one
         b.
@@ -340,7 +342,7 @@ class Draw:
         return b if lead.value(self.robot.constants) > 0 else 1 - b
 
     def _opaque(self, op: str, x: list[Fp]) -> Fp:
-        """Return values in F_p in place of a function that F_p does not have, such as exp.
+        """Return substitute values for a function, such as exp, that does not exist modulo p.
 
         Equal operands give equal values. The head of this module has the formula.
         """
@@ -350,7 +352,8 @@ class Draw:
 
 @lru_cache
 def primes_for(robot: Robot, count: int, seed: int | None = None) -> tuple[int, ...]:
-    """Return `count` primes p for which the fixed angles and square roots of a robot exist in F_p.
+    """Return `count` primes p modulo which the sines and cosines of the fixed angles and the square
+    roots of a robot have values.
 
     p < 2**31, and p = -1 modulo 4 and 2D. Without a seed they are the largest such primes; with a
     seed, the largest below a random number. Raises SymgenError if there are too few.
@@ -359,13 +362,15 @@ def primes_for(robot: Robot, count: int, seed: int | None = None) -> tuple[int, 
     if len(primes) == count:
         return primes
     raise SymgenError(
-        f"robot {robot.name}: no prime found over which angles pi/{units_of(numbered(robot)).D} and "
-        "all its square roots exist; write some of them as decimals"
+        f"robot {robot.name}: no prime found for exact arithmetic with angles "
+        f"pi/{units_of(numbered(robot)).D} and all square roots of the robot; write some of these "
+        "angles or roots as decimals"
     )
 
 
 def candidates(robot: Robot, seed: int | None = None) -> Iterator[int]:
-    """Yield primes p for which the fixed angles and square roots of a robot exist in F_p.
+    """Yield primes p modulo which the sines and cosines of the fixed angles and the square roots of
+    a robot have values.
 
     p = -1 modulo 4 and 2D, and the large numbers under square roots are squares in F_p. The primes
     are in descending order, from 2**31, or from a random number if a seed is given.

@@ -18,7 +18,7 @@ LETTERS = {"q": "q", "qd": "QP", "qdd": "QDP"}
 
 
 class Floats:
-    """The constants and states of a robot, as values for evaluating its formulas.
+    """Values of the constants and states of a robot, at which its formulas are evaluated.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class Floats:
 
 
 def states_of(**states: Mapping[int, Any]) -> dict[Symbol, Any]:
-    """Return {input: value} from the values of q, qd and qdd, each a mapping by joint number."""
+    """Return {graph input: value} from mappings {joint number: value} of q, qd and qdd."""
     return {
         Symbol(kind, f"{LETTERS[kind]}{j}"): x
         for kind, by_joint in states.items()

@@ -93,7 +93,7 @@ class Frames:
         return ((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])), self.position(j, i, i)
 
     def columns(self, j: int, i: int) -> dict[int, tuple[Vector, Vector]]:
-        """Return the Jacobian columns of frame j by moving joint, in components of frame i.
+        """Return the Jacobian of frame j, in frame i: one column per moving joint up to frame j.
 
         Column k is the pair (velocity of O_j, angular velocity of frame j) per unit rate of joint
         k.
@@ -107,7 +107,7 @@ class Frames:
         return result
 
     def _depth(self, j: int) -> int:
-        """Return the number of rotations from the base to frame j, parallel axes counted as one."""
+        """Return the number of rotations from the base to frame j; parallel axes count as one."""
         depth = 0
         while j:
             j, depth = self.geometry.carrier[j].m, depth + 1
@@ -127,12 +127,12 @@ class Frames:
         return Rotation(None, *self.geometry.algebra.cos_sin(*self._between(j, i)))
 
     def _between(self, j: int, i: int) -> tuple[Turn, Expression]:
-        """Return the angle of frame j relative to frame i about z: joint multiples and constant."""
+        """Return the angle from frame i to frame j about z: joint multiples, and a constant."""
         (turn, offset), (other, other_offset) = self.geometry.turn[j], self.geometry.turn[i]
         return summed((*turn, *((k, -n) for k, n in other))), offset - other_offset
 
     def register_angles(self, algebra: GraphAlgebra) -> None:
-        """Add the angles between all pairs of frames with parallel z axes to the graph `algebra`.
+        """Add to the graph `algebra` the angles between all pairs of frames with parallel z axes.
 
         Each such angle, for instance q2 + q3, then has a cosine and a sine with a name.
         """

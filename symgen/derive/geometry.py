@@ -70,7 +70,7 @@ class Rotation:
 
 @dataclass(frozen=True)
 class Carrier:
-    """The frame m before a series of parallel joint axes, and the one rotation from m to frame j.
+    """Frame m before a series of parallel joint axes up to frame j, and the rotation from m to j.
 
     All joint axes after frame m, up to joint j, are parallel, so that their angles add up.
 
@@ -166,12 +166,12 @@ class Geometry:
         )
 
     def from_carrier(self, j: int, v: Vector) -> Vector:
-        """Transform a vector to frame j from the frame before the parallel axes, see `Carrier`."""
+        """Transform a vector from frame m of `Carrier` (before the parallel axes) to frame j."""
         return v if is_zero(v) else self.carrier[j].rotation.down(v)
 
 
 def summed(turn: Turn) -> Turn:
-    """Add up the multiples of each joint angle in `turn`, sorted by joint, without zero sums."""
+    """Merge pairs (joint, multiple) of the same joint by a sum; sort, and leave out zero sums."""
     total: dict[int, int | Fraction] = {}
     for j, n in turn:
         total[j] = total.get(j, 0) + n

@@ -64,7 +64,7 @@ class Angle(NamedTuple):
 
 
 class Velocity(NamedTuple):
-    """The velocity sum_i G_i qd_i, in independent joints, of a sign or a positive part."""
+    """A velocity sum_i G_i qd_i of independent joints, the operand of sign or of max(x, 0)."""
 
     row: ActiveRow
 
@@ -310,13 +310,16 @@ def reachable(
 
 
 class Domain(Protocol):
-    """A number system for graph nodes, such as floats or F_p, with + * and unary minus."""
+    """A number system in which graph nodes are evaluated: floats, integers modulo a prime p, ...
+
+    Its values have the operations +, * and unary minus.
+    """
 
     def symbol(self, symbol: Symbol) -> Any:
-        """Return the value of an input."""
+        """Return the value of an input of the graph, such as q1."""
 
     def number(self, c: Fraction) -> Any:
-        """Represent the rational number c in this domain."""
+        """Represent the rational number c in this number system."""
 
     def function(self, node: Node, x: list[Any]) -> Any:
         """Return the value of an operation other than + and *, from the values of its operands."""
@@ -325,7 +328,7 @@ class Domain(Protocol):
 def interpret(
     outputs: Sequence[Scalar | int], domain: Domain, known: dict[int, Any] | None = None
 ) -> list[Any]:
-    """Compute the values of graph scalars over a domain; Python integers stay integers.
+    """Compute the values of graph nodes in a number system; Python integers stay integers.
 
     known : {index of a node: its value}; the values that are computed here are added to this
     mapping.
@@ -357,7 +360,7 @@ def interpret(
 def rates(
     outputs: Sequence[Scalar | int], inputs: Mapping[Symbol, Scalar | int]
 ) -> list[Scalar | int]:
-    """Return the time derivatives of graph scalars, from the rates of the inputs (forward mode)."""
+    """Return the time derivatives of graph nodes, from the rates of the inputs (forward mode)."""
     rate: dict[int, Scalar | int] = {}
 
     def signed(s: Scalar | int) -> Scalar | int:
@@ -383,5 +386,5 @@ def rates(
             case "sin":
                 rate[node.index] = x[0].graph.call(COS, x[0], of=node.value) * xd[0]
             case op:
-                raise NotImplementedError(f"the rate of {op}")
+                raise NotImplementedError(f"no rule for the time derivative of {op}")
     return [signed(s) for s in outputs]

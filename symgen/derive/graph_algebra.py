@@ -30,7 +30,7 @@ from symgen.description.robot import Robot
 
 
 class GraphAlgebra:
-    """The graph of one derivation, with methods that return the nodes of a robot's symbols.
+    """The expression graph of a robot, with methods that make nodes for its joints and constants.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class GraphAlgebra:
         self.sections.append((len(self.graph.nodes), title))
 
     def constant(self, e: Expression) -> Scalar | int:
-        """Return the scalar of a constant expression: a length, or the cosine of a fixed angle."""
+        """Return the node of a constant expression: a length, or the cosine of a fixed angle."""
         value: Scalar | int = e.evaluate(
             self._constant, self._call, self.graph.number, self._number
         )
@@ -79,7 +79,7 @@ class GraphAlgebra:
         return self.graph.symbol(Symbol("parameter", name), fixed=True)
 
     def gravity(self, axis: int) -> Scalar | int:
-        """Return a component of minus the gravity acceleration in frame 0, m/s**2, or zero."""
+        """Return the node of one component of minus gravity in frame 0, m/s**2, or the number 0."""
         symbol = Symbol("gravity", str(axis))
         return self.graph.symbol(symbol, fixed=True) if self.robot.gravity[axis] else 0
 
@@ -114,7 +114,9 @@ class GraphAlgebra:
         return ((c, s), (-s, c), (-c, -s), (s, -c))[quarters % 4]
 
     def _label(self, turn: Turn) -> str:
-        """Return a label for a sum of angles: 23 for q2 + q3, 2m5 for q2 - q5, 2o5x3 for 2/5 q3."""
+        """Return the end of names such as C23, for a sum of angles: 23 for q2 + q3, 2m5 for q2 -
+        q5, 2o5x3 for 2/5 q3.
+        """
         text = ""
         for j, n in turn:
             times = f"{abs(n)}x".replace("/", "o") if abs(n) != 1 else ""
@@ -134,7 +136,9 @@ class GraphAlgebra:
         return self.graph.symbol(Symbol("qdd", f"QDP{j}"))
 
     def channel(self, name: str) -> Scalar:
-        """Return the node of a channel: a constant that is a function of time."""
+        """Return the node of a channel (a quantity that the record gives at each sample, such as
+        temperature).
+        """
         return self.graph.symbol(Symbol("channel", name))
 
     def rate(self, u: int, i: int) -> Scalar:

@@ -91,7 +91,7 @@ def _screw(axis: int, angle: SX, shift: SX) -> SX:
 def poses(
     robot: Robot, q: Mapping[int, SX], constants: Mapping[str, SX], root: int = 0
 ) -> dict[int, SX]:
-    """Return {j: rTj}: the poses, in frame r = `root`, of frame r and all frames j that follow.
+    """Return {j: rTj}: the poses, in frame r = `root`, of frame r and all frames j mounted on it.
 
     The positions q are given by joint number; a missing joint has position 0.
     """
@@ -102,7 +102,7 @@ def poses(
 
 
 def pseudo_inertia(name: str) -> Array:
-    """Return the pseudo-inertia Sigma, 4 x 4, of a link with the only parameter `name` = 1."""
+    """Return the pseudo-inertia Sigma, 4 x 4, of a link with parameter `name` = 1, all others 0."""
     S = np.zeros((4, 4))
     if name == "M":
         S[3, 3] = 1
@@ -149,7 +149,7 @@ def _matrices(columns: Array) -> Array:
 
 
 class Lagrange:
-    """Dynamics of the open tree of a robot, in all its moving joints, from its energies.
+    """Dynamics of a robot with its loops cut (open tree), in all moving joints, from its energies.
 
     The joints have the order `robot.moving`. Arrays q, qd, qdd have shape (..., n), in rad or m and
     their rates; results have the same leading axes. The parameters chi have shape (p,), in the
@@ -169,7 +169,9 @@ class Lagrange:
         return _floats(self._functions[name], *arguments, self._values)
 
     def vary(self, rng: np.random.Generator, states: int) -> None:
-        """Draw a random value of each channel (a constant that varies with time) per state."""
+        """Draw random values, one per state, of each channel (a quantity that the record gives at
+        each sample, such as temperature).
+        """
         self._values = np.tile(self._values, (states, 1))
         for name in self.robot.channels:
             self._values[:, [*self.constants].index(name)] = rng.uniform(0.5, 2, states)
@@ -205,7 +207,8 @@ class Lagrange:
         return D
 
     def _element(self, e: Element, j: int, q: Array, qd: Array, qdd: Array) -> Array:
-        """Return the joint torques of an element whose parameter is 1, shape (..., n).
+        """Return the joint torques, shape (..., n), of an element (friction, spring, ...) whose
+        parameter is 1.
 
         j is the number in the name of the parameter, for instance 2 for FV2.
         """
@@ -221,7 +224,8 @@ class Lagrange:
         return force if e.when is None else force * (sd > 0 if e.when == "positive" else sd < 0)
 
     def _row(self, e: Element, j: int) -> Array:
-        """Return the row G, shape (n,), of the motion s = G q along which an element acts.
+        """Return the coefficients G, shape (n,), of the motion s = G q on which an element
+        (friction, spring, ...) acts.
 
         j is the number in the name of the element parameter.
         """
@@ -321,7 +325,7 @@ class Lagrange:
         return U
 
     def motion(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array, Array]:
-        """Compute the motion of all joints of the tree from the motion of the actuated joints.
+        """Compute the motion of all moving joints from the motion of the actuated joints.
 
         The arguments have shape (..., n_a). Return the tree motion q, qd, qdd, shape (..., n), and
         G = dq/dqa, shape (..., n, n_a). Newton's method closes the loops. It begins with the
@@ -372,7 +376,8 @@ class Lagrange:
         return self._floats("loop", x)[..., 0]
 
     def _regularity(self, x: Array, passive: list[int]) -> Array:
-        """Return the smallest over the largest singular value of dphi/dq_passive.
+        """Return the ratio of the smallest to the largest singular value of the closure Jacobian
+        dphi/dq_passive.
 
         The ratio is small near a dead point of the mechanism.
         """
@@ -454,7 +459,8 @@ def _closure(robot: Robot, q: SX, constants: Mapping[str, SX]) -> SX:
 
 
 def _start(robot: Robot, q: SX, constants: Mapping[str, SX]) -> tuple[SX, SX]:
-    """Return the actuated joints, and start positions of all moving joints computed from them.
+    """Return symbols of the actuated joints, and start positions of all moving joints as functions
+    of them.
 
     A passive joint has the position of its constraint, else the `start` of its loop, else 0.
     """
@@ -477,7 +483,8 @@ def _start(robot: Robot, q: SX, constants: Mapping[str, SX]) -> tuple[SX, SX]:
 def _law(
     robot: Robot, e: Element, j: int, q: SX, qd: SX, constants: Mapping[str, SX]
 ) -> tuple[SX, SX]:
-    """Return the joint torques, shape (n,), and the energy of an element whose parameter is 1.
+    """Return the joint torques, shape (n,), and the energy of a torque law of the user whose
+    parameter is 1.
 
     j is the number in the name of the parameter. CasADi differentiates an energy U to the torque
     dU/dq.
@@ -530,7 +537,8 @@ class Sample:
 
 
 def _leverage(robot: Robot, constants: Mapping[str, float]) -> Array:
-    """Return each actuated joint's largest coefficient in elements that act on several joints.
+    """Return, for each actuated joint, its largest coefficient in friction and other elements that
+    act on several joints.
 
     For instance 101.25 for q5 in friction along q4 + 101.25 q5; 1 if there is no such element.
     Shape (n,).
@@ -606,7 +614,7 @@ def sampled(
 
 
 def in_one_mode(robot: Robot) -> Robot:
-    """Return the robot with its loops fixed to one assembly mode, never an antiparallelogram.
+    """Return the robot with constraints or start positions that fix the assembly mode of its loops.
 
     If all passive joints are linear in the actuated ones, these relations become constraints of the
     robot; else its loops get a start configuration that closes them. The dynamics by energies still

@@ -1,4 +1,4 @@
-"""Closure equations of general loops, one for each tied joint, with Jacobian and curvature.
+"""Closure equations of loops whose joint relations are not linear, with Jacobian and curvature.
 
 A tied joint is a passive joint that only these equations relate to the actuated joints. The
 equations are the entries of `assembly.residuals` that determine the tied joints best at the start
@@ -33,7 +33,7 @@ TURN_STEPS, TURN_CLOSED = 72, 1e-4  # of a full turn of the crank, and residual 
 
 @dataclass(frozen=True)
 class LoopSystem:
-    """The closure equations of a robot with tied joints, and the values of these equations.
+    """The closure equations of a robot whose joint relations are not linear, and their derivatives.
 
     A tied joint is a passive joint that only the closure equations relate to the actuated joints.
     Arrays q hold the independent joints in the last axis: n actuated, then m tied.
@@ -55,7 +55,7 @@ class LoopSystem:
 
     @property
     def closure(self) -> Closure:
-        """Each joint as a function of the independent joints."""
+        """Every moving joint as a linear function of the independent joints."""
         return self.derivation.closure
 
     @property
@@ -65,18 +65,18 @@ class LoopSystem:
 
     @property
     def tied(self) -> slice:
-        """Slice of the joints given by closure equations, in an array of the independent joints."""
+        """Slice of the independent joints that selects the joints given by closure equations."""
         return slice(len(self.robot.joints), len(self.closure.independent))
 
     @cached_property
     def rows(self) -> list[Scalar]:
-        """All residuals of the loops, six for each loop, as nodes of the graph."""
+        """All closure residuals, six for each loop, as nodes of the graph."""
         geometry = self.derivation.geometry
         return residuals(geometry.robot, geometry.algebra, geometry.closure)
 
     @cached_property
     def residual(self) -> list[Scalar]:
-        """The closure residuals r(q), one for each tied joint, as nodes of the graph."""
+        """The closure residuals r(q), one for each joint that they determine, as graph nodes."""
         return [self.rows[k] for k in self.equations]
 
     @cached_property
@@ -87,14 +87,14 @@ class LoopSystem:
 
     @cached_property
     def curvature(self) -> list[Scalar]:
-        """The term Jd qd of the second time derivative of the residuals, as nodes of the graph."""
+        """The term Jd qd in the second time derivative of the closure residuals, as graph nodes."""
         qd = self.derivation.algebra.qd
         along = {Symbol("q", f"q{i}"): qd(i) for i in self.closure.independent}
         return rates(rates(self.residual, along), along)
 
     @cached_property
     def alignment(self) -> list[Scalar]:
-        """Trace of A_cut' A_twin of each loop: 3 if it closes, -1 if it is half a turn away.
+        """Trace of A_cut' A_twin per loop: 3 if it closes, -1 if its ends are half a turn apart.
 
         The axial vector of A_cut' A_twin is zero in both cases. A loop whose cut joint is not tied
         is left out: there the angle is a sum of other angles, and the orientations always agree.
@@ -118,16 +118,16 @@ class LoopSystem:
         return np.stack([np.broadcast_to(x, q.shape[:-1]) for x in values], axis=-1)
 
     def residual_floats(self, q: Array) -> Array:
-        """Evaluate the residual r at q, shape (..., m)."""
+        """Evaluate the closure residual r at q, shape (..., m)."""
         return self.floats(self.residual, q)
 
     def jacobian_floats(self, q: Array) -> Array:
-        """Evaluate the Jacobian J at q, shape (..., m, n + m)."""
+        """Evaluate the Jacobian J = dr/dq at q, shape (..., m, n + m)."""
         J = self.floats([x for row in self.jacobian for x in row], q)
         return J.reshape(*q.shape[:-1], len(self.equations), -1)
 
     def closed(self, q: Array, *, steps: int, tolerance: float) -> Array:
-        """Return q with the tied joints changed so that the loops close, by Newton's method.
+        """Return q with the dependent joints moved so that the loops close, by Newton's method.
 
         The tied joints start from their positions in q. The loops may stay open if the method
         fails.
@@ -135,9 +135,10 @@ class LoopSystem:
         return newton(self.residual_floats, q, self.tied, steps=steps, tolerance=tolerance)
 
     def mode(self) -> float:
-        """Return the sign of det J_u at the start configuration; J_u is dr/dq of the tied joints.
+        """Return the sign of det(dr/dq_tied) at the start, which identifies the assembly mode.
 
-        It stays the same until the mechanism passes a dead point, hence within one assembly mode.
+        r are the closure residuals, q_tied the joints that they determine. The sign stays the same
+        until the mechanism passes a dead point, hence within one assembly mode.
         """
         return float(np.sign(np.linalg.det(self.jacobian_floats(self.start)[:, self.tied])))
 
@@ -153,7 +154,7 @@ class LoopSystem:
         return 1e-13 if self.robot.longest > IN_METRES else 1e-16
 
     def pace(self) -> float:
-        """Return a step size of the actuated joints for which no tied joint moves far.
+        """Return a step size of the actuated joints in which no passive joint moves far.
 
         It is computed from the rates at the start configuration (PACE); in rad, or as a fraction of
         the longest length if prismatic.
@@ -165,7 +166,7 @@ class LoopSystem:
         return float(min(PACE[0], PACE[1] / np.abs(G).max()))
 
     def turn(self) -> tuple[int, ...] | None:
-        """Return the whole turns of each tied joint during one full turn of the actuated joint.
+        """Return how many turns each tied (dependent) joint makes per turn of the actuated joint.
 
         None if the actuated joint cannot turn fully, is prismatic, or is not the only one.
         """
@@ -188,7 +189,7 @@ class LoopSystem:
 
 @lru_cache(maxsize=64)
 def loop_system(robot: Robot) -> LoopSystem:
-    """Choose the closure equations that determine the tied joints best at the start configuration.
+    """Choose the closure equations that determine the dependent joints best at the start.
 
     The method is a pivoted elimination of the Jacobian of the tied joints: one equation per joint.
     """

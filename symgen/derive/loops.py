@@ -1,4 +1,4 @@
-"""Relations of the passive joints in closed loops: declared relations, and proved linear ones.
+"""Relations between passive and independent joints of closed loops: declared, or linear and proved.
 
 Loop: frame `cut` (one branch) and frame `twin` (sigma 2, other branch) coincide, 0T_cut = 0T_twin.
 At a closed configuration the passive rates are G = -J_u^+ J_a. If G has the same whole numbers
@@ -61,7 +61,7 @@ def close(robot: Robot) -> Closure:
 
 
 def find_relations(robot: Robot) -> Closure:
-    """Find the closure of a robot with passive joints from its closed configurations.
+    """Find the relations of the passive joints from configurations that close the loops.
 
     The closure is linear if one of the configurations shows linear relations, else general.
     """
@@ -70,8 +70,8 @@ def find_relations(robot: Robot) -> Closure:
     for j in assembly.unknown:
         if j not in in_loops:
             raise DescriptionError(
-                f"passive joint {j} has no relation: it is in no loop; declare q{j} under "
-                "constraints or set mu: 1",
+                f"passive joint {j} is in no loop, so no equation gives its position; declare q{j} "
+                "under constraints or set mu: 1",
                 path=("frames", j, "mu"),
                 file=robot.file or None,
             )
@@ -112,7 +112,7 @@ def _configurations(assembly: Assembly) -> Iterator[Array]:
 
 
 def _nearest(assembly: Assembly, wanted: Mapping[int, float]) -> Array | None:
-    """Return the closed configuration nearest to `start`, or None if no configuration closes.
+    """Return the configuration nearest to `start` that closes the loops, or None if none is found.
 
     Joints that are not in `start` begin at several positions. Passive joints in `start` begin near
     it. Whole turns of a hinge do not count as a distance.
@@ -164,7 +164,7 @@ def _general(assembly: Assembly, q: Array) -> Closure:
 def _angle_sum(
     assembly: Assembly, loop: Loop, configuration: Mapping[int, float]
 ) -> dict[int, Expression] | None:
-    """Return {j: n_j} with q_cut = sum n_j q_j + c if the loop is planar, else None.
+    """Return the multiples {j: n_j} in q_cut = sum n_j q_j + c for a planar loop, else None.
 
     In a planar loop all hinges have parallel axes, in equal or opposite directions, with or without
     prismatic joints between them. The axes are compared in two configurations of the open tree;
@@ -191,7 +191,7 @@ def _angle_sum(
 
 
 def _linear(assembly: Assembly, q: Array) -> Closure | None:
-    """Return linear relations for all passive joints, or None if the loops are not linear.
+    """Return linear relations for all passive joints, or None if there are no such relations.
 
     The rates of the passive joints must be constant whole numbers near configuration q, the
     constants must be sums of fixed angles or lengths, and the relations must be proved over F_p.
@@ -218,7 +218,7 @@ def _linear(assembly: Assembly, q: Array) -> Closure | None:
 def _closure(
     assembly: Assembly, relations: Mapping[int, Relation], start: Mapping[int, float]
 ) -> Closure:
-    """Combine the found and the declared joint relations to a closure of the robot.
+    """Combine the found and the declared joint relations into one `Closure` of the robot.
 
     Passive joints without a relation are tied: only the closure equations give them.
     """
@@ -241,7 +241,8 @@ def _closure(
 
 
 def _samples(assembly: Assembly, q: Array) -> list[Sample]:
-    """Return the constants of the file and changed constants, each with a closed configuration.
+    """Return the constants of the file, and slightly changed constants, each set with a
+    configuration that closes the loops.
 
     At the changed constants, equal values of different symbols differ. The list is empty if the
     loops do not close there, and has only the constants of the file if an expression has no value
@@ -265,7 +266,7 @@ def _samples(assembly: Assembly, q: Array) -> list[Sample]:
 def _offset(
     assembly: Assembly, samples: list[Sample], j: int, row: Mapping[int, Expression]
 ) -> Expression | None:
-    """Find the constant c of q_j = sum n_i q_i + c as an expression, or None.
+    """Find an expression for the constant c of q_j = sum n_i q_i + c, or return None.
 
     Constants that the frames add to q_j and q_i in theta or r enter c with their factors. The rest
     of c is a sum of other fixed angles of the loops and quarter turns, or of lengths.
@@ -296,14 +297,14 @@ def _offset(
 
 
 def _beside(robot: Robot, row: Mapping[int, Expression]) -> Expression:
-    """Return sum n_i c_i, where c_i is the constant that frame i adds to q_i in theta or r."""
+    """Return sum n_i c_i, where c_i is the constant theta or r that frame i adds to q_i."""
     frames = {i: robot.frame(i) for i in row}
     terms = ((f.theta0 if f.sigma == REVOLUTE else f.r0) * row[i] for i, f in frames.items())
     return sum(terms, ZERO)
 
 
 def _fixed(assembly: Assembly, hinge: bool) -> list[Expression]:
-    """Return the fixed angles, or lengths, of which the constant of a relation may be a sum.
+    """Return the candidate terms for the constant of a joint relation: fixed angles, or lengths.
 
     They are from the frames of the loops and from the declared relations: without quarter turns,
     each once up to sign. Constants added to a joint position are left out.
@@ -326,7 +327,8 @@ def _fixed(assembly: Assembly, hinge: bool) -> list[Expression]:
 
 
 def _coincide(closure: Closure) -> bool:
-    """Whether cut and twin frames coincide over F_p for random lengths and joint positions.
+    """Whether the two frames at the cut joint of each loop coincide, tested with random lengths and
+    positions modulo a prime p.
 
     This is the proof of the relations in `closure`.
     """
@@ -341,11 +343,11 @@ def _coincide(closure: Closure) -> bool:
 def _wrong_mobility(robot: Robot, freedoms: int, left: int) -> DescriptionError:
     expected = len(robot.joints)
     what = (
-        "over-constrained or has too many actuators; joints without a motor have mu: 0"
+        "over-constrained or has too many actuators; set mu: 0 for each joint without a motor"
         if freedoms < expected
-        else "under-constrained or lacks actuators (mu: 1) or relations"
+        else "under-constrained; set mu: 1 for more joints, or add relations under constraints"
     )
-    held = f"; with them held, {left} freedoms are left" if left else ""
+    held = f"; if these joints are held, {left} freedoms remain" if left else ""
     return DescriptionError(
         f"mobility is {freedoms}, but {expected} joints are actuated ({list(robot.joints)}){held}; "
         f"the mechanism is {what}",
@@ -355,7 +357,7 @@ def _wrong_mobility(robot: Robot, freedoms: int, left: int) -> DescriptionError:
 
 
 def _cannot_close(assembly: Assembly) -> DescriptionError:
-    """Return the error that says why no configuration closes: relations, actuators or frames."""
+    """Return an error that says why the loops cannot close: relations, actuators or frames."""
     robot = assembly.robot
     in_loops = {j for loop in robot.loops for k in (loop.cut, loop.twin) for j in robot.path(k)}
     declared = {j: e for j, e in robot.constraints.items() if j in in_loops}
@@ -373,9 +375,9 @@ def _cannot_close(assembly: Assembly) -> DescriptionError:
     if gap < CLOSED:
         return _wrong_mobility(robot, *assembly.mobility(q))
     return DescriptionError(
-        f"frame {loop.cut} (cut) and frame {loop.twin} (twin) cannot coincide{also}; they come as "
-        f"close as {gap:.3g} (positions per longest link); check the lengths, alpha, theta and the "
-        "row of the twin",
+        f"frame {loop.cut} (cut) and frame {loop.twin} (twin) cannot coincide{also}; their "
+        f"smallest difference is {gap:.3g} (positions divided by the longest link); check the lengths, "
+        f"alpha, theta and the table row of frame {loop.twin}",
         path=("loops", robot.loops.index(loop)),
         file=robot.file or None,
     )
@@ -384,7 +386,7 @@ def _cannot_close(assembly: Assembly) -> DescriptionError:
 def _contradiction(
     assembly: Assembly, declared: Mapping[int, Expression], closure: Closure
 ) -> DescriptionError:
-    """Return the error for declared relations that contradict the closure of the loops.
+    """Return an error for joint relations of the file with which the loops cannot close.
 
     It gives both forms of each such relation, and how far the loop is open with the declared ones.
     """
@@ -399,15 +401,15 @@ def _contradiction(
             sides.append(f"q{j}: declared {e}, the closure gives {closure.formula(j)}")
     loop, gap = assembly.widest(np.array([closure.start[j] for j in assembly.free]))
     return DescriptionError(
-        f"declared relations contradict the closure; {'; '.join(sides)}; with the declared ones "
-        f"frame {loop.cut} (cut) and frame {loop.twin} (twin) are {gap:.3g} apart (positions per "
-        "longest link)",
+        f"declared relations contradict the closure; {'; '.join(sides)}; with the declared relations "
+        f"frame {loop.cut} (cut) and frame {loop.twin} (twin) are {gap:.3g} apart (positions divided "
+        "by the longest link); correct or remove these relations under constraints",
         path=("constraints", f"q{min(declared)}"),
     )
 
 
 def _same(closure: Closure, j: int, row: Mapping[int, Expression], c: Expression) -> bool:
-    """Whether q_j = row q + c is the relation of joint j in the closure, up to whole turns."""
+    """Whether q_j = row q + c equals the relation of joint j in `closure`, up to whole turns."""
     apart = (c - closure.offset[j]).value(closure.robot.constants)
     if closure.robot.frame(j).sigma == REVOLUTE:
         apart -= 2 * np.pi * round(apart / (2 * np.pi))

@@ -45,7 +45,7 @@ class Request:
 
 @dataclass(frozen=True)
 class Entry:
-    """One entry of a model: its index in the array, its value, its heading and its comment."""
+    """One entry of a model array, such as A or Gamma: its index, value, heading and comment."""
 
     place: Place
     value: Scalar | int
@@ -55,7 +55,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Case:
-    """Entries of a model that share the same replaced inputs, for instance one column of A.
+    """Entries of a model that are derived with the same inputs replaced, for instance qdd = 0.
 
     `tag` ends the names of the intermediate variables that these replaced inputs change.
     """

@@ -47,7 +47,8 @@ def _still(d: Derivation, *kinds: str, tied: bool = True) -> dict[Symbol, Input]
 def _without(
     d: Derivation, kept: Callable[[Element], bool], links: bool = True
 ) -> dict[Symbol, Input]:
-    """Return replacements that set parameters to zero: those of elements that are not `kept`.
+    """Return replacements that set to zero the parameters of all elements (friction, springs, ...)
+    for which `kept` is false.
 
     The inertial parameters are zero too if `links` is false.
     """
@@ -94,7 +95,7 @@ def _inertia_matrix(d: Derivation, r: Request) -> Iterator[Case]:
 
 
 def _unit_accelerations(d: Derivation, r: Request) -> Iterator[Case]:
-    """Yield the columns of A: column i is Gamma from rest, without gravity, for qdd_i = 1.
+    """Yield the columns of A: column i is Gamma for qdd_i = 1, from rest and without gravity.
 
     A tied passive joint then has the acceleration G = dq_u/dq_i.
     """
@@ -111,8 +112,8 @@ def _require_closed_form(d: Derivation) -> None:
     if d.closure.tied:
         tied = ", ".join(f"q{u}" for u in d.closure.tied)
         raise SymgenError(
-            f"C(q, qd) of {d.robot.name} has no closed form in its actuated joints while {tied} "
-            "are symbols; bias has C qd + Q + friction, with the passive joints as symbols"
+            f"C(q, qd) of {d.robot.name} has no closed form in the actuated joints, because the passive "
+            f"joints {tied} are symbols; the model bias has C qd + Q + friction with these symbols"
         )
 
 
@@ -141,7 +142,7 @@ def _by_column(d: Derivation, r: Request, columns: Columns) -> list[Entry]:
 
 
 def _momentum_regressor(d: Derivation, r: Request) -> Iterator[Case]:
-    """Yield the regressor of p = A qd: Gamma from rest, without gravity, for qdd = qd."""
+    """Yield the regressor of p = A qd, equal to Gamma for qdd = qd at rest without gravity."""
     elements = element_names(d.robot)
     moved = {
         own: {} if own in elements and elements[own][0].kind != "inertia" else d.columns[own]
@@ -241,7 +242,7 @@ def _jacobian_rate(d: Derivation, r: Request) -> Iterator[Case]:
 
 def _closure(d: Derivation, r: Request) -> Iterator[Case]:
     if not d.closure.tied:
-        why = "its passive joints are functions of the others; passive=symbols keeps them"
+        why = "its passive joints are functions of the actuated joints; use passive=symbols to keep the passive joints as symbols"
         raise SymgenError(
             f"{d.robot.name} has no closure equations to solve: "
             f"{why if d.robot.passive else 'it has no passive joints'}"

@@ -50,7 +50,7 @@ def numbered(robot: Robot) -> Robot:
 
 
 def keep_rationals(e: Expression) -> Expression:
-    """Replace the rational coefficients of a polynomial by symbols that have these values.
+    """Replace each rational coefficient of a polynomial by a symbol that has the same value.
 
     Coefficients inside square roots and inverses are replaced too. Whole numbers up to
     LARGEST_WHOLE stay numbers.
@@ -99,5 +99,7 @@ def _atom(c: Fraction) -> Expression:
 
 
 def numbers_of(robot: Robot) -> tuple[Number, ...]:
-    """Return the number symbols in lengths, gravity, relations and element rows, each once."""
+    """Return the symbols that stand for numbers in the lengths, gravity, joint relations and
+    elements (friction, springs, ...) of a robot, each once.
+    """
     return tuple(dict.fromkeys(a for a in atoms_of(robot) if isinstance(a, Number)))

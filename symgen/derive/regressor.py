@@ -48,7 +48,7 @@ def element_names(robot: Robot) -> dict[str, tuple[Element, int]]:
 
 
 def acting(e: Element, j: int) -> dict[Any, Expression]:
-    """Return the coefficients with which parameter j of an element acts on the joints.
+    """Return the coefficients with which an element parameter, such as FV2, acts on the joints.
 
     They are its row {joint: G}, or its form {(i, k): B} with i <= k.
     """
@@ -84,13 +84,15 @@ def columns(motion: Motion, names: Iterable[str]) -> dict[str, dict[int, Scalar]
 
 
 def unit_wrench(m: LinkMotion, parameter: str) -> tuple[Vector, Vector]:
-    """Return the force F and moment N that move a link with the only parameter `parameter` = 1."""
+    """Return the force F and moment N that move a link whose inertial parameter `parameter` is 1
+    and all others 0.
+    """
     K = dict.fromkeys(INERTIAL, 0) | {parameter: 1}
     return force(m, K), moment(m, K)
 
 
 class Axes:
-    """The axis of every joint i, and the velocity of every link j per unit rate of joint i.
+    """Axes of joints i in frames j, and velocities of the origins O_j per unit rate of joint i.
 
     z_ij is the axis of joint i in frame j, v_ij the velocity of origin O_j per unit rate of joint
     i.
@@ -126,7 +128,7 @@ class Axes:
             self.z[j, j], self.v[j, j] = (E3, ZERO3) if frame.sigma == REVOLUTE else (ZERO3, E3)
 
     def column(self, parameter: str, j: int) -> dict[int, Scalar]:
-        """Return the torques {i: D_ik} of an inertial parameter of link j that is set to 1.
+        """Return the joint torques {i: D_ik} of link j if its `parameter` is 1 and all others 0.
 
         The joints i are the moving joints between the base and link j.
         """

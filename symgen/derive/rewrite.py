@@ -1,4 +1,4 @@
-"""Graphs of single models, copied from the derivation with some inputs replaced.
+"""Graph of one model, copied from the graph of the derivation with some inputs replaced.
 
 Every model is the recursion with some inputs set. The bias is Gamma at qdd = 0. A column of the
 inertia matrix is Gamma of a unit acceleration at qd = 0 without gravity. Base parameters replace
@@ -45,7 +45,7 @@ Inputs = Mapping[Symbol, Input]
 
 
 class ByNode(Draw):
-    """Random values over F_p in which the sign of each velocity is independent of all others.
+    """Random values modulo a prime p, with the sign of each velocity independent of all others.
 
     sign(K qd) is not treated as sign(qd), since K may be negative.
     """
@@ -55,7 +55,7 @@ class ByNode(Draw):
 
 
 class Rewrite:
-    """A new graph, `algebra`, to which values of a derivation are copied with replaced inputs.
+    """A new graph, `algebra`, to which nodes of a derivation are copied with some inputs replaced.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ class Rewrite:
         return a + b
 
     def _is_given(self, node: Node) -> bool:
-        """Whether a joint position in the angle of a cosine or sine is replaced."""
+        """Whether the angle of a cosine or sine contains a joint position that is replaced."""
         return node.value is not None and any(
             Symbol("q", f"q{j}") in self.inputs for j, _ in node.value.turn
         )
@@ -190,7 +190,7 @@ class Rewrite:
     # --- values over F_p ---
 
     def _merged(self, image: Scalar) -> Scalar | int:
-        """Return an earlier number or node with the same value, or else the new node `image`."""
+        """Return an earlier node, or a number, that equals the new node `image`, else `image`."""
         node = image.node
         if node.index not in self._same:
             self._same[node.index] = self._first_of(node)

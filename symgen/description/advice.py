@@ -16,14 +16,14 @@ FULL_TURN = 2 * math.pi  # rad: a larger constant in an angle, pi aside, was mea
 _YAML = {  # what the scanner says: what to change
     "'\\t'": "there is a tab here; indent with spaces",
     "mapping values are not allowed here": (
-        "a second `: ` on this line; put text that holds one between quotes"
+        "a second `: ` on this line; put text that contains `: ` between quotes"
     ),
     "but found '<block mapping start>'": (
-        "this line is indented otherwise than those above it; "
-        "give rows of one table the same indent"
+        "this line has another indent than the lines above; "
+        "give all rows of one table the same indent"
     ),
     "<block end>, ": (
-        "the lines above are a list (-) or are indented otherwise; write every row as `1: {...}`, "
+        "the lines above are a list (-) or have another indent; write every row as `1: {...}`, "
         "with the same indent"
     ),
     "found another document": "a second document starts here; a robot file holds one",
@@ -34,7 +34,7 @@ _YAML = {  # what the scanner says: what to change
 
 
 def yaml_advice(problem: str) -> str:
-    """Return a hint for an error message `problem` of the YAML parser, for instance on a tab."""
+    """Return a hint for an error message of the YAML parser, for instance about a tab."""
     return next((f"; {advice}" for part, advice in _YAML.items() if part in problem), "")
 
 
@@ -49,7 +49,7 @@ def symbol_advice(name: str, declared: Iterable[str]) -> str:
 
 
 def unit_advice(token: str) -> str:
-    """Return a hint for the unexpected text `token`: a unit such as deg or mm, or ^ for a power."""
+    """Return a hint if `token` in an expression is a unit, such as deg, or the power sign ^."""
     unit = token.lower()
     if unit in ("deg", "degree", "degrees", "°", "grad"):
         return "; angles are in rad: 90 degrees are pi/2"

@@ -57,10 +57,10 @@ class Angles:
         return None if self.exact else k
 
     def report(self, file: str) -> tuple[str, tuple[str, ...]]:
-        """Return a text and notes on how angles near multiples of pi/12 were read.
+        """Describe how the angles near multiples of pi/12 were read, for headers and for users.
 
-        The text is for file headers. If angles were rounded, a note names the largest change, and
-        an AngleWarning is issued. Both results are empty if the file has no such angle.
+        Return a text for file headers, and notes. If angles were rounded, a note names the largest
+        change, and an AngleWarning is issued. Both results are empty if the file has no such angle.
         """
         if not self.near:
             return "", ()

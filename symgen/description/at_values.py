@@ -1,6 +1,6 @@
-"""Robots with numbers in place of symbolic constants, for special geometries.
+"""Replace the symbolic constants of a robot, such as lengths and angles, by their numbers.
 
-At such geometries the formulas of the general robot do not hold.
+If these numbers make the geometry special, the formulas of the general robot do not hold.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ WITHIN = 1e-6  # rad, of a multiple of pi/12: rounding of 1.570796
 
 
 def at_values(robot: Robot, values: Mapping[str, Expression] | None = None) -> Robot:
-    """Replace the constants of `robot` by their numbers, or some constants by given expressions.
+    """Replace all constants of `robot` by their numbers, or those in `values` by given expressions.
 
     Decimals are exact. An angle near a multiple of pi/12 becomes this multiple if `values` is left
     out.
@@ -70,7 +70,7 @@ def round_angle(e: Expression) -> Expression:
 
 
 def substituted(e: Expression, values: Mapping[str, Expression]) -> Expression:
-    """Replace the symbols of `e` by the expressions in `values`.
+    """Replace the symbols of the expression `e` by the expressions in `values`.
 
     Raises DescriptionError if `e` has no finite real value there.
     """

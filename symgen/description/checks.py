@@ -1,4 +1,4 @@
-"""Checks that the frames, elements and loops of a robot file describe a valid mechanism.
+"""Checks that frames, elements on the joints, and loops of a robot file make a valid mechanism.
 
 Each check raises DescriptionError with the path of the wrong field, for instance frames.2.alpha.
 """
@@ -42,8 +42,8 @@ def check_robot(robot: Any) -> None:
     check_names(robot)
     if not robot.parameters:
         raise DescriptionError(
-            "no parameters: every link is massless and no element acts on a joint; take links out "
-            "of massless, or add elements",
+            "the robot has no parameters: every link is massless and no element acts on a joint; "
+            "remove links from the list massless, or add elements",
             path=("massless",),
         )
     _check_geometry(robot)
@@ -69,7 +69,7 @@ def _check_tree(frames: Sequence[Frame], massless: Collection[int]) -> None:
     """
     numbers = [f.j for f in frames]
     if not numbers:
-        raise DescriptionError("no frames; a robot has at least frame 1", path=("frames",))
+        raise DescriptionError("the robot has no frames; add at least frame 1", path=("frames",))
     for k, j in enumerate(numbers, start=1):
         if j != k:
             what = (
@@ -239,7 +239,7 @@ def _other_sigma(f: Frame) -> str:
 
 
 def _check_element(e: Element, robot: Any) -> None:
-    """Check one element: its kind, law, unit, direction of motion and coefficients."""
+    """Check an element, such as friction: kind, law, unit, direction of motion, coefficients."""
     where: Path = ("elements", e.family)
     both = sorted(set(e.along) & set(e.form))
     laws = [law for law in (e.torque, e.energy) if law is not None]
@@ -265,7 +265,7 @@ def _check_element(e: Element, robot: Any) -> None:
         (
             e.when is not None
             and (e.when not in DIRECTIONS or e.kind not in KINDS or not KINDS[e.kind].when),
-            f"when {e.when!r}; viscous and coulomb elements take positive or negative",
+            f"when {e.when!r}; expected positive or negative, only for viscous and coulomb elements",
             "when",
         ),
         (not e.along and not e.form, "it acts on no joint; give `along` or `form`", ""),
@@ -279,7 +279,7 @@ def _check_element(e: Element, robot: Any) -> None:
             "`when` needs a direction of motion; use `along` instead of `form`",
             "when",
         ),
-        (both, f"keys {both} in both along and form", "form"),
+        (both, f"keys {both} are in both along and form; keep each key in one of the two", "form"),
     )
     for wrong, message, key in problems:
         if wrong:
@@ -294,7 +294,10 @@ def _check_element(e: Element, robot: Any) -> None:
         for j, coefficients in table.items():
             place = (*where, part, j)
             if not 0 < j <= len(robot.frames):
-                raise DescriptionError(f"element {e.family}: frame {j} does not exist", path=place)
+                raise DescriptionError(
+                    f"element {e.family}: frame {j} does not exist; frames are 1 to {len(robot.frames)}",
+                    path=place,
+                )
             for index, c in coefficients.items():
                 for i in (index,) if isinstance(index, int) else index:
                     if i not in robot.moving:
@@ -305,7 +308,10 @@ def _check_element(e: Element, robot: Any) -> None:
                         )
                 _check_expression(c, place, robot.constants)
             if not any(coefficients.values()):
-                raise DescriptionError(f"element {e.family}{j}: zero along every joint", path=place)
+                raise DescriptionError(
+                    f"element {e.family}{j}: all coefficients are zero; give a joint a coefficient that is not zero",
+                    path=place,
+                )
     if e.is_own and (not own or laws):
         check_law(e, robot)
 
@@ -322,18 +328,19 @@ def _check_loops(robot: Any) -> None:
         for name, j in (("cut", loop.cut), ("twin", loop.twin)):
             if j not in numbers:
                 raise DescriptionError(
-                    f"loop {k + 1}: {name} frame {j} does not exist", path=(*where, name)
+                    f"loop {k + 1}: {name} frame {j} does not exist; frames are 1 to {len(numbers)}",
+                    path=(*where, name),
                 )
         cut, twin = robot.frame(loop.cut), robot.frame(loop.twin)
         if twin.sigma != FIXED:
             raise DescriptionError(
                 f"loop {k + 1}: twin frame {loop.twin} has sigma {twin.sigma}; expected 2 (fixed "
-                f"on its link){'; cut and twin are exchanged' if cut.sigma == FIXED else ''}",
+                f"on its link){'; exchange cut and twin' if cut.sigma == FIXED else ''}",
                 path=(*where, "twin"),
             )
         if cut.mu:
             raise DescriptionError(
-                f"loop {k + 1}: cut joint {loop.cut} is actuated; cut a passive joint (mu: 0)",
+                f"loop {k + 1}: cut joint {loop.cut} is actuated; cut the loop at a passive joint (mu: 0)",
                 path=(*where, "cut"),
             )
     passive = list(robot.passive)
@@ -341,14 +348,15 @@ def _check_loops(robot: Any) -> None:
         place = ("constraints", f"q{j}")
         if j not in passive:
             raise DescriptionError(
-                f"constraint on q{j}: not a passive joint (passive: {passive})", path=place
+                f"constraint on q{j}: joint {j} is not a passive joint (passive joints: {passive}); remove the constraint or set mu: 0",
+                path=place,
             )
         _check_declared(e, place, [*robot.constants, *(f"q{i}" for i in robot.moving)])
         _check_finite(e, place, robot.constants)
     if passive and not robot.loops and not robot.constraints:
         raise DescriptionError(
-            f"joints {passive} are passive but there is no loop and no constraint; set mu: 1 or "
-            "add one",
+            f"joints {passive} are passive but there is no loop and no constraint; set mu: 1, or "
+            "add a loop or a constraint",
             path=("frames", passive[0], "mu"),
         )
 
@@ -361,18 +369,19 @@ def _check_drives(robot: Any) -> None:
     shape = [len(row) for row in drives.ratio]
     if shape != [n] * n:
         raise DescriptionError(
-            f"drives: ratio has rows of {shape}; expected {n} rows of {n}, one per actuated joint",
+            f"drives: ratio has rows with {shape} numbers; expected {n} rows with {n} numbers, one row per actuated joint",
             path=("drives", "ratio"),
         )
     if determinant(drives.ratio) == 0:
         raise DescriptionError(
-            "drives: ratio is singular; motor positions must determine the joint positions",
+            "drives: ratio is singular; expected an invertible matrix, so that motor positions determine joint positions",
             path=("drives", "ratio"),
         )
     for name, row in (("offset", drives.offset), ("torque_constant", drives.torque_constant)):
         if row is not None and len(row) != n:
             raise DescriptionError(
-                f"drives: {name} has {len(row)} entries; expected {n}", path=("drives", name)
+                f"drives: {name} has {len(row)} entries; expected {n}, one per actuated joint",
+                path=("drives", name),
             )
 
 
@@ -382,8 +391,8 @@ def _check_limits(robot: Any) -> None:
     for name, row in robot.limits.items():
         if name not in ("q", "qd", "qdd", "tau") or len(row) != n:
             raise DescriptionError(
-                f"limits: {name} has {len(row)} entries; expected q, qd, qdd, tau with {n} numbers "
-                "each",
+                f"limits: {name} has {len(row)} entries; expected the keys q, qd, qdd, tau with {n} "
+                "entries each, one per actuated joint",
                 path=("limits", name),
             )
         for i, entry in enumerate(row):
@@ -391,18 +400,22 @@ def _check_limits(robot: Any) -> None:
             if not low < high and (name, entry) != ("tau", 0.0):
                 raise DescriptionError(
                     f"limits: {name} of joint {robot.joints[i]} is {entry}; expected lower < "
-                    "upper, or a positive number; tau of a joint without a motor is 0",
+                    "upper, or a positive number; for tau of a joint without a motor write 0",
                     path=("limits", name, i),
                 )
 
 
 def _meant(name: str, robot: Any) -> str:
-    """Suggest the parameter that was probably meant by an unknown name in a robot file."""
+    """Suggest the standard parameter that the user probably meant by an unknown name in a file."""
     if name.endswith("R") and name[:-1] in robot.parameters:
-        return f"; base parameters (...R) are not given, standard ones are: {name[:-1]}"
+        return f"; {name} is a base parameter; give the standard parameter {name[:-1]}"
     number = re.search(r"\d+\Z", name)
     j = int(number.group()) if number else 0
     if name.removesuffix(str(j)) in INERTIAL and 0 < j <= len(robot.frames):
-        return f"; frame {j} is massless or cut" if j not in robot.links else ""
+        return (
+            f"; link {j} has no inertial parameters, because it is massless or frame {j} is cut"
+            if j not in robot.links
+            else ""
+        )
     own = [p for p in robot.parameters if p.endswith(str(j))] if j else []
     return f"; expected names such as {', '.join(own or robot.parameters[:12])}"

@@ -39,7 +39,7 @@ def khalil_values(robot: Robot) -> dict[str, float]:
         if lost.any():
             row = enters[:, lost].any(axis=1) @ enters & ~known
             raise DescriptionError(
-                f"values of link {j} are given in the frame at the end of the link (convention: distal); to convert {', '.join(np.array(names)[lost])}, give {', '.join(np.array(names)[row])} too",
+                f"values of link {j} are given in the frame at the end of the link (convention: distal); to convert {', '.join(np.array(names)[lost])}, also give {', '.join(np.array(names)[row])}",
                 path=("values", names[int(np.argmax(lost))]),
             )
         x = np.array([values.pop(name, 0.0) for name in names])
@@ -50,7 +50,7 @@ def khalil_values(robot: Robot) -> dict[str, float]:
 
 
 def _transport(alpha: float, d: float) -> Array:
-    """Build the matrix (10, 10) that converts parameters of a link from its end to Khalil's frame.
+    """Build the matrix (10, 10) that converts link parameters from the end frame to Khalil's frame.
 
     The ten parameters are first given in the frame at the end of the link.
     """

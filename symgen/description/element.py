@@ -50,7 +50,7 @@ class LawScalar:
 
     @property
     def value(self) -> float:
-        """Value from which a fit starts: `start`, or the middle of the bounds."""
+        """Value of the constant before a fit of the law: `start`, or the middle of the bounds."""
         lower, upper = self.bounds
         middle = (lower * upper) ** 0.5 if lower > 0 else (lower + upper) / 2
         return middle if self.start is None else self.start
@@ -61,7 +61,7 @@ class LawScalar:
 
 
 def _scalars(table: Mapping[str, Any], declared: Any) -> dict[str, LawScalar]:
-    """Convert the scalars of a law to LawScalar objects; a plain number is a fixed scalar."""
+    """Convert the nonlinear constants of a law to LawScalar objects; a plain number is fixed."""
     return {
         name: x if isinstance(x, LawScalar) else LawScalar((float(x), float(x)))
         for name, x in table.items()
@@ -69,7 +69,7 @@ def _scalars(table: Mapping[str, Any], declared: Any) -> dict[str, LawScalar]:
 
 
 def _law(text: str | None, declared: Any) -> Expression | None:
-    """Parse the text of a law from a robot file; `check_law` later refuses unknown names."""
+    """Parse the text of a torque or energy law; `check_law` later refuses unknown names."""
     try:
         return None if text is None else parse(text, None, LAWS)
     except ExpressionError as error:
@@ -77,7 +77,7 @@ def _law(text: str | None, declared: Any) -> Expression | None:
 
 
 def _scalar(name: str, given: Any) -> LawScalar:
-    """Make a LawScalar from a default in the table KINDS: a fixed number, or bounds and a start."""
+    """Make a LawScalar from a default in KINDS: a fixed number, or bounds and a start value."""
     if not isinstance(given, Mapping):
         return LawScalar((float(given), float(given)))
     lower, upper = map(float, given["bounds"])
@@ -139,7 +139,7 @@ class Element:
 
     @property
     def scalars(self) -> dict[str, LawScalar]:
-        """Scalars of the law by name; values of the file replace the defaults of the kind."""
+        """Nonlinear constants of the law, by name: values of the file replace default values."""
         kind = KINDS.get(self.kind)
         return {name: _scalar(name, x) for name, x in (kind.fit if kind else {}).items()} | {
             **self.fit
@@ -147,10 +147,10 @@ class Element:
 
     @property
     def constants(self) -> dict[str, float]:
-        """Start values of the fitted scalars of the law, by scalar and frame, for instance vs3.
+        """Start values of the nonlinear constants to be fitted, by name, for instance vs3.
 
-        If the law depends on the transmitted torque, the mapping also has its name for each frame,
-        such as tau_model3, with the value 0.
+        The name vs3 means the constant vs for frame 3. If the law depends on the transmitted
+        torque, the mapping also has its name for each frame, such as tau_model3, with the value 0.
         """
         values = {name: x.value for name, x in self.scalars.items() if not x.fixed}
         if TRANSMITTED in (self.torque or KINDS.get(self.kind, KINDS["column"]).torque).symbols:
@@ -158,9 +158,10 @@ class Element:
         return {parameter(name, j): x for name, x in values.items() for j in self.keys}
 
     def _of_key(self, law: Expression, j: int) -> Expression:
-        """Replace fitted scalars in `law` by symbols of frame j (vs3 for vs), fixed by numbers.
+        """Replace fitted constants in `law` by symbols of frame j (vs3), fixed ones by numbers.
 
-        The transmitted torque tau_model becomes channel.tau_model3.
+        A constant to be fitted becomes a symbol (vs3 for vs), a fixed one a number. The transmitted
+        torque tau_model becomes channel.tau_model3.
         """
         torque = Expression.symbol(f"{CHANNEL}{parameter(TRANSMITTED, j)}")
         return law.substitute(
@@ -174,27 +175,27 @@ class Element:
         )
 
     def channels(self, j: int) -> list[str]:
-        """List the functions of time in the law for frame j, for instance T for channel.T."""
+        """List the functions of time (channels), such as temperature, in the law for frame j."""
         names = self.law(j).symbols if j in self.along else ()
         return sorted(name.removeprefix(CHANNEL) for name in names if name.startswith(CHANNEL))
 
     def law(self, j: int) -> Expression:
-        """Return the torque along s = G q for frame j and the parameter value 1.
+        """Return the law for frame j: the torque along s = G q for the parameter value 1.
 
         It is zero if the law is an energy.
         """
         return self._of_key(self.torque or KINDS[self.kind].torque, j)
 
     def potential(self, j: int) -> Expression:
-        """Return the energy for frame j and the parameter value 1; zero if the law is a torque."""
+        """Return the energy for frame j and the parameter value 1; zero if there is none."""
         return self._of_key(self.energy or ZERO, j)
 
     def laws(self, j: int) -> tuple[Expression, dict[int, Expression]]:
-        """Return the torques for frame j and the parameter value 1: along s, and at joints in U.
+        """Return the torque of the element along s = G q, and its torques at single joints.
 
-        U is the energy. With the torque x along s = G q, Gamma = G' x + dU/dq_i. The torque x
-        includes the derivative of U with respect to s. The second result maps each joint i that U
-        names to dU/dq_i.
+        They are those for frame j and the parameter value 1. With the torque x along s and the
+        energy U, Gamma = G' x + dU/dq_i. The torque x includes the derivative of U with respect to
+        s. The second result maps each joint i that U names to dU/dq_i.
         """
         law, U = self.law(j), self.potential(j)
         joints = sorted(int(match[2]) for n in U.symbols if (match := STATE.match(n)) and match[2])
@@ -202,7 +203,7 @@ class Element:
 
     @property
     def is_own(self) -> bool:
-        """Whether the law is special: no inertia, viscous or Coulomb friction, offset or spring."""
+        """Whether the law is none of inertia, viscous or Coulomb friction, offset and spring."""
         return (
             bool(self.torque or self.energy or self.scalars)
             or self.kind not in USUAL_KINDS.values()
@@ -223,7 +224,7 @@ class Element:
 
     @property
     def is_friction(self) -> bool:
-        """Whether the torque depends on joint velocities."""
+        """Whether the torque of the element depends on joint velocities."""
         return any((match := STATE.match(name)) and match[1] == "qd" for name in self.symbols)
 
     @property
@@ -233,7 +234,10 @@ class Element:
 
 
 def check_law(e: Element, robot: Any) -> None:
-    """Check that a law uses only known names and scalars, and is finite at rest and in motion."""
+    """Check that the law of an element has only known names and gives finite torques.
+
+    The torques are computed at rest and in motion.
+    """
     where: Path = ("elements", e.family)
     states = [f"{state}{j}" for state in ("q", "qd") for j in ("", *robot.moving)]
     for name, x in e.scalars.items():
@@ -241,7 +245,7 @@ def check_law(e: Element, robot: Any) -> None:
         if not lower <= x.value <= upper or not 1 <= x.grid <= 50:
             raise DescriptionError(
                 f"{e.family}: fit.{name}: start {x.value:g}, bounds [{lower:g}, {upper:g}], grid "
-                f"{x.grid}; expected the start within the bounds and 1 to 50 starts",
+                f"{x.grid}; expected a start within the bounds and a grid of 1 to 50 starts",
                 path=(*where, "fit", name),
             )
     law = e.energy if e.energy is not None else e.torque
@@ -251,7 +255,8 @@ def check_law(e: Element, robot: Any) -> None:
     for name in e.scalars:
         if name not in law.symbols or name in states:
             raise DescriptionError(
-                f"{e.family}: fit.{name} is no scalar of {law}", path=(*where, "fit", name)
+                f"{e.family}: fit.{name}: the law {law} has no constant {name} to fit; use {name} in the law or remove fit.{name}",
+                path=(*where, "fit", name),
             )
     channels = {f"{CHANNEL}{name}": x for name, x in robot.constants.items()}
     declared = [*states, *e.scalars, *robot.constants, *channels, TRANSMITTED]
@@ -261,16 +266,17 @@ def check_law(e: Element, robot: Any) -> None:
     for j in e.keys if TRANSMITTED in law.symbols else ():
         if e.along.get(j) != {j: ONE} or j not in robot.joints:
             raise DescriptionError(
-                f"{e.family}{j}: {TRANSMITTED} is the torque at one actuated joint; expected "
-                f"`along: {j}` of a joint among {list(robot.joints)}",
+                f"{e.family}{j}: a law with {TRANSMITTED} acts on one actuated joint; expected "
+                f"`along: j` with j one of {list(robot.joints)}",
                 path=(*where, "along", j),
             )
     if unknown := sorted(law.symbols - {*declared}):
         raise DescriptionError(
-            f"{e.family}: {key}: {unknown[0]!r} is unknown there; expected q, qd, q1, qd1 ... of "
-            f"the joints{' (an energy: positions only)' * bool(e.energy)}, scalars of `fit`, "
-            f"constants ({', '.join(robot.constants) or 'none'}), {TRANSMITTED}, and {CHANNEL} "
-            "before a constant that the record gives",
+            f"{e.family}: {key}: {unknown[0]!r} is unknown in this law; expected q, qd, q1, qd1 ... "
+            f"of the joints{' (in an energy: positions only)' * bool(e.energy)}, constants of the law "
+            "given under `fit`, constants of the robot file "
+            f"({', '.join(robot.constants) or 'none'}), {TRANSMITTED}, or {CHANNEL}NAME for a constant "
+            "NAME whose values the record has",
             path=(*where, key),
         )
     for j in e.along:
@@ -287,7 +293,7 @@ def check_law(e: Element, robot: Any) -> None:
             if not finite:
                 raise DescriptionError(
                     f"{e.family}: {law} is not finite at q = {position:g}, qd = {speed:g} with the "
-                    f"constants of the file; a law is finite at rest and in motion{reason}",
+                    f"constants of the robot file{reason}; write a law that is finite at rest and in motion",
                     path=(*where, key),
                 )
 
@@ -305,7 +311,7 @@ def _positions(robot: Any, row: Any) -> tuple[float, float]:
 
 
 def check_channels(robot: Any) -> None:
-    """Check that a constant that varies with time (a channel) occurs only in laws."""
+    """Check that a constant used as a function of time (a channel) is not also used as a number."""
     of_frames = [
         getattr(f, name)
         for f in robot.frames
@@ -317,7 +323,7 @@ def check_channels(robot: Any) -> None:
     for name in robot.channels:
         if name in laws or any(name in x.symbols for x in every):
             raise DescriptionError(
-                f"{name} is used as a constant, but {CHANNEL}{name} is a function of time; write "
-                f"{CHANNEL}{name} in every law, and give the constant another name",
+                f"{name} is used as a constant and as the measured quantity {CHANNEL}{name}; write "
+                f"{CHANNEL}{name} in every law, and use a constant with another name elsewhere",
                 path=("constants", name),
             )

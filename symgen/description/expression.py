@@ -135,8 +135,8 @@ class Expression:
         other = Expression.of(other)
         if len(self.terms) * len(other.terms) > MOST_PRODUCTS:
             raise DescriptionError(
-                f"expressions of {len(self.terms)} and {len(other.terms)} terms are multiplied, more "
-                f"than {MOST_PRODUCTS:,} products; name a long sum as one constant"
+                f"the product of expressions with {len(self.terms)} and {len(other.terms)} terms has more "
+                f"than {MOST_PRODUCTS:,} terms; replace a long sum by one constant"
             )
         for m1, c1 in self.terms.items():
             for m2, c2 in other.terms.items():
@@ -162,7 +162,7 @@ class Expression:
         return result
 
     def inverse(self) -> Expression:
-        """Return 1/e: a product is inverted factor by factor, a sum becomes the function inv(e)."""
+        """Return 1/e for this expression e: factor by factor for a product, inv(e) for a sum."""
         if not self.terms:
             raise ZeroDivisionError
         if len(self.terms) == 1:
@@ -259,7 +259,7 @@ class Expression:
                     rest = rest * _atom(b) ** l
                 result = result + rest * _slope(a, name)
                 if len(result.terms) > LONGEST_SLOPE:
-                    raise ValueError(f"a derivative of more than {LONGEST_SLOPE} terms")
+                    raise ValueError(f"a derivative has more than {LONGEST_SLOPE} terms")
         return result
 
     def evaluate(
@@ -269,7 +269,7 @@ class Expression:
         number: Callable[[Fraction], Any],
         written: Callable[[Number], Any] | None = None,
     ) -> Any:
-        """Evaluate the expression in any type of scalar, for instance floats or CasADi symbols.
+        """Evaluate the expression with numbers of any type, for instance floats or CasADi symbols.
 
         The arguments convert the parts of the expression: `value` a symbol or pi, `function` a
         function given its name and its operands, `number` a rational, and `written` a Number (by
@@ -504,7 +504,9 @@ def _slope(a: Atom, name: str) -> Expression:
     inner = x.derivative(name)
     if a.exponent is not None:
         if name in a.exponent.symbols:
-            raise ValueError(f"{a}: {name} in an exponent has no derivative here; use exp")
+            raise ValueError(
+                f"{a}: {name} in an exponent has no derivative; write the power with exp"
+            )
         return a.exponent * power(x, a.exponent - ONE) * inner
     return FUNCTIONS[a.function].slope(x, value) * inner if inner else ZERO
 
@@ -534,7 +536,7 @@ class Function(NamedTuple):
 
 
 def _slope_of_power(base: Expression, value: Expression) -> Expression:
-    raise ValueError("the slope of a power is that of its base")
+    raise ValueError("the derivative of a power follows from its base and exponent")
 
 
 FUNCTIONS = {
@@ -611,7 +613,7 @@ def simplified(e: Expression) -> Expression:
 
 
 def _sine_and_rest(m: Monomial) -> list[tuple[Monomial, Monomial]]:
-    """For each cos(a)**2 in m, return m with sin(a)**2 instead, and m without this factor."""
+    """For each cos(a)**2 in the product m, return m with sin(a)**2 instead, and m without it."""
     pairs = []
     for a, n in m:
         if isinstance(a, Call) and a.function == "cos" and n >= 2:

@@ -59,7 +59,7 @@ def located(file: str, line: Callable[[Path], int] = lambda _: 1) -> Iterator[No
 
 @dataclass
 class Declared:
-    """The facts needed to read tables of a robot file: declared names, number of rows, convention.
+    """Facts needed to read the tables of a robot file: declared names, frame count, convention.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class Declared:
 
 @dataclass(frozen=True)
 class Given:
-    """A field value that the reader itself adds to a table, such as the file name.
+    """A field value that is not in the robot file but added by its reader, such as the file name.
 
     The file has no key for this field.
     """
@@ -93,9 +93,9 @@ class Given:
 
 
 class Written:
-    """Annotation of a field: its type in a file (`form`), and the function that converts it.
+    """Annotation of a Robot field: its type in a file, and a function that converts its value.
 
-    The function `turn` makes the value that the Robot stores.
+    The type is `form`; the function `turn` makes the value that the Robot stores.
     """
 
     def __init__(

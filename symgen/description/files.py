@@ -105,8 +105,8 @@ def read_robot(
     suffix = "" if source in packaged_robots() else Path(source).suffix.lower()
     if (lock or chain) and suffix not in TREES:
         raise DescriptionError(
-            f"{source}: joints are locked and chains cut out of {', '.join(TREES)}; edit the "
-            "frames of this file instead"
+            f"{source}: lock and chain are only for files {', '.join(TREES)}; edit the frames of this "
+            "file instead"
         )
     if source in packaged_robots():
         file = f"{source}.yaml"
@@ -145,9 +145,9 @@ def _beside(path: Path) -> Callable[[str, int], bytes]:
         problems = (
             (
                 not included.is_relative_to(folder),
-                "outside of its folder; copy it there",
+                "the included file is outside the folder of the MJCF file; copy it into this folder",
             ),
-            (included in before, "a file is included once, and never by itself"),
+            (included in before, "a file may be included once, and never by itself"),
             (not os.path.isfile(included), "no such file"),  # noqa: PTH113 (of any length)
         )
         for wrong, what in problems:
@@ -162,7 +162,7 @@ def _beside(path: Path) -> Callable[[str, int], bytes]:
 def write_robot(
     robot: Robot, file: str, *, comments: Sequence[str] = ()
 ) -> tuple[str, tuple[str, ...]]:
-    """Return the text of `robot` in the format given by the suffix of `file`, and notes.
+    """Return `robot` as text in the format given by the suffix of `file`, and notes on losses.
 
     The notes list what the format cannot store. No file is written.
 

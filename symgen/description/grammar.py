@@ -53,7 +53,7 @@ class _Parser:
         self.tokens: list[tuple[str, str, int]] = []
         if len(text) > MAX_LENGTH:
             raise self.error(
-                f"expression of {len(text)} characters; at most {MAX_LENGTH} are read", 1
+                f"the expression has {len(text)} characters; the limit is {MAX_LENGTH}", 1
             )
         position, end = 0, len(text.rstrip())
         while position < end:
@@ -89,7 +89,7 @@ class _Parser:
             raise self.error(
                 (
                     f"expression expands to more than {MAX_TERMS} terms or powers above "
-                    f"{MAX_EXPONENT}; introduce a constant"
+                    f"{MAX_EXPONENT}; replace a part by a constant"
                 ),
                 self.tokens[self.position][2],
             )
@@ -103,7 +103,9 @@ class _Parser:
     def sum(self) -> Expression:
         self.depth += 1
         if self.depth > MAX_DEPTH:
-            raise self.error(f"nested more than {MAX_DEPTH} deep", self.tokens[self.position][2])
+            raise self.error(
+                f"parentheses are nested more than {MAX_DEPTH} deep", self.tokens[self.position][2]
+            )
         e = self.product()
         while op := self.accept("+", "-"):
             e = self.guard(e + self.product() if op == "+" else e - self.product())
@@ -145,7 +147,9 @@ class _Parser:
             if n < 0 and not base:
                 raise self.error("division by zero", column)
             if len(base.terms) > 1 and abs(n) > 8:
-                raise self.error("power of a sum above 8; introduce a constant", column)
+                raise self.error(
+                    "the power of a sum is above 8; replace the sum by a constant", column
+                )
             factor, result = base.inverse() if n < 0 else base, Expression.number(1)
             for _ in range(
                 abs(n)
@@ -172,8 +176,7 @@ class _Parser:
                 if text not in self.functions:
                     *others, last = self.functions
                     raise self.error(
-                        f"{text!r} is not a function of the grammar; {', '.join(others)} and "
-                        f"{last} are",
+                        f"{text!r} is not a known function; expected {', '.join(others)} or {last}",
                         column,
                         unit_advice(text),
                     )
@@ -181,7 +184,7 @@ class _Parser:
                 if text in ("min", "max"):
                     if self.accept(",") is None:
                         raise self.error(
-                            f"{text} takes two values, {text}(a, b)",
+                            f"{text} takes two values; write {text}(a, b)",
                             self.tokens[self.position][2],
                         )
                     other = self.sum()
@@ -195,13 +198,13 @@ class _Parser:
                     return self.guard(call(text, e))
                 except (ValueError, ZeroDivisionError) as error:
                     raise self.error(
-                        f"{text} of {e}: {error or 'division by zero'}", column
+                        f"cannot evaluate {text}({e}): {error or 'division by zero'}", column
                     ) from error
             if text == "pi" or self.symbols is None or text in self.symbols:
                 return Expression.symbol(text)
             declared = sorted(self.symbols)
             raise self.error(
-                f"undeclared symbol {text!r}; declared here: {', '.join(declared) or 'none'}",
+                f"undeclared symbol {text!r}; declared symbols: {', '.join(declared) or 'none'}",
                 column,
                 symbol_advice(text, declared),
             )

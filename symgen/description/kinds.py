@@ -16,7 +16,7 @@ JOINT_FAMILIES = ("Ia", "FV", "FS", "OFFSET")  # after the inertial ones of eq. 
 
 
 class Kind(NamedTuple):
-    """One kind of element on the joints: its law, its units, and the options that it allows.
+    """One kind of element on the joints, such as viscous friction: law, units and allowed options.
 
     Attributes
     ----------

@@ -85,7 +85,7 @@ class _Growing:
 def _tree(mjcf: Mjcf, angles: Angles, *, sites: bool) -> Tree:
     model = mjcf.model
     if model.njnt > MAX_JOINTS:
-        raise DescriptionError(f"{model.njnt} joints; at most {MAX_JOINTS} are read")
+        raise DescriptionError(f"the file has {model.njnt} joints; the limit is {MAX_JOINTS}")
     for what, values in (
         ("pos of a body", model.body_pos),
         ("mass of a body", model.body_mass),
@@ -97,7 +97,7 @@ def _tree(mjcf: Mjcf, angles: Angles, *, sites: bool) -> Tree:
     ):
         if not np.all(np.abs(values) <= LARGEST):
             raise DescriptionError(
-                f"{what}: a number is infinite, nan or larger than {LARGEST:g} in magnitude; expected one in SI units"
+                f"{what}: a number is infinite, nan or larger than {LARGEST:g} in magnitude; expected a number in SI units"
             )
     growing = _Growing(mjcf, angles, _joint_names(model))
     for b in range(1, model.nbody):
@@ -209,7 +209,7 @@ def _body(growing: _Growing, b: int) -> None:
 
 
 def _joint(growing: _Growing, k: int, parent: str, child: str, pose: Array) -> tuple[Joint, Array]:
-    """Make joint k between links `parent` and `child`; return it and the body's pose in its frame.
+    """Return joint k from link `parent` to `child`, and the pose of the body in the joint frame.
 
     `pose` is the pose of the body in the frame of `parent` at q = ref.
     """
@@ -217,7 +217,7 @@ def _joint(growing: _Growing, k: int, parent: str, child: str, pose: Array) -> t
     name, kind = growing.names[k], int(model.jnt_type[k])
     if kind == BALL:
         raise DescriptionError(
-            f"ball joint {name!r}: hinge and slide joints are read; write three hinges", line=line
+            f"ball joint {name!r} is not supported; write three hinge joints instead", line=line
         )
     if kind == FREE_JOINT:
         z = np.array([0.0, 0.0, 1.0])
@@ -292,7 +292,7 @@ def _left_out(model: Any) -> list[str]:
 
 
 def _relations(growing: _Growing) -> dict[str, Expression]:
-    """Solve the linear relations between joints for joints without actuator.
+    """Solve the linear relations between joints for the positions of joints without actuator.
 
     The arithmetic is exact. The result has, for each solved joint, its position as an expression in
     the other joints.
@@ -305,8 +305,8 @@ def _relations(growing: _Growing) -> dict[str, Expression]:
         free = [name for name in names if name in equation.atoms - growing.mjcf.driven]
         if not free:
             raise DescriptionError(
-                f"equality {model.equality(e).name!r}: it ties driven joints, or says what others "
-                "say already",
+                f"equality {model.equality(e).name!r}: the relation ties only driven joints, or follows "
+                "from the other relations; remove the equality",
                 line=line,
             )
         of_joint = int(model.eq_type[e]) == JOINT_RELATION
@@ -319,16 +319,17 @@ def _relations(growing: _Growing) -> dict[str, Expression]:
 
 
 def _equation(model: Any, names: list[str], e: int, line: int) -> Expression:
-    """Return the expression that relation e sets to zero: y1 - y1_0 - a0 - a1 (y2 - y2_0).
+    """Return the expression that relation number e of the MJCF file sets to zero.
 
-    y is a joint position or the length of a fixed tendon, and y_0 its value at ref.
+    It is y1 - y1_0 - a0 - a1 (y2 - y2_0), where y is a joint position or the length of a fixed
+    tendon, and y_0 is its value at ref.
     """
     kind, name = int(model.eq_type[e]), model.equality(e).name
     a0, a1, *higher = (ratio(float(x)) for x in model.eq_data[e][:5])
     if any(higher):
         raise DescriptionError(
-            f"equality {name!r}: polycoef {[float(x) for x in model.eq_data[e][:5]]}; linear "
-            "relations are read: a0 + a1 y",
+            f"equality {name!r}: polycoef {[float(x) for x in model.eq_data[e][:5]]}; expected "
+            "a linear relation a0 + a1 y",
             line=line,
         )
     first, second = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
@@ -337,7 +338,7 @@ def _equation(model: Any, names: list[str], e: int, line: int) -> Expression:
 
 
 def _deflection(model: Any, names: list[str], kind: int, k: int) -> Expression:
-    """Return a joint position, or the length of a fixed tendon, minus its value at ref."""
+    """Return a joint position, or the length of a fixed tendon, minus its reference value."""
     if kind == JOINT_RELATION:
         reference = Expression.number(repr(float(model.qpos0[int(model.jnt_qposadr[k])])))
         return Expression.symbol(names[k]) - reference

@@ -42,7 +42,7 @@ TEXTS = re.compile(r"\w*(name|class|joint\d?|tendon\d?|body\d?|model|mesh|materi
 
 @dataclass(frozen=True)
 class Mjcf:
-    """The mechanism of an MJCF file: the compiled model, and the lines of its parts in the file.
+    """The mechanism of an MJCF file: the compiled model, and the lines of bodies and joints.
 
     Attributes
     ----------
@@ -82,7 +82,10 @@ def with_includes(content: bytes, read: Callable[[str, int], bytes]) -> bytes:
     for e in read_elements(content, DEEPEST).iter("include"):
         name, tag = e.word("file"), INCLUDE.match(content, e.byte)
         if tag is None:
-            raise DescriptionError("<include> is read from UTF-8, without content", line=e.line)
+            raise DescriptionError(
+                "<include> must have no content, in a file saved as UTF-8; write <include file=.../>",
+                line=e.line,
+            )
         included = read(name, e.line)
         with located(name):
             inner = with_includes(included, read)
@@ -143,12 +146,12 @@ def compiled(content: bytes) -> Mjcf:
 def _refuse(root: XmlElement) -> None:
     """Raise DescriptionError if the file is no MJCF, or has elements that are not supported."""
     if root.tag != "mujoco":
-        hint = "; a URDF is read from a file that ends in .urdf" if root.tag == "robot" else ""
+        hint = "; the name of a URDF file must end in .urdf" if root.tag == "robot" else ""
         raise DescriptionError(f"found <{root.tag[:40]}>; expected <mujoco>{hint}", line=root.line)
     for e in root.iter():
         if e.tag in MULTIPLIED:
             raise DescriptionError(
-                f"<{e.tag}> is not read; write out the elements it makes, as the XML that MuJoCo saves does",
+                f"<{e.tag}> is not read; write out the elements that it generates, as MuJoCo does when it saves the XML",
                 line=e.line,
             )
         for key, value in e.attrib.items():
@@ -160,19 +163,19 @@ def _refuse(root: XmlElement) -> None:
         raise DescriptionError(f"<{unknown[0][:40]}> is no part of an MJCF file", line=root.line)
     for k, e in enumerate(e for world in root.own("worldbody") for e in world.iter("body")):
         if k >= MAX_BODIES:
-            raise DescriptionError(f"more than {MAX_BODIES} bodies", line=e.line)
+            raise DescriptionError(f"the file has more than {MAX_BODIES} bodies", line=e.line)
     for e in (e for section in root.own("equality") for e in section):
         if e.tag not in RELATIONS and e.attrib.get("active") != "false":
             name = e.attrib.get("name", "")
             raise DescriptionError(
-                f"<{e.tag[:30]}> {name[:40]!r} in <equality>: joint and tendon relations are read, closed loops and ties between bodies not; "
+                f"<{e.tag[:30]}> {name[:40]!r} in <equality>: only joint and tendon relations are supported, not closed loops and ties between bodies; "
                 "describe the loop by cut and twin in a robot file",
                 line=e.line,
             )
 
 
 def _is_finite(word: str) -> bool:
-    """Whether a word is a finite number, or no number at all."""
+    """Whether a word is anything but an infinite number or nan."""
     try:
         return isfinite(float(word))
     except ValueError:
@@ -180,7 +183,7 @@ def _is_finite(word: str) -> bool:
 
 
 def _take_out(holder: XmlElement) -> None:
-    """Remove all child elements, at every depth, that the mechanism does not need."""
+    """Remove all elements inside an XML element that the mechanism does not need (cameras ...)."""
     for e in list(holder):
         if _is_left_out(holder, e):
             holder.remove(e)
@@ -202,7 +205,7 @@ def _is_left_out(holder: XmlElement, e: XmlElement) -> bool:
 
 
 def _spec(root: XmlElement) -> tuple[Any, list[int]]:
-    """Build the MjSpec of the XML elements, and a list of line numbers.
+    """Build MuJoCo's MjSpec from the XML elements, and a list that maps its lines to the file.
 
     The list has, for each line of the text that MuJoCo reads, the line of the original file.
     """
@@ -258,7 +261,7 @@ def _take_out_meshes(
         if _no_mesh(geom) and weighed:
             number = re.search(r"line (\d+)", geom.info)
             raise DescriptionError(
-                "the mass of this body would come from a mesh, which is not read; add <inertial>",
+                "the mass of this body would come from a mesh, and meshes are not read; add <inertial> to the body",
                 line=lines[int(number[1]) - 1] if number else None,
             )
     for child in body.bodies:

@@ -76,7 +76,7 @@ DEVICES = {
 def check_identifier(name: str, path: Path) -> None:
     """Refuse a name that is not a valid identifier in generated code."""
     if not IDENTIFIER.match(name) or keyword.iskeyword(name):
-        what = "is a word of Python; choose another"
+        what = "is a keyword of Python; choose another name"
         if not keyword.iskeyword(name):
             what = "is no identifier; use a letter followed by letters, digits or _ (at most 40)"
         raise DescriptionError(f"{dotted(path[:-1] or path)}: {name!r} {what}", path=path)
@@ -90,8 +90,8 @@ def check_names(robot: Any) -> None:
     check_identifier(robot.name, ("name",))
     if robot.name.upper() in DEVICES:
         raise DescriptionError(
-            f"{robot.name!r} names a device on Windows, where no file can be called so; choose "
-            "another",
+            f"{robot.name!r} is the name of a device on Windows, where no file can have this name; choose "
+            "another name",
             path=("name",),
         )
     for key, text in (("title", robot.title), ("source", robot.source), ("file", robot.file)):
@@ -109,18 +109,18 @@ def check_names(robot: Any) -> None:
         check_identifier(name, ("constants", name))
         if what := "a parameter" if name in taken else _of_others(name):
             raise DescriptionError(
-                f"constant {name!r} is the name of {what}; choose another, such as {name}c",
+                f"constant {name!r} is the name of {what}; choose another name, such as {name}c",
                 path=("constants", name),
             )
     if double := sorted({n for n in robot.parameters if robot.parameters.count(n) > 1}):
         raise DescriptionError(
-            f"parameters {double} would be named twice; rename an element family",
+            f"several parameters would have the same name: {double}; rename an element family",
             path=("elements",),
         )
 
 
 def check_families(elements: Sequence[Element]) -> None:
-    """Check that each family of elements, such as FV, and each parameter has its own name."""
+    """Check that names of element families, such as FV, and of their parameters are unique."""
     families = [e.family for e in elements]
     for e in elements:
         family, path = e.family, ("elements", e.family)
@@ -128,15 +128,15 @@ def check_families(elements: Sequence[Element]) -> None:
         taken = family in INERTIAL or families.count(family) > 1
         if taken or family[-1].isdigit() or family.endswith("_"):
             raise DescriptionError(
-                f"element {family!r}: give each family a name of its own, not an inertial "
-                "parameter's, that does not end in a digit or _",
+                f"element {family!r}: give each family a unique name; it must not be the name "
+                "of an inertial parameter, nor end in a digit or _",
                 path=path,
             )
         for name in (f"{family}{j}" for j in e.keys):
             if what := _of_others(name):
                 raise DescriptionError(
-                    f"element {family!r}: its parameter {name} would be called as {what}; "
-                    f"choose another family, such as K{family}",
+                    f"element {family!r}: its parameter would be named {name}, which is already "
+                    f"the name of {what}; choose another family name, such as K{family}",
                     path=path,
                 )
 
@@ -146,7 +146,9 @@ def _of_others(name: str) -> str:
     if STATES.match(name):
         return "a joint position, rate or torque (q, QP, QDP, GAM and a number)"
     if name in LAYOUT:
-        return f"a word of the emitted functions (these are {', '.join(sorted(LAYOUT))})"
+        return (
+            f"a reserved word of the generated functions (reserved are {', '.join(sorted(LAYOUT))})"
+        )
     return "a builtin of Python" if hasattr(builtins, name) else ""
 
 
@@ -163,7 +165,7 @@ def _check_labels(labels: Mapping[int, str], frames: int) -> None:
                 "printable characters without \\, quotes, /* or */"
             )
         elif text in used:
-            message = f"labels.{j}: {text!r} names frame {used[text]} already; names differ"
+            message = f"labels.{j}: {text!r} names frame {used[text]} already; give each frame a different label"
         if message:
             raise DescriptionError(message, path=("labels", j))
         used[text] = j
@@ -197,7 +199,7 @@ class Namespace:
             self._written[name] = self.own(name)
 
     def of_file(self, name: str) -> str:
-        """Return the name in the generated file of a constant or parameter of the robot file."""
+        """Return the name in the generated file for a constant or parameter of the robot."""
         return self._written.get(name, name)
 
     def has(self, name: str) -> bool:

@@ -105,7 +105,7 @@ class _Par:
     notes: list[str] = field(default_factory=list)
 
     def line(self, path: Path) -> int:
-        """Find the line of the file that gives the Robot field `path`, for error messages."""
+        """Find the line of the file that defines the Robot field with the key path `path`."""
         key = KEYS.get(str(path[-1]).lower() if path else "", "ant")
         items = self.lists.get(key) or [("", 1)]
         j = path[1] if len(path) > 1 and isinstance(path[1], int) else 1
@@ -279,7 +279,7 @@ def _robot(par: _Par, constants: dict[str, float], file: str, sha256: str) -> Ro
         )
     if par.lists.get("is_mobile", [("0", 1)])[0][0] not in ("0", "False", "false"):
         raise DescriptionError(
-            "is_mobile: a base that moves is not read; expected 0",
+            "is_mobile: a base that moves is not supported; expected 0",
             line=par.lists["is_mobile"][0][1],
         )
     frames = _frames(par, NF, loops=kind == 2)

@@ -1,4 +1,4 @@
-"""Tables of a robot file: frames, coefficients of elements, loops, drives and limits."""
+"""Tables of a robot file: frames, coefficients of joint elements, loops, drives and limits."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class Frame:
 
     @property
     def q(self) -> str:
-        """Name of the joint variable."""
+        """Name of the joint variable, for instance q3."""
         return f"q{self.j}"
 
     @property
@@ -120,7 +120,7 @@ class Frame:
 
 
 def rows(texts: Mapping[int, str] | str, declared: Declared) -> Mapping[int, Row]:
-    """Convert the table {j: text} of an element to rows of coefficients of the joint positions.
+    """Convert the texts of a joint element, such as {6: q5 + q6}, to coefficients of q.
 
     The text "all" gives a row for each actuated joint, in which this joint has the coefficient 1.
     """
@@ -132,7 +132,7 @@ def rows(texts: Mapping[int, str] | str, declared: Declared) -> Mapping[int, Row
 def reduced(
     reduce: Callable[[Expression, tuple[int, ...]], Any], texts: Any, declared: Declared
 ) -> dict[int, Any]:
-    """Parse each text of a table {j: text} to a row of coefficients or a quadratic form.
+    """Convert the texts of a joint element, such as {6: q6**2}, to rows or quadratic forms.
 
     The function `reduce` makes the row or the form from an expression. A joint number, or a list of
     joint numbers, means a row for each joint with its coefficient 1.
@@ -168,8 +168,8 @@ def assumed(table: Mapping[str, str], declared: Declared) -> frozenset[str]:
             names.add(key)
         else:
             raise DescriptionError(
-                f"{key}: {text}; only zero values change the regrouping; write a known value "
-                "under `values`, where method feasible uses it as a prior",
+                f"{key}: {text}; expected 0, since only zero changes the regrouping; write another known "
+                "value under `values`, which method feasible uses as a prior",
                 path=(key,),
             )
     return frozenset(names)
@@ -279,7 +279,7 @@ def parameter(family: str, j: int) -> str:
 
 
 def row_of(e: Expression, joints: tuple[int, ...]) -> dict[int, Expression]:
-    """Return the row G of coefficients of an expression G q in the joint positions q.
+    """Return the coefficients G of an expression G q that is linear in the joint positions q.
 
     Raises ValueError if the expression is not linear and homogeneous in the joint positions.
     """
@@ -303,7 +303,7 @@ def form_of(e: Expression, joints: tuple[int, ...]) -> dict[tuple[int, int], Exp
 def _cofactors(
     e: Expression, products: Iterable[tuple[int, ...]], what: str
 ) -> dict[tuple[int, ...], Expression]:
-    """Return the constant coefficients of the given products of joint positions in `e`.
+    """Return the coefficients in `e` of given products of joint positions, for instance of q5 q6.
 
     The result maps the joints of each product to its coefficient: for e = 2 q5 q6, (5, 6) to 2.
     Raises ValueError if `e` is not a sum of such products.
@@ -320,7 +320,7 @@ def _cofactors(
 
 
 def moves(c: Expression) -> bool:
-    """Whether a joint position occurs in `c`."""
+    """Whether a joint position occurs in the expression `c`."""
     return any(re.fullmatch(r"q\d+", name) for name in c.symbols)
 
 

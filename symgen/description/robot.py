@@ -1,4 +1,4 @@
-"""The description of a robot: frames of Khalil and Kleinfinger, elements on the joints, and loops.
+"""The description of a robot: Khalil's frames, elements on the joints (friction, ...), and loops.
 
 Modified Denavit-Hartenberg [KK86]: frame j, antecedent i = ant(j), sigma_j = 0 revolute, 1
 prismatic, 2 fixed,
@@ -93,7 +93,7 @@ def _frames(rows: Mapping[int, Frame], declared: Declared) -> tuple[Frame, ...]:
 
 
 def _massless(links: list[int], declared: Declared) -> frozenset[int]:
-    """Return the massless links: those of the file, and the end frames added to a classic table."""
+    """Return the massless links: those the file lists, and end frames added to a classic table."""
     return frozenset((*links, *(f.j for f in declared.frames[declared.rows :])))
 
 
@@ -306,10 +306,10 @@ class Robot:
 
     @cached_property
     def parameters(self) -> tuple[str, ...]:
-        """Names of the standard parameters: link by link, then of other elements in file order.
+        """Names of the standard parameters: link by link, then of further elements.
 
         For each link, the order is that of eq. (4): XX .. ZZ, MX, MY, MZ, M, then Ia, FV, FS and
-        OFFSET, as far as the robot has them.
+        OFFSET, as far as the robot has them. Further elements are in the order of the file.
         """
         by_family = {e.family: e for e in self.elements}
         names: list[str] = []
@@ -328,16 +328,20 @@ class Robot:
 
     @cached_property
     def channels(self) -> dict[str, tuple[str, ...]]:
-        """For each channel (a constant that varies with time): parameters whose laws contain it."""
+        """For each channel, such as a temperature: names of the parameters whose laws contain it.
+
+        A channel is a quantity that varies with time.
+        """
         read = [(c, parameter(e.family, j)) for e in self.elements for j in e.keys
                 for c in e.channels(j)]  # fmt: skip
         return {c: tuple(name for own, name in read if own == c) for c, _ in read}
 
     @property
     def loaded(self) -> tuple[str, ...]:
-        """Parameters of laws, such as load-dependent friction, that depend on transmitted torque.
+        """Names of the parameters whose law contains the torque that the joint transmits.
 
-        A robot with such parameters has no forward dynamics.
+        Load-dependent friction has such a law. A robot with such parameters has no forward
+        dynamics.
         """
         read = (own for c, own in self.channels.items() if c.startswith(TRANSMITTED))
         return tuple(name for own in read for name in own)
@@ -360,7 +364,7 @@ class Robot:
 
 
 def one_joint_parameters(robot: Robot, families: Collection[str]) -> set[str]:
-    """Find the parameters of `families` that a file with one number per joint can hold.
+    """Find the parameters of `families` that can be stored as one number per joint.
 
     Such a parameter acts on one joint alone, and equally in both directions of motion.
     """

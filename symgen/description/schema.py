@@ -73,7 +73,10 @@ def robot_of(data: Mapping[str, Any], file: str, sha256: str) -> Robot:
 
 
 def _with_columns(data: dict[str, Any]) -> dict[str, Any]:
-    """Move the table `columns` of a robot file into `elements`: each column is an element."""
+    """Move each entry of the table `columns` of a robot file to the table `elements`.
+
+    Both tables describe torques on the joints; in `columns`, the user gives the law.
+    """
     columns, elements = data.pop("columns", {}), data.get("elements", {})
     if not columns:
         return data
@@ -82,7 +85,7 @@ def _with_columns(data: dict[str, Any]) -> dict[str, Any]:
             raise DescriptionError(f"{key}: found {table!r:.60}; expected a table", path=(key,))
     if both := [name for name in columns if name in elements]:
         raise DescriptionError(
-            f"columns: {both[0]!r} is an element of this robot too; give it another name",
+            f"columns: {both[0]!r} is also the name of an element; give the column another name",
             path=("columns", both[0]),
         )
     return {**data, "elements": {**elements, **columns}}
@@ -191,7 +194,7 @@ def _advice(path: Path, given: Any, message: str) -> str:
     if path[-1:] == ("sigma",):
         return ": 0 revolute, 1 prismatic, 2 fixed"
     if path[:2] == ("drives", "ratio"):
-        return "; ratio has one row per motor: [[100, 0], [0, 80]], or one number: [100, 80]"
+        return "; give ratio one row per motor, [[100, 0], [0, 80]], or one number per motor, [100, 80]"
     if path[:1] == ("constants",) and isinstance(given, int):
         return "; a decimal comma? write 0.06, not 0,06"
     if path[:1] == ("constants",) and "undeclared symbol" in message:

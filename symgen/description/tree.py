@@ -159,7 +159,7 @@ def rotation(rpy: Sequence[float], what: str, angles: Angles) -> Array:
 
 
 def transform(row: Sequence[float]) -> Array:
-    """Compute the pose iTj, shape (4, 4), from a row gamma, b, alpha, d, theta, r of a table.
+    """Compute the pose iTj, shape (4, 4), from a row gamma, b, alpha, d, theta, r of a frame table.
 
     The pose is
 
@@ -179,7 +179,7 @@ def transform(row: Sequence[float]) -> Array:
 
 @dataclass(frozen=True)
 class TreePart:
-    """Selection of a part of a tree: joints that are held, and the chain whose joints move.
+    """Selection of a part of a tree: joints held at given positions, and a chain whose joints move.
 
     Attributes
     ----------
@@ -197,7 +197,7 @@ WHOLE_TREE = TreePart()
 
 
 def part_of(tree: Tree, part: TreePart) -> Tree:
-    """Return the tree with the joints in `part.lock` and the joints outside `part.chain` held.
+    """Return the tree in which the joints in `part.lock` and outside `part.chain` are held fixed.
 
     Notes of the tree name the held joints.
 
@@ -224,7 +224,7 @@ def part_of(tree: Tree, part: TreePart) -> Tree:
 
 
 def _beside(tree: Tree, base: str, tip: str) -> dict[str, float]:
-    """Return the positions at which the moving joints outside the chain `base` to `tip` are held.
+    """Find the moving joints outside the chain `base` to `tip`, and positions to hold them at.
 
     The position is zero, or for a joint that follows others its position when these are at zero.
     """
@@ -241,8 +241,8 @@ def _beside(tree: Tree, base: str, tip: str) -> dict[str, float]:
         link = holding[link].parent
     if link != base or all(joint.kind == FIXED_TYPE for joint in between):
         raise DescriptionError(
-            f"link {tip!a:.60} is not connected to {base!a:.60} by a joint that moves; a chain goes "
-            "from base to tip, outward"
+            f"link {tip!a:.60} is not connected to {base!a:.60} by a moving joint; give "
+            "first the base link of the chain, then the tip link, outward"
         )
     kept = {joint.name for joint in between}
     others = [j.name for j in tree.joints if j.kind != FIXED_TYPE and j.name not in kept]
@@ -260,11 +260,13 @@ def _require_independent(tree: Tree, name: str) -> None:
         )
     if name in tree.relations:
         leaders = [leader for leader in kinds if leader in tree.relations[name].atoms]
-        raise DescriptionError(f"joint {name!a:.60} to lock follows others; lock {_names(leaders)}")
+        raise DescriptionError(
+            f"joint {name!a:.60} cannot be locked, because it follows other joints; lock {_names(leaders)} instead"
+        )
 
 
 def _hold(tree: Tree, positions: Mapping[str, float]) -> Tree:
-    """Hold the joints named in `positions`, and the joints that follow only held joints."""
+    """Fix the joints in `positions` at these values, and joints that follow only fixed joints."""
     exact = {name: Expression.number(repr(x)) for name, x in positions.items()}
     relations = {
         name: e.substitute(exact) for name, e in tree.relations.items() if name not in positions
@@ -290,7 +292,7 @@ def _motion(joint: Joint, q: float) -> Array:
     T = np.eye(4)
     if joint.kind == FREE_TYPE and q:
         raise DescriptionError(
-            f"free joint {joint.name!a:.60} is fixed at its pose in the file; its value must be 0",
+            f"free joint {joint.name!a:.60} can only be locked at its pose in the file; lock this joint at 0",
             line=joint.line,
         )
     if joint.kind == "prismatic":

@@ -165,7 +165,10 @@ def _add(table: Table, ant: int, joint: Joint, parent: Array) -> int:
 
 
 def _nearly_parallel(axis: Array) -> bool:
-    """Whether `axis` is almost parallel to z: their common normal is then too far away."""
+    """Whether `axis` is almost, but not exactly, parallel to the z axis of the frame.
+
+    The common normal of both axes is then too far away.
+    """
     return SAME < math.hypot(axis[0], axis[1]) < STEEP
 
 
@@ -193,7 +196,7 @@ def _normal(axis: Array, point: Array) -> tuple[float, float, float, float]:
 
 
 def _numbered(row: Sequence[float]) -> tuple[float, ...]:
-    """Round alternating angles and lengths as the table stores them.
+    """Round a row of numbers, in turn an angle and a length, as the frame table stores them.
 
     Angles that are multiples of pi/12 are exact; other numbers get DIGITS decimals.
     """
@@ -212,7 +215,7 @@ def _angle(x: float) -> tuple[float, Expression]:
 def _row(
     table: Table, ant: int, sigma: int, before: Sequence[float], theta: float = 0.0, r: float = 0.0
 ) -> tuple[Array, int]:
-    """Append a frame to the table; return its pose in its antecedent at q = 0 and its number.
+    """Append a frame; return its pose in the antecedent frame at q = 0, and its number.
 
     The pose has the shape (4, 4).
     """

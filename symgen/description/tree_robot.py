@@ -104,14 +104,14 @@ def parse_tree(content: bytes, file: str, *, exact: bool = False, sites: bool = 
 def robot_of_tree(
     tree: Tree, file: str, sha256: str, *, keep_fixed: bool = False
 ) -> tuple[Robot, tuple[str, ...]]:
-    """Build the Robot of a tree, and notes for the user.
+    """Build the Robot of a tree of links and joints, and notes for the user.
 
     The notes list which joint is which q, which link is which kept frame, and what was not read.
     Raises DescriptionError, with the line of the wrong joint, if the tree describes no robot.
     """
     if free := [joint for joint in tree.joints if joint.kind == FREE_TYPE]:
         raise DescriptionError(
-            f"free joint {free[0].name!r}: the base of a robot must be fixed; to fix this one "
+            f"free joint {free[0].name!r}: the base of a robot must be fixed; to fix this joint "
             f"at its pose in the file: symgen convert --lock {free[0].name}=0",
             line=free[0].line,
         )
@@ -140,7 +140,7 @@ def _robot(table: Table, file: str, sha256: str) -> Robot:
     constraints = _constraints(table)
     actuated = [j for j in table.joint if j not in constraints]
     if not actuated:
-        raise DescriptionError("no joint that moves; a robot has at least one")
+        raise DescriptionError("no joint that moves; a robot needs at least one moving joint")
     frames = tuple(Frame(**{**vars(f), "mu": int(f.j in actuated)}) for f in table.frames)
     values, massless = _values(table, actuated)
     gravity, constants = _gravity(table.tree.gravity)
@@ -220,7 +220,7 @@ def _constraints(table: Table) -> dict[int, Expression]:
 
 
 def _keys(table: Table, family: str, actuated: list[int]) -> list[int]:
-    """Find the joints that have a parameter of `family`.
+    """Find the joints that have a parameter of the family `family`, for instance FV.
 
     These are all actuated joints, and the joints that follow others if the file gives a value. A
     spring (family K) needs a value of the file in any case.
@@ -234,7 +234,10 @@ def _keys(table: Table, family: str, actuated: list[int]) -> list[int]:
 def _limits(
     table: Table, actuated: list[int]
 ) -> dict[str, tuple[float, ...] | tuple[tuple[float, float], ...]]:
-    """Collect the limits that all actuated joints have; a note lists the omitted kinds."""
+    """Collect the kinds of limits (position, speed, torque) that all actuated joints have.
+
+    A note lists the kinds that are left out.
+    """
     rows = [table.joint[j] for j in actuated]
     limits: dict[str, tuple[float, ...] | tuple[tuple[float, float], ...]] = {}
     bounds = tuple(

@@ -44,7 +44,10 @@ ROUNDING = 1e-6  # of moments that a file rounds
 
 
 def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
-    """Read the links and joints of a URDF file as a Tree; `exact` as in `read_tree`."""
+    """Read the links and joints of a URDF file as a Tree.
+
+    `exact` is used as in `read_tree`.
+    """
     angles = Angles(exact)
     root = read_elements(content)
     if root.tag != "robot":
@@ -68,7 +71,7 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
                 mimics[joints[-1].name] = leader, factor * Expression.symbol(leader) + offset
     if len(joints) > MAX_JOINTS:
         raise DescriptionError(
-            f"{len(joints)} joints; at most {MAX_JOINTS} are read", line=root.line
+            f"the file has {len(joints)} joints; the limit is {MAX_JOINTS}", line=root.line
         )
     base = _root(links, joints, root.line)
     other = Counter(_left_out(root))
@@ -111,13 +114,13 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
 
 
 def _left_out(root: XmlElement) -> Iterator[str]:
-    """Yield the tags of XML elements in a robot, its links and its joints that are not read."""
+    """Yield the tag of each XML element in the robot, its links and joints that is not read."""
     for e in (root, *root):
         yield from (child.tag for child in e if e.tag in READ and child.tag not in READ[e.tag])
 
 
 def _relations(joints: list[Joint], mimics: dict[str, Mimic]) -> dict[str, Expression]:
-    """Express the position of each mimic joint by that of the joint that it finally follows.
+    """Express the position of each mimic joint by that of the joint at the end of its mimic chain.
 
         q = multiplier q_leader + offset
 
@@ -218,7 +221,7 @@ def _joint(e: XmlElement, angles: Angles) -> Joint:
         axis, length = np.array([0.0, 0.0, 1.0]), 1.0  # of no meaning; some files say 0 0 0
     if length < 1e-6:
         raise DescriptionError(
-            f"joint {name!r}: axis {axis.tolist()} has no direction",
+            f"joint {name!r}: axis {axis.tolist()} has no direction; expected an axis such as 0 0 1",
             line=(e if given is None else given).line,
         )
     limit, dynamics = e.find("limit"), e.find("dynamics")
@@ -257,8 +260,8 @@ def _root(links: dict[str, Inertial | None], joints: list[Joint], line: int) -> 
         if joint.child in parent:
             raise DescriptionError(
                 (
-                    f"joint {joint.name!r}: link {joint.child!r} has a parent already; a URDF is a "
-                    "tree"
+                    f"joint {joint.name!r}: link {joint.child!r} has a parent already; in a URDF a "
+                    "link has only one parent joint"
                 ),
                 line=joint.line,
             )

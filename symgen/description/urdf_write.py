@@ -66,7 +66,7 @@ def write_urdf(
     ]:
         raise DescriptionError(
             f"{robot.name}: no value of {', '.join(missing[:12])}{' ...' * (len(missing) > 12)}; "
-            "add them under values, 0 where one is zero"
+            "add these parameters under values, with 0 for a parameter that is zero"
         )
     lines = [
         '<?xml version="1.0"?>',
@@ -89,8 +89,8 @@ def _link(robot: Robot, j: int, values: Mapping[str, float]) -> list[str]:
     *_, mx, my, mz, M = standard
     if M < 0 or (M == 0 and (mx, my, mz) != (0, 0, 0)):
         raise DescriptionError(
-            f"{robot.name}: link {j} has the mass M{j} = {M} and moments that are not zero; no body "
-            "has these. Export a physically feasible estimate (--method feasible)"
+            f"{robot.name}: link {j} has the mass M{j} = {M} and first moments that are not zero, which no "
+            "body can have; export a physically feasible estimate (--method feasible)"
         )
     own = inertial_of(standard)
     inertia = dict(zip(MOMENTS, own.I[np.triu_indices(3)], strict=True))
@@ -169,7 +169,7 @@ def _follows(robot: Robot, j: int) -> tuple[int, float, float]:
         f"q{leaders[0]}"
     }:
         raise DescriptionError(
-            f"{robot.name}: q{j} = {e}; in a URDF a joint follows one other, multiplier and offset"
+            f"{robot.name}: q{j} = {e} has no place in a URDF, where a joint follows one other joint with multiplier and offset"
         )
     rest = e - factor * Expression.symbol(f"q{leaders[0]}")
     return leaders[0], factor.value(robot.constants), rest.value(robot.constants)

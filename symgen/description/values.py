@@ -1,4 +1,4 @@
-"""Values from outside the robot file: constants of a command line, and standard parameters.
+"""Values that are not in the robot file: constants on the command line, and standard parameters.
 
 Standard parameters come from a table or from an estimate.
 """

@@ -34,7 +34,7 @@ class XmlElement(ElementTree.Element):
         def find(self, path: str, namespaces: Any = None) -> XmlElement | None: ...
 
     def own(self, *tags: str) -> Iterator[XmlElement]:
-        """Yield the child elements with these tags, also inside <frame> elements of an MJCF."""
+        """Yield the child elements with the given tags, also inside <frame> elements of an MJCF."""
         for child in self:
             if child.tag in tags:
                 yield child
@@ -42,7 +42,7 @@ class XmlElement(ElementTree.Element):
                 yield from child.own(*tags)
 
     def word(self, name: str, default: str | None = None) -> str:
-        """Return the attribute `name` as text, by default `default`.
+        """Return the attribute `name` as text, or `default` if the attribute is missing.
 
         Raises DescriptionError if both are missing.
         """
@@ -63,7 +63,7 @@ class XmlElement(ElementTree.Element):
             values = []
         if len(words) != n or len(values) != n or not all(abs(x) <= largest for x in values):
             raise DescriptionError(
-                f"<{self.tag} {name}={text[:60]!r}>: expected {n} number{'s' * (n > 1)} of size at most {largest:g}",
+                f"<{self.tag} {name}={text[:60]!r}>: expected {n} number{'s' * (n > 1)} of magnitude at most {largest:g}",
                 line=self.line,
             )
         return np.array(values)
@@ -80,7 +80,7 @@ def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> XmlElement:
     """
     if len(content) > MAX_BYTES:
         raise DescriptionError(
-            f"more than {MAX_BYTES} bytes; put meshes into files of their own", line=1
+            f"more than {MAX_BYTES} bytes; put meshes into separate files", line=1
         )
     parser = expat.ParserCreate()
     top = XmlElement("", {}, 0, 0)
@@ -92,7 +92,7 @@ def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> XmlElement:
         line = parser.CurrentLineNumber
         if len(open_) > max_depth or count > MAX_ELEMENTS:
             raise DescriptionError(
-                f"nested more than {max_depth} deep, or more than {MAX_ELEMENTS} elements",
+                f"the XML elements are nested more than {max_depth} deep, or the file has more than {MAX_ELEMENTS} elements",
                 line=line,
             )
         if tag.startswith("xacro:"):

@@ -50,7 +50,7 @@ def parse_robot(content: bytes, file: str) -> Robot:
     if not isinstance(content, bytes):
         raise DescriptionError(
             f"content is of type {type(content).__name__}; expected the bytes of a robot file "
-            "(of a text: text.encode()), or its path to load_robot"
+            "(for a text: text.encode()); use load_robot to read a file by its path"
         )
     lines: dict[Path, int] = {}
 
@@ -105,7 +105,9 @@ def _document(content: bytes, lines: dict[Path, int]) -> Any:
             f"not YAML: {problem}{yaml_advice(problem)}", line=mark.line + 1 if mark else None
         ) from error
     except RecursionError as error:
-        raise DescriptionError(f"nested more than {MAX_NESTING} deep") from error
+        raise DescriptionError(
+            f"tables and lists are nested more than {MAX_NESTING} deep"
+        ) from error
     except Exception as error:  # on malformed text the scanner raises IndexError and others too
         first = (str(error) or type(error).__name__).splitlines()[0]
         raise DescriptionError(f"not YAML: {first}") from error
@@ -116,7 +118,9 @@ def _value(node: Node, path: Path, lines: dict[Path, int], resolver: Any) -> Any
     line = node.start_mark.line + 1
     lines.setdefault(path, line)
     if len(path) > MAX_NESTING:
-        raise DescriptionError(f"nested more than {MAX_NESTING} deep", line=line)
+        raise DescriptionError(
+            f"tables and lists are nested more than {MAX_NESTING} deep", line=line
+        )
     if node.anchor is not None:
         raise DescriptionError(ANCHORS, line=line)
     plain = (node.style is None, True) if isinstance(node, ScalarNode) else True
@@ -150,7 +154,7 @@ def _scalar(node: ScalarNode, line: int) -> Any:
     text: str = node.value
     if len(text) > MAX_SCALAR:
         raise DescriptionError(
-            f"text of {len(text)} characters; at most {MAX_SCALAR} are read", line=line
+            f"the text has {len(text)} characters; the limit is {MAX_SCALAR}", line=line
         )
     if node.style is not None:
         return text
@@ -163,7 +167,7 @@ def _scalar(node: ScalarNode, line: int) -> Any:
 
 
 def tables_of(robot: Robot) -> dict[str, Any]:
-    """Return the tables of the robot file of `robot` by key; expressions are not yet text."""
+    """Return the tables of the robot file for `robot`, by key; expressions are not yet text."""
     drives = robot.drives
     return {
         "symgen": SCHEMA,

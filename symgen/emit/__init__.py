@@ -1,1 +1,1 @@
-"""Code generator: writes the models of a robot over its base parameters in Python and C."""
+"""Code generator: writes the models of a robot, in terms of base parameters, in Python and C."""

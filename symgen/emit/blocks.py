@@ -68,7 +68,7 @@ Call = Callable[[Sequence[str], Sequence[str]], list[str]]
 def blocks_of(
     spec: ModuleSpec, language: Language, component: Callable[[str, int], str] = "{}[{}]".format
 ) -> dict[str, Block]:
-    """Write every function of a robot in a programming language, without steps shared by functions.
+    """Write every function of a robot as source text that is complete without the others.
 
     `component` gives the text of entry k of a state or of X, such as `q[0]`.
     """
@@ -121,7 +121,7 @@ class FunctionPrinter:
 
     @property
     def given(self) -> list[str]:
-        """Names of the shared intermediate variables that the functions use."""
+        """Names of the intermediate variables that are computed once for all functions."""
         read = {n.index for f in self.functions for n in self._read(f)}
         return [self.text.called[k] for k in sorted(read & self.shared & self.text.named)]
 
@@ -133,7 +133,7 @@ class FunctionPrinter:
         return self._block(self.functions[0], own, [n for n in own if n.index in operands], ())
 
     def block(self, f: Function, call: Call = lambda names, arguments: []) -> Block:
-        """Write one function as source text, without the intermediate variables that it shares.
+        """Write one function as source text that uses, but does not repeat, the shared link motion.
 
         `call` writes the lines that get the shared variables from the block `motion`.
         """

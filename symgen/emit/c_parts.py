@@ -17,7 +17,7 @@ Titled = tuple[str, Sequence[str]]  # lines that belong together, under a title
 
 @dataclass(frozen=True)
 class Part:
-    """One part of a long C function body: its lines, and all words that occur in the lines."""
+    """One part of a long C function body: its lines, and the names that occur in these lines."""
 
     sections: tuple[Section, ...]
     read: frozenset[str]
@@ -60,7 +60,7 @@ def words(lines: Sequence[str]) -> frozenset[str]:
 
 
 def read_by(read: frozenset[str], steps: Sequence[str]) -> list[str]:
-    """Select the lines of C that compute the names in `read`, and the lines that these depend on.
+    """Select the C lines that compute the variables `read`, and all lines that these depend on.
 
     Each step has the form `const real x = ...;`.
     """

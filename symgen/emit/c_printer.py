@@ -31,7 +31,7 @@ HEADERS = re.compile(r"(M|FP|HUGE|MATH|U?INT\w*|SIZE|PTRDIFF|SIG|WCHAR|WINT)_\w+
 
 
 def is_word(name: str) -> bool:
-    """Whether a name is reserved by C, by its headers or by the code around the functions."""
+    """Whether a name is reserved: a word of C, of its header files or of the emitted C code."""
     return name in RESERVED or bool(HEADERS.fullmatch(name))
 
 

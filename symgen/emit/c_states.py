@@ -1,4 +1,4 @@
-"""How C functions receive the states: one pointer per state, or one struct if loops tie joints."""
+"""How C functions receive q, qd, qdd: one pointer for each, or one struct with all of them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from symgen.emit.spec import STATES, ModuleSpec
 
 @dataclass(frozen=True)
 class CStates:
-    """The state arguments of the C functions of one robot.
+    """The arguments by which the C functions of one robot receive the joint states q, qd, ...
 
     Attributes
     ----------
@@ -28,7 +28,7 @@ class CStates:
 
     @classmethod
     def of(cls, spec: ModuleSpec) -> CStates:
-        """Make the state arguments for the functions of `spec`."""
+        """Make the state arguments of the C functions of the robot that `spec` describes."""
         size = spec.sizes
         if not spec.tied:
             return cls(spec.robot.name, dict.fromkeys(STATES, size["n"]), closed=False)
@@ -37,7 +37,7 @@ class CStates:
         return cls(spec.robot.name, joints | tied, closed=True)
 
     def arguments(self, *states: str) -> list[str]:
-        """Return the argument names that pass the given states: s, or one name per state."""
+        """Return the argument names for the given states: s (the struct), or one per state."""
         return ["s"] if self.closed else [*states]
 
     def parameters(self, *states: str) -> list[str]:
@@ -50,7 +50,7 @@ class CStates:
         return f"s->{state}" if self.closed else state
 
     def load(self, state: str) -> str:
-        """Return C arguments that locate a state: distance between samples, and start address.
+        """Return two C arguments that locate a state: distance between samples, and start address.
 
         The distance, in numbers, is from one sample to the next. The address is the address of the
         first sample of a tile, a group of samples computed together.

@@ -135,7 +135,7 @@ def _loops(
 
 
 def _kinematics(spec: ModuleSpec, states: CStates, names: Namespace) -> dict[str, Any]:
-    """Make the C tables and signatures for the Jacobian and the forward dynamics."""
+    """Make the tables and signatures that the C code for Jacobian and forward dynamics needs."""
     robot, closure, name = spec.robot, spec.derivation.closure, spec.robot.name
     moved = [
         (f.j, k, closure.row[f.j][i])
@@ -174,7 +174,7 @@ def _kinematics(spec: ModuleSpec, states: CStates, names: Namespace) -> dict[str
 
 
 def _constant(e: Expression) -> str:
-    """Write a constant expression in C, 2 as 2.0, because C truncates quotients of integers."""
+    """Write a constant expression in C; integers become floats (2.0), because in C 1/2 is 0."""
     if e.constant is not None:
         return repr(float(e.constant))
     return re.sub(r"(?<![\w.])(\d+)(?![\w.])", r"\1.0", C.expression(e))
@@ -404,7 +404,7 @@ def _signatures(
 def _part(
     laid: Mapping[str, Any], number: int, part: Part, parameters: Sequence[str]
 ) -> dict[str, object]:
-    """Make one part of a long C function body as a C function of its own.
+    """Make a C function from one part of the body of a long C function.
 
     Its parameters are the ones among `parameters` that its lines use.
     """

@@ -1,4 +1,4 @@
-"""From a robot to its source files: derive the model, regroup the parameters, print the targets."""
+"""From a robot to its source files: derive the models, regroup the parameters, write the code."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from symgen.regroup.regrouping import Regrouping
 
 @dataclass(frozen=True)
 class Emitter:
-    """Code generator of one target: its language, and the function that writes the file."""
+    """Code generator of one kind of file (target): its language, and its writing function."""
 
     language: Language
     render: Callable[..., str]

@@ -108,7 +108,7 @@ def grouped(regrouping: Regrouping) -> dict[str, str]:
 
 
 def one_sided_friction_that_absorbs(regrouping: Regrouping) -> list[str]:
-    """List the base parameters of one-sided Coulomb friction that also contain a constant force.
+    """List base parameters of one-directional friction that also contain a constant force.
 
     D_FSP - D_FSN = 1 in motion, as for a constant force, but 0 at rest.
     """
@@ -156,7 +156,7 @@ def informative_columns(robot: Robot) -> tuple[str, ...]:
 
 
 def element_lines(robot: Robot) -> list[str]:
-    """Describe each family of elements (friction, springs, actuator inertia) and where it acts.
+    """Describe the elements (friction, springs, actuator inertia) and the joints they act on.
 
     An element acts along a linear combination of joint motions, or in a quadratic form of them.
     """
@@ -263,7 +263,7 @@ def tables(spec: ModuleSpec) -> list[str]:
 
 
 def data(spec: ModuleSpec) -> list[str]:
-    """Write the drives, limits and parameter values of the robot file as Python source."""
+    """Write, as Python source, the drives, limits and parameter values from the robot file."""
     robot = spec.robot
     return [
         *_drives(robot),
@@ -294,7 +294,7 @@ def scalars(robot: Robot) -> dict[str, tuple[tuple[float, float], int, str]]:
 
 
 def channels(regrouping: Regrouping) -> dict[str, tuple[str, ...]]:
-    """Find the base parameters that depend on each constant that is a function of time."""
+    """List, for each constant that varies with time, the base parameters that depend on it."""
     return {
         c: tuple(b.name for b in regrouping.base if b.own in read)
         for c, read in regrouping.robot.channels.items()
@@ -367,7 +367,7 @@ def _literal(start: str, value: Any, end: str) -> list[str]:
 
 
 def plain(text: str) -> str:
-    """Make a text safe within a docstring: no line breaks, backslashes or triple quotes."""
+    """Make a text safe within a docstring: replace line breaks, backslashes, triple quotes."""
     return (
         " ".join(text.replace("\\", "/").replace('"""', "'''").split(" "))
         .replace("\r", " ")

@@ -173,13 +173,13 @@ class Text:
 
     @property
     def given(self) -> set[str]:
-        """Names of the inputs, and names that the derivation gave to intermediate variables."""
+        """Names of the inputs, and of intermediate variables named by the symbolic derivation."""
         named = [n for n in self.nodes if n.index in self.named and (n.name or n.hint)]
         return {self.called[n.index] for n in named} | self.inputs
 
     @property
     def inputs(self) -> set[str]:
-        """Names of the inputs on which the outputs depend, as the derivation writes them."""
+        """Names of the inputs on which the outputs depend, before any renaming for the language."""
         return {str(node.value) for node in self.nodes if node.op == SYM}
 
     def _symbol(self, node: Node) -> str:
@@ -266,7 +266,7 @@ class Text:
             letters = ascii_lowercase[k % 26] * (k // 26 + 1)
             if not self.names.has(f"{of}{letters}"):
                 return self.names.own(f"{of}{letters}")
-        raise AssertionError("more parts than nodes")
+        raise AssertionError("more intermediate variables than nodes of the graph")
 
     # --- lines ---
 
@@ -286,7 +286,7 @@ class Text:
         return under_titles((title(n), self._line(n)) for n in named)
 
     def _title(self, node: Node) -> str:
-        """Return the heading under which the derivation made a node of the expression graph."""
+        """Return the heading, such as a step of the recursion, to which a graph node belongs."""
         return self._marks[bisect_right(self._marks, node.index, key=itemgetter(0)) - 1][1]
 
     def _line(self, node: Node) -> str:
@@ -305,7 +305,7 @@ class Text:
     # --- expressions ---
 
     def expression(self, s: Scalar | int) -> str:
-        """Write the value of an output: its name, its expression, or a number."""
+        """Write the value of an output as a variable name, an expression, or a number."""
         return self._operand(s) if isinstance(s, Scalar) else f"{float(s)}"
 
     def _operand(self, s: Scalar) -> str:
@@ -342,7 +342,7 @@ class Text:
         )
 
     def _addends(self, s: Scalar) -> list[Scalar]:
-        """List the terms of a sum; inner sums without a line of their own are split too."""
+        """List the terms of a sum; an inner sum that has no name is replaced by its terms."""
         terms: list[Scalar] = []
         for x in s.node.operands:
             x = x if s.sign > 0 else -x

@@ -179,10 +179,11 @@ def _laid_out(spec: ModuleSpec, block: Block) -> dict[str, object]:
 def _filled_at_once(
     steps: Sequence[Section], results: Sequence[Section]
 ) -> tuple[list[Section], list[Section]]:
-    """Merge assignments: a result entry equal to an intermediate variable is set in its line.
+    """Merge assignments: `N1 = x` and `Gamma[0] = N1` become `N1 = Gamma[0] = x`.
 
-    Entries with the same value are assigned in one line; entries with a remark are not merged.
-    Return the sections of the steps, and the sections of the results that remain.
+    N1 is left out of this line if no other line uses N1. Entries with the same value are assigned
+    in one line; entries with a remark are not merged. Return the sections of the steps, and the
+    sections of the results that remain.
     """
     named = {line.partition(" = ")[0] for section in steps for line in section.lines}
     targets: dict[str, list[str]] = {}
@@ -219,7 +220,7 @@ def _filled_at_once(
 
 
 def _passed_constants(robot: Robot, names: Sequence[str]) -> str:
-    """Write the constants as arguments: a tuple, and a second one for functions of time."""
+    """Write constants as arguments: one tuple, and a second for constants that vary with time."""
     timed = [c for c in names if c in robot.channels]
     rest = tuple_of([c for c in names if c not in timed])
     return f"{rest}, {tuple_of(timed)}" if timed else rest
@@ -260,7 +261,7 @@ def _constant_entries(f: Function, result: str) -> list[str]:
 
 
 def _loop_tables(spec: ModuleSpec, slides: bool) -> Iterator[str]:
-    """Yield the source lines of the data that close the loops: start, assembly mode, units.
+    """Yield source lines with the data that close loops: start position, assembly mode, units.
 
     A unit is a typical motion of an independent joint: 1 rad, or the longest length of the robot
     file if the joint is prismatic. Units are written only if `slides` is true.
@@ -359,7 +360,7 @@ def tuple_of(names: Sequence[object]) -> str:
 
 
 def further_arguments(names: Iterable[str]) -> str:
-    """Write names so that they continue a list of arguments: ", D3, RL4"."""
+    """Write names as the continuation of a list of arguments, for instance ", D3, RL4"."""
     return "".join(f", {name}" for name in names)
 
 
@@ -373,7 +374,7 @@ def source(e: Expression) -> str:
 
 
 def _moving(robot: Robot, closure: Closure) -> list[str]:
-    """Write the table of how the independent joints move the joint of each frame, as Python source.
+    """Write, as Python source, how the joint of each frame depends on the independent joints.
 
     Entries are {frame: (antecedent, sigma, ((column, rate), ...))}. The rate is the velocity of the
     joint per velocity of the independent joint that the column counts.
@@ -388,7 +389,7 @@ def _moving(robot: Robot, closure: Closure) -> list[str]:
 
 
 def _passive_rows(robot: Robot, closure: Closure) -> list[str]:
-    """Write each passive joint as a linear function of the independent joints, as Python source.
+    """Write, as Python source, each passive joint as a linear function of independent joints.
 
     A row is (position at zero, rate for each independent joint).
     """

@@ -27,7 +27,7 @@ STATES = {"q": "q", "qd": "QP", "qdd": "QDP", "qdr": "QPR", "qddr": "QDPR"}
 
 @dataclass(frozen=True)
 class Function:
-    """One function of the emitted code, such as the inverse dynamics, over the base parameters.
+    """One function of the emitted code, such as the inverse dynamics, written in base parameters.
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ class Function:
 
 @dataclass(frozen=True)
 class Signals:
-    """The distinct entries of a function's result; x and -x count as the same entry.
+    """The distinct values among the entries of a result; x and -x count as one value.
 
     Attributes
     ----------
@@ -167,7 +167,7 @@ def signals(f: Function, entries: Sequence[Entry]) -> Signals:
 
 @dataclass(frozen=True, eq=False)
 class ModuleSpec:
-    """All functions of the emitted code of one robot, as data that any target can print."""
+    """All functions of the emitted code of one robot, as data before they are written as text."""
 
     derivation: Derivation
     regrouping: Regrouping
@@ -179,7 +179,7 @@ class ModuleSpec:
 
     @property
     def tied(self) -> tuple[int, ...]:
-        """Passive joints whose positions only the closure equations define, no explicit formula."""
+        """Passive joints whose positions have no formula: only closure equations define them."""
         return self.derivation.closure.tied
 
     @cached_property
@@ -218,7 +218,7 @@ SHARING = ("regressor", "inverse_dynamics")
 
 
 def module_spec(regrouping: Regrouping, options: Sequence[str] = ()) -> ModuleSpec:
-    """Make all functions of the emitted code of a robot, over its base parameters.
+    """Make the data of all functions of the emitted code of a robot, written in base parameters.
 
     Models on request are included if `options` names them.
     """
@@ -245,7 +245,7 @@ def function(
     only: Callable[[str], bool] = lambda own: True,
     graph: Rewrite | None = None,
 ) -> Function:
-    """Make one function of the emitted code: a model, such as the regressor, over base parameters.
+    """Make the data of one function of the emitted code, such as the regressor.
 
     Only base parameters named after a standard parameter for which `only` is true take part.
     `graph` is an expression graph that several models share; it needs all parameters.
@@ -267,7 +267,7 @@ def shape_of(model: Model, d: Derivation, parameters: tuple[str, ...]) -> tuple[
 
 @lru_cache(maxsize=2)
 def spec_of(robot: Robot, options: tuple[str, ...] = ()) -> ModuleSpec:
-    """Make all functions of the emitted code of a robot; the results are cached.
+    """Make the data of all functions of the emitted code of a robot, and cache the result.
 
     The cache saves time if the Python module and the C file of a robot are made one after the
     other.
@@ -276,11 +276,11 @@ def spec_of(robot: Robot, options: tuple[str, ...] = ()) -> ModuleSpec:
 
 
 def is_inertial(robot: Robot) -> Callable[[str], bool]:
-    """Return a test whether a standard parameter is an inertial parameter of a link."""
+    """Return a function that tests whether a parameter is an inertial parameter of a link."""
     return inertial_names(robot).__contains__
 
 
 def is_inertial_or_actuator(robot: Robot) -> Callable[[str], bool]:
-    """Return a test whether a standard parameter is inertial or the inertia of an actuator."""
+    """Return a function that tests whether a parameter is inertial, of a link or an actuator."""
     inertial, elements = inertial_names(robot), element_names(robot)
     return lambda own: own in inertial or elements[own][0].kind == "inertia"

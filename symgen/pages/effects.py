@@ -57,7 +57,10 @@ class Effect:
 
 
 def effects(spec: ModuleSpec) -> tuple[Effect, ...]:
-    """Find the effect of every standard parameter of a module, in the order of eq. (4)."""
+    """Find the base parameters and joints that each standard parameter affects.
+
+    The order is that of eq. (4).
+    """
     robot = spec.robot
     into: dict[str, list[int]] = {name: [] for name in robot.parameters}
     for k, b in enumerate(spec.regrouping.base):
@@ -111,7 +114,7 @@ def inertial_meaning(family: str, j: int) -> str:
 
 
 class Reasons:
-    """Reasons why standard parameters of one robot have no effect.
+    """Reasons why standard parameters of one robot have no effect on the joint torques.
 
     They come from components of motion and gravity that are zero in every motion of a link.
     """
@@ -129,7 +132,7 @@ class Reasons:
         self.gravity = any(robot.gravity)
 
     def inertial(self, family: str, j: int) -> str:
-        """Say why an inertial parameter of link j has no effect.
+        """Explain why an inertial parameter of link j has no effect on the joint torques.
 
         family : name of the parameter without its number, such as XX.
         """
@@ -181,5 +184,5 @@ def _zero(x: Scalar) -> bool:
 
 
 def _constant(x: Scalar) -> bool:
-    """Whether a scalar of the expression graph has the same value in every motion."""
+    """Whether a quantity of the derivation, such as a velocity, is the same in every motion."""
     return not isinstance(x, Node) or bool(x.node.fixed)

@@ -1,4 +1,4 @@
-"""Prepare the numbers of the robot drawing: frame table, passive joints, ranges of the sliders.
+"""Prepare the data of the robot drawing: frame table, passive joints, ranges of the sliders.
 
 The script of the page computes the geometry itself.
 """
@@ -14,7 +14,7 @@ from symgen.description.robot import PRISMATIC, Robot
 
 
 def figure(robot: Robot, closure: Closure) -> dict[str, Any]:
-    """Collect the numbers of the drawing as plain values for JSON, SI and rad.
+    """Collect the data of the robot drawing as plain values for JSON, in SI units and rad.
 
     `theta` and `r` are without the joint position. `follows` gives each passive joint as
     q_j = offset + sum_i of_i q_i.
@@ -45,7 +45,7 @@ def figure(robot: Robot, closure: Closure) -> dict[str, Any]:
 
 
 def joint_ranges(robot: Robot, closure: Closure, size: float) -> list[dict[str, Any]]:
-    """Set the range and the start of the slider of every actuated joint.
+    """Choose the range and the first position of the slider of every actuated joint.
 
     The range is that of the joint limits. Without limits it is half a turn to either side, or half
     of `size`, the size of the robot, for a prismatic joint. The start is 0 if 0 is in the range.
@@ -69,7 +69,7 @@ def joint_ranges(robot: Robot, closure: Closure, size: float) -> list[dict[str, 
 
 
 def passive_text(robot: Robot, closure: Closure) -> dict[int, str]:
-    """Say in words how each passive joint gets its position."""
+    """Say in words how the position of each passive joint is found, for instance from the loop."""
     words = {True: "declared", False: "found from the loop"}
     return {
         j: "solved from the loop" if j in closure.tied else words[j in robot.constraints]

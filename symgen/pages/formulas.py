@@ -44,11 +44,11 @@ def printed(regrouping: Regrouping, form: str, only: str | None = None) -> str:
 
 
 def _page(regrouping: Regrouping, formulas: list[str]) -> list[str]:
-    """Arrange the text of `symgen show`: counts, formulas, and two lists of parameters.
+    """Arrange the text of `symgen show`: counts, formulas, and two lists of further parameters.
 
-    The formulas are aligned as in eq. (27). The lists are parameters without regrouping and
-    parameters without effect. Joint names and relations of passive joints are included if there are
-    any.
+    The formulas are aligned as in eq. (27). The lists are base parameters without regrouping, and
+    standard parameters without effect. Joint names and relations of passive joints are included if
+    there are any.
     """
     robot = regrouping.robot
     alone = " ".join(b.name for b in regrouping.base if b.name == b.own)
@@ -73,7 +73,7 @@ def _page(regrouping: Regrouping, formulas: list[str]) -> list[str]:
 
 
 def mapping(regrouping: Regrouping, only: str | None = None) -> dict[str, Any]:
-    """Return the formulas as plain values, with the operation counts of the models."""
+    """Return the formulas of base parameters and the operation counts as values for JSON."""
     return {
         "name": regrouping.robot.name,
         "count": len(regrouping),
@@ -100,8 +100,8 @@ def selected(regrouping: Regrouping, only: str | None) -> list[BaseParameter]:
             or "none"
         )
         raise SymgenError(
-            f"{only!r} is no base parameter of {regrouping.robot.name}; close: {close} (all of "
-            "them: leave out --only)"
+            f"{only!r} is no base parameter of {regrouping.robot.name}; similar names: {close} "
+            "(to list all, leave out --only)"
         )
     return base
 

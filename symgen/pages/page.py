@@ -190,7 +190,7 @@ def printed(text: str) -> str:
 
 
 def _places(parameters: Sequence[Effect]) -> dict[str, list[dict[str, Any]]]:
-    """Group the standard parameters by link or joint; mark each as alone, regrouped or none.
+    """Group the standard parameters by link or joint, each with its role: alone, regrouped or none.
 
     The mark none means that the parameter has no effect.
     """
@@ -204,7 +204,7 @@ def _places(parameters: Sequence[Effect]) -> dict[str, list[dict[str, Any]]]:
 
 
 def _without_effect(parameters: Sequence[Effect]) -> list[tuple[list[MathML], str]]:
-    """Group the standard parameters without effect by the reason.
+    """Group the standard parameters that have no effect by the reason for this.
 
     Return pairs of the parameters and the reason that they share.
     """
@@ -218,7 +218,7 @@ def _without_effect(parameters: Sequence[Effect]) -> list[tuple[list[MathML], st
 def _pointed_at(
     spec: ModuleSpec, parameters: Sequence[Effect], absorbed: Sequence[Absorption]
 ) -> Mapping[str, Any]:
-    """Collect the texts that the page shows when the pointer is on a parameter, by name."""
+    """Collect, for each parameter, what the page shows when the pointer is on this parameter."""
     robot = spec.robot
     by_name = {e.name: e for e in parameters}
     entries = {e.name: _entry(e, e.meaning, e.base, e.joints, e.why) for e in parameters}

@@ -1,4 +1,4 @@
-"""Random closed states of a mechanism with loops, computed exactly modulo a prime p.
+"""Random states in which the loops of a mechanism close, computed exactly modulo a prime p.
 
 The tied joints are algebraic functions of the actuated ones. The method serves loops whose
 orientations agree by construction (sums of angles), so that the closure equations r = 0 are
@@ -50,7 +50,8 @@ ON_BRANCH = 1e-6  # rad
 
 
 class ClosedDraw(Draw):
-    """Random closed states modulo a prime p: `samples` states at each of `count` geometries.
+    """Random states modulo a prime p that close the loops: `samples` states at each of `count`
+    geometries.
 
     `geometry` gives the values modulo p of the quantities that vary, shape (count, 1). By default
     these are all lengths; with `at_numbers`, lengths that are numbers in the robot file have their
@@ -76,7 +77,7 @@ class ClosedDraw(Draw):
         self.tied = self.system.closure.tied
         if spatial := [loop for loop in robot.loops if loop.cut in self.tied]:
             raise ArithmeticError(
-                f"the orientation of frame {spatial[0].cut} on {spatial[0].twin} is no sum of joint angles, so the loop is spatial"
+                f"the orientation of frame {spatial[0].cut} relative to frame {spatial[0].twin} is not a sum of joint angles, so the loop is spatial"
             )
         p = p if p is not None else primes_for(robot, 1)[0]
         rng = np.random.default_rng([seed, 1])
@@ -96,7 +97,9 @@ class ClosedDraw(Draw):
         algebra = GraphAlgebra(geometry_of_all.robot)
         ends = loop_ends(geometry_of_all.robot, algebra, geometry_of_all.closure)
         if any(self.residues(x).any() for x in interpret(coincidence(ends), self)):
-            raise ArithmeticError("the loops do not close by their positions alone")
+            raise ArithmeticError(
+                "closing the loops in position does not close them in orientation"
+            )
         self._move()
 
     def _array(self, x: Scalar) -> Array:
@@ -123,7 +126,7 @@ class ClosedDraw(Draw):
                     break
             else:
                 raise ArithmeticError(
-                    "the loops are not closed one after the other by two joints each"
+                    "the loops cannot be solved one after the other, each for two joints"
                 )
             del pending[k]
             left -= {*unknown}
@@ -186,7 +189,7 @@ class ClosedDraw(Draw):
             excess.append((c * c + s * s - 1) % p * scale % p)
         none, one, two = coefficients = self._solved(np.stack(basis[:3]), np.stack(excess[:3]))
         if ((coefficients * basis[3] % p).sum(axis=0) % p != excess[3]).any():
-            raise ArithmeticError(f"the loop is not of second degree in q{u}")
+            raise ArithmeticError(f"the closure equation of the loop is not quadratic in q{u}")
         if not slides:
             B, C = (one * zero[0] + two * zero[1]) % p, (two * zero[0] - one * zero[1]) % p
             none, one, two = (none + B) % p, 2 * C % p, (none - B) % p
@@ -211,7 +214,7 @@ class ClosedDraw(Draw):
         return np.asarray(square)
 
     def _branch(self, j: int, first: Point, second: Point, around: set[int]) -> Array:
-        """Whether the first of two loop solutions is on the robot file's branch, for each sample.
+        """Whether the first of two solutions has the assembly mode of the robot file, per sample.
 
         `first` and `second` are the two solutions for hinge j. The test is needed if the closure
         splits into two branches; the result has shape (samples,).
@@ -244,7 +247,7 @@ class ClosedDraw(Draw):
                     )
                 turned = (-turned[1] % p, turned[0])
         raise ArithmeticError(
-            "the closure has several branches that no relation of angles separates"
+            "the closure equations have several solution branches, which no relation of joint angles separates"
         )
 
     def _take(self, closed: Array) -> None:
@@ -266,7 +269,7 @@ class ClosedDraw(Draw):
         self.samples = len(places)
 
     def _move(self) -> None:
-        """Compute velocities and accelerations of the tied joints from the actuated joints."""
+        """Compute velocities and accelerations of the dependent joints from the actuated joints."""
         joints = self.robot.joints
         n = len(joints)
         named = self.system.derivation.algebra.named
@@ -298,7 +301,7 @@ class ClosedDraw(Draw):
 
 
 def closed_draw(robot: Robot, seed: int, samples: int, **given: Any) -> ClosedDraw:
-    """Draw random closed states modulo p; repeat the draw if it fails by chance.
+    """Draw random states modulo p that close the loops; repeat the draw if it fails by chance.
 
     A draw fails if it is singular, or if too few states close at one of the geometries. Each
     repetition draws more samples.
@@ -313,7 +316,7 @@ def closed_draw(robot: Robot, seed: int, samples: int, **given: Any) -> ClosedDr
 
 
 def lengths_of(robot: Robot) -> tuple[Length, ...]:
-    """Collect the constants, numbers and roots in the lengths b, d and r of the frames."""
+    """Collect the constants, numbers and square roots in the lengths b, d and r of the frames."""
     atoms: dict[Length, None] = {}
     for f in robot.frames:
         for e in (f.b, f.d, f.r0):

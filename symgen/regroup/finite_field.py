@@ -1,4 +1,4 @@
-"""Linear algebra over the finite field F_p: echelon form, linear systems, small rationals."""
+"""Linear algebra modulo a prime p: echelon form, linear systems, conversion to small fractions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from symgen.derive.exact import Array, power
 
 
 def rref(M: Array, p: int, *, reduced: bool = True) -> tuple[list[int], Array]:
-    """Compute the reduced row echelon form of M over the finite field F_p.
+    """Compute the reduced row echelon form of M modulo a prime p.
 
     Return the pivot columns, leftmost first, and the rows with pivots, shape (rank, columns). Rows
     with few nonzero entries are used first, and only the columns of these entries are changed; this
@@ -46,7 +46,7 @@ def rref(M: Array, p: int, *, reduced: bool = True) -> tuple[list[int], Array]:
 
 
 def solve_each(W: Array, p: int, rng: np.random.Generator) -> Array | None:
-    """Solve W[g, :, -1] = W[g, :, :-1] beta[g] modulo p for every g at once.
+    """Solve many linear systems at once modulo p: W[g, :, -1] = W[g, :, :-1] beta[g] for each g.
 
     Return beta, shape (G, columns - 1), or None unless all systems are consistent. Random
     combinations of the rows make pivoting unnecessary. There are three more combinations than

@@ -1,8 +1,9 @@
-"""Base columns and coefficients in floating point, for the constants of the robot file.
+"""Base columns of the regressor and their regrouping coefficients, computed in floating point.
 
-They are used for coefficients that are not recognised modulo primes, and for loops that cannot be
-closed exactly modulo a prime, such as spatial loops. Dependent columns are found at random states,
-which Newton's method closes near the start configuration of the loops.
+They hold for the constants of the robot file. They are used for coefficients that are not
+recognised modulo primes, and for loops that cannot be closed exactly modulo a prime, such as
+spatial loops. Dependent columns are found at random states, which Newton's method closes near the
+start configuration of the loops.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ Relations = dict[str, dict[str, Expression]]  # {dependent: {base column: coeffi
 
 
 def float_relations(robot: Robot, names: Sequence[str]) -> tuple[tuple[str, ...], Relations]:
-    """Find base columns of the regressor numerically, and the coefficients of the other columns.
+    """Find the base columns of the regressor numerically, and express the other columns by them.
 
     `names` are the columns in order of preference. Return the base columns and {dependent column:
     {base column: coefficient}}.
@@ -48,7 +49,7 @@ def float_relations(robot: Robot, names: Sequence[str]) -> tuple[tuple[str, ...]
 
 
 def numeric_coefficients(robot: Robot, name: str, support: Sequence[str]) -> list[Expression]:
-    """Compute beta of the regressor column D_name = sum_k beta_k D_support,k by least squares."""
+    """Express a regressor column by others by least squares: D_name = sum_k beta_k D_support,k."""
     W = float_regressor(robot, (*support, name))
     size = np.linalg.norm(W[:, :-1], axis=0)
     beta = np.linalg.lstsq(W[:, :-1] / size, W[:, -1], rcond=None)[0] / size
@@ -114,7 +115,7 @@ def sampled_columns(floats: Floats, names: Sequence[str], count: int) -> Array:
         )
         own = next((e for e in robot.elements if e.is_own and name.startswith(e.family)), None)
         raise DescriptionError(
-            f"column {name} is no number at {state} (rad, m, s)"
+            f"column {name} is not finite at {state} (rad, m, s)"
             + (f": {own.torque or own.energy}" if own else "")
             + "; write a law that is finite everywhere, such as sqrt(max(1 - q, 0))",
             path=("columns", own.family) if own else (),
@@ -125,7 +126,7 @@ def sampled_columns(floats: Floats, names: Sequence[str], count: int) -> Array:
 def _columns_near_start(
     system: LoopSystem, names: Sequence[str], count: int, rng: np.random.Generator
 ) -> Array:
-    """Compute regressor columns at random closed states near the start configuration.
+    """Compute regressor columns at random states, near the start, that close the loops.
 
     `count` states are tried; states that do not close are dropped. The result has shape (joints,
     states, columns).
@@ -167,7 +168,9 @@ def _columns_near_start(
 
 
 def _in_time(robot: Robot, rng: np.random.Generator, count: int) -> Any:
-    """Draw a random value at each state for the constants that are functions of time."""
+    """Draw random values, one per state, of the channels (quantities that the record gives at each
+    sample, such as temperature).
+    """
     return {name: rng.uniform(0.5, 2, count) for name in robot.channels}
 
 

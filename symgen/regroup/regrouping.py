@@ -144,8 +144,8 @@ def _warn(regrouping: Regrouping) -> None:
         moments = {parameter(p, j) for p in INERTIAL[:6]}
         names = [b.name for b in regrouping.base if moments & b.combination.keys()]
         warnings.warn(
-            f"{wrong}; it enters {', '.join(names) or 'no base parameter'}. Give the moments about "
-            "the centre of mass, kg m^2, of CAD or of a box, or identify them",
+            f"{wrong}; this inertia enters {', '.join(names) or 'no base parameter'}. Give the "
+            "moments about the centre of mass in kg m^2, from CAD or of a box, or identify the moments",
             InertiaWarning,
             stacklevel=3,
         )
@@ -153,7 +153,7 @@ def _warn(regrouping: Regrouping) -> None:
 
 @lru_cache(maxsize=16)
 def _regrouped(robot: Robot, seed: int) -> Regrouping:
-    """Derive the base parameters of a robot, with a cache.
+    """Derive the base parameters of a robot; a second call returns the stored result.
 
     The cache saves time, because formulas, certificate and module of a robot need the same result.
     """

@@ -25,7 +25,7 @@ def draw_states(
     geometry: Mapping[Variable, Array] | None = None,
     count: int = 0,
 ) -> Draw:
-    """Draw `samples` random states modulo p, at one geometry or at each of `count` geometries.
+    """Draw `samples` random states modulo p, for one robot geometry or each of `count` geometries.
 
     If closure equations tie joints, the states satisfy these equations. ArithmeticError is raised
     for loops that cannot be closed exactly modulo p, such as spatial loops.
@@ -73,6 +73,6 @@ def states_for(robot: Robot, names: Sequence[str], spare: int = 4) -> int:
 
 @lru_cache(maxsize=8)
 def _acting(robot: Robot) -> dict[str, Array]:
-    """Find by random states on which joints each standard parameter acts."""
+    """Find, with random states, the joints on whose torques each standard parameter acts."""
     W = sample(Draw(robot, 5, 2), robot.parameters).reshape(len(robot.joints), 2, -1)
     return dict(zip(robot.parameters, (W != 0).any(axis=1).T, strict=True))

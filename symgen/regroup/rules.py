@@ -32,7 +32,7 @@ Step = tuple[
 
 
 class Transfer:
-    """The moves of standard parameters from each link to the link before it, by the general rules.
+    """Regrouping of standard parameters from each link to the link before it, by the general rules.
 
     `steps` holds the moves. `combination` holds, for each parameter that remains, the sum of
     standard parameters that it stands for. The torque is then the sum over the remaining names k of
@@ -76,7 +76,7 @@ class Transfer:
                 self._move(parameter(name, frame.j), acting)
 
     def _reached(self, name: str, j: int) -> Combination:
-        """Express the regressor column of a parameter of frame j by columns of links.
+        """Express the regressor column of an inertial parameter at frame j by columns of links.
 
         A frame that is fixed to a link but is no link itself is replaced by that link. Parameters
         of the base have no columns.

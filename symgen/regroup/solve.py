@@ -1,4 +1,4 @@
-"""Exact coefficients of relations that hold for one robot: D_dependent = sum_k beta_k D_base,k.
+"""Exact coefficients of dependent regressor columns: D_dependent = sum_k beta_k D_base,k.
 
 Over F_p each beta is a residue, and a function of the geometry: lengths, gravity, (cos, sin) of
 fixed angles. The program changes one of these variables at a time to find which of them matter. The
@@ -71,7 +71,9 @@ Supports = Mapping[
 def coefficients(
     robot: Robot, supports: Supports
 ) -> tuple[dict[str, list[Expression]], dict[str, str]]:
-    """Find exact beta in D_dependent = sum_k beta_k D_support,k, with D the regressor columns.
+    """Find the exact coefficients that express dependent regressor columns by base columns.
+
+        D_dependent = sum_k beta_k D_support,k
 
     Return the coefficients of each dependent column, and for columns without a fraction P/Q of
     moderate degree the reason.
@@ -87,7 +89,7 @@ def coefficients(
 
 
 class Pool:
-    """Coefficients of dependent columns modulo a prime, at a growing number of random geometries.
+    """Coefficients of dependent regressor columns, modulo a prime, at a set of random geometries.
 
     `k` is the number of the prime. `free` names what may vary besides the constants: "numbers" of
     the robot file, "pi" (fractions of pi), or both.
@@ -119,7 +121,7 @@ class Pool:
         self.values: dict[Expression, Array] = {}
 
     def random(self, count: int) -> dict[Variable, Array]:
-        """Draw `count` random geometries: integers modulo p, shape (count, 1), per variable."""
+        """Draw `count` random geometries: per variable, integers modulo p, shape (count, 1)."""
         return {v: self.rng.integers(2, self.p, (count, 1)) for v in self.variables}
 
     def solved(self, geometry: Mapping[Variable, Array], count: int) -> dict[str, Array | None]:
@@ -161,7 +163,7 @@ class Pool:
         return total
 
     def vector(self, name: str, k: int, P: Products, Q: Products) -> dict[int, int] | None:
-        """Find polynomials P, Q with beta = P/Q, as sums of the given products, modulo p.
+        """Find, modulo p, a fraction beta = P/Q in which P and Q are sums of the given products.
 
         Return {index in [*Q, *P]: residue} of the first relation with a denominator (a product of
         Q), or None. There can be several relations, since cos(a) and cos(3 a) are related.
@@ -188,7 +190,7 @@ class Pool:
 
 @dataclass(frozen=True)
 class Dependence:
-    """The variables, such as lengths, on which a coefficient depends.
+    """The variables, such as lengths, on which a regrouping coefficient depends.
 
     The coefficient depends on `free` in an unknown way; the variables in `powers` are mere factors
     with the given power.
@@ -332,7 +334,7 @@ class Recognition:
     def _rationals(
         self, vector: dict[int, int], name: str, k: int, P: Products, Q: Products
     ) -> dict[int, Fraction] | None:
-        """Convert integers modulo p to rational numbers; return None if there are none.
+        """Convert integers modulo p to the rational numbers they represent; None if this fails.
 
         One prime is enough for small numerators and denominators. Otherwise primes are combined by
         the Chinese remainder theorem until one more prime agrees.
@@ -401,7 +403,7 @@ class Recognition:
 
 
 def _fraction(entries: Mapping[int, Fraction], P: Products, Q: Products) -> Expression | None:
-    """Make the expression P/Q from the coefficients of its products; None if Q is zero.
+    """Build the expression P/Q from the coefficients of its terms; return None if Q is zero.
 
     The products are [*Q, *P]. Cosines and roots that have simple values are replaced by these
     values.

@@ -1,4 +1,4 @@
-"""Run commands and views of the studio in separate processes, with limits of memory and time.
+"""Run commands and computations of the studio in child processes, limited in memory and time.
 
 These processes end when the server ends.
 """
@@ -66,7 +66,10 @@ class ViewProcess:
         return self.pool
 
     def submit(self, view: Callable[..., Any], *args: Any) -> Future[Any]:
-        """Compute a view in the child process, after the views that were submitted before."""
+        """Run a view function, which computes data for a page, in the child process.
+
+        View functions run in the order in which they are submitted. Return a Future of the data.
+        """
         return self.start().submit(view, *args)
 
     def end(self) -> None:

@@ -62,7 +62,7 @@ class WorkFolder:
         write_all(self.path, {name: content})
 
     def read(self, name: str) -> str:
-        """Text of a file of the folder; "" if it does not exist."""
+        """Return the text of a file of the folder; "" if it does not exist."""
         path = self.path / name
         return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
 
@@ -226,8 +226,8 @@ class WorkFolder:
         outside = {file for file in files_named(study) if Path(file).name != file}
         if alien := sorted(outside - {*files_named(self.study())}):
             raise InputError(
-                f"{', '.join(alien)[:200]}: a study of the studio names files of its work folder; "
-                "drop the file on the page, or name it on the command line"
+                f"{', '.join(alien)[:200]}: a study in the studio may only name files of its work "
+                "folder; drop these files on the page, or give them on the command line"
             )
         return text
 
@@ -243,7 +243,7 @@ class WorkFolder:
         return found[name]
 
     def about(self, run: Path) -> dict[str, Any]:
-        """Summarise one run for the pages."""
+        """Summarise one run of an identification or resolution study for the pages."""
         kind = result_of(run)
         data = json_of(run / kind)
         parts = [p for part in data.get("validation") or [] for p in part.get("predictions", [])]

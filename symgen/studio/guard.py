@@ -78,7 +78,7 @@ class Guard:
         await sent({"type": "http.response.body", "body": reason[1].encode()})
 
     def refusal(self, scope: Message, limit: int) -> tuple[int, str] | None:
-        """Return the status and the sentence that refuse a request; None if it is allowed."""
+        """Return the HTTP status and the message that refuse a request; None if it is allowed."""
         headers: dict[str, list[str]] = {}
         for name, value in scope["headers"]:
             headers.setdefault(name.decode("latin-1").lower(), []).append(value.decode("latin-1"))

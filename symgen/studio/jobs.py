@@ -85,7 +85,7 @@ class Job:
 
     @property
     def counted(self) -> list[str]:
-        """Numbers of finished and of all steps, from the progress bar; empty without a bar."""
+        """Number of finished steps and of all steps in the progress bar; empty without bar."""
         return re.findall(r"\d+(?=/\d)|(?<=\d/)\d+", "".join(self.said[-1:]))[:2]
 
     @property
@@ -129,7 +129,7 @@ class Jobs:
                 self.cancel(job)
         if sum(job.open for job in self.all) >= MOST_COMMANDS:
             raise ValueError(
-                f"{MOST_COMMANDS} commands wait already; cancel some, or wait for them"
+                f"{MOST_COMMANDS} commands are waiting already; cancel some commands, or wait"
             )
         number = self.all[-1].number + 1 if self.all else 1
         self.all.append(Job(number, title, tuple(words), result, run))
@@ -151,7 +151,7 @@ class Jobs:
             self.changed()
 
     async def work(self) -> None:
-        """Run the queued commands, without end.
+        """Run the queued commands one after the other, until this task is cancelled.
 
         If this task is cancelled, the running process is ended.
         """
@@ -201,7 +201,10 @@ class Jobs:
             job.state = DONE if told else FAILED
 
     def _written(self, job: Job) -> int:
-        """Return the time when the result of a command was written, ns; 0 without a result."""
+        """Return the time, ns, at which the result file of a command was last written.
+
+        The time is 0 if the file does not exist.
+        """
         path = self.folder / job.result
         return path.stat().st_mtime_ns if path.is_file() else 0
 

@@ -64,7 +64,7 @@ class Pages:
         self.server, self.folder, self.jobs = server, server.folder, server.jobs
 
     def routes(self) -> list[Route]:
-        """Return the routes of all pages; routes under /do/ accept POST only."""
+        """Return the URL routes of all pages; routes under /do/ accept POST only."""
         gets = {
             "/{name}": self._show,
             "/view/{name}": self._view,
@@ -160,7 +160,7 @@ class Pages:
         )
 
     def _proof(self) -> dict[str, Any]:
-        """Return the certificate of the robot with its state.
+        """Return the certificate of the robot's formulas and its state, such as valid.
 
         The state is none, stale, running, failed, valid, invalid or draft.
         """
@@ -175,7 +175,9 @@ class Pages:
 
     def _source(self) -> Path:
         if self.folder.robot is None or self.folder.read(DRAFT):
-            raise InputError("the table describes no robot yet")
+            raise InputError(
+                "the table describes no robot yet; complete the table on the page Robot"
+            )
         return self.folder.robot
 
     def _is_checked(self) -> bool:
@@ -277,7 +279,7 @@ class Pages:
 
     def _of_this_robot(self, form: dict[str, str]) -> None:
         if form.get("digest") != self.folder.digest:
-            raise InputError("another page has changed the robot; reload this one")
+            raise InputError("another page has changed the robot; reload this page")
 
     async def _prove(self, form: dict[str, str]) -> str:
         # The page asks by itself; the draft may be newer than its question.
@@ -291,9 +293,9 @@ class Pages:
         return "certificate"
 
     async def _study(self, form: dict[str, str]) -> str:
-        """Replace the study by a text, or by values in JSON."""
+        """Replace the study file by a text, or by values in JSON."""
         if form.get("digest", "") != self.folder.study_digest:
-            raise InputError("another page has changed the study; reload this one")
+            raise InputError("another page has changed the study; reload this page")
         text = form.get("text", "").replace("\r\n", "\n")
         values = json.loads(form["values"]) if "values" in form else text
         self.folder.write("study.yaml", self.folder.checked_study(values))
@@ -302,7 +304,7 @@ class Pages:
     def _command(self) -> tuple[str, str]:
         """Return the names of the robot file and of the study file, for a command line."""
         if not self.folder.read("study.yaml"):
-            raise InputError("no study yet; answer the questions on the page Record first")
+            raise InputError("there is no study yet; answer the questions on the page Record first")
         return self._source().name, "study.yaml"
 
     async def _check(self, form: dict[str, str]) -> str:
@@ -345,14 +347,16 @@ class Pages:
         return "jobs"
 
     async def _apply(self, form: dict[str, str]) -> str:
-        """Queue the command that writes the values of a run into the user's URDF or MJCF.
+        """Queue the command that writes identified values into the user's URDF or MJCF.
 
         It writes a new file and shows the changed lines.
         """
         run = self.folder.run(form.get("run", ""))
         own, robot = self.folder.first(TREES), self._source()
         if own is None:
-            raise InputError("the robot did not come from a URDF or MJCF; drop yours on Robot")
+            raise InputError(
+                "the robot was not read from a URDF or MJCF file; drop your file on the page Robot"
+            )
         target = f"applied-{run.name}{own.suffix}"
         options = ("-o", target, "--force", "--diff")
         edited = () if robot == own else ("--robot", robot.name)
@@ -362,7 +366,7 @@ class Pages:
 
 
 def answering(handler: Handler) -> Handler:
-    """Wrap a handler so that bad input becomes one sentence on the page, with status 422."""
+    """Wrap a handler so that, for bad input, the page shows one sentence and the status is 422."""
 
     async def answer(request: Request) -> Response:
         try:
@@ -376,5 +380,5 @@ def answering(handler: Handler) -> Handler:
 
 
 def safe(text: str) -> str:
-    """Shorten a text to letters, digits, _ . and -, for the name of a file."""
+    """Make a file name from a text: only letters, digits, _ . and -, at most 60 characters."""
     return re.sub(r"[^A-Za-z0-9_.-]", "", text).lstrip(".-")[:60]

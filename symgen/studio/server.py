@@ -32,7 +32,7 @@ PAGE_TEMPLATES = Environment(
 
 
 class Server:
-    """The state that all requests of the studio share.
+    """State that all requests of the studio share: work folder, command queue and computed data.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class Server:
         self.news = asyncio.Event()
 
     async def view(self, view: Callable[..., dict[str, Any]], *args: Any) -> dict[str, Any]:
-        """Compute a view, the data that a page shows of a file, in a child process.
+        """Compute data that a page shows about a file (a view), in a child process.
 
         If robot, file and arguments are the same as before, the stored value is returned. A view
         that takes too long ends its process and gives an error. Views that derive models have a

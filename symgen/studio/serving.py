@@ -28,7 +28,7 @@ PULSE = 0.25  # s between two events of one page
 
 
 def application(server: Server, port: int, end: Callable[[], None]) -> Guard:
-    """Build the web application of the studio, with all paths behind the token.
+    """Build the web application of the studio, with a secret token at the start of every path.
 
     `end` is called after no page has been open for IDLE_TIME seconds.
     """
@@ -68,7 +68,7 @@ def application(server: Server, port: int, end: Callable[[], None]) -> Guard:
 
 
 async def told(server: Server) -> AsyncIterator[str]:
-    """Yield the events of one open page: version number and robot digest, after each change.
+    """Yield the events for one open page: version number and hash of the robot, after each change.
 
     An event is also sent after about 15 s without a change.
     """

@@ -45,7 +45,7 @@ def cells_of(text: str) -> dict[str, Any]:
 
 
 def _texts(x: Any) -> Any:
-    """Turn every scalar inside x into a text."""
+    """Convert every number or text inside the nested tables and lists of x to a text."""
     if isinstance(x, dict):
         return {str(key): _texts(value) for key, value in x.items()}
     if isinstance(x, list):
@@ -67,7 +67,7 @@ def with_cells(text: str, asked: str) -> str:
         gravity = ", ".join(map(_scalar, cells["gravity"]))
         constants = _flow(cells["constants"].items())
     except (ValueError, TypeError, KeyError, AttributeError) as error:
-        raise DescriptionError("the page sent no table; reload it") from error
+        raise DescriptionError("the page sent no table; reload the page") from error
     new = {
         "gravity": f"gravity: [{gravity}]\n",
         "constants": f"constants: {constants}\n",

@@ -34,7 +34,7 @@ NAMES_LISTED = 200  # columns that are listed
 
 
 def answered(view: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, Any]]:
-    """Wrap a function so that an error becomes a value with the keys error and path.
+    """Wrap a function so that an error is returned as a mapping with the keys error and path.
 
     Warnings of the library are added to the value as notes.
     """
@@ -55,7 +55,7 @@ def answered(view: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, Any
 
 @answered
 def robot(path: str, draft: str) -> dict[str, Any]:
-    """Describe a robot file, or its draft, without deriving any model.
+    """Describe a robot file, or an unfinished draft of it, without deriving any model.
 
     Returns the text of its table, its drawing, angles in degrees, and doubts about the file.
     """
@@ -160,7 +160,7 @@ def preview(path: str, request: Mapping[str, Any]) -> dict[str, Any]:
             if len(other.refused) < len(opened.refused):
                 opened, mark = other, ","
     if not opened.names:
-        nothing = InputError("no columns of numbers", file=opened.file)
+        nothing = InputError("the file has no columns of numbers", file=opened.file)
         raise next(iter(opened.refused.values()), nothing)
     names = list(opened.names)[:NAMES_LISTED]
     asked = [n for n in request.get("columns", "").split(",") if n in names]

@@ -1,6 +1,7 @@
-"""The source of symbolic models: a robot, its parameters, its closure, and given values of symbols.
+"""Inputs of the symbolic models: robot, parameters, relations between joints, given values.
 
-The closure gives the joint positions of a closed loop as functions of the independent ones.
+The relations (`closure`) give the joint positions of a closed loop as functions of the
+independent joint positions.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ PASSIVE = ("functions", "symbols")
 
 @dataclass(frozen=True)
 class Source:
-    """Everything that a symbolic model is derived from.
+    """All inputs from which the symbolic models of one robot are derived.
 
     Attributes
     ----------
@@ -73,7 +74,7 @@ class Source:
 
     @cached_property
     def derivation(self) -> Derivation:
-        """Derivation of the robot, from which all its symbolic models are computed.
+        """Derived formulas of the robot, as an expression graph for all its symbolic models.
 
         Passive joints that stay symbols are treated as independent joints.
         """
@@ -82,7 +83,7 @@ class Source:
         return derived(self.robot, open_tree)
 
     def request(self, of: int = 0, frame: int = 0) -> Request:
-        """Make the request for a model: its parameters, its given values and its frames.
+        """Collect the choices for one model: parameters, values that replace symbols, frames.
 
         The model is of frame `of` in components of frame `frame`.
         """
@@ -118,7 +119,7 @@ def source_of(
     passive: str | None = None,
     regrouping: Regrouping | None = None,
 ) -> Source:
-    """Collect everything that the symbolic models of a robot are derived from.
+    """Collect the inputs (parameters, given values, ...) of the symbolic models of a robot.
 
     The parameters are explained in `symgen.symbolic`. `regrouping` is the regrouping of the robot,
     if it is already computed.
@@ -151,7 +152,7 @@ def source_of(
             raise SymgenError(
                 f"{tied} of {robot.name} have no closed form: only the closure equations tie them "
                 "to the actuated joints; "
-                "leave out passive, or passive='symbols', and take their equations from `closure`"
+                "leave out passive, or use passive='symbols' with the equations of the model closure"
             )
         if passive == "symbols":
             closure = open_tree(robot)
@@ -166,7 +167,7 @@ def _one_of(what: str, given: str, known: Iterable[str]) -> None:
 def _parsed(
     robot: Robot, parameters: Iterable[str], values: Mapping[str, Any]
 ) -> dict[str, Expression]:
-    """Convert the given values to exact expressions in pi and the constants of the robot.
+    """Convert values given for symbols to exact expressions in pi and the robot's constants.
 
     A text is parsed by the grammar of robot files.
     """
@@ -181,7 +182,7 @@ def _parsed(
                 or f"{', '.join(known[:6])} ..."
             )
             raise SymgenError(
-                f"{name!r} is no symbol of the models of {robot.name}; close: {close_to}"
+                f"{name!r} is no symbol of the models of {robot.name}; similar names: {close_to}"
             )
         if isinstance(value, Expression):
             result[name] = value

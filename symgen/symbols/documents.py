@@ -1,9 +1,9 @@
-"""Printed models in closed form or as recursion: text, LaTeX, Python with SymPy, JSON, or MathML.
+"""Symbolic models as documents: in text, LaTeX, Python with SymPy, JSON, or MathML.
 
-MathML is for the HTML page of a robot. LaTeX needs amsmath alone; velocities are \\dot{q},
-accelerations \\ddot{q}, torques \\Gamma; intermediate variables of a recursion keep the names of
-SYMORO. Long formulas are broken before + and -: outside of brackets first, and inside if a term is
-wider than a line.
+Each model is written in closed form or as a recursion. MathML is for the HTML page of a robot.
+LaTeX needs amsmath alone; velocities are \\dot{q}, accelerations \\ddot{q}, torques \\Gamma;
+intermediate variables of a recursion keep the names of SYMORO. Long formulas are broken before +
+and -: outside of brackets first, and inside if a term is wider than a line.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ class Formulas:
 
 
 def closed_texts(model: SymbolicModel) -> dict[str, str]:
-    """Return the nonzero entries of the closed form as text, by label, for instance A(1,2).
+    """Return the nonzero entries of a model in closed form as texts, by name, such as A(1,2).
 
     If the model has a denominator, these are the numerators.
     """
@@ -128,9 +128,9 @@ def closed_texts(model: SymbolicModel) -> dict[str, str]:
 
 
 def notes(model: SymbolicModel) -> list[str]:
-    """List the sentences that explain a printed model.
+    """List the notes that are printed with a model, for instance which parameters it contains.
 
-    They name its parameters, the values that replace symbols, the entries that are not shown, the
+    Other notes name the values that replace symbols, the entries that are not shown, the
     denominator and the passive joints.
     """
     source = model.source
@@ -175,7 +175,7 @@ def passive_notes(model: SymbolicModel) -> list[str]:
 
 
 def angle_lines(angles: Mapping[str, Expression]) -> list[str]:
-    """Write the meaning of the symbols C and S, for instance "C23 = cos(q2 + q3)"."""
+    """Explain the short names of cosines and sines, for instance "C23 = cos(q2 + q3)"."""
     told = ", ".join(
         f"{name} = {'cos' if name[0] == 'C' else 'sin'}({e})".replace(" ", "\0")
         for name, e in angles.items()
@@ -187,7 +187,7 @@ def angle_lines(angles: Mapping[str, Expression]) -> list[str]:
 
 
 def text(model: SymbolicModel, form: str) -> str:
-    """Write a model as plain text: title, summary, notes, then its entries or its recursion."""
+    """Write a model as plain text: title, summary, notes, then its formulas."""
     return "\n".join([model.title, model.summary, *notes(model), "", *text_lines(model, form)])
 
 
@@ -245,9 +245,9 @@ def broken_lines(
 def pieces(
     formula: str, width: int, measure: Callable[[str], int] = len, depth: int = 0
 ) -> Iterator[str]:
-    """Yield the terms of a formula, cut before each + or - that at most `depth` brackets enclose.
+    """Cut a formula before each + or - that at most `depth` brackets enclose; yield the pieces.
 
-    A term that is wider than `width` is cut again, one bracket deeper.
+    A piece that is wider than `width` is cut again, one bracket deeper.
     """
     for piece in _cut(formula, depth):
         if measure(piece) <= width or depth > 8:
@@ -271,7 +271,7 @@ def _cut(text: str, deepest: int) -> Iterator[str]:
 
 
 def latex_lines(model: SymbolicModel, form: str) -> dict[str, list[str]]:
-    """Write the equations of a model in LaTeX as lines `left &= right`, by heading."""
+    """Write the equations of a model in LaTeX as lines `left &= right`, grouped by heading."""
     if form == "closed":
         closed = model.closed
         values, listing = closed.entries, None
@@ -298,9 +298,10 @@ def latex_lines(model: SymbolicModel, form: str) -> dict[str, list[str]]:
 def recursion(
     model: SymbolicModel,
 ) -> tuple[dict[str, list[tuple[str, Tree]]], dict[tuple[int, ...], Tree]]:
-    """Return the recursion of a model as equations of SymPy expressions, and its entries.
+    """Return the recursive equations of a model in SymPy, and the entries of its result.
 
-    The equations (name, expression) are listed by heading, the entries by their indices.
+    The equations are pairs (name, expression), grouped by heading. The entries are SymPy
+    expressions, by their indices.
     """
     listing = model.listing
     objects = Objects(partial(expressions.product, factors=()))
@@ -313,7 +314,7 @@ def recursion(
 
 
 def latex_label(model: SymbolicModel, place: Sequence[int]) -> str:
-    """Write the name of an entry of a model in LaTeX, for instance A with subscript 1,2."""
+    """Write in LaTeX the name of an entry of a matrix or vector, such as A with subscript 1,2."""
     if model.model.axes == ("parameters",):
         return latex_symbol(model.source.parameters[place[0]])
     letter = model.model.latex or rf"\mathbf{{{model.model.letter}}}"
@@ -347,7 +348,7 @@ def latex_document(model: SymbolicModel, form: str) -> str:
 
 
 def formulas(definitions: Mapping[str, Formula]) -> str:
-    r"""Write regrouping formulas in an `aligned` environment of LaTeX.
+    r"""Write the formulas of base parameters in LaTeX, in an `aligned` environment.
 
     For instance ZZ_{1R} &= ZZ_{1} + I_{a1} + ...
     """
@@ -365,7 +366,7 @@ def aligned(equations: Iterable[str], environment: str = "align*") -> str:
 
 
 def broken(line: str) -> list[str]:
-    """Break an equation `left &= right` into as many lines as needed."""
+    """Break a LaTeX equation `left &= right` before + or -, if it is too long for one line."""
     left, _, right = line.partition(" &= ")
     if width(line) > LATEX_WIDTH:  # brackets that grow cannot be broken
         right = re.sub(r"\\(left|right)\b", "", right)
@@ -388,18 +389,18 @@ def escaped(text: str) -> str:
 
 
 def _written(c: str) -> str:
-    """Write one character in LaTeX.
+    """Write one character in LaTeX; if fonts may lack the character, add its Unicode number.
 
-    A common character is unchanged; any other is written by \\other with its Unicode number.
+    A common character is unchanged; any other is written by the command \\other.
     """
     common = (c < "\u0180" and c not in "ĦħĸĿŀŉŦŧſ") or c in "–—‘’“”„…•€"
     return c if common else rf"\other{{{ord(c):04X}}}{{{c}}}"
 
 
 def document(title: str, summary: str, robot: Robot, notes: Sequence[str], body: str) -> str:
-    """Write a LaTeX document that compiles by itself.
+    """Write a complete LaTeX document that contains a frame table, notes, and the text `body`.
 
-    It holds the frame table, the direction of gravity, the notes, then `body`.
+    The direction of gravity comes after the frame table.
     """
     kept = informative_columns(robot)
     head = " & ".join(f"${HEADINGS.get(c, c)}$" for c in kept)
@@ -521,7 +522,7 @@ def shown_models(regrouping: Regrouping) -> tuple[list[ShownModel], list[str]]:
 
 
 def _shown(model: SymbolicModel) -> ShownModel | None:
-    """Prepare one model for the page; None if it has no closed form and no recursion."""
+    """Prepare one model for the HTML page; None if it has no short closed form and no recursion."""
     title = model.model.name.replace("_", " ")
     try:
         closed = model.closed

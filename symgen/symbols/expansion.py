@@ -1,4 +1,4 @@
-"""Closed forms of a model: its computation graph is expanded, then collected by parameter.
+"""Closed form of a model: its expression graph is multiplied out, then collected by parameter.
 
     entry = sum_k common_k inside_k chi_k
 
@@ -41,7 +41,7 @@ class TooManyTermsError(SymgenError):
 
 
 class Expansion:
-    """Values of a computation graph, expanded as polynomials in the parameters.
+    """The values of an expression graph, multiplied out as polynomials in the parameters.
 
     Parameters
     ----------
@@ -117,10 +117,9 @@ class Expansion:
         return names
 
     def _generators(self, node: Node) -> Iterable[tuple[Tree, int]]:
-        """Yield the symbols and functions that a graph node adds to coefficients, with their rank.
+        """Yield the symbols and functions of a graph node, each with its rank in printed products.
 
-        The rank is its place in a printed product: constants first, then positions of prismatic
-        joints, cosines and sines, rates.
+        Constants are printed first, then positions of prismatic joints, cosines and sines, rates.
         """
         name = str(node.value)
         match node.op:
@@ -200,7 +199,7 @@ class Expansion:
     # --- arithmetic ---
 
     def of(self, x: Scalar | int) -> Polynomial:
-        """Return the expanded polynomial of a value of the graph."""
+        """Return a value of the expression graph as a polynomial in the parameters."""
         value = self.ring(x) if isinstance(x, int) else self._value[x.node.index]
         return value if isinstance(x, int) or x.sign > 0 else -value
 
@@ -241,13 +240,13 @@ class Expansion:
         return (-1) ** odd * minor(0, tuple(range(size)))
 
     def tidied(self, a: Polynomial) -> Polynomial:
-        """Shorten every coefficient of a polynomial by the identities of sines and cosines."""
+        """Shorten the coefficients of a polynomial, for instance by sin**2 + cos**2 = 1."""
         return self._each(a, self.identities.tidy)
 
     # --- as expressions ---
 
     def written(self, a: Polynomial) -> Tree:
-        """Write a polynomial as a short expression, collected by parameter.
+        """Write a polynomial as a short expression: a factored coefficient times each parameter.
 
         Parameters that have the same coefficient, up to the sign, share one bracket.
         """
@@ -267,5 +266,5 @@ class Expansion:
 
 
 def length(a: Polynomial) -> int:
-    """Count the terms of an expanded polynomial."""
+    """Count the terms of a polynomial that is multiplied out."""
     return sum(map(len, a.values()))

@@ -1,4 +1,4 @@
-"""SymPy expressions that keep their written form: sums in their order, products factored.
+"""SymPy expressions that SymPy does not rearrange: sums stay in their order, products factored.
 
 SymPy's printers print them unchanged with order="none". `evaluated` converts them to ordinary SymPy
 objects.
@@ -29,12 +29,12 @@ class Parameter(sympy.Symbol):  # type: ignore[misc]
 
 
 def symbol(name: str) -> Tree:
-    """Make the real SymPy symbol of a name; the name pi gives the number pi."""
+    """Make a SymPy symbol (a real variable) from a name; the name pi gives the number pi."""
     return sympy.pi if name == "pi" else sympy.Symbol(name, real=True)
 
 
 def parameter(name: str) -> Tree:
-    """Make the real SymPy symbol of a parameter."""
+    """Make a SymPy symbol (a real variable) from the name of a parameter."""
     return Parameter(name, real=True)
 
 
@@ -138,7 +138,7 @@ def angle(letter: str, e: Expression) -> Tree:
 
 
 def equation(left: Tree, right: Tree) -> Tree:
-    """Write the equation left = right."""
+    """Make the SymPy equation left = right without evaluating it."""
     return sympy.Eq(left, right, evaluate=False)
 
 

@@ -1,4 +1,4 @@
-"""Short forms of coefficients: common factors before brackets, as few symbols as possible."""
+"""Short forms of the coefficients in a formula: factored, with as few symbols as possible."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Powers = tuple[int, ...]  # of the generators of a ring
 
 
 class Factors:
-    """Writer of short, factored expressions for the coefficients of one polynomial ring.
+    """Writer of coefficients (polynomials in cosines, lengths, ...) as short factored expressions.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Factors:
         self._labels = [*map(str, shown)]
 
     def terms(self, c: Coefficient, members: Sequence[Tree]) -> Sequence[Tree]:
-        """Multiply the coefficient c by a sum of parameters (or by 1), and write the product short.
+        """Write the product of the coefficient c and a sum of parameters (or 1) in a short form.
 
         Returns its terms: several if the product is a plain sum, else one.
         """
@@ -59,7 +59,7 @@ class Factors:
         return [self._product(number, factors)]
 
     def _product(self, c: Fraction, factors: Sequence[Tree]) -> Tree:
-        """Multiply the number c by the factors; with `decimals`, c is written as a decimal."""
+        """Multiply the number c by the factors; c is a decimal if the robot file has decimals."""
         if self.decimals and c.denominator > 1:
             factors, c = [expressions.product(abs(c), ()), *factors], Fraction(1 if c > 0 else -1)
         return expressions.product(c, factors)
@@ -82,7 +82,7 @@ class Factors:
         return number * number_of_rest, [*self._powers(common), *factors]
 
     def _symbols(self, c: Coefficient) -> int:
-        """Count the symbols of a coefficient that is written with one bracket."""
+        """Count the symbols that a coefficient needs if it is written with one bracket."""
         number, shared = _content(c), sum(map(min, zip(*c, strict=True)))
         inside = sum(sum(m) - shared + (abs(n) != number) for m, n in c.items())
         return int(inside + shared + (number != 1))
@@ -120,7 +120,7 @@ class Factors:
         return number, common, c.new(rest)
 
     def _parts(self, terms: Mapping[Powers, Any], fields: Sequence[int]) -> Iterable[Coefficient]:
-        """Group the terms of a coefficient by their powers of the given generators.
+        """Group the terms of a coefficient: equal powers of the variables `fields` go together.
 
         Each group is a coefficient too.
         """
@@ -130,7 +130,7 @@ class Factors:
         return map(self.ring.zero.new, parts.values())
 
     def _order(self, m: Powers) -> tuple[Any, ...]:
-        """Return the key that sorts monomials for print: highest degree first, then by name."""
+        """Return the sort key of a monomial for printing: highest degree first, then by name."""
         return -sum(m), [(self._labels[k], -n) for k, n in enumerate(m) if n]
 
     def _powers(self, m: Powers) -> list[Tree]:
@@ -143,7 +143,7 @@ class Factors:
 
 
 def _content(c: Coefficient) -> Fraction:
-    """Return the number that is factored out of all terms of a coefficient.
+    """Return the number that can be factored out of all terms of a coefficient.
 
     It is the greatest number that divides all terms. Different decimals have no common factor: 0.5
     x + 0.8636 y is easier to read than 0.0004 (1250 x + 2159 y).

@@ -24,7 +24,7 @@ Coefficient = Any  # of the ring of cosines, sines, constants and rates
 
 
 class Identities:
-    """The identities between the cosines and sines of one ring of coefficients.
+    """The trigonometric identities between the cosines and sines that occur in coefficients.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Identities:
         ]
 
     def reduced(self, c: Coefficient) -> Coefficient:
-        """Replace every squared sine in the coefficient c by 1 - C**2."""
+        """Replace every sin**2 in the coefficient c by 1 - cos**2 of the same angle."""
         c, times = c.copy(), self.ring.monomial_mul
         for k, less, other in self._circles:
             while squares := [m for m in c if m[k] > 1]:
@@ -58,7 +58,7 @@ class Identities:
         return c
 
     def tidy(self, c: Coefficient) -> Coefficient:
-        """Write the coefficient c in fewer terms, by the identities of cosines and sines.
+        """Shorten the coefficient c by identities such as cos a cos b - sin a sin b = cos(a + b).
 
         Pairs of terms that an identity turns into one term are replaced, until no such pair is
         left.
@@ -80,9 +80,9 @@ class Identities:
         return c.new(terms)
 
     def _sums(self) -> Iterable[tuple[Coefficient, Coefficient, int, Coefficient]]:
-        """Yield the identities of cosines and sines as (first, second, sign, value).
+        """Yield identities of cosines and sines, first + sign*second = value, as four values.
 
-        Each of them reads first + sign * second = value.
+        Each identity is a tuple (first, second, sign, value).
         """
         one = self.ring(1)
         for C, S in self.pairs.values():
@@ -95,9 +95,9 @@ class Identities:
                 yield Sa * Cb, Ca * Sb, way, whole[1]
 
     def _whole(self, a: Angle, b: Angle, way: int) -> tuple[Coefficient, Coefficient] | None:
-        """Return the cosine and sine of the angle a + way b, if the model has this angle.
+        """Return cosine and sine of a + b (if `way` is 1) or of a - b (if `way` is -1).
 
-        `way` is 1 or -1. None if the sum is no angle of the model.
+        Return None if the sum or difference is no angle of the model.
         """
         turn = summed((*a.turn, *((j, way * n) for j, n in b.turn)))
         if not turn:
@@ -124,8 +124,8 @@ def _ends(monomial: tuple[int, ...]) -> tuple[int, int]:
 
 
 def forward(angle: Angle) -> tuple[Angle, int]:
-    """Write an angle with its first joint positive, for instance -q1 - q2 as q1 + q2.
+    """Change the sign of an angle if it starts with a minus, for instance -q1 - q2 to q1 + q2.
 
-    Returns this angle and the sign that its sine gets, 1 or -1.
+    Returns the angle and the sign, 1 or -1, by which its sine must be multiplied.
     """
     return (angle, 1) if angle.turn[0][1] > 0 else (-angle, -1)

@@ -19,7 +19,7 @@ from symgen.emit.printers import PLAIN, Text
 
 @dataclass(frozen=True)
 class Equation:
-    """An equation name = expression, both as text, under the heading `section`."""
+    """An equation `name = expression` as two texts, printed under the heading `section`."""
 
     section: str
     name: str
@@ -27,7 +27,7 @@ class Equation:
 
 
 class Listing:
-    """The equations that compute the outputs of a model.
+    """The equations that compute the entries of a model, intermediate variables first.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class Listing:
 
     @property
     def lines(self) -> list[Equation]:
-        """Equations of all intermediate variables, then those of all nonzero outputs."""
+        """Equations of all intermediate variables, then of all nonzero entries of the model."""
         steps = [
             Equation(section.title, *line.split(" = ", 1))
             for section in self.text.sections
@@ -72,7 +72,7 @@ class Listing:
     def steps(
         self, domain: Domain, symbol: Callable[[str], Any]
     ) -> tuple[dict[str, Any], list[Any]]:
-        """Evaluate the equations with other objects than text, for instance SymPy expressions.
+        """Compute the equations as objects of another kind than text, such as SymPy expressions.
 
         Returns the value of each intermediate variable by name, and the list of the outputs. Each
         value is in terms of the symbols of the inputs and of earlier variables.

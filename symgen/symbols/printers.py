@@ -1,4 +1,4 @@
-"""Printers of expressions: SymPy's printers with the letters and the order of the literature.
+"""Printers of SymPy expressions as text, LaTeX and MathML, with the symbols of the literature.
 
 Terms and factors are printed in the order in which they were made. A minus sign or a fraction is
 printed before its product, and decimals are printed as decimals. The name of a symbol is printed
@@ -80,7 +80,7 @@ def split_sign(x: Tree) -> tuple[Any, Tree]:
 
 
 class Ordered:
-    """Base of printers that print a minus sign or a fraction first, and exact numbers as decimals.
+    """Base class of printers that print a minus sign or fraction first, and decimals like 0.4318.
 
     A subclass sets the text between two factors (`times`), and the text between a number and a
     factor that starts with a digit (`visible`).
@@ -182,7 +182,7 @@ class Presentation(MathMLPresentationPrinter):  # type: ignore[misc]
         return self.element("mo", ")", stretchy="false")
 
     def row(self, *parts: Any) -> Any:
-        """Put the nodes side by side in one row; a single node is returned unchanged."""
+        """Put MathML elements side by side in a row; a single element is returned unchanged."""
         return parts[0] if len(parts) == 1 else self.element("mrow", *parts)
 
     def term(self, x: Tree, *, first: bool = True) -> Any:

@@ -81,7 +81,7 @@ class SymbolicRobot:
     def model(
         self, name: str, *, of: int | None = None, frame: int = 0, rows: Sequence[int] | None = None
     ) -> SymbolicModel:
-        """Return a model, with its closed form and its recursion.
+        """Return one model, such as the inertia matrix, in closed form and as a recursion.
 
         Raises
         ------
@@ -93,11 +93,13 @@ class SymbolicRobot:
         robot = self.source.robot
         if (of is not None or frame) and not SYMBOLIC[name].of_frames:
             raise SymgenError(
-                f"{name} has no frame; leave out `of` and `frame` (they are for "
+                f"{name} has no frame; leave out `of` and `frame` (only for "
                 f"{', '.join(name for name, m in SYMBOLIC.items() if m.of_frames)})"
             )
         if rows is not None and name != "determinant":
-            raise SymgenError(f"only the determinant has rows; leave rows out for {name}")
+            raise SymgenError(
+                f"`rows` is only for the model determinant; leave `rows` out for {name}"
+            )
         of = robot.frames[-1].j if of is None else of
         for j in (of, frame):
             if j != 0 and j not in {f.j for f in robot.frames}:
@@ -120,7 +122,7 @@ class SymbolicRobot:
     def equations(
         self, name: str, *, of: int | None = None, frame: int = 0
     ) -> tuple[list[tuple[Any, Any]], Any]:
-        """Return the recursion of a model as a list of equations, and the model in their symbols.
+        """Return the recursive equations of a model, and its result in terms of their variables.
 
         As from `sympy.cse`, an equation is a pair (symbol, expression). The symbols have the names
         of SYMORO.
@@ -180,22 +182,22 @@ class SymbolicRobot:
 
     @property
     def q(self) -> tuple[Any, ...]:
-        """Positions of the actuated joints."""
+        """Symbols of the positions of the actuated joints, q1 ..."""
         return tuple(self.symbols[f"q{j}"] for j in self.source.robot.joints)
 
     @property
     def qd(self) -> tuple[Any, ...]:
-        """Velocities of the actuated joints, QP1 ..."""
+        """Symbols of the velocities of the actuated joints, QP1 ..."""
         return tuple(self.symbols[f"QP{j}"] for j in self.source.robot.joints)
 
     @property
     def qdd(self) -> tuple[Any, ...]:
-        """Accelerations of the actuated joints, QDP1 ..."""
+        """Symbols of the accelerations of the actuated joints, QDP1 ..."""
         return tuple(self.symbols[f"QDP{j}"] for j in self.source.robot.joints)
 
     @property
     def parameters(self) -> tuple[Any, ...]:
-        """Base or standard parameters, in the order of the columns of the regressor."""
+        """Symbols of the base or standard parameters, in the order of the regressor columns."""
         return tuple(self.symbols[name] for name in self.source.parameters)
 
     # --- models ---

@@ -1,4 +1,4 @@
-"""One model of one robot: its closed form, factored by parameter, or its recursion as equations."""
+"""One model of one robot: in closed form, factored by parameter, or as recursive equations."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class ClosedModel:
 
     @property
     def size(self) -> int:
-        """Number of terms as written, not expanded."""
+        """Number of terms of all formulas as they are written, products not multiplied out."""
         below = () if self.denominator is None else (self.denominator,)
         return sum(map(expressions.size, (*self.entries.values(), *below)))
 
@@ -69,13 +69,13 @@ class SymbolicModel:
 
     @property
     def axes(self) -> tuple[tuple[str, ...], ...]:
-        """Labels of the rows, then of the columns, of the matrix or vector of the model."""
+        """Names of the rows of the model's matrix or vector, then of the columns of a matrix."""
         d, parameters = self.source.derivation, self.source.parameters
         return tuple(labels(d, axis, parameters) for axis in self.model.axes)
 
     @property
     def places(self) -> list[Place]:
-        """Indices of all entries, row by row.
+        """Indices of the entries of the matrix or vector of the model, row by row.
 
         For a symmetric matrix, only the entries on and above the diagonal are listed.
         """
@@ -123,9 +123,9 @@ class SymbolicModel:
             return self._closed()
         except TooManyTermsError as e:
             more = (
-                "its entries can be had from the inertia matrix and the bias by recursion"
+                "compute its entries from the models inertia_matrix and bias in form recursive"
                 if self.model.cases is None
-                else f"its recursion has {len(self.listing.lines)} equations: form recursive"
+                else f"use form recursive, with {len(self.listing.lines)} equations"
             )
             raise SymgenError(
                 f"the closed form of {self.model.name} of {self.source.robot.name} has {e}; {more}"
@@ -148,7 +148,7 @@ class SymbolicModel:
         return ClosedModel({(k,): expressions.formula(f) for k, f in enumerate(formulas)}, None, {})
 
     def _entries(self, *models: Model, request: Request | None = None) -> tuple[Any, ...]:
-        """Derive the entries of several models in one computation graph.
+        """Derive the entries of several models as nodes of one expression graph.
 
         Returns the algebra of the graph, then the entries of each model by their indices. The
         angles between parallel axes of all pairs of frames are added to the graph, for use in
@@ -196,7 +196,7 @@ class SymbolicModel:
         return ClosedModel(entries, denominator, angles)
 
     def _determinant(self) -> ClosedModel:
-        """Compute the determinant of the Jacobian, or of its chosen rows.
+        """Compute the determinant of the Jacobian, or of a square matrix of some of its rows.
 
         The determinant of a whole 6 x 6 Jacobian does not depend on the frame of its components nor
         on the point of the last link, so the choice with the fewest terms is used.
@@ -204,8 +204,8 @@ class SymbolicModel:
         robot, n, of = self.source.robot, len(self.source.robot.joints), self.request.of
         if n > 6:
             raise SymgenError(
-                f"the Jacobian of {robot.name} is 6 x {n}: no rows of it make a square matrix; "
-                "take jacobian, and det(J*J.T) in SymPy"
+                f"the Jacobian of {robot.name} is 6 x {n}, so its rows make no square matrix; "
+                "use the model jacobian and det(J*J.T) in SymPy"
             )
         requests = [self.request]
         if n == 6 and self.rows is None and of:
@@ -225,7 +225,7 @@ class SymbolicModel:
         return expansion, {p: expansion.tidied(expansion.of(x)) for p, x in entries.items()}
 
     def _chosen_rows(self, matrix: Sequence[Sequence[Polynomial]], n: int) -> list[int]:
-        """Choose the rows of the Jacobian that make a square matrix.
+        """Choose the rows of the Jacobian for its determinant, as many as it has columns.
 
         These are the rows that the user gave, else all rows that are not zero. Raises SymgenError
         if they do not make a square matrix.
@@ -244,8 +244,8 @@ class SymbolicModel:
             raise SymgenError(
                 f"the Jacobian of frame {self.request.of} of {self.source.robot.name} in frame "
                 f"{self.request.frame} has {len(moved)} rows that "
-                f"are not zero ({', '.join(TWIST[k] for k in moved)}) and {n} columns; name {n} of "
-                "its rows, 1 to 6: "
+                f"are not zero ({', '.join(TWIST[k] for k in moved)}) and {n} columns; choose {n} of "
+                "its rows 1 to 6, such as "
                 f"rows={tuple(first)}, --rows {','.join(map(str, first))}"
             )
         return moved
@@ -256,13 +256,14 @@ class SymbolicModel:
         n = range(len(robot.joints))
         if robot.loaded:
             raise SymgenError(
-                f"the direct model of {robot.name}: laws of {', '.join(robot.loaded)} read "
-                "tau_model, which depends on qdd; A qdd = Gamma - H is implicit in it"
+                f"the direct model of {robot.name} has no closed form: the laws of "
+                f"{', '.join(robot.loaded)} use tau_model, which depends on qdd, so A qdd = Gamma - H "
+                "is implicit in qdd"
             )
         if len(n) > LARGEST_DIRECT:
             raise SymgenError(
-                f"the direct model of {robot.name} has {len(n)} joints; its closed form is given "
-                f"up to {LARGEST_DIRECT}: solve A qdd = Gamma - H with "
+                f"the direct model of {robot.name} has {len(n)} joints; the closed form is limited to "
+                f"{LARGEST_DIRECT} joints; solve A qdd = Gamma - H with "
                 "inertia_matrix and bias, or take forward_dynamics of the emitted module"
             )
         algebra, A, H = self._entries(MODELS["inertia_matrix"], MODELS["bias"])

@@ -41,7 +41,7 @@ def of_model(model: SymbolicModel) -> Any:
 
 
 def of_listing(model: SymbolicModel) -> tuple[list[tuple[Any, Any]], Any]:
-    """Return the recursion of a model as SymPy equations, and the model in their symbols.
+    """Return the recursive equations of a model in SymPy, and the result in their variables.
 
     As from `sympy.cse`, an equation is a pair (symbol, expression).
     """
@@ -63,7 +63,7 @@ def _shaped(model: SymbolicModel, values: Mapping[tuple[int, ...], Any]) -> Any:
 
 
 class Objects:
-    """Operations that convert the nodes of a computation graph to SymPy objects.
+    """Operations that convert the nodes of an expression graph to SymPy objects.
 
     `rational` is the function that converts a rational number.
     """
@@ -72,11 +72,11 @@ class Objects:
         self.number = rational
 
     def symbol(self, symbol_: Symbol) -> Any:
-        """Make the SymPy symbol of an input, with the same name."""
+        """Make a SymPy symbol with the name of an input (joint variable, parameter, constant)."""
         return symbol(symbol_.name)
 
     def function(self, node: Node, x: list[Any]) -> Any:
-        """Apply the function of a node to SymPy objects x."""
+        """Apply the function of a graph node, such as cos, to its operands x in SymPy."""
         if node.op == INV:
             return 1 / x[0]
         if node.op == POS:

@@ -210,7 +210,7 @@ def _percent(c: Change) -> str:
 
 
 def _by_place(lines: Sequence[str]) -> str:
-    """Join lines `link: number` into one text in which the name of each link occurs once."""
+    """Join the lines `link: number` into one text in which the numbers are grouped by link."""
     places: dict[str, list[str]] = {}
     for line in lines:
         place, _, what = line.partition(": ")

@@ -147,7 +147,7 @@ def _estimate(given: Any) -> Estimate:
     if not isinstance(given, Estimate):
         raise DescriptionError(
             f"{type(given).__name__} given as estimate; expected an Estimate, an Identification, "
-            "or their estimate.json"
+            "or the path of estimate.json"
         )
     return given
 
@@ -172,8 +172,8 @@ def _require_same_joints(result: Estimate, robot: Robot, of: str) -> None:
         q = different[0]
         ours = robot.labels.get(int(q[1:])) if q[1:].isdigit() else None
         raise DescriptionError(
-            f"{q} of the estimate is {theirs.get(q, 'no joint with a name')!s:.60}, of {of} "
-            f"{ours or 'no joint with a name'}: give --chain and --lock as for the conversion of the robot, or name the robot file that was identified (--robot)"
+            f"{q} is {theirs.get(q, 'no joint with a name')!s:.60} in the estimate, but "
+            f"{ours or 'no joint with a name'} in {of}; give the same --chain and --lock as in the conversion of the robot, or give the robot file that was identified (--robot)"
         )
 
 
@@ -190,22 +190,23 @@ def _determined_names(
     """
     if unknown := [name for name in result.names if name not in physical.base]:
         raise DescriptionError(
-            f"{', '.join(unknown[:8])} of the estimate are no base parameters of {of}; name the "
-            "robot file that was identified (--robot), and --chain, "
-            "--lock as when it was converted"
+            f"{', '.join(unknown[:8])} of the estimate are no base parameters of {of}; give the "
+            "robot file that was identified (--robot), and the --chain and --lock of its conversion"
         )
     silent = {group[0] for group in result.groups if len(group) == 1}
     places = [
         k for k, name in enumerate(result.names) if np.isfinite(result.X[k]) and name not in silent
     ]
     if not places:
-        raise DescriptionError("the estimate determines no parameter")
+        raise DescriptionError(
+            "the record determines no parameter of the estimate, so there is nothing to write"
+        )
     names = [result.names[k] for k in places]
     return names, result.X[places], [name for name in physical.base if name not in names]
 
 
 def _root(result: Estimate, names: Sequence[str]) -> Array:
-    """Compute a square root, shape (b, b), of the covariance of the determined base parameters.
+    """Compute a matrix square root (b, b) of the covariance of the determined base parameters.
 
     Corrected standard deviations are used if they are larger. The result is zero if the covariance
     is unknown.

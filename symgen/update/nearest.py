@@ -1,4 +1,4 @@
-"""Find physical values that give the identified base parameters and are nearest to those of a file.
+"""Find the physically possible robot with given base parameters that is nearest to a file.
 
 This is the optimisation of the feasible estimate in `identify`, with the file as prior:
 
@@ -38,7 +38,7 @@ from symgen.description.tree import Array
 from symgen.errors import DescriptionError
 from symgen.update.places import FileLink
 
-NONE = "no physical robot of this file has the estimate"
+NONE = "no physical robot with the links of this file has the estimated parameters"
 MISSED = 1e-9  # of the size of a base parameter: more is not reached
 STEPS, SETTLED = 30, 1e-15  # of Newton, and what they change at last
 FAR = 1e6  # sizes that a number may move
@@ -51,7 +51,7 @@ TINY = 1e-15  # SI; an eigenvalue so little below zero is rounding
 
 @dataclass(frozen=True, eq=False)
 class Nearest:
-    """Result of `nearest`: the values of links and joints that are nearest to those of the file.
+    """Result of `nearest`: masses, centres, tensors and joint parameters nearest to a file.
 
     The numbers u, shape (p,), are mass, centre and tensor of each link, and the parameters of the
     elements on the joints.
@@ -87,9 +87,9 @@ class Nearest:
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """The unknowns of the optimisation in `nearest`: the values of links and joints of a file.
+    """The unknowns of the optimisation in `nearest`: masses, centres, tensors and joint parameters.
 
-    The values are mass, centre and tensor of each link, and the parameters of elements on the
+    Each link of the file has ten unknowns; joint parameters are those of the elements on the
     joints.
 
     Attributes
@@ -123,16 +123,17 @@ class Numbers:
         return Numbers(part, links, *(x[:count] for x in of_numbers))
 
     def chi(self, u: Array) -> Array:
-        """Compute the standard parameters, shape (p,), from the values u of links and joints."""
+        """Compute standard parameters, shape (p,), from the masses, centres, tensors ... in u."""
         chi = u.copy()
         for link, at in self.links:
             chi[at] = link.place.ten(u[at])
         return chi
 
     def slope(self, u: Array) -> Array:
-        """Compute the derivatives d chi / d u, shape (p, p), of the standard parameters.
+        """Compute the derivatives (p, p) of the standard parameters chi with respect to u.
 
-        Central differences are exact, because chi is of second order in every number.
+        u are masses, centres, tensors and joint parameters. Central differences are exact, because
+        chi is of second order in every number.
         """
         T = np.eye(len(u))
         for link, at in self.links:
@@ -144,7 +145,7 @@ class Numbers:
         return T
 
     def seen(self, u: Array) -> Array:
-        """Find the values of links and joints that affect a base parameter; bool, shape (p,)."""
+        """Find the link and joint values on which a base parameter depends; bool, shape (p,)."""
         A = self.physical.K @ self.slope(u) * self.size
         share = np.abs(A) > MISSED * np.linalg.norm(A, axis=1, keepdims=True)
         return np.asarray(np.any(share, axis=0))
@@ -158,7 +159,7 @@ def nearest(
     X: Array,
     absent: Collection[str] = (),
 ) -> Nearest:
-    """Find values of links and joints that give the base parameters X and are nearest to the file.
+    """Find the physically possible robot with base parameters X nearest to the values of the file.
 
     Parameters
     ----------
@@ -223,7 +224,7 @@ def _of_file(
     values: Mapping[str, float],
     absent: Collection[str],
 ) -> tuple[Numbers, dict[str, int], list[int]]:
-    """Collect the values of links and joints as unknowns, in the order in which they may change.
+    """Collect the unknowns from the file; those that the optimisation changes first come first.
 
     Return the unknowns, the index of each element, and for each attempt how many numbers may
     change. The first attempt has the first link of each body, and the elements. The second adds
@@ -290,7 +291,7 @@ def _sizes_of(x: Array) -> Array:
 
 
 def _spare(physical: PhysicalModel, own: Sequence[str], absent: Sequence[str]) -> list[str]:
-    """Find the elements that the file lacks and whose effect the other parameters can replace."""
+    """Find the joint parameters that the file lacks and that other parameters can replace."""
     spare: list[str] = []
 
     def rank(names: Sequence[str]) -> int:
@@ -306,9 +307,10 @@ def _spare(physical: PhysicalModel, own: Sequence[str], absent: Sequence[str]) -
 
 
 def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple[Array | None, str]:
-    """Find values u of a physical robot that give the base parameters: K chi(u) = rest.
+    """Find the link and joint values of a physically possible robot with given base parameters.
 
-    Return u and "", or None and the reason why no physical robot has these base parameters.
+    The equation is K chi(u) = rest, with the standard parameters chi. Return u and "", or None and
+    the reason why no physical robot has these base parameters.
     """
     K = part.physical.rows(names)
     sizes = np.maximum(np.abs(X), np.abs(K) @ scales(part.physical))
@@ -319,8 +321,8 @@ def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple
             f"{name} = {x:.4g}" for name, x, out in zip(names, X, missed, strict=True) if out
         )
         raise DescriptionError(
-            f"no values of this file give {lost}, since a moving link has no <inertial> that could "
-            "hold it; add one to that link"
+            f"no values in this file can give {lost}, because a moving link has no <inertial>; add "
+            "<inertial> to this link"
         )
     u = _solve(part, K, rest, part.u0, ~part.masses)
     if u is None or _violated(part, u):
@@ -339,15 +341,16 @@ def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple
 
 
 def _violated(part: Numbers, u: Array) -> bool:
-    """Whether the values that changed violate a condition of a physical robot."""
+    """Whether the link and joint values that changed are physically impossible."""
     chi, moved = part.chi(u), u != part.u0
     conditions = [c for c in part.physical.conditions if moved[list(c.numbers)].any()]
     return any(c.smallest(chi) < -TINY for c in conditions)
 
 
 def _solve(part: Numbers, K: Array, rest: Array, start: Array, free: Array) -> Array | None:
-    """Find the values u nearest to `start` with K chi(u) = rest, by Newton's method.
+    """Find the link and joint values nearest to `start` that give the base parameters.
 
+    The equation K chi(u) = rest, with the standard parameters chi, is solved by Newton's method.
     Only the values in `free` change. The result is None if the steps do not reach a solution.
     """
     S, u = (part.size * part.ease)[free], start.copy()
@@ -367,7 +370,7 @@ def _solve(part: Numbers, K: Array, rest: Array, start: Array, free: Array) -> A
 
 
 def _hold(part: Numbers, chi: Array) -> Array:
-    """Convert standard parameters chi to values of the file; values without effect do not change.
+    """Convert standard parameters to link and joint values; values without effect do not change.
 
     A value has no effect if no base parameter depends on it. If the unchanged values violate a
     condition of a physical robot, the values in this condition are those of chi.
@@ -383,7 +386,7 @@ def _hold(part: Numbers, chi: Array) -> Array:
 
 
 def strange(link: FileLink, closest: Nearest) -> str:
-    """Describe how far mass and centre of a link are from those of the file; "" if they are near.
+    """Describe how far mass and centre of a link are from the file; "" if they are near.
 
     They are near if the mass is within a factor STRANGE and the centre has moved by no more than
     the size of the link.

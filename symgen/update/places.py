@@ -52,7 +52,7 @@ POSE = 1e-6  # m, rad: frames of two descriptions of one robot differ by no more
 
 @dataclass(frozen=True)
 class Attributes:
-    """Names of the XML attributes that hold the numbers of links and joints in one format.
+    """Names of the XML attributes for masses, tensors, friction ... in one format (URDF or MJCF).
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ MJCF = Attributes(
 
 @dataclass(frozen=True, eq=False)
 class LinkPlace:
-    """The XML elements of a link of the file, and the frames in which its numbers are given.
+    """The XML elements of a link, and the frames in which the file gives mass, centre and tensor.
 
     Attributes
     ----------
@@ -136,7 +136,7 @@ class LinkPlace:
         return self.attributes is MJCF and not full
 
     def numbers(self, ten: Array) -> Array:
-        """Convert ten inertial parameters in frame j to mass, centre and tensor of the file.
+        """Convert inertial parameters in frame j to mass, centre and tensor as in the file.
 
         The argument has the order XX .. ZZ, MX, MY, MZ, M, the result the order of NUMBERS.
         """
@@ -152,7 +152,7 @@ class LinkPlace:
         return np.array([own.M, *(R.T @ (own.pose[:3, 3] - self.X[:3, 3])), *tensor])
 
     def ten(self, x: Array) -> Array:
-        """Convert mass, centre and tensor of the file to ten inertial parameters in frame j.
+        """Convert mass, centre and tensor as in the file to inertial parameters in frame j.
 
         The argument and the result have the shape (10,).
         """
@@ -164,7 +164,7 @@ class LinkPlace:
         return ten_of(Inertial(float(x[0]), pose, I), self.X)
 
     def write(self, edits: XmlEdits, x: Array) -> None:
-        """Add the edits that change mass, centre and tensor in the file to x, shape (10,)."""
+        """Add to `edits` the changes that set mass, centre and tensor to x, shape (10,)."""
         if self.inertial is None:
             row = self.attributes.inertial[""]
             words = _words({key: x[[*row[key]]] for key in ("pos", "mass", "fullinertia")})
@@ -231,21 +231,24 @@ class Places:
         for name, e in self.joints.items():
             if e.attrib.get("name", name) != name:
                 raise DescriptionError(
-                    f"joint {name!a:.60} has another place in the file than in MuJoCo's model; write "
+                    f"joint {name!a:.60}: the order of joints in the file differs from that in the model of MuJoCo; write "
                     "the joints of a body before its child bodies",
                     line=e.line,
                 )
 
     def link(self, name: str, tree: Tree, X: Array) -> LinkPlace:
-        """Find the XML elements with the numbers of link `name`; the link has pose X in frame j."""
+        """Find the XML elements with the inertia of link `name`, whose pose in frame j is X."""
         link, inertial = self.links[name], tree.links[name]
         e = next(link.own("inertial"), None)
         if e is not None and e not in link:
             raise DescriptionError(
-                "<inertial> inside a <frame>; write it into its body", line=e.line
+                "<inertial> is inside a <frame>; move <inertial> directly into the body",
+                line=e.line,
             )
         if inertial is None or (e is None and self.attributes is URDF):
-            raise DescriptionError(f"link {name!a:.60} has no <inertial>", line=link.line)
+            raise DescriptionError(
+                f"link {name!a:.60} has no <inertial>; add <inertial> to the link", line=link.line
+            )
         place = self.tree.places.get(name, np.eye(4))  # a URDF has one frame for link and body
         axes = place[:3, :3].T @ inertial.pose[:3, :3]
         tensor = inertial.I[np.triu_indices(3)]
@@ -280,17 +283,18 @@ class Places:
         values: Mapping[str, float],
         before: Mapping[str, float],
     ) -> None:
-        """Add the edits that change the parameters of a joint in the file to `values`, by family.
+        """Add to `edits` the changes that set the parameters of a joint to `values`.
 
-        `before` has the values in the file; equal values are not edited.
+        `values` and `before` are given by family (FV, FS, Ia ...). `before` has the values in the
+        file; equal values are not edited.
         """
         e, names = self.joints[joint.name], self.attributes.joint
         new = {family: x for family, x in values.items() if not same(x, before[family])}
         own = {names[family]: x for family, x in new.items() if family not in SPRING}
         if new and "springdamper" in e.attrib:
             raise DescriptionError(
-                f"joint {joint.name!a:.60}: springdamper sets its damping; write stiffness and "
-                "damping instead",
+                f"joint {joint.name!a:.60}: springdamper sets the damping; replace springdamper by "
+                "stiffness and damping",
                 line=e.line,
             )
         if new.keys() & set(SPRING):
@@ -385,7 +389,7 @@ class FileLink:
 
 @dataclass(frozen=True, eq=False)
 class RobotText:
-    """A parsed URDF or MJCF file, with the places of its numbers in the text.
+    """A parsed URDF or MJCF file: its tree, its frame table, and the XML elements with its numbers.
 
     Attributes
     ----------
@@ -409,7 +413,7 @@ class RobotText:
 
     @property
     def links(self) -> list[FileLink]:
-        """Links with inertia on moving bodies, body by body; the link on the joint comes first."""
+        """Links with inertia on moving bodies; in a body, the link at the joint comes first."""
         return [
             FileLink(name, j, ten_of(inertial, X), self.places.link(name, self.tree, X))
             for j in self.robot.links
@@ -418,7 +422,7 @@ class RobotText:
         ]
 
     def joint_values(self, j: int) -> dict[str, float]:
-        """Return the values of the elements on joint j in the file, by family: Ia, FV, FS ..."""
+        """Return motor inertia, friction and spring of joint j in the file, by family (Ia ...)."""
         return {family: value(self.table.joint[j]) for family, _, value in JOINT_TERMS}
 
     def attribute(self, family: str, j: int) -> str | None:

@@ -41,7 +41,7 @@ class Writing:
     root: Array
 
     def links(self, edits: XmlEdits) -> list[Change]:
-        """Edit the links that change, and return a Change for each number of every link."""
+        """Edit the links in the file; return a Change for each mass, centre and tensor element."""
         rows, moved = [], []
         for link in self.text.links:
             x = self.nearest.u[self.nearest.links[link.name]]
@@ -79,7 +79,7 @@ class Writing:
         return "record" if self.nearest.told[k] else "sum"
 
     def joints(self, edits: XmlEdits) -> list[Change]:
-        """Edit the joints, and return a Change for each parameter that the format can store."""
+        """Edit joint parameters in the file; return a Change for each that the format can store."""
         rows = []
         for j, joint in self.text.table.joint.items():
             attributes = {
@@ -102,7 +102,7 @@ class Writing:
         return float(self.nearest.u[self.nearest.elements[name]])
 
     def sigma(self, k: int) -> float:
-        """Compute the standard deviation of value k of the links and joints."""
+        """Compute the standard deviation of number k in the list of all link and joint values."""
         return float(np.linalg.norm(self.nearest.gain[k] @ self.root))
 
     @property
@@ -125,15 +125,17 @@ class Writing:
             wanted = np.zeros(10) if at is None else self.nearest.chi[at]
             if np.abs(link.ten - wanted).max() > AGREE * max(float(np.abs(wanted).max()), AGREE):
                 raise DescriptionError(
-                    f"link {link.name!a:.60} would be read with other values than written "
-                    "(compiler settings that bound inertia?)"
+                    f"link {link.name!a:.60}: a program that reads the new file would change the written values; "
+                    "remove compiler settings that bound or balance inertia"
                 )
         for name, (family, j) in self.own.items():
             attribute, x = self.text.attribute(family, j), self._value(name)
             if attribute and abs(again.joint_values(j)[family] - x) > AGREE * max(1.0, abs(x)):
                 raise DescriptionError(
-                    f"joint {again.table.joint[j].name!a:.60} would be read with another "
-                    f"{attribute} than written"
+                    f"joint {again.table.joint[j].name!a:.60}: a program that reads the new file would "
+                    f"change the written {attribute}; remove the settings of the file that change it"
                 )
         if len(again.links) != len(self.nearest.links):
-            raise DescriptionError("a link would be read without inertia; its mass becomes zero")
+            raise DescriptionError(
+                "no file is written: a link would get the mass zero, and would be read without inertia"
+            )

@@ -75,7 +75,7 @@ class XmlEdits:
             words
         ) < len(values):
             raise DescriptionError(
-                f"<{e.tag} {name}>: its numbers are written by character references; write digits",
+                f"<{e.tag} {name}>: the numbers are written as character references (&#...;); write digits",
                 line=e.line,
             )
         for word, x in zip(words, values, strict=False):
@@ -132,14 +132,14 @@ class XmlEdits:
         match = TAG.match(self.content, e.byte)
         if match is None or match["tag"] != e.tag.encode():
             raise DescriptionError(
-                f"<{e.tag[:40]}> is not found in the bytes of the file; save it as UTF-8",
+                f"<{e.tag[:40]}> is not found in the bytes of the file; save the file as UTF-8",
                 line=e.line,
             )
         return match
 
 
 def same(x: float, y: float) -> bool:
-    """Whether two numbers differ by no more than UNCHANGED."""
+    """Whether two numbers differ by no more than the tolerance UNCHANGED."""
     return abs(x - y) <= UNCHANGED * max(1.0, abs(x), abs(y))
 
 

@@ -52,7 +52,7 @@ def test_in_place_and_into_another_file(folder) -> None:
     assert Path("arm.xml").read_text() == EXPECTED
     assert "no number changes" in run("results", "arm.xml", "--in-place").stdout
     both = run("results", "arm.xml", "--in-place", "-o", "x.xml", code=2).stderr
-    assert "leave one of them out" in both
+    assert "give only one of the two options" in both
     assert sorted(p.name for p in folder.iterdir()) == ["arm.xml", "new.xml", "results"]
 
 

@@ -95,11 +95,11 @@ def test_torque_steps_and_named_columns(emps_data):
         (["--uneven", "0.6", "--rounding", "phase"], ["cestac.uneven", "0.5"]),
         (["--reader", "counts"], ["cestac.rounding", "destroys the changes"]),
         (["--reader", "edges"], ["signals.reader", "counts"]),
-        (["--place", "loop"], ["cestac.rounding", "phase alone"]),
+        (["--place", "loop"], ["cestac.rounding", "expected phase, the only rounding"]),
         (["--method", "best"], ["estimate.method", "didim"]),
         (
             ["--rounding", "phase", "--delta", "5e-8"],
-            ["cestac.delta", "not coarser than that of encoder"],
+            ["cestac.delta", "not coarser than the step of encoder"],
         ),
     ],
 )
@@ -207,4 +207,4 @@ def test_scheduler_that_does_not_answer(emps_data):
     result = run("emps", "emps", "--scheduler", "tcp://nowhere")
     assert result.exit_code == 2 and "no answer from the scheduler tcp://nowhere" in result.stderr
     result = run("emps", "emps", "--scheduler", "tcp://nowhere", "--workers", 2)
-    assert result.exit_code == 2 and "workers of its own" in result.stderr
+    assert result.exit_code == 2 and "a scheduler uses its own workers" in result.stderr

@@ -128,7 +128,7 @@ def test_one_bad_robot_and_nothing_is_written(tmp_path):
         (["no_such_robot"], "no_such_robot"),
         (["missing.yaml"], "missing.yaml"),
         (["emps", "--target", "fortran"], "fortran"),
-        (["emps", "emps"], "two robots are called emps"),
+        (["emps", "emps"], "two robots have the name emps"),
         ([], "ROBOT"),
     ],
 )

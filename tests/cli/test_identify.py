@@ -70,10 +70,13 @@ def test_arguments_exchanged_or_no_record_at_all(tmp_path):
     (tmp_path / "results").mkdir()
     for arguments, said in (
         ((tmp_path / "log.csv", tmp_path / "robot.yaml"), "the robot comes first, then the record"),
-        (("emps", tmp_path / "results"), "no ROS 2 bag; name the measured or study file in it"),
+        (
+            ("emps", tmp_path / "results"),
+            "no ROS 2 bag; give a measured file or study file in this folder",
+        ),
         (
             ("emps", tmp_path / "log.csv"),
-            "no columns q1, q2 ... among time, a, b; name them in a study file, record.columns.q",
+            "no columns q1, q2 ... among time, a, b; give the column names in a study file, record.columns.q",
         ),
     ):
         result = run(*arguments)
@@ -229,4 +232,7 @@ def test_a_study_that_asks_for_blocks_is_told_what_to_do(tmp_path):
     (tmp_path / "study.yaml").write_text("record: {files: axis.npz}\nstream: 65536\n")
     result = run("emps", tmp_path / "study.yaml")
     assert result.exit_code == 2
-    assert "study.yaml, line 2: stream: gone, every record is read whole" in result.stderr
+    assert (
+        "study.yaml, line 2: stream: this setting was removed, every record is read whole"
+        in result.stderr
+    )

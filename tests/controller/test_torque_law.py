@@ -128,7 +128,7 @@ def test_parameters_of_an_arm_whose_torque_is_its_law(tmp_path):
         ({}, {"kp": 10, "law": {"kp": 10}}, "are short for law"),
         ({}, {"law": {"kp": 10, "ki": 3}}, "controller.law.ki: 3.0 is not supported here"),
         ({}, {"kp": [1, 2, 3]}, "3 values; expected one or 2"),
-        ({}, {"kd": 1}, "expected a gain for every joint"),
+        ({}, {"kd": 1}, "expected a gain other than 0 for every joint"),
         ({"qd_ref": ["q1"]}, {"kp": 10}, "1 reference velocities q1; expected 2"),
         ({"qr": ["q1", "q2"]}, {"kp": 10}, "given together with q_ref"),
     ],
@@ -146,7 +146,7 @@ def test_a_simulated_loop_needs_a_number(tmp_path):
     from runtime.loop.control_law import control_law
     from runtime.loop.settings import Controller
 
-    with pytest.raises(SettingsError, match="found by identify"):
+    with pytest.raises(SettingsError, match="identify the record first"):
         control_law(Controller(kp=10, kd="fit"), planar)
 
 

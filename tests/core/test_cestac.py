@@ -303,7 +303,7 @@ def test_motor_side_divides_the_step_by_the_ratio():
     )
     with pytest.raises(SettingsError, match="no drives"):
         cestac(blind, RECORD, study(side="motor"))
-    with pytest.raises(InputError, match="one process alone"), processes(2) as several:
+    with pytest.raises(InputError, match="use one process"), processes(2) as several:
         cestac(blind, RECORD, study(), map=several)
 
 

@@ -188,7 +188,7 @@ def test_report_writes_what_the_verbs_write(model, tmp_path):
     assert "resolution.png" in {path.name for path in study} and "report.html" in {
         path.name for path in study
     }
-    with pytest.raises(InputError, match="float is no result that is written"):
+    with pytest.raises(InputError, match="float cannot be written to files"):
         runtime.report(1.0, tmp_path / "wrong")
     assert not (tmp_path / "wrong").exists()
 
@@ -259,7 +259,7 @@ def test_records_that_do_not_belong_together_are_told_in_a_sentence(model):
     )
     for given in ({"records": other}, {"records": record, "further": [other]}):
         with pytest.raises(
-            InputError, match="other: 3 joints; planar_2r has 2: a record of another robot"
+            InputError, match="other: the record has 3 joints, but planar_2r has 2; give a record"
         ):
             runtime.identify(model, study=STUDY, **given)
     still = replace(record, q=np.tile(record.q[:1], (len(record), 1)), name="still")
@@ -285,7 +285,7 @@ def test_joints_of_which_no_row_is_left_are_told(model):
     study = replace(STUDY, rows=replace(STUDY.rows, low_speed=(1e3, 0.97 * fastest)))
     result = runtime.identify(model, record, study, physical=True)
     assert result.part("feasibility").judged is None
-    assert any("physical consistency: the record does not separate" in x for x in result.missing)
+    assert any("physical consistency: the record does not determine" in x for x in result.missing)
     assert result.warnings[0] == "No row of joint 1 is used: rows.low_speed leaves them out."
     assert result.estimate.status == "rank-deficient"
 

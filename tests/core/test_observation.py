@@ -359,7 +359,7 @@ def test_stack_refuses(record):
     a = observe(planar, record, study())
     with pytest.raises(InputError, match="no observation"):
         stack([])
-    with pytest.raises(InputError, match="expected those of the first record"):
+    with pytest.raises(InputError, match="expected the columns of the first record"):
         stack([a, a.columns(["FV1"])])
 
 
@@ -389,7 +389,7 @@ def test_refusals(record, sections, said):
 
 def test_model_of_another_robot(record):
     with pytest.raises(
-        InputError, match=r"arm\.csv: 2 joints; emps has 1: a record of another robot"
+        InputError, match=r"arm\.csv: the record has 2 joints, but emps has 1; give a record"
     ):
         observe(emps_model, record, study())
 

@@ -80,8 +80,8 @@ def test_record_is_a_read_only_copy():
 @pytest.mark.parametrize(
     ("t", "q", "tau", "rate", "said"),
     [
-        (T, Q[:-1], TAU, RATE, "expected (N,), (N, n), (N, n)"),
-        (T, Q[:, :1], TAU, RATE, "expected (N,), (N, n), (N, n)"),
+        (T, Q[:-1], TAU, RATE, "expected the shapes (N,), (N, n), (N, n)"),
+        (T, Q[:, :1], TAU, RATE, "expected the shapes (N,), (N, n), (N, n)"),
         (T[:5], Q[:5], TAU[:5], RATE, "at least 10"),
         (T, Q, TAU, 0.0, "positive"),
         (T, with_at(Q, np.nan), TAU, RATE, "column 'q1', sample 8"),
@@ -114,8 +114,8 @@ def late(t):
 @pytest.mark.parametrize(
     ("t", "rate", "said"),
     [
-        (T, 10 * RATE, "time runs at 200 Hz, record.rate is 2000 Hz"),
-        (T / 10, RATE, "time runs at 2000 Hz, record.rate is 200 Hz"),
+        (T, 10 * RATE, "time runs at 200 Hz, but record.rate is 2000 Hz"),
+        (T / 10, RATE, "time runs at 2000 Hz, but record.rate is 200 Hz"),
         (T[::-1], None, "sample 2: time goes from 0.295 s to 0.29 s; expected increasing time"),
         (shuffled(T), None, "sample 32: time goes from 0.295 s to 0.29 s"),
         (np.repeat(T[::2], 2), None, "sample 2: time goes from 0 s to 0 s"),
@@ -219,7 +219,7 @@ def test_folders_are_texts_or_paths(tmp_path, monkeypatch, folder):
 def test_errors_name_the_file(tmp_path):
     write_csv(tmp_path / "short.csv", rows=np.column_stack([T, Q, TAU])[:5])
     write_csv(tmp_path / "run.csv")
-    with pytest.raises(InputError, match=r"^short\.csv: 5 samples; a record has at least 10"):
+    with pytest.raises(InputError, match=r"^short\.csv: 5 samples; a record needs at least 10"):
         read_record(settings(files="short.csv"), folder=tmp_path)
     with pytest.raises(InputError, match=r"^run\.csv: 2 joints; arm has 3"):
         read_record(
@@ -250,7 +250,8 @@ def test_a_file_a_study_and_a_dataset_are_read_by_name(tmp_path, monkeypatch, em
         "record: [{files: [run.csv]}, {files: [run.csv], name: b}]\n"
     )
     with pytest.raises(
-        InputError, match="2 records or pieces between gaps; read_records returns them all: run, b"
+        InputError,
+        match="2 records or pieces between gaps, but one is expected; use read_records, which returns all of them: run, b",
     ):
         read_record("two.yaml")
 
@@ -446,9 +447,9 @@ def test_two_files_are_the_two_halves_of_one_record(tmp_path):
     write_csv(tmp_path / "tau.csv", header="tau1,tau2", rows=TAU[:-3])
     write_csv(tmp_path / "p.csv", header="a,b", rows=Q)
     for said, record in (
-        (r"hold positions and torques each; .*also: \[b\.csv\]", {"files": ["a.csv", "b.csv"]}),
+        (r"both contain positions and torques, .*also: \[b\.csv\]", {"files": ["a.csv", "b.csv"]}),
         (
-            "holds the torques and p.csv the positions",
+            "contains the torques and p.csv the positions",
             {"files": ["tau.csv", "p.csv"], "columns": {"q": ["a", "b"], "tau": ["tau1", "tau2"]}},
         ),
         (
@@ -512,7 +513,7 @@ NAMES = "t;q1;q2;tau1;tau2\n"
         (
             NAMES + "10:00:00;0;0;0;0\n",
             (
-                "line 2: '10:00:00'; expected a number; no date or time of day is read: write "
+                "line 2: '10:00:00'; expected a number; dates and times of day are not supported: write "
                 "seconds, or give record.rate"
             ),
         ),
@@ -551,7 +552,7 @@ def test_separators_of_thousands_are_no_decimals(tmp_path):
     (tmp_path / "log.csv").write_text(NAMES + "0,0;1.234;0;0;0\n0,1;1.235;0;0;0\n")
     with pytest.raises(
         InputError,
-        match=r"column 'q1', line 2: '1.234' holds a point, .* without separators of thousands",
+        match=r"column 'q1', line 2: '1.234' contains a point, .* without separators of thousands",
     ):
         read_record(settings(files="log.csv", decimal=","), folder=tmp_path)
 
@@ -636,7 +637,7 @@ def test_bad_csv(tmp_path, rows, said):
         ({"columns": {"q": ["q1", "q3"]}}, "no column q3; the file has t, q1, q2, tau1, tau2"),
         ({"columns": {"q": ["q1"]}}, "1 columns of positions (q1), 2 of torques (tau1, tau2)"),
         ({"columns": {"t": "time"}}, "no column time"),
-        ({"rate": 100, "columns": {"t": "t"}}, "time runs at 200 Hz, record.rate is 100 Hz"),
+        ({"rate": 100, "columns": {"t": "t"}}, "time runs at 200 Hz, but record.rate is 100 Hz"),
         ({"scale": {"tau": "gtau"}}, "no single number 'gtau' in a text file"),
         ({"scale": {"q": [1, 2, 3]}}, "record.scale.q has 3 values; expected one or 2"),
         ({"units": {"q": ["rad", "rad", "m"]}}, "record.units.q has 3 units"),

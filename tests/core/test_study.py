@@ -158,7 +158,7 @@ def test_one_record_or_several():
         (
             {"record": {"units": {"q": "counts"}}},
             ("record", "counts_per_revolution"),
-            "counts need it",
+            "counts need this key",
         ),
         ({"cestac": {"runs": 1}}, ("cestac", "runs"), "at least 2"),
         (
@@ -166,7 +166,7 @@ def test_one_record_or_several():
             ("cestac", "delta", 1),
             "inf; expected a finite number",
         ),
-        ({"symgen": 2}, ("symgen",), "this version reads 1"),
+        ({"symgen": 2}, ("symgen",), "this version of symgen reads schema 1"),
         ({"validate": {"split": [[0, 1]]}}, ("validate", "split"), "at least two"),
     ],
 )

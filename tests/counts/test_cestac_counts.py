@@ -87,7 +87,7 @@ def test_steps_near_those_of_the_record_are_put_into_draws():
     assert found.levels[0].sigma.min() > 0 and found.notes == ()
     with pytest.raises(
         SettingsError,
-        match=r"cestac.delta: a step of 0\.001 is not coarser than that of encoder \d .*, 0\.001",
+        match=r"cestac.delta: step 0\.001 is not coarser than the step of encoder \d .*, 0\.001",
     ):
         cestac(planar, coarse, study(delta=(d,)))
     filtered = replace(

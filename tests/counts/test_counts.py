@@ -244,7 +244,7 @@ def test_a_step_that_is_a_fraction_of_the_true_one_is_told():
             "3 times finer: .* or, if a driver averaged",
         ),
         (lambda q: q, 0.0, "expected a positive number"),
-        (lambda q: q, 40.0, "larger than its motion"),
+        (lambda q: q, 40.0, "larger than the motion of the encoder"),
         (lambda q: 0 * q, None, "no position changes"),
         (
             lambda q: np.where(np.arange(len(q))[:, None] < 3000, q, q - 123 * 0.01),
@@ -305,7 +305,7 @@ def test_wraps_across_stretches(planar, record, monkeypatch, bits):
     reset[3000:, 1] -= 1234567 * fine
     with pytest.raises(
         InputError,
-        match=r"encoder 2: the count jumps by -123\d+ at sample 3000; it was reset or lost there",
+        match=r"encoder 2: the count jumps by -123\d+ at sample 3000; the encoder was reset or its count was lost",
     ):
         observe(planar, replace(changed, q=reset), study)
 

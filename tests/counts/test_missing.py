@@ -138,11 +138,11 @@ def test_arrays():
     with pytest.raises(
         InputError,
         match=(
-            "reader: lowpass needs all of them: repair or cut the record; where positions are counts"
+            "reader: lowpass needs all positions: repair or cut the record; where positions are counts"
         ),
     ):
         observe(planar, RECORD, replace(STUDY, signals=replace(SIGNALS, reader="lowpass")))
-    with pytest.raises(InputError, match="encoder 2: no sample is known"):
+    with pytest.raises(InputError, match="encoder 2: all positions are missing"):
         observe(planar, replace(RECORD, missing=MISSING | [False, True]), STUDY)
     rare = replace(RECORD, missing=MISSING | ((np.arange(N) % 500 > 0)[:, None] & [True, False]))
     with pytest.raises(

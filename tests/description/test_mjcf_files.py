@@ -84,13 +84,13 @@ WRONG = [  # what is replaced, by what, line of the error, words of the message
             '0"/></equality>'
         ),
         6,
-        "linear relations",
+        "a linear relation a0 + a1 y",
     ),
     (
         "</worldbody>",
         '</worldbody><equality><joint name="p" joint1="s"/><joint name="r" joint1="s"/></equality>',
         6,
-        "says what others say",
+        "follows from the other relations",
     ),
     (
         "</worldbody>",
@@ -102,7 +102,7 @@ WRONG = [  # what is replaced, by what, line of the error, words of the message
         6,
         "ties driven joints",
     ),
-    (SMALL, '<robot name="x"/>', 1, "ends in .urdf"),
+    (SMALL, '<robot name="x"/>', 1, "must end in .urdf"),
     (SMALL, "<mujoco><worldbody/></mujoco>", 1, "no joint that moves"),
 ]
 

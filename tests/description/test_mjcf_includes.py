@@ -81,10 +81,10 @@ def test_lines_are_those_of_the_file_that_is_wrong(tmp_path):
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("/etc/passwd", "outside of its folder"),
-        ("../secret.xml", "outside of its folder"),
-        ("common/../../secret.xml", "outside of its folder"),
-        ("link.xml", "outside of its folder"),
+        ("/etc/passwd", "outside the folder of the MJCF file"),
+        ("../secret.xml", "outside the folder of the MJCF file"),
+        ("common/../../secret.xml", "outside the folder of the MJCF file"),
+        ("link.xml", "outside the folder of the MJCF file"),
         ("arm.xml", "never by itself"),
         ("./common/../arm.xml", "never by itself"),
         ("common/defaults.xml", "once"),

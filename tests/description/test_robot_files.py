@@ -59,7 +59,7 @@ WRONG = [
     ("title: Test arm", 'title: \'a"""b\'', 3, ["expected one line", "quotes"]),
     ("[0, -g, 0]", "[0, -g]", 4, ["[0, '-g']", "expected 3 entries"]),
     ("[0, -g, 0]", "down", 4, ["'down'", "expected a list"]),
-    ("[0, -g, 0]", "[0, -G, 0]", 4, ["'G'", "declared here: D2, g"]),
+    ("[0, -g, 0]", "[0, -G, 0]", 4, ["'G'", "declared symbols: D2, g"]),
     ("g: 9.81", "g: fast", 5, ["'fast'", "constant expression"]),
     ("g: 9.81", "g: sqrt(2 - sqrt(5))", 5, ["finite real"]),
     ("g: 9.81", "g: .inf", 5, ["'.inf'", "expected a number"]),
@@ -79,7 +79,7 @@ WRONG = [
     ("1, sigma: 0", "1, sigma: 0.0", 8, ["0.0", "expected a whole number"]),
     ("1, sigma: 0", "1, sigma: 0, mu: 2", 8, ["mu = 2", "1 actuated or 0 passive"]),
     ("1, sigma: 0", "1, sigma: 0, mu: 0", 8, ["joints [2] are passive", "set mu: 1"]),
-    ("d: D2", "d: L2", 8, ["'L2'", "declared here: D2, g"]),
+    ("d: D2", "d: L2", 8, ["'L2'", "declared symbols: D2, g"]),
     ("d: D2", "d: __import__('os')", 8, ["__import__", "expected numbers"]),
     ("d: D2", "d: eval(D2)", 8, ["'eval' is not a function", "sin, cos, tan"]),
     ("d: D2", "d: q1.__class__", 8, ["q1.__class__", "expected numbers"]),
@@ -104,17 +104,22 @@ WRONG = [
     ("inertia, along: all", "inertia, along: {1: q1 + 1}", 10, ["q1 + 1", "such as q5 + q6"]),
     ("inertia, along: all", "inertia, form: {1: q1}", 10, ["q1", "such as q6**2"]),
     ("inertia, along: all", "inertia, along: {5: q1}", 10, ["frame 5 does not exist"]),
-    ("inertia, along: all", "inertia, along: {1: q7}", 10, ["'q7'", "declared here"]),
+    ("inertia, along: all", "inertia, along: {1: q7}", 10, ["'q7'", "declared symbols"]),
     (
         "inertia, along: all",
         "inertia, along: all, when: positive",
         10,
         ["'positive'", "viscous and coulomb"],
     ),
-    ("  Ia:", "  M:", 10, ["'M'", "not an inertial parameter's"]),
+    ("  Ia:", "  M:", 10, ["'M'", "must not be the name of an inertial parameter"]),
     ("  Ia:", "  Ia2:", 10, ["'Ia2'", "digit"]),
     ("viscous, along: all", "coulomb, form: {1: q1**2}", 11, ["no quadratic form", "use `along`"]),
-    ("[[100, 0], [0, 100]]", "[[100, 0]]", 12, ["rows of [2]", "expected 2 rows of 2"]),
+    (
+        "[[100, 0], [0, 100]]",
+        "[[100, 0]]",
+        12,
+        ["rows with [2] numbers", "expected 2 rows with 2 numbers"],
+    ),
     ("[[100, 0], [0, 100]]", "[[100, 0], [50, 0]]", 12, ["singular"]),
     ("[[100, 0], [0, 100]]", "[[100, 0], [0, x]]", 12, ["'x'", "expected a number"]),
     ("offset: [0, 0]", "offset: [0]", 12, ["1 entries", "expected 2"]),
@@ -127,9 +132,9 @@ WRONG = [
     ),
     ("[-pi/2, pi/2]", "[1, -1]", 13, ["(1.0, -1.0)", "lower < upper"]),
     ("[-pi/2, pi/2]", "[1]", 13, ["[1]", "[lower, upper]"]),
-    ("qd: [3, 3]", "qd: [3]", 13, ["1 entries", "2 numbers each"]),
+    ("qd: [3, 3]", "qd: [3]", 13, ["1 entries", "with 2 entries each"]),
     ("qd: [3, 3]", "qd: [3, -3]", 13, ["-3.0", "positive number"]),
-    ("qd: [3, 3]", "qv: [3, 3]", 13, ["'qv'", "expected q, qd, qdd, tau"]),
+    ("qd: [3, 3]", "qv: [3, 3]", 13, ["'qv'", "expected the keys q, qd, qdd, tau"]),
     ("M1: 2.0", "M3: 2.0", 14, ["'M3'", "not a standard parameter"]),
     ("M1: 2.0", "M1: heavy", 14, ["'heavy'", "expected a number"]),
     ("M1: 2.0", "1: 2.0", 14, ["found 1", "expected a name"]),
@@ -180,13 +185,13 @@ WRONG = [
     ("1, sigma: 0", "1, sigma: 1", 8, ["theta = q2", "in r if sigma is 1"]),
     ("1, sigma: 0", "1, sigma: prismatic", 8, ["'prismatic'", "0 revolute, 1 prismatic, 2 fixed"]),
     ("[[100, 0], [0, 100]]", "[100, [0, 100]]", 12, ["found 100", "one row per motor"]),
-    ("[[100, 0], [0, 100]]", "100", 12, ["found 100", "one number: [100, 80]"]),
-    ("M1: 2.0", "M1R: 2.0", 14, ["'M1R'", "standard ones are: M1"]),
+    ("[[100, 0], [0, 100]]", "100", 12, ["found 100", "one number per motor, [100, 80]"]),
+    ("M1: 2.0", "M1R: 2.0", 14, ["'M1R'", "give the standard parameter M1"]),
     ("M1: 2.0", "mass2: 2.0", 14, ["'mass2'", "expected names such as XX2", "M2", "FV2"]),
-    ("M1: 2.0", "M2: 2.0}\nmassless: [2] #{", 14, ["'M2'", "frame 2 is massless"]),
+    ("M1: 2.0", "M2: 2.0}\nmassless: [2] #{", 14, ["'M2'", "link 2 has no inertial parameters"]),
     ("values:", "loops:\n  - {cut: 3, twin: 2}\nvalues:", 15, ["cut frame 3 does not exist"]),
     ("  2: {ant", "\t2: {ant", 8, ["there is a tab here; indent with spaces"]),
-    ("  2: {ant", "   2: {ant", 8, ["indented otherwise"]),
+    ("  2: {ant", "   2: {ant", 8, ["another indent"]),
     ("theta: q2, r: 0}", "theta: q2 r: 0}", 8, ["missing , or }"]),
     ("title: Test arm", "title: Arm: test", 3, ["between quotes"]),
     ("  2: {ant", "  - {ant", 8, ["every row as `1: {...}`"]),
@@ -200,7 +205,7 @@ WRONG = [
     ("values:", "---\nvalues:", 14, ["second document"]),
     ("values:", "\tvalues:", 14, ["not YAML"]),
     ("{M1: 2.0}", "{M1: 2.0", 14, ["not YAML"]),
-    ("title: Test arm", "title: " + "a" * 5000, 3, ["5000 characters", "at most"]),
+    ("title: Test arm", "title: " + "a" * 5000, 3, ["5000 characters", "the limit is"]),
 ]
 
 
@@ -222,7 +227,7 @@ def test_error_names_line_given_and_expected(old, new, line, words):
 def test_cut_and_twin_exchanged():
     fixed = "  3: {ant: 1, sigma: 2, alpha: 0, d: D2, theta: 0, r: 0}\n"
     error = error_of(ARM.replace("elements:", f"{fixed}loops: [{{cut: 3, twin: 2}}]\nelements:"))
-    assert "twin frame 2 has sigma 0" in str(error) and "cut and twin are exchanged" in str(error)
+    assert "twin frame 2 has sigma 0" in str(error) and "exchange cut and twin" in str(error)
 
 
 @pytest.mark.parametrize("theta", ["q2 + 3*pi", "q2 - 6.28", "q2 + 8*pi + D2"])

@@ -89,7 +89,10 @@ def test_the_rest_stands_still(part, moving, at):
 @pytest.mark.parametrize(
     ("part", "words"),
     [
-        (TreePart({"twin": 0.0}), "'twin' to lock follows others; lock finger"),
+        (
+            TreePart({"twin": 0.0}),
+            "'twin' cannot be locked, because it follows other joints; lock finger",
+        ),
         (TreePart({"nose": 0.0}), "no moving joint of that name; the file has lift, head"),
         (TreePart(chain=("eye", "pad")), "outward"),
         (TreePart(chain=("torso", "nose")), "no link 'nose'"),

@@ -198,7 +198,7 @@ def test_a_constant_may_be_named_as_a_local_of_the_loops(constant: str) -> None:
 @pytest.mark.parametrize("constant", ["store", "states", "X", "tau"])
 def test_a_constant_that_functions_need_for_themselves_is_refused(constant: str) -> None:
     with pytest.raises(
-        DescriptionError, match=f"constant '{constant}' is the name of a word of the"
+        DescriptionError, match=f"constant '{constant}' is the name of a reserved word of the"
     ):
         parse_robot(ARM.format(title="", constant=constant).encode(), "arm.yaml")
 

@@ -93,9 +93,9 @@ def test_bad_input() -> None:
         structure(AnyFamily, {"family": "fourier", "order": 3})
     with pytest.raises(SettingsError, match="expected more than 0"):
         structure(AnyFamily, {"family": "fourier", "period": 0})
-    with pytest.raises(SettingsError, match="shorten it"):
+    with pytest.raises(SettingsError, match="shorten the blend"):
         structure(AnyFamily, {"family": "point-to-point", "travel": 1, "blend": 0.6})
-    with pytest.raises(SettingsError, match="shorten it"):
+    with pytest.raises(SettingsError, match="shorten the ramp"):
         structure(AnyFamily, {"family": "sinusoids", "length": 1, "ramp": 0.6})
     with pytest.raises(InputError, match="coefficients of shape"):
         Part(Fourier(), np.zeros((3, 2)))

@@ -179,5 +179,5 @@ def test_tx40_record(tx40_data) -> None:
 
 def test_too_few_rows(arm) -> None:
     record, fit = simulated(arm, coulomb, seconds=0.6)
-    with pytest.raises(InputError, match="a friction curve needs more of the record"):
+    with pytest.raises(InputError, match="a friction curve needs more rows"):
         friction_curves(problem(arm, [record], STUDY), fit)

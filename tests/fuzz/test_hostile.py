@@ -219,8 +219,8 @@ def test_gzip_bombs(reader):
 @campaign
 def test_lines_without_end(reader):
     refused(reader, "csv", b"1" * 20_000_000, "no columns q1, q2")
-    refused(reader, "csv", b"," * 10_000_000, "columns; at most")
-    refused(reader, "csv", b"," * 900_000, "columns; at most")
+    refused(reader, "csv", b"," * 10_000_000, "columns; expected at most")
+    refused(reader, "csv", b"," * 900_000, "columns; expected at most")
     refused(reader, "csv", csv_file() + b"," * 10_000_000, "10000001 fields; expected")
     refused(reader, "csv", b"\n" * 8_000_000, "no line of numbers")
 
@@ -327,7 +327,7 @@ def test_large_files(tmp_path):
         load_study(tmp_path / "large.yaml")
     with (tmp_path / "large.csv").open("wb") as file:
         file.truncate(10_000_000_000)
-    with pytest.raises(InputError, match="cut it into shorter records"):
+    with pytest.raises(InputError, match="cut the file into shorter records"):
         read_bytes(tmp_path / "large.csv")
 
 

@@ -126,7 +126,7 @@ def test_columns_of_channels_are_those_of_casadi() -> None:
         ModelError, match="friction laws depend on tau_model, which depends on the accelerations"
     ):
         require(module, "forward_dynamics")
-    with pytest.raises(SymgenError, match="LD2 read tau_model, which depends on qdd"):
+    with pytest.raises(SymgenError, match="LD2 use tau_model, which depends on qdd"):
         str(symgen.symbolic(arm).formulas("forward_dynamics"))
     printed = str(symgen.symbolic(arm).formulas("friction"))
     assert "tau_model2*sign(QP2)*sign(tau_model2)*LD2" in printed and "temperature" in printed
@@ -139,7 +139,7 @@ def test_columns_of_channels_are_those_of_casadi() -> None:
         ('energy: "channel.temperature*q", unit: N', "positions only"),
         (
             'torque: "channel.temperature*temperature*qd", unit: N',
-            "used as a constant, but channel.temperature",
+            "used as a constant and as the measured quantity channel.temperature",
         ),
     ],
 )
@@ -149,7 +149,7 @@ def test_laws_that_no_record_can_give_are_refused(column: str, message: str) -> 
 
 
 def test_a_channel_is_no_length_and_a_load_that_of_one_joint() -> None:
-    with pytest.raises(DescriptionError, match="function of time"):
+    with pytest.raises(DescriptionError, match="the measured quantity channel.temperature"):
         robot(d="temperature")
     with pytest.raises(DescriptionError, match="one actuated joint"):
         robot("LD: {kind: load_dependent, along: {2: q1 + q2}}")

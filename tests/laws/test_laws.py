@@ -152,7 +152,7 @@ def test_a_law_that_is_not_there_is_a_sentence(model) -> None:
 
 def test_methods_that_simulate_refuse_scalars(model) -> None:
     study = runtime.study.study_from_mapping({"estimate": {"method": "iv"}})
-    with pytest.raises(runtime.InputError, match="not fitted by iv"):
+    with pytest.raises(runtime.InputError, match="iv cannot fit the constants of a law"):
         runtime.identify(model, record_of(model, 0.1), study)
 
 

@@ -144,16 +144,16 @@ def test_other_processes_simulate_the_same_loop(arm, study, simulator):  # noqa:
 
 def test_what_cannot_be_asked(arm, study, record):  # noqa: F811
     for changed, words in (
-        ({"uneven": 0.1}, "uneven lines belong to rounding: phase"),
+        ({"uneven": 0.1}, "uneven lines need rounding: phase"),
         ({"rounding": "phase", "common": True}, "set common: false"),
-        ({"place": "loop"}, "rounds by the law phase alone"),
+        ({"place": "loop"}, "expected phase, the only rounding of an encoder in the loop"),
         ({"place": "loop", "rounding": "phase", "uneven": 0.1}, "has even lines"),
         ({"place": "loop", "rounding": "phase", "torque": [0.1]}, "controller.torque.step"),
     ):
         with pytest.raises(SettingsError, match=words):
             CestacSettings(**changed)
     with pytest.raises(
-        SettingsError, match="didim simulates the closed loop, but this study describes none"
+        SettingsError, match="didim simulates the closed loop, but this study does not describe it"
     ):
         cestac(arm[0], record, replace(method(study, "didim"), controller=None))
     with pytest.raises(SettingsError, match="place: loop simulates the closed loop"):

@@ -198,7 +198,8 @@ def test_unit_start_needs_gains_that_follow(emps, axes):
             seen, EstimateSettings("didim", options={"start": "unit", "gains": "one"}), model=model
         )
     with pytest.raises(
-        InputError, match="gains: start: these parameters have no positive inertia about joint 1"
+        InputError,
+        match="gains: start: these parameters do not give a positive inertia about joint 1",
     ):
         estimate_of(
             seen,
@@ -316,7 +317,7 @@ def test_unknown_reference(arm, clean):
         model,
         replace(study.controller, reference=replace(study.controller.reference, motion=None)),
     )
-    with pytest.raises(SettingsError, match=r"what the controller followed in .* is not known"):
+    with pytest.raises(SettingsError, match=r"the reference of the controller in .* is not known"):
         loop_of_records(model, [record], study, blind)
     with pytest.raises(SettingsError, match="expected known or measured"):
         loop_of_records(model, [record], study, blind, reference="guessed")
@@ -340,7 +341,7 @@ def test_unknown_reference(arm, clean):
 
 def test_parameters_without_inertia_are_refused_on_the_way(arm, clean):
     model = arm[0]
-    with pytest.raises(InputError, match="cannot be simulated with the parameters it starts from"):
+    with pytest.raises(InputError, match="cannot be simulated with the start parameters"):
         estimate_of(
             clean[1],
             EstimateSettings("didim", options={"start": {"FV1": 1.0}, "gains": "one"}),
@@ -451,7 +452,7 @@ def test_recorded_feedforward_and_known_torques_are_in_the_loop(arm):
     assert found.status == "ok", found.message
     np.testing.assert_allclose(found.X, truth, rtol=0, atol=5e-3)
     with pytest.raises(
-        SettingsError, match=r"no feed-forward torque; name its columns in record\.columns\.tau_ff"
+        SettingsError, match=r"no feed-forward torque; give its columns in record\.columns\.tau_ff"
     ):
         loop_of_records(model, [Record(run.t, run.q, run.tau, q_r=run.q_r)], own, loop.simulator)
     rounded = replace(record, q=np.round(record.q, 6))

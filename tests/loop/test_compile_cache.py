@@ -158,7 +158,10 @@ def test_folders_that_cannot_be_used(tmp_path: Path) -> None:
 @needs_compiler
 @pytest.mark.skipif(sys.platform != "linux", reason="nobody may write to /proc")
 def test_a_folder_that_cannot_be_written() -> None:
-    refused("cache folder /proc/symgen: .*; choose another by SYMGEN_CACHE", Path("/proc/symgen"))
+    refused(
+        "cache folder /proc/symgen: .*; choose another folder by the variable SYMGEN_CACHE",
+        Path("/proc/symgen"),
+    )
 
 
 FULL = """
@@ -180,7 +183,7 @@ print(*(warning.message for warning in seen))
 @pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
 @pytest.mark.parametrize(
     ("room", "reason"),
-    [(100, "choose another by SYMGEN_CACHE"), (1.1, "failed with")],
+    [(100, "choose another folder by the variable SYMGEN_CACHE"), (1.1, "failed with")],
     ids=["source", "object"],
 )
 def test_a_full_disk(room: float, reason: str, tmp_path: Path) -> None:
@@ -199,7 +202,9 @@ def test_a_full_disk(room: float, reason: str, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert (
         reason in done.stdout
-        and done.stdout.startswith("simulation: CasADi's own interpreter in place of C: ")
+        and done.stdout.startswith(
+            "the simulation runs in the interpreter of CasADi, because it cannot run as compiled C: "
+        )
         and done.stdout.count("\n") == 1
     )
     assert list((tmp_path / "cache").iterdir()) == []

@@ -215,8 +215,8 @@ def test_robots_with_columns_are_written_as_they_are_read() -> None:
 @pytest.mark.parametrize(
     "column, sentence",
     [
-        ("A: {along: 1, torque: tanh(qd/vs), unit: N*m}", "'vs' is unknown there"),
-        ("A: {along: 1, torque: log(qd), unit: N*m}", "not a function of the grammar"),
+        ("A: {along: 1, torque: tanh(qd/vs), unit: N*m}", "'vs' is unknown in this law"),
+        ("A: {along: 1, torque: log(qd), unit: N*m}", "'log' is not a known function"),
         ("A: {along: 1, torque: qd}", "unit"),
         ("A: {along: 1, unit: N*m}", "torque"),
         ("A: {along: 1, torque: qd, energy: q, unit: N*m}", "one of `torque` and `energy`"),
@@ -224,8 +224,8 @@ def test_robots_with_columns_are_written_as_they_are_read() -> None:
         ("A: {along: 1, torque: 1/qd, unit: N*m}", "not finite"),
         ("A: {kind: tanh, along: 1, torque: qd}", "tanh already defines the law"),
         ("A: {along: 9, torque: qd, unit: N*m}", "frame 9 does not exist"),
-        ("FV: {along: 1, torque: qd, unit: N*m}", "is an element of this robot too"),
-        ("A: {kind: tanh, along: 1, fit: {v: 1}}", "no scalar"),
+        ("FV: {along: 1, torque: qd, unit: N*m}", "is also the name of an element"),
+        ("A: {kind: tanh, along: 1, fit: {v: 1}}", "has no constant v to fit"),
         ("A: {kind: tanh, along: 1, fit: {vs: {bounds: [1, 2], start: 3}}}", "start 3"),
         ("A: {along: 1, torque: __import__('os'), unit: N*m}", "unexpected"),
     ],

@@ -143,7 +143,7 @@ def test_full_disk(tmp_path, whole):
     process = started(tmp_path, limit=1000)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 1
-    assert "InputError" in errors and "File too large; 0 runs are safe" in errors
+    assert "InputError" in errors and "File too large; 0 runs are saved" in errors
     assert list(tmp_path.iterdir()) == []
     assert same_bits(cestac(planar, RECORD, study(), checkpoint=Checkpoint(tmp_path)), whole)
 
@@ -158,7 +158,9 @@ def test_disk_that_fills_up_leaves_earlier_runs(tmp_path, whole, monkeypatch):
 
     before = (tmp_path / "runs.npz").read_bytes()
     monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(InputError, match=f"No space left on device; {first.written} runs are safe"):
+    with pytest.raises(
+        InputError, match=f"No space left on device; {first.written} runs are saved"
+    ):
         cestac(planar, RECORD, study(), checkpoint=Checkpoint(tmp_path))
     monkeypatch.undo()
     assert files(tmp_path) == ["runs.npz"] and (tmp_path / "runs.npz").read_bytes() == before

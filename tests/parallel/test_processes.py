@@ -76,7 +76,10 @@ def test_a_failing_task_is_the_callers_error(count):
 
 
 def test_a_process_that_dies_is_one_sentence():
-    with pytest.raises(InputError, match="a process died: no memory left"), processes(2) as several:
+    with (
+        pytest.raises(InputError, match="a process died: the memory is full"),
+        processes(2) as several,
+    ):
         list(several(dying, range(2)))
 
 

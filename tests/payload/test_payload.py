@@ -216,7 +216,9 @@ def test_bad_input() -> None:
     without, loaded = pair(arm, 0.1)
     with pytest.raises(SettingsError, match=r"payload\.link: no link 7"):
         payload(arm, without, loaded, PayloadSettings(link=7))
-    with pytest.raises(InputError, match="a record without it and one with it"):
+    with pytest.raises(
+        InputError, match=r"a record without the load \(record\) and a record with the load"
+    ):
         payload(arm, without, [], PayloadSettings())
     with pytest.raises(SettingsError, match=r"payload\.known\.mass"):
         study_from_mapping({"payload": {"known": {"mass": 2}}})

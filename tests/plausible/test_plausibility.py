@@ -224,7 +224,7 @@ def test_loops_that_do_not_close_in_the_record_are_the_finding() -> None:
         and "does not close" in found.worst.finding
     )
     with pytest.raises(
-        runtime.InputError, match=r"does not close at sample .*; look at units and zeros"
+        runtime.InputError, match=r"does not close at sample .*; check units and zeros"
     ):
         runtime.identify(model, runtime.Record(t, q, np.cos(q)))
 

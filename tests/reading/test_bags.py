@@ -66,7 +66,7 @@ def test_columns(tmp_path):
     )
     np.testing.assert_array_equal(velocities.q[:, 0], QD[:, 1])
     for columns, said in (
-        ({}, "/joint_states has the joints shoulder, elbow; name those of the robot"),
+        ({}, "/joint_states has the joints shoulder, elbow; list the joints of the robot"),
         (
             {"q": ["wrist"]},
             (
@@ -82,7 +82,7 @@ def test_columns(tmp_path):
         with pytest.raises(InputError) as e:
             read_record(settings(path, columns=columns))
         assert said in str(e.value)
-    with pytest.raises(InputError, match="time stamps of bags are read in s"):
+    with pytest.raises(InputError, match="time stamps of bags are in s"):
         read_record(settings(path, units={"t": "ms"}))
     with pytest.raises(InputError, match="no single number 'gain' in a bag"):
         read_record(settings(path, scale={"q": "gain"}))
@@ -179,7 +179,8 @@ def test_topics(tmp_path):
         read_record(settings(path))
     np.testing.assert_array_equal(read_record(settings(path, topic="/right/joint_states")).q, 2 * Q)
     with pytest.raises(
-        InputError, match="no topic /up of sensor_msgs/msg/JointState; the bag has /left"
+        InputError,
+        match="no topic /up of sensor_msgs/msg/JointState; the topics of the bag are /left",
     ):
         read_record(settings(path, topic="/up"))
 
@@ -210,7 +211,7 @@ def test_paths(tmp_path):
     with pytest.raises(InputError, match="no such file"):
         read_record(settings(tmp_path / "no.bag"))
     (tmp_path / "a.bag.gz").write_bytes(b"")
-    with pytest.raises(InputError, match="uncompress it"):
+    with pytest.raises(InputError, match="uncompress the file"):
         read_record(settings(tmp_path / "a.bag.gz"))
     with pytest.raises(InputError, match=r"a folder without metadata\.yaml"):
         read_record(settings(tmp_path))

@@ -71,9 +71,9 @@ def test_columns_are_found_in_any_order(q, tau, tmp_path):
         (
             ["a", "b", "c", "d", "e", "f"],
             SimpleNamespace(**{**vars(MODEL), "LABELS": {1: "shoulder"}}),
-            "no name for every joint",
+            "some joints of the robot have no name",
         ),
-        (["a", "b", "c", "d", "e", "f"], None, "no name for every joint"),
+        (["a", "b", "c", "d", "e", "f"], None, "some joints of the robot have no name"),
     ],
 )
 def test_what_says_too_little_is_refused(head, model, words, tmp_path):

@@ -60,7 +60,7 @@ def test_another_file_under_that_name_is_an_error(toy, monkeypatch, tmp_path):
     (tmp_path / "data" / "toy").mkdir(parents=True)
     (tmp_path / "data" / "toy" / "a.csv").write_bytes(b"other")
     monkeypatch.setenv("SYMGEN_DATA", str(tmp_path / "data"))
-    with pytest.raises(InputError, match="that of the public record"):
+    with pytest.raises(InputError, match="the hash of the public record"):
         fetch("toy", "a.csv", cache=tmp_path / "cache")
 
 

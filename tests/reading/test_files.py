@@ -132,7 +132,7 @@ def test_clock(tmp_path, samples):
     ):
         with pytest.raises(InputError, match=message):
             read_record(settings(write("npz", tmp_path, (bad, q, tau))), folder=tmp_path)
-    with pytest.raises(InputError, match=r"time runs at 500 Hz, record\.rate is 400 Hz"):
+    with pytest.raises(InputError, match=r"time runs at 500 Hz, but record\.rate is 400 Hz"):
         read_record(
             settings(write("npz", tmp_path, samples), rate=400, columns={"t": "t"}), folder=tmp_path
         )
@@ -154,7 +154,7 @@ def test_bad_files(tmp_path, samples):
         read_record(replace(given, rate=RATE), folder=tmp_path)
     np.savez(path, q1=np.array([{}], dtype=object))
     with pytest.raises(
-        InputError, match=r"not an archive of plain arrays \(q1 holds pickled objects"
+        InputError, match=r"not an archive of plain arrays \(q1 contains pickled objects"
     ):
         read_record(replace(given, rate=RATE), folder=tmp_path)
     with pytest.raises(InputError, match="no such file"):

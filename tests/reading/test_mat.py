@@ -180,7 +180,7 @@ def test_more_than_there_is_memory_for_is_refused(tmp_path):
     )
     assert len(declared) < 3_000_000
     (tmp_path / "a.mat").write_bytes(declared)
-    with pytest.raises(InputError, match=r"a\.mat: needs more memory than there is"):
+    with pytest.raises(InputError, match=r"a\.mat: needs more memory than available"):
         read_table(tmp_path / "a.mat")
 
 

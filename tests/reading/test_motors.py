@@ -42,7 +42,7 @@ def test_the_torque_of_a_joint_without_a_motor_is_zero(tmp_path, columns, named)
 
 
 def test_other_limits_and_negative_torques_stay_refused():
-    with pytest.raises(DescriptionError, match="tau of a joint without a motor is 0"):
+    with pytest.raises(DescriptionError, match="for tau of a joint without a motor write 0"):
         robot((100.0, -1.0))
     with pytest.raises(DescriptionError, match="qd of joint 2 is 0"):
         replace(symgen.load_robot("planar_2r"), limits={"qd": (1.0, 0.0)})

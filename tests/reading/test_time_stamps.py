@@ -205,7 +205,7 @@ def test_counted_samples_stay_as_they_are():
 def test_counted_samples_must_fill_their_time():
     for t, rate in ((np.delete(T, range(0, 2000, 100)), RATE), (T, 510.0)):
         with pytest.raises(
-            InputError, match="the rate is different, or samples are missing; state record"
+            InputError, match="the rate is different, or samples are missing; set record"
         ):
             resampled(t, [signal(t)], time_stamps(t), Resample(method="count"), rate, file="x")
 
@@ -215,7 +215,7 @@ def test_counted_samples_must_fill_their_time():
     [
         (Resample(), "time has gaps or goes back; set record.resample.gaps: split"),
         (Resample(gaps="split", rate=100), "below the 500 Hz of the record"),
-        (Resample(gaps="split", shortest=5), "no stretch of 5 s without a gap"),
+        (Resample(gaps="split", shortest=5), "no part of the record lasts 5 s without a gap"),
     ],
 )
 def test_refused(settings, said):
@@ -254,7 +254,7 @@ def test_a_record_with_a_gap_becomes_two(tmp_path):
     with pytest.raises(
         InputError,
         match=(
-            "2 records or pieces between gaps; read_records returns them all: a (1 of 2), a (2 of 2)"
+            "2 records or pieces between gaps, but one is expected; use read_records, which returns all of them: a (1 of 2), a (2 of 2)"
         )
         .replace("(", r"\(")
         .replace(")", r"\)"),
@@ -280,7 +280,7 @@ def test_errors_tell_all_irregularities(tmp_path):
         ({"resample": {}}, "set record.resample.gaps: split"),
         (
             {"resample": {"gaps": "split"}, "rate": 1000},
-            "time runs at 500 Hz, record.rate is 1000 Hz",
+            "time runs at 500 Hz, but record.rate is 1000 Hz",
         ),
     ):
         with pytest.raises(InputError) as e:
@@ -288,7 +288,7 @@ def test_errors_tell_all_irregularities(tmp_path):
         assert "a.npz" in str(e.value) and said in str(e.value)
         remedy = (
             "Remedy: record.resample: {gaps: split} makes a record of each piece between gaps. "
-            "Where samples are uniform and their stamps alone are not: record.resample: {gaps: split, method: count}"
+            "If the samples are uniform and only their stamps are not: record.resample: {gaps: split, method: count}"
         )
         assert record or remedy in str(e.value)
         assert "rate" in record or (
@@ -402,7 +402,7 @@ def test_the_remedy_named_is_the_best_of_the_three(tmp_path):
         ),
         (
             0.002 * (1 + np.random.default_rng(0).uniform(-0.3, 0.3, 4000)),
-            "{} interpolates at the stamps. Where samples are uniform and their stamps alone are not: record.resample: {method: count}, or record.rate",
+            "{} interpolates at the stamps. If the samples are uniform and only their stamps are not: record.resample: {method: count}, or record.rate",
         ),
     ],
 )

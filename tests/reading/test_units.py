@@ -78,7 +78,11 @@ def test_units_of_pint(read, name, kind, factor):
                 "rad, deg"
             ),
         ),
-        (torque_unit, "%", "'%' does not say of which quantity; write the unit of the rated value"),
+        (
+            torque_unit,
+            "%",
+            "'%' does not say the rated quantity; write the unit of the rated value",
+        ),
         (torque_unit, "MA", "'MA' is 1e+06 ampere"),
         (position_unit, "s", "is a unit of time"),
         (
@@ -123,7 +127,7 @@ def test_study_units_name_the_key():
         study_from_mapping({"record": {"units": {"tau": "deg"}}})
     with pytest.raises(SettingsError, match=r"record\.units\.q\[1\]: 'degz' is not a unit"):
         study_from_mapping({"record": {"units": {"q": ["deg", "degz"]}}})
-    with pytest.raises(SettingsError, match="counts need it"):
+    with pytest.raises(SettingsError, match="counts need this key"):
         study_from_mapping({"record": {"units": {"q": ["deg", "count"]}}})
 
 

@@ -39,7 +39,7 @@ def test_the_note_names_the_base_parameters(link, parameters):
         regroup(robot)
     (note,) = notes
     assert str(note.message).startswith(f"link '{link}' (line ")
-    assert f"; it enters {parameters}. " in str(note.message)
+    assert f"; this inertia enters {parameters}. " in str(note.message)
 
 
 def test_a_robot_of_bodies_that_exist_has_no_note(recwarn):

@@ -376,7 +376,7 @@ def test_frames_that_cannot_coincide(few_starts: None) -> None:
     """alpha5 = +pi/2 in Table 5: the two planes are turned against each other."""
     with pytest.raises(
         DescriptionError,
-        match=r"frame 7 \(cut\) and frame 8 \(twin\) cannot coincide; they come as close as 2 ",
+        match=r"frame 7 \(cut\) and frame 8 \(twin\) cannot coincide; their smallest difference is 2 ",
     ):
         close(changed(load_robot("haptic"), 5, alpha="pi/2"))
 
@@ -385,7 +385,7 @@ def test_sides_too_long(few_starts: None) -> None:
     robot = load_robot("four_bar")
     with pytest.raises(
         DescriptionError,
-        match=r"frame 4 \(cut\) and frame 5 \(twin\) cannot coincide; they come as close as 0\.\d+",
+        match=r"frame 4 \(cut\) and frame 5 \(twin\) cannot coincide; their smallest difference is 0\.\d+",
     ):
         close(replace(robot, constants=dict(robot.constants) | {"L0": 1.5}))
 
@@ -410,7 +410,7 @@ def test_too_few_actuators() -> None:
     with pytest.raises(
         DescriptionError,
         match=(
-            r"mobility is 3, but 2 joints are actuated .* 1 freedoms are left; .* "
+            r"mobility is 3, but 2 joints are actuated .* 1 freedoms remain; .* "
             r"under-constrained"
         ),
     ):
@@ -435,7 +435,7 @@ def test_over_constrained_mechanism(few_starts: None) -> None:
 def test_passive_joint_without_relation() -> None:
     with pytest.raises(
         DescriptionError,
-        match="passive joint 4 has no relation: it is in no loop; declare q4 under constraints",
+        match="passive joint 4 is in no loop, so no equation gives its position; declare q4 under constraints",
     ):
         close(haptic())
 
@@ -472,8 +472,8 @@ def test_lengths_that_make_a_declared_parallelogram_impossible(few_starts: None)
     with pytest.raises(
         DescriptionError,
         match=(
-            r"cannot coincide, with or without the declared relations; they come as close as "
-            r"0\.61"
+            r"cannot coincide, with or without the declared relations; their smallest "
+            r"difference is 0\.61"
         ),
     ):
         close(changed(unequal, 7, d="0.9"))

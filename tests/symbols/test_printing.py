@@ -212,7 +212,7 @@ BAD = [
     ({"robot": "planar_2r", "name": "determinant", "rows": (1, 9)}, "expected 2 different rows"),
     ({"robot": "planar_2r", "name": "pose", "form": "open"}, "expected one of closed, recursive"),
     ({"robot": "planar_2r", "name": "pose", "format": "word"}, "expected one of text, latex"),
-    ({"robot": "sr400", "name": "closure"}, "passive=symbols keeps them"),
+    ({"robot": "sr400", "name": "closure"}, "use passive=symbols to keep the passive joints"),
     ({"robot": "panda", "name": "determinant"}, "det(J*J.T) in SymPy"),
     ({"robot": "tx40", "name": "gravity", "of": 3}, "leave out of and frame"),
     ({"robot": "tx40", "name": "gravity", "rows": (1,)}, "rows are for the determinant"),
@@ -231,7 +231,7 @@ def test_bad_input_is_one_sentence_with_what_works(asked: dict, told: str) -> No
 @pytest.mark.parametrize(
     ("asked", "told"),
     [
-        ({"values": {"D9": 1}}, "close: "),
+        ({"values": {"D9": 1}}, "similar names: "),
         ({"values": {"D2": float("nan")}}, "expected a finite number"),
         ({"values": {"D2": "1 +"}}, "in '1 +'"),
         ({"values": {"D2": "__import__('os')"}}, "__import__"),

@@ -261,7 +261,7 @@ def test_the_parameters_printed_first_are_written(tmp_path) -> None:
     document = json.loads((tmp_path / "results" / "estimate.json").read_text())
     next(own for own in document["sets"] if own["name"] == "feasible")["X"].pop()
     (tmp_path / "results" / "estimate.json").write_text(json.dumps(document))
-    with pytest.raises(InputError, match="its sets and its parameters do not match"):
+    with pytest.raises(InputError, match="the sets and the parameters in the file do not match"):
         symgen.apply(tmp_path / "results", path)
 
 
@@ -277,7 +277,8 @@ def test_estimates_of_other_robots_are_refused(tmp_path) -> None:
         provenance={"labels": {"q1": "shoulder", "q2": "wrist"}},
     )
     with pytest.raises(
-        DescriptionError, match=r"q2 of the estimate is wrist, of arm\.urdf elbow: give --chain"
+        DescriptionError,
+        match=r"q2 is wrist in the estimate, but elbow in arm\.urdf; give the same --chain",
     ):
         symgen.apply(named, path)
     with pytest.raises(DescriptionError, match="float given as estimate"):
@@ -363,7 +364,7 @@ def test_encodings(tmp_path) -> None:
     assert changed(tmp_path, "arm.urdf", latin.encode("latin-1")) == expected.replace(
         '"utf-8"', '"iso-8859-1"'
     ).encode("latin-1")
-    with pytest.raises(DescriptionError, match="save it as UTF-8"):
+    with pytest.raises(DescriptionError, match="save the file as UTF-8"):
         changed(tmp_path, "arm.urdf", URDF.replace('"utf-8"', '"utf-16"').encode("utf-16"))
     with pytest.raises(DescriptionError, match="write digits"):
         changed(tmp_path, "arm.urdf", URDF.replace('damping="1.25"', 'damping="&#49;.25"'))
@@ -426,7 +427,7 @@ def test_settings_that_would_change_what_is_written_are_noticed(tmp_path) -> Non
     )
     model = symgen.model(read_robot(path)[0])
     light = dict(model.VALUES) | {"ZZ1": model.VALUES["ZZ1"] - 0.01}
-    with pytest.raises(DescriptionError, match="other values than written"):
+    with pytest.raises(DescriptionError, match="would change the written values"):
         symgen.apply(exact(model, light), path)
 
 

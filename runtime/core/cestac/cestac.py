@@ -122,8 +122,9 @@ def cestac(
     if study.signals.reader == "counts" and settings.delta and settings.rounding != "phase":
         raise SettingsError(
             (
-                f"{settings.rounding} does not work with signals.reader: counts. It rounds each sample "
-                "independently, which destroys the changes of the count that the reader needs; use phase"
+                f"{settings.rounding} does not work with signals.reader: counts, because this rounding of "
+                "each sample independently destroys the changes of the count that the reader needs; use "
+                "rounding: phase"
             ),
             path=("cestac", "rounding"),
         )
@@ -195,8 +196,8 @@ def _refuse(reference: Estimate) -> None:
     """
     if reference.status not in (*USABLE, "rank-deficient", "no-redundancy", "singular-weights"):
         raise InputError(
-            f"{reference.method} finds no estimate from the record as measured, so rounded records "
-            f"have nothing to be compared with: {reference.message}"
+            f"{reference.method} finds no estimate from the measured record, which is the reference "
+            f"for the estimates from rounded records: {reference.message}"
         )
 
 
@@ -245,7 +246,7 @@ def _all_runs(
     progress: Progress | None,
     checkpoint: Checkpoint | None,
 ) -> Runs:
-    """Compute the runs that are not yet on disk, and return all runs, sorted by level and number.
+    """Compute the runs that are not yet on disk; return all runs, sorted by level and run number.
 
     identity : function that returns the data that identify this study on disk.
     """
@@ -313,7 +314,7 @@ def resolution(result: Identification, own_encoder: EncoderOf, loop_of: LoopOf) 
     """
     if not result.determined:
         raise InputError(
-            "the record does not determine the parameters, so no encoder can be judged by it; "
+            "the record does not determine the parameters, so this record cannot judge an encoder; "
             "record a richer motion"
         )
     essential = result.study.cestac.columns != "all"

@@ -1,4 +1,4 @@
-"""Rounding of measurements as by coarser sensors, and the system Y = W X + rho that results.
+"""Round measurements as coarser sensors would, and build the system Y = W X + rho that results.
 
 Eqs. (15), (16), (28).
 
@@ -258,7 +258,7 @@ def _measured(problem: Problem, records: Sequence[Prepared]) -> Observation:
 
 
 def stream_keys(draw: tuple[int, ...], k: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Return the keys of the two random streams of record k: for positions and for torques.
+    """Return the keys that seed two random streams of record k: for positions, and for torques.
 
     They are (*draw, 2 k) and (*draw, 2 k + 1); the positions of record 0 have the key `draw`
     itself.
@@ -300,7 +300,7 @@ def perturbed_torque(
 
 
 def torque_rows(task: Task, record: PreparedRecord, level: Level, key: Sequence[int]) -> Array:
-    """Compute Y of one record in one run, shape (n, K), before the selection of rows.
+    """Compute the torques Y of one record in one run, shape (n, K), before rows are selected.
 
     The torques are as measured, or rounded in steps of Phi if the level has a torque step.
     """
@@ -371,7 +371,7 @@ def run_states(task: Task, record: PreparedRecord, q: Array, level: Level) -> St
             states = task.reader(_moved(task, record, q), known)
         except np.linalg.LinAlgError as e:
             raise InputError(
-                f"encoder counts of {level.label} a step are too coarse for this motion ({e}); use finer steps"
+                f"an encoder step of {level.label} is too coarse for this motion ({e}); use finer steps"
             ) from e
     return replace(states, channels=record.channels)
 

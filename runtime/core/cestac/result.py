@@ -74,7 +74,7 @@ Verdict = Literal["unbiased", "doubtful", "biased"]
 
 @dataclass(frozen=True, eq=False)
 class LevelResult:
-    """The results at one level of a study, that is for one position step and one torque step.
+    """The results at one level of a study, that is for one pair of position and torque steps.
 
     Arrays are in the order of the names.
 
@@ -138,7 +138,7 @@ class LevelResult:
 
 @dataclass(frozen=True, eq=False)
 class Cestac(Result, Part):
-    """The result of a study of the encoder resolution, level by level.
+    """The result of a study of the encoder resolution, for every rounding step (level).
 
     Attributes
     ----------
@@ -176,7 +176,7 @@ class Cestac(Result, Part):
 
     @property
     def verdict(self) -> Verdict:
-        """Worst verdict of all levels: unbiased, doubtful or biased."""
+        """Worst verdict of all rounding steps (levels): unbiased, doubtful or biased."""
         return max(
             (result.verdict for result in self.levels),
             key=get_args(Verdict).index,
@@ -185,7 +185,7 @@ class Cestac(Result, Part):
 
     @property
     def encoder_steps(self) -> list[LevelResult]:
-        """Results of the levels that have a position step and no torque step."""
+        """Results for the rounding steps of the encoder alone, without a torque step."""
         return [r for r in self.levels if r.level.delta and not r.level.torque]
 
     @property
@@ -222,7 +222,7 @@ class Cestac(Result, Part):
 
     @property
     def message(self) -> str:
-        """Sentence with the verdict of every level and the parameter that changes most."""
+        """Sentence with the verdict for every rounding step and the parameter that changes most."""
         if not self.levels:
             return "Nothing was perturbed."
         by_verdict: dict[str, list[str]] = {}
@@ -248,7 +248,7 @@ class Cestac(Result, Part):
         return bool(sum(len(level.runs) for level in self.levels) <= LIMIT.RUNS_LISTED)
 
     def brief(self) -> str:
-        """Return a short text: the verdict of every level, then the table of the errors %e."""
+        """Return a short text: the verdict for every rounding step, then the table of errors %e."""
         errors = self.error_table()
         return "\n".join([self.message, "", errors.caption, errors.to_text(), *self.notes])
 
@@ -260,12 +260,12 @@ class Cestac(Result, Part):
         return f"{means.to_text()}\n\n{residual.to_text()}\n\n{notes}\n\n{below}"
 
     def text(self) -> str:
-        """Return the text that explains the two verdicts and gives the verdict of every level."""
+        """Return the text that explains the two verdicts and gives them for every rounding step."""
         verdicts = [f"{r.level.label}: {r.message}" for r in self.levels]
         return "\n".join([VERDICTS, *verdicts, *self.notes])
 
     def tables(self) -> list[Table]:
-        """Return three tables: the means, the errors %e, and the residuals with the verdicts."""
+        """Return three tables: mean estimates, their errors %e, and residuals with the verdicts."""
         return [self.mean_table(), self.error_table(), self.residual_table()]
 
     def figures(self) -> tuple[Figure, ...]:
@@ -284,11 +284,11 @@ class Cestac(Result, Part):
         return {"cestac.json": self.to_json(), "cestac.csv": cestac_csv(self)}
 
     def arrays(self) -> dict[str, dict[str, Array]]:
-        """Return names, levels and results as arrays for NPZ and MAT files."""
+        """Return parameter names, rounding steps and results as arrays for NPZ and MAT files."""
         return {"cestac": cestac_arrays(self)}
 
     def mean_table(self) -> Table:
-        """Return the table of the mean estimate over the runs, by parameter and level."""
+        """Return the table of mean estimates: a line per parameter, a column per rounding step."""
         rows = [
             (name, number(self.reference.X[i]), *(number(r.mean[i]) for r in self.levels))
             for i, name in enumerate(self.names)
@@ -300,7 +300,7 @@ class Cestac(Result, Part):
         )
 
     def error_table(self) -> Table:
-        """Return the table of the error %e (21), with %sigma (20) in brackets, for all levels.
+        """Return the table of the errors %e (21), with %sigma (20), for every rounding step.
 
         It has one line per parameter; `*` marks parameters that do not decide the verdict.
         """
@@ -323,7 +323,7 @@ class Cestac(Result, Part):
         )
 
     def residual_table(self) -> Table:
-        """Return the table of residual errors and verdicts, with one column per level.
+        """Return the table of residual errors and verdicts, with one column per rounding step.
 
         It has both forms of %e(rho), the increase of the residual norm, and the verdicts.
         """
@@ -374,7 +374,7 @@ class Cestac(Result, Part):
         }
 
     def _level_summary(self, level: LevelResult) -> dict[str, Any]:
-        """Return the fields of one level for JSON, without the runs if the study has many.
+        """Return the results at one rounding step for JSON, without the runs if there are many.
 
         The number of runs is always given.
         """
@@ -435,7 +435,7 @@ def error_against_resolution(result: Cestac, names: Sequence[str] = ()) -> Figur
 
 
 def cestac_arrays(result: Cestac) -> dict[str, Array]:
-    """Collect names, levels and results of a study in arrays, for NPZ and MAT files.
+    """Collect parameter names, rounding steps and results of a study in arrays for NPZ and MAT.
 
     Their shapes are (b,), (levels,) and (levels, b).
     """
@@ -465,7 +465,7 @@ def cestac_arrays(result: Cestac) -> dict[str, Array]:
 
 
 def cestac_csv(result: Cestac) -> str:
-    """Write the text of cestac.csv: one line per parameter and level, one line per residual.
+    """Write cestac.csv: one line per parameter and rounding step, and one for each residual.
 
     The residual is called "rho"; its e is %e(rho), and the last column is its increase.
     """
@@ -488,7 +488,7 @@ def texts(words: Iterable[str]) -> Array:
 
 
 def names_judged(settings: CestacSettings) -> dict[str, tuple[str, ...]]:
-    """Return the provenance entry that lists the parameters to judge, if the settings name some."""
+    """Return the parameters that the settings name for the verdict, as an entry of provenance."""
     return {} if isinstance(settings.columns, str) else {JUDGED: settings.columns}
 
 
@@ -505,7 +505,9 @@ def deciding_names(reference: Estimate) -> tuple[str, ...]:
 def level_result(
     level: Level, runs: Runs, measured: Observation, reference: Estimate
 ) -> LevelResult:
-    """Compute means, standard deviations, errors and verdict of one level, eqs. (18) to (22).
+    """Compute means, standard deviations, errors and verdict at one rounding step (level).
+
+    Eqs. (18) to (22).
 
     measured : the unperturbed system with the columns of the runs.
     """
@@ -514,8 +516,8 @@ def level_result(
     X, N = runs.X, len(runs)
     if N < 2:
         raise InputError(
-            f"{reference.method} finds {N} estimates of {N + failed} runs at {level.label}; use "
-            "smaller steps, or another method"
+            f"{reference.method} finds an estimate in only {N} of {N + failed} runs at "
+            f"{level.label}; use smaller steps, or another method"
         )
     mean, sigma = X.mean(axis=0), X.std(axis=0, ddof=1)
     norm_Y = float(np.linalg.norm(measured.Y))
@@ -583,7 +585,7 @@ def runs_needed(spread: float) -> int:
 
 
 def _verdict(errors: Mapping[str, float]) -> tuple[Verdict, dict[str, float]]:
-    """Return the verdict, and the errors that decided it, by name, largest first.
+    """Return the verdict, and the errors that decided it: a mapping by name, largest first.
 
     If all errors are negligible, only the largest is returned.
     """

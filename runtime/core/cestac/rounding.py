@@ -37,7 +37,7 @@ ADDED = ("two-point", "gaussian", "uniform")  # Modes that add Delta xi
 
 
 def stream(seed: int, *key: int) -> np.random.Generator:
-    """Return the random generator of one draw, which depends on seed and key alone.
+    """Return a random generator that depends only on the seed and on a key such as (level, run).
 
     Generators of different keys are independent.
     """
@@ -84,8 +84,8 @@ def counted(x: Array, step: float, phase: float, uneven: float, rng: np.random.G
     )
     if last - first > LIMIT.UNEVEN_LINES:
         raise InputError(
-            f"{last - first} lines of {step:.3g} along the motion; uneven lines want at most "
-            f"{LIMIT.UNEVEN_LINES}, use larger steps"
+            f"the motion crosses {last - first} encoder lines of step {step:.3g}; uneven lines are "
+            f"supported up to {LIMIT.UNEVEN_LINES} lines, use larger steps"
         )
     line, turn = np.arange(first, last), 2 * np.pi / step
     lines = round(turn) if abs(turn - round(turn)) < 1e-6 and round(turn) < len(line) else len(line)

@@ -1,4 +1,4 @@
-"""Levels (sensor steps) of a study of the encoder resolution, and the runs at each level."""
+"""Levels (pairs of rounding steps) of a study of the encoder resolution, and the runs of each."""
 
 from __future__ import annotations
 

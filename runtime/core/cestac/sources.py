@@ -36,7 +36,7 @@ class RecordEncoder(Protocol):
     def read(self) -> bool: ...
 
     def positions(self, q: Array, delta: float, rng: np.random.Generator) -> Array:
-        """Return joint positions, shape (N, n), to be rounded as an encoder of step delta would.
+        """Return the joint positions, shape (N, n), that are then rounded to steps of `delta`.
 
         They are the measured q, or a random motion that agrees with the recorded counts.
         """
@@ -81,7 +81,7 @@ class Loop(Protocol):
         """Build the system Y = W X + rho of the measured records."""
 
     def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
-        """Attach this loop, with the rounded positions in its records, to `observation`."""
+        """Attach this loop to `observation`, with rounded positions in the records of the loop."""
 
     def rows(self, level: Level, draw: tuple[int, ...]) -> Observation:
         """Simulate a record with encoder steps level.delta, and build its system Y = W X + rho."""

@@ -1,4 +1,4 @@
-"""Uncertainty with correlated residuals: blocks of time are left out one by one, or drawn again.
+"""Uncertainty of X for correlated residuals, by leaving out or redrawing blocks of time.
 
 Filtered residuals are correlated over time, and the joints of one instant with each other; eq. (10)
 accounts for neither. Time is cut into K blocks, longer than the memory of the residuals, and only
@@ -47,7 +47,7 @@ def block_covariance(blocks: Iterable[Array], X: Array, T: Array) -> Array:
 
 
 def deletions(blocks: Iterable[Array], X: Array, T: Array, into: Array) -> Array:
-    """Compute the change of X when each block of time alone is left out, for the jackknife.
+    """Compute how X changes if one block of time is left out, for every block (jackknife).
 
     Row k is sqrt((K - 1)/K) into (1 - G_k)^-1 T'g_k, shape (K, b).
 
@@ -72,7 +72,7 @@ def deletions(blocks: Iterable[Array], X: Array, T: Array, into: Array) -> Array
 
 
 def _without_its_own(G: Array, g: Array, into: Array, size: Array) -> Array:
-    """Compute the effect of leaving out a block, on the directions that other blocks determine.
+    """Compute the change of X without one block, in directions that other blocks determine.
 
     It is into (1 - G)^-1 g on these directions, and nan for a parameter that depends on another
     direction.
@@ -121,7 +121,7 @@ def scatter(
 
 
 def gram_root(gram: Array) -> Array:
-    """Compute an upper triangular R, shape (c, c), with R'R = gram.
+    """Compute an upper triangular R, shape (c, c), such that R'R is the Gram matrix `gram`.
 
     gram is any positive semidefinite matrix. Columns are first scaled to 1.
     """

@@ -211,7 +211,7 @@ class Estimate:
 
     @classmethod
     def from_json(cls, text: str, *, file: str = "estimate.json") -> Estimate:
-        """Read the Estimate that `to_json` wrote, with every bit.
+        """Read an Estimate from the JSON text of `to_json`; every bit of its numbers is the same.
 
         Other keys of estimate.json are ignored. Raises InputError if the text is not JSON, has
         another schema or is incomplete; `file` is the name in its message.

@@ -1,4 +1,4 @@
-"""Estimates from a factored linear system: eqs. (7)-(11), rank, and residuals by joint.
+"""Estimates from the QR factor of Y = W X + rho: eqs. (7)-(11), rank, and residuals by joint.
 
 All numbers are computed from triangular factors. A System is the rows as a method weighs them.
 Ordinary least squares leaves them as they are; weighted least squares divides the rows of joint j
@@ -47,7 +47,7 @@ class LinearOptions(Settings):
 
 @dataclass(frozen=True)
 class System:
-    """The factored rows of one observation, before and after weighting.
+    """The QR factor of one system Y = W X + rho, before and after weighting.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class System:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the remaining columns."""
+        """Names of the parameters whose columns remain in the system."""
         return self.raw.names
 
     def select(self, names: Sequence[str]) -> System:
@@ -116,11 +116,11 @@ class System:
 
     @property
     def block(self) -> float:
-        """Length of a block of residuals, s."""
+        """Length of the blocks of time from which standard deviations are corrected, s."""
         return self.options.block or self.observation.residual_block
 
     def block_rows(self) -> Iterator[Array]:
-        """Yield the weighted rows [W Y] of every block of residuals, shape (rows, b + 1)."""
+        """Yield the weighted rows [W Y] of every block of time, shape (rows, b + 1)."""
         return self.observation.block_rows(
             self.names, 1 / np.array(self.scales), self.block, self.whitener
         )
@@ -223,7 +223,7 @@ def assemble(
 
 
 def labels_of(model: GeneratedModel | None, n: int) -> tuple[str, ...]:
-    """Return the names of the joints, or their numbers from 1 without a model."""
+    """Return the names of the joints in results; without a model, their numbers from 1."""
     return tuple(map(str, range(1, n + 1))) if model is None else joint_labels(model)
 
 

@@ -29,7 +29,7 @@ WEIGHTINGS = ("none", "joint", "iterated", "covariance")
 
 @dataclass(frozen=True, eq=False)
 class Beginning:
-    """Input of a method: rows, settings, and the least-squares solution to start from.
+    """Input of an estimation method: rows, settings, and a least-squares solution as start.
 
     Attributes
     ----------
@@ -121,14 +121,13 @@ class Method:
         """
         message = (
             f"{settings.weights!r} with method {settings.method}; expected "
-            f"{' or '.join(self.weights)}: it has its own weights or none, others belong to "
-            "method wls"
+            f"{' or '.join(self.weights)}, or method wls, which supports other weights"
         )
         require(settings.weights in self.weights, message, "estimate", "weights")
         return structure(self.options, settings.options, OPTIONS)
 
     def system(self, observation: Observation, settings: EstimateSettings) -> System:
-        """Build the weighted rows of the least squares from which the method starts."""
+        """Build the weighted least-squares system from which the method starts."""
         options = self.checked(settings)
         if not isinstance(options, LinearOptions):
             given = getattr(options, "linear", {})
@@ -144,18 +143,18 @@ LINEAR: Mapping[str, Method] = {
 
 
 def linear_system(observation: Observation, settings: EstimateSettings) -> System:
-    """Build the factored and weighted rows for the linear method (ols or wls) of `settings`.
+    """Build the weighted linear system, in QR form, for the method ols or wls of `settings`.
 
     SettingsError for a method that is not one linear system.
     """
     if settings.method not in LINEAR:
-        message = f"{settings.method!r} is not one linear system; expected {' or '.join(LINEAR)}"
+        message = f"{settings.method!r} is not a linear least-squares method; expected {' or '.join(LINEAR)}"
         raise SettingsError(message, path=("estimate", "method"))
     return LINEAR[settings.method].system(observation, settings)
 
 
 def linear_companion(settings: EstimateSettings) -> EstimateSettings:
-    """Return `settings` if its method is linear, else settings of least squares with its weights.
+    """Return the settings of least squares with the same weights; linear methods stay as they are.
 
     The columns stay the same too. Essential parameters and weak directions of a method that is not
     linear are those of its companion.

@@ -26,7 +26,7 @@ from runtime.core.rows.factor import Array, Factor, triangularise
 
 @dataclass(frozen=True)
 class Solution:
-    """Least-squares solution of one triangular factor.
+    """Least-squares solution X from the triangular factor of [W Y], with the rank of W.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ def unit_columns(R11: Array) -> tuple[Array, Array]:
 
 
 def rank_tolerance(factor: Factor) -> float:
-    """Compute the default tolerance on s_i / s_1 for the rank, with unit columns.
+    """Compute the smallest ratio s_i/s_1 of singular values that counts as rank, by default.
 
     It is the number of rows times the unit round-off.
     """

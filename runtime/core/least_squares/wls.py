@@ -60,7 +60,7 @@ def by_weights(
 
 
 def common_scales(raw: Factor, X: np.ndarray, rank: int) -> np.ndarray:
-    """Compute the standard deviations s_j, shape (n,), of the residuals of one X for all joints.
+    """Compute the standard deviation s_j of the residuals of each joint for a common X, shape (n,).
 
     Each joint loses its share b N_j/r of the degrees of freedom.
     """
@@ -71,7 +71,7 @@ def common_scales(raw: Factor, X: np.ndarray, rank: int) -> np.ndarray:
 
 
 def floored(raw: Factor, scales: np.ndarray) -> np.ndarray:
-    """Raise the scales s_j of the joints to at least LIMIT.EXACT_FIT times the rms of Y_j.
+    """Raise the residual scale s_j of each joint to at least LIMIT.EXACT_FIT times the rms of Y_j.
 
     An exact fit of a joint would otherwise get infinite weight.
     """
@@ -123,7 +123,7 @@ def _covariance(start: System) -> System:
     if not same:
         counts = ", ".join(map(str, observation.rows))
         message = (
-            f"covariance needs every joint at every instant; rows per joint are {counts}. "
+            f"covariance needs rows of every joint at every instant; rows per joint are {counts}. "
             "Use weights: joint, or rows.low_speed: 0"
         )
         raise SettingsError(message, path=("estimate", "weights"))

@@ -30,7 +30,7 @@ Array = np.ndarray
 
 
 def triangularise(A: Array) -> Array:
-    """Compute the upper triangular R, shape (n, n), with R'R = A'A, of A, shape (m, n).
+    """Compute the upper triangular R, shape (n, n), with R'R = A'A, from a matrix A, shape (m, n).
 
     m < n is allowed.
     """
@@ -43,7 +43,7 @@ def triangularise(A: Array) -> Array:
 
 @dataclass(frozen=True)
 class JointFactor:
-    """Triangular factor R_j of the rows of one joint, with the columns that act on this joint.
+    """Triangular factor R_j of the rows [W_j Y_j] of one joint, for the columns that act on it.
 
     R'R is the Gram matrix of [W_j[:, columns] Y_j].
 
@@ -58,7 +58,7 @@ class JointFactor:
     rows: int
 
     def spread(self, b: int) -> Array:
-        """Expand R to columns for all b parameters and for Y, shape (k, b + 1), with zeros."""
+        """Expand R_j with zeros to the columns of all b parameters and Y, shape (k, b + 1)."""
         block = np.zeros((len(self.R), b + 1))
         block[:, [*self.columns, b]] = self.R
         return block
@@ -75,7 +75,7 @@ class JointFactor:
 
 @dataclass(frozen=True)
 class Factor:
-    """Triangular factor of [W Y] and the factors of its joints.
+    """Triangular (QR) factor R of the matrix [W Y], and the factor of the rows of each joint.
 
     names : the b parameters, in column order.
     R : ndarray, shape (b + 1, b + 1), upper triangular.
@@ -88,7 +88,7 @@ class Factor:
 
     @classmethod
     def of(cls, names: Sequence[str], joints: Sequence[JointFactor]) -> Factor:
-        """Combine the factors of the single joints into the factor of all rows."""
+        """Combine the factors of all joints into the triangular factor of all rows [W Y]."""
         b = len(names)
         R = (
             triangularise(np.vstack([joint.spread(b) for joint in joints]))
@@ -104,12 +104,12 @@ class Factor:
 
     @property
     def R11(self) -> Array:
-        """R factor of W, shape (b, b)."""
+        """Upper triangular factor R_11 of W, shape (b, b)."""
         return self.R[:-1, :-1]
 
     @property
     def r12(self) -> Array:
-        """Component of Y in the range of W, Q'Y, shape (b,)."""
+        """Vector r_12 = Q'Y, shape (b,): the component of Y in the range of W."""
         return self.R[:-1, -1]
 
     @property
@@ -118,14 +118,14 @@ class Factor:
         return float(abs(self.R[-1, -1]))
 
     def weighted(self, weights: Sequence[float] | Array) -> Factor:
-        """Return the factor after the rows of joint j are multiplied by weights[j]."""
+        """Return the triangular factor of [W Y] with the rows of joint j times weights[j]."""
         return Factor.of(
             self.names,
             [replace(joint, R=joint.R * w) for joint, w in zip(self.joints, weights, strict=True)],
         )
 
     def select(self, names: Sequence[str]) -> Factor:
-        """Return the factor of the columns `names`, in this order, and of Y."""
+        """Return the triangular factor of [W Y] for the columns `names` of W, in this order."""
         unknown = [name for name in names if name not in self.names]
         if unknown:
             raise ValueError(
@@ -136,7 +136,7 @@ class Factor:
         return Factor(tuple(names), R, tuple(selected(joint, kept) for joint in self.joints))
 
     def drop(self, name: str) -> Factor:
-        """Return the factor without the column of one parameter.
+        """Return the triangular factor of [W Y] without the column of one parameter.
 
         Without column k, R stays triangular above row k. Only the trailing block, an upper
         Hessenberg matrix of order b - k, is made triangular again.
@@ -155,7 +155,7 @@ class Factor:
 
 
 def selected(joint: JointFactor, kept: Sequence[int]) -> JointFactor:
-    """Reduce the factor of one joint to the columns whose numbers are in `kept`.
+    """Reduce the triangular factor of one joint to the columns that are kept.
 
     kept : numbers of columns of the Factor, in their new order.
     """
@@ -191,7 +191,9 @@ def factor(W: Array, Y: Array, rows: Sequence[int], names: Sequence[str]) -> Fac
 def joint_factors(
     W: Array, Y: Array, rows: Sequence[int], parts: Array
 ) -> list[tuple[JointFactor, ...]]:
-    """Compute the triangular factor of every joint, separately for each part of the rows.
+    """Compute the triangular factor of every joint, separately for each block of rows.
+
+    A block is, for instance, an interval of time.
 
     To save memory, only the rows of one part of one joint are copied at a time.
 
@@ -222,7 +224,7 @@ def joint_factors(
 
 
 def merged(parts: Iterable[Sequence[JointFactor]]) -> tuple[JointFactor, ...]:
-    """Merge the joint factors of several parts of the rows into the joint factors of all rows.
+    """Merge the triangular factors of several blocks of rows into those of all rows, by joint.
 
     All parts have the same columns.
     """

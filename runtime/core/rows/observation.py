@@ -36,7 +36,7 @@ filter, at the rate of eq. (13).
 
 @dataclass(frozen=True, eq=False)
 class LoopRows:
-    """The closed loop that made the records, and the numbers of its rows that an observation has.
+    """The closed loop that produced the records, and which of its rows a system Y = W X + rho uses.
 
     loop : `runtime.loop.closed_loop`. rows : shape (r,).
     """
@@ -117,7 +117,7 @@ class Observation:
 
     @property
     def joints(self) -> Array:
-        """Joint of each row, from 0, shape (r,)."""
+        """Number of the joint to which each row belongs, from 0, shape (r,)."""
         return np.repeat(np.arange(self.n), self.rows)
 
     @property
@@ -132,7 +132,7 @@ class Observation:
 
     @cached_property
     def factor(self) -> Factor:
-        """Triangular factor of [W Y], joint by joint; computed once."""
+        """Triangular (QR) factor of [W Y], made from the factors of the joints; computed once."""
         if self.block_factors is None:
             return factor(self.W, self.Y, self.rows, self.names)
         return Factor.of(self.names, merged(self.block_factors))
@@ -149,7 +149,7 @@ class Observation:
         return joint_factors(self.W, self.Y, self.rows, self.blocks())
 
     def columns(self, names: Sequence[str]) -> Observation:
-        """Return the same rows with the named columns only, in the given order."""
+        """Return the same rows of Y = W X + rho with the named columns of W only, in this order."""
         if tuple(names) == self.names:
             return self
         kept = column_numbers(names, self.names)
@@ -166,7 +166,7 @@ class Observation:
         )
 
     def where(self, mask: Array) -> Observation:
-        """Return the observation of the rows for which `mask`, bool of shape (r,), is true."""
+        """Return the rows of Y = W X + rho for which `mask`, bool of shape (r,), is true."""
         if mask.shape != self.Y.shape or mask.dtype != np.bool_:
             raise InputError(f"mask {mask.dtype} {mask.shape}; expected bool {self.Y.shape}")
         rows = tuple(int(np.count_nonzero(mask[self.joint(j)])) for j in range(self.n))
@@ -187,7 +187,7 @@ class Observation:
         )
 
     def between(self, t0: float | None, t1: float | None) -> Observation:
-        """Return the observation of the rows with t0 <= t <= t1, s; None leaves an end open."""
+        """Return the rows of Y = W X + rho with t0 <= t <= t1, s; None leaves an end open."""
         first = -np.inf if t0 is None else t0
         last = np.inf if t1 is None else t1
         part = self.where((self.t >= first) & (self.t <= last))
@@ -198,7 +198,7 @@ class Observation:
         return part
 
     def of_record(self, number: int) -> Observation:
-        """Return the observation of the rows of one record, its number counted from 0."""
+        """Return the rows of Y = W X + rho from one record; its number is counted from 0."""
         rate = self.rates[number] if self.rates else self.rate
         return replace(self.where(self.record == number), rate=rate, rates=())
 
@@ -217,11 +217,14 @@ class Observation:
 
     @property
     def residual_block(self) -> float:
-        """Default length of a block of residuals, s: a 50th of the record, at least five rows."""
+        """Default length of a block of time, s: a 50th of the record, at least five rows.
+
+        Blocks of time serve to compute corrected standard deviations.
+        """
         return float(max(max(self.rows) / BLOCKS, SHORTEST) / self.rate)
 
     def blocks(self, length: float | None = None) -> Array:
-        """Divide the records into intervals of `length` seconds; return the interval of each row.
+        """Divide the records into intervals of `length` seconds; number the interval of each row.
 
         Shape (r,), numbers from 0. Such an interval is a block of residuals; no interval extends
         over two records.
@@ -239,7 +242,7 @@ class Observation:
     def block_rows(
         self, names: Sequence[str], weights: Array, length: float, whitener: Array | None = None
     ) -> Iterator[Array]:
-        """Yield the weighted rows [W Y] of every block of residuals, shape (rows, b + 1).
+        """Yield the weighted rows [W Y] of every block of time, shape (rows, b + 1).
 
         For a long record, factors from `block_factors` replace the rows: their Gram matrix is the
         same.
@@ -276,7 +279,7 @@ class Observation:
 
 
 def split_rows(A: Array, blocks: Array) -> Iterator[Array]:
-    """Yield the rows of A, shape (r, c), block by block.
+    """Yield the rows of a matrix A, shape (r, c), that belong to each block of time.
 
     blocks : number of the block of each row, shape (r,).
     """
@@ -284,7 +287,7 @@ def split_rows(A: Array, blocks: Array) -> Iterator[Array]:
 
 
 def rows_by_block(blocks: Array) -> list[Array]:
-    """List the row numbers of every block.
+    """List the row numbers that belong to each block of time.
 
     blocks : number of the block of each row, shape (r,).
     """
@@ -293,7 +296,7 @@ def rows_by_block(blocks: Array) -> list[Array]:
 
 
 def whitened(A: Array, whitener: Array) -> Array:
-    """Multiply the n rows of each instant in A by the matrix `whitener`, shape (n, n).
+    """Multiply the n rows (one per joint) of each instant in A by the (n, n) matrix `whitener`.
 
     A : shape (n*N, c), joint-major.
     """
@@ -310,17 +313,17 @@ def halves(t0: float, t1: float) -> tuple[Window, Window]:
 
 
 def stack(observations: Sequence[Observation]) -> Observation:
-    """Stack the observations of several records of one robot into one system, joint-major.
+    """Stack the rows Y = W X + rho of several records of one robot into one system, joint-major.
 
     `record` of the result has the number of the record of each row.
     """
     if not observations:
-        raise InputError("no observation to stack")
+        raise InputError("no observation to stack; give at least one")
     first = observations[0]
     for o in observations:
         if o.names != first.names or o.n != first.n:
             raise InputError(
-                f"columns {o.names} on {o.n} joints; expected those of the first record, "
+                f"columns {o.names} on {o.n} joints; expected the columns of the first record, "
                 f"{first.names} on {first.n} joints"
             )
     offsets = np.cumsum([0] + [int(o.record.max(initial=0)) + 1 for o in observations])

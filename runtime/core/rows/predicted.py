@@ -54,7 +54,7 @@ class Weights:
     def relative_sigma(
         self, observation: Observation, correlation: Sequence[float] | Array = (1.0,)
     ) -> Array:
-        """Predict %sigma of the parameters, shape (c,), relative to their size.
+        """Predict the relative standard deviation %sigma of each parameter, in %, shape (c,).
 
         correlation : correlation of the torque noise of a joint between rows that are 0, 1, 2 ...
             sampling periods apart (`kept_correlation`).
@@ -84,7 +84,7 @@ class Weights:
 
 
 def kept_correlation(signals: Signals, rate: float) -> Array:
-    """Compute the correlation of decimated torque noise between rows 0, 1, 2 ... instants apart.
+    """Compute the correlation of decimated torque noise at distances of 0, 1, 2 ... rows.
 
     The noise is white before the decimation, at the sampling rate `rate`, Hz.
     """

@@ -72,13 +72,13 @@ class Prepared:
 
     @property
     def channels(self) -> dict[str, Array]:
-        """Further recorded signals of one column, shape (N,), by name, such as temperatures."""
+        """Recorded signals with one column, such as a temperature, by name, shape (N,) each."""
         given = self.record.channels.items()
         return {c: x[:, 0] for c, x in given if c not in JOINT_CHANNELS and x.shape[1] == 1}
 
     @cached_property
     def selection(self) -> Selection:
-        """Rows of the record that are used, by window, decimation, trim, low speed and `keep`."""
+        """Rows of the record that are used, chosen by time, decimation, speed and mask `keep`."""
         signals, rows = self.study.signals, self.study.rows
         return select_rows(self.record, self.states.qd, signals, rows, keep=self.keep)
 
@@ -88,7 +88,7 @@ class Prepared:
         return decimated_torque(self.record.torque, self.selection)
 
     def certain(self, model: GeneratedModel) -> Selection:
-        """Return the selection without rows of unknown state or of uncertain friction direction."""
+        """Return the selected rows, without those of unknown state or unsure friction direction."""
         return certain(model, self.states, self.selection)
 
     def observation(
@@ -117,7 +117,7 @@ class Prepared:
         return other
 
     def take_states(self, other: Prepared) -> None:
-        """Reuse the states of another Prepared, if it has the same positions and signals."""
+        """Reuse the filtered states of another Prepared if positions and filters are the same."""
         same = self.record.q is other.record.q and self.record.missing is other.record.missing
         same &= self.record.channels.get("qd") is other.record.channels.get("qd")
         same &= self.reader is other.reader and self.study.signals == other.study.signals
@@ -136,7 +136,9 @@ def common_drives(model: GeneratedModel, records: Sequence[Prepared]) -> Drives 
     """
     coupled = {own.drives.coupling for own in records if own.drives is not None}
     if len(coupled) > 1:
-        raise InputError(f"records read with coupling {', '.join(sorted(coupled))}; expected one")
+        raise InputError(
+            f"the records have different values of record.coupling, {', '.join(sorted(coupled))}; expected the same value"
+        )
     return records[0].drives if records else drives_of(model)
 
 
@@ -175,7 +177,7 @@ def observation_of(
     *,
     files: Mapping[str, str] | None = None,
 ) -> Observation:
-    """Build the system Y = W X + rho of one record; `columns` is an evaluator of W for all records.
+    """Build the system Y = W X + rho of one record; `columns` computes the observation matrix W.
 
     If errors of the velocities are known, two more kinds of rows are left out: rows in which
     missing positions leave the state unknown ("missing"), and rows in which the direction of dry
@@ -219,7 +221,7 @@ def certain(
     states: States,
     selection: Selection,
 ) -> Selection:
-    """Remove the rows of unknown state or of uncertain direction of dry friction from a selection.
+    """Remove rows of unknown state, or with uncertain direction of dry friction, from a selection.
 
     Missing positions make a state unknown ("missing"); a direction is uncertain ("direction") near
     zero speed. Without known errors of the velocities, the selection does not change.
@@ -243,7 +245,7 @@ def stacked(
     columns : names of the columns; default: all.
     """
     if not records:
-        raise InputError("no record to observe")
+        raise InputError("no record is given; expected at least one")
     parts = [record.observation(model, columns) for record in records]
     return parts[0] if len(parts) == 1 else stack(parts)
 
@@ -251,7 +253,10 @@ def stacked(
 def with_torques(
     observation: Observation, records: Sequence[Prepared], torques: Sequence[Array]
 ) -> Observation:
-    """Replace Y of an observation by other torques, shape (N, n), of the same records."""
+    """Replace Y in a system Y = W X + rho by other joint torques of the same records.
+
+    The torques have the shape (N, n), one array for each record.
+    """
     Y = np.empty_like(observation.Y)
     for number, (own, tau) in enumerate(zip(records, torques, strict=True)):
         rows = observation.record == number

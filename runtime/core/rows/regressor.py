@@ -29,7 +29,7 @@ PROBES = 64  # random states that tell signals apart
 
 @dataclass(frozen=True, eq=False)
 class Entries:
-    """Table of the nonzero entries of the regressor: entries equal up to sign share one signal.
+    """Table of the nonzero entries of the regressor; entries equal up to sign are computed once.
 
     Model store[k[m], j[m]] = sign[m] * signal[which[m]]. Signal s first occurs at entry source[s].
 
@@ -75,12 +75,12 @@ class Columns:
 
     @cached_property
     def tape(self) -> Tape | None:
-        """Recorded operations that compute the entries; None if the model itself must be called."""
+        """Recorded operations for the regressor entries; None if the model must be called."""
         n = len(self.model.JOINTS)
         return recorded(self.model, [divmod(int(place), n) for place in self.entries.place])
 
     def decimated(self, states: States, plan: Plan | None, instants: slice = slice(None)) -> Array:
-        """Compute the decimated columns of W, shape (b, n, K), from the states of the window.
+        """Compute the decimated columns of W, shape (b, n, K), from states in the time window.
 
         Entry [k, j] has column k in the rows of joint j. The states have shape (N, n).
 
@@ -100,7 +100,7 @@ class Columns:
         return store
 
     def signals(self, states: States, plan: Plan | None) -> Iterator[tuple[slice, Array]]:
-        """Yield slices of successive instants, with the decimated distinct entries of W there.
+        """Yield the decimated distinct entries of W, one slice of instants after the other.
 
         Their shape is (S, instants). Arrays are valid until the next ones are requested.
 
@@ -134,15 +134,15 @@ class Columns:
             D = self.model.regressor(states.q, states.qd, states.qdd, out=store, **timed)
         except ValueError as e:  # what an emitted module of a general loop raises
             raise InputError(
-                f"{self.model.NAME}: {e}; look at units and zeros of the positions, and at the "
-                "lengths of the robot file"
+                f"{self.model.NAME}: {e}; check units and zeros of the positions, and the "
+                "lengths in the robot file"
             ) from None
         rows = D.transpose(2, 1, 0).reshape(-1, B)
         return np.take(rows, self.entries.place, axis=0, out=signals, mode="clip")
 
 
 def in_time(model: GeneratedModel, states: States) -> dict[str, Any]:
-    """Return the recorded signals on which laws of the model depend, shape (N,), by name.
+    """Return the recorded signals that the model needs, such as a temperature, by name, shape (N,).
 
     InputError if the states lack one of them.
     """
@@ -150,8 +150,8 @@ def in_time(model: GeneratedModel, states: States) -> dict[str, Any]:
     if missing := [c for c in channels if c not in states.channels]:
         read = ", ".join(channels[missing[0]])
         raise InputError(
-            f"{model.NAME}: {read} read {missing[0]}, which these states do not have; "
-            f"name its column, record.columns: {{channels: {{{missing[0]}: COLUMN}}}}"
+            f"{model.NAME}: the laws of {read} need the signal {missing[0]}, which is not given; "
+            f"give its column in record.columns: {{channels: {{{missing[0]}: COLUMN}}}}"
         )
     return {c: states.channels[c] for c in channels}
 

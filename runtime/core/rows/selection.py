@@ -1,4 +1,4 @@
-"""Choice of the rows of Y = W X + rho that are used: by window, decimation, trim and speed.
+"""Choice of the rows of Y = W X + rho that are used, by time, decimation, speed and known state.
 
 The choice is made once, on the measured record, and shared by every run of a study, so that noise
 never decides whether a row is used.
@@ -67,13 +67,13 @@ class Selection:
 
     @cached_property
     def settings(self) -> dict[str, Any]:
-        """All settings of signals and rows, with the decimation factor chosen for "auto"."""
+        """Settings of filters and row selection, with the decimation factor chosen for "auto"."""
         signals, rows = to_mapping(self.signals), to_mapping(self.rows)
         return {"signals": signals, "rows": rows, "factor": self.factor}
 
     @property
     def plan(self) -> Plan | None:
-        """Plan of the decimation of the window; None if every sample is kept."""
+        """Matrices (Plan) that decimate the time window; None if every sample is kept."""
         window, settings = self.samples, self.signals.decimate
         return decimation_plan(window.stop - window.start, self.factor, settings, int(self.kept[0]))
 
@@ -125,7 +125,7 @@ EXCERPT = 2**16
 
 
 def excerpt(record: Record, rows: Rows) -> slice:
-    """Return the slice of the first samples in the window, to choose automatic settings.
+    """Return the slice of the first samples in the time window, from which settings are chosen.
 
     It has EXCERPT samples at most.
     """
@@ -134,7 +134,7 @@ def excerpt(record: Record, rows: Rows) -> slice:
 
 
 def instants_of(t: Array, rate: float, signals: Signals, rows: Rows, file: str) -> Instants:
-    """Choose the window and the decimated instants of a record.
+    """Choose the time window of a record, and the samples in it that decimation keeps.
 
     t : times, shape (N,), s. rate : Hz.
 
@@ -165,7 +165,9 @@ def instants_of(t: Array, rate: float, signals: Signals, rows: Rows, file: str) 
 def select_rows(
     record: Record, qd: Array, signals: Signals, rows: Rows, *, keep: Array | None = None
 ) -> Selection:
-    """Select the rows of a record by window, decimation, trim, low speed and `keep`.
+    """Select the rows of a record by time window, decimation, distance from the ends, and speed.
+
+    The mask `keep` of samples (and joints), if given, excludes further rows.
 
     qd : ndarray, shape (N, n), filtered velocities.
     """
@@ -210,8 +212,8 @@ def nothing_left(dropped: Mapping[str, Sequence[int]], K: int) -> str:
         if any(counts)
     )
     return (
-        f"none of its {K} rows per joint is used: {left_out}; choose these settings anew, or "
-        "leave this record out"
+        f"none of the {K} rows per joint is used: {left_out}; change these settings, or remove "
+        "this record"
     )
 
 

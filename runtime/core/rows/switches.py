@@ -76,8 +76,8 @@ def switches(
         if strange:
             raise ModelError(
                 (
-                    f"{name} acts along {strange}, which are no actuated joints; no prediction is "
-                    "made for it"
+                    f"{name} acts along the joints {strange}, which are not actuated; no prediction is "
+                    "possible for this parameter"
                 ),
                 file=model.NAME,
             )

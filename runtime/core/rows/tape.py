@@ -30,12 +30,12 @@ POWERS = {2: np.square, 0.5: np.sqrt, -1: np.reciprocal}
 
 
 class NotRecordedError(Exception):
-    """Error: an emitted module does more than operations on rows, so it cannot be recorded."""
+    """Error: an emitted module does more than arithmetic on signals, so it cannot be recorded."""
 
 
 @dataclass(eq=False)
 class Row:
-    """A symbolic row of samples that records its computation: a state, or an operation on rows.
+    """A symbolic signal that records its computation: an input q, qd, qdd or an operation.
 
     function : None for a state, whose arguments are its array (0 for q) and its joint.
     """
@@ -82,7 +82,7 @@ class Row:
 
 
 class Functions:
-    """Replacement of NumPy: its functions record operations on rows, and compute with numbers."""
+    """Replacement for NumPy: functions of symbolic signals are recorded, of numbers computed."""
 
     def __getattr__(self, name: str) -> Any:
         function = getattr(np, name)
@@ -115,7 +115,7 @@ class Tape:
         self._rooms: dict[int, tuple[Array, list[Any], list[Any]]] = {}
 
     def evaluate(self, q: Array, qd: Array, qdd: Array, out: Array) -> Array:
-        """Compute the entries, shape (S, B), at states of shape (B, n), into `out`."""
+        """Compute selected entries of D, shape (S, B), at states of shape (B, n), into `out`."""
         B = len(q)
         if B not in self._rooms:
             self._rooms[B] = self._bound(B)
@@ -129,7 +129,7 @@ class Tape:
         return out
 
     def _bound(self, B: int) -> tuple[Array, list[Any], list[Any]]:
-        """Allocate rows of B samples for the states and for the results of the operations.
+        """Allocate arrays (rows) of B samples for the states and for the results of the operations.
 
         Returns the rows of the states, the operations with their rows, and the rows of the entries.
         A row that no later operation uses is used again.
@@ -159,7 +159,7 @@ class Tape:
 
 
 def in_order(entries: Sequence[Row | float]) -> list[Row]:
-    """List the operations that the entries need, each one after its arguments."""
+    """List the operations that compute the entries, each one after the operations it depends on."""
     order: list[Row] = []
     done: set[int] = set()
     stack = _operations(entries)

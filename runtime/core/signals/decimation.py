@@ -1,4 +1,4 @@
-"""Exact zero-phase decimation, computed at the kept samples only, of signals that come in pieces.
+"""Exact zero-phase decimation of signals, piece by piece, computed at the kept samples only.
 
 Reference: a Chebyshev I low-pass forward and backward in second-order sections with odd padding of
 p samples, then every n_d-th sample, which computes N outputs and discards all but N/n_d. In
@@ -60,7 +60,7 @@ TRUNCATION = 1e-20
 
 @dataclass(frozen=True, eq=False)
 class Operator:
-    """Modal form of the decimation filter for one factor n_d; m = 4 modes.
+    """Modal form (poles, residues) of the decimation filter for one factor n_d; m = 4 modes.
 
     D : real.   c, lam : complex, shape (m,).
     """
@@ -94,7 +94,7 @@ def operator(factor: int) -> Operator:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Matrices of a decimation of N samples to K kept samples; they do not depend on the signals.
+    """Matrices that decimate N samples to K kept samples; they do not depend on the signals.
 
     Complex numbers are pairs Re, Im, 2 m of them.
 
@@ -137,7 +137,7 @@ class Plan:
 
 @lru_cache(maxsize=32)
 def plan(N: int, factor: int, phase: int, pad: int) -> Plan:
-    """Compute the matrices of the decimation of N samples by a factor of at least 2.
+    """Compute the matrices that decimate N samples by a factor of at least 2.
 
     phase : first kept sample, 0 to factor - 1. pad : number p < N of samples that extend each end.
     """
@@ -177,7 +177,7 @@ def decimate(u: Array, plan: Plan) -> Array:
 def decimated_parts(
     read: Callable[[int, int], Array], S: int, whole: Plan, most: int = PART
 ) -> Iterator[tuple[slice, Array]]:
-    """Yield slices [a, b) of the kept samples, with the values of S decimated signals there.
+    """Yield the values of S decimated signals, one slice [a, b) of kept samples after the other.
 
     The values have shape (S, b - a), b - a being at most `most`.
 
@@ -231,7 +231,7 @@ def decimated_pieces(read: Callable[[int, int], Array], S: int, plan: Plan) -> A
 
 
 def _later(read: Callable[[int, int], Array], begin: int, t0: int, t1: int) -> Array:
-    """Return the samples [t0, t1) from the function `read`, counted from sample `begin`."""
+    """Read the samples [begin + t0, begin + t1) by the function `read`."""
     return read(begin + t0, begin + t1)
 
 
@@ -247,7 +247,10 @@ def recursion(a: Array, x: Array, drive: Array) -> None:
 
 
 def copy_overlap(u: Array, t0: int, window: Array, start: int) -> None:
-    """Copy to `window` (samples from `start` on) the samples that it shares with u (from t0 on)."""
+    """Copy samples from u, which starts at sample t0, to `window`, which starts at sample `start`.
+
+    Only samples that lie in both are copied.
+    """
     a, b = max(t0, start), min(t0 + u.shape[1], start + window.shape[1])
     if a < b:
         window[:, a - start : b - start] = u[:, a - t0 : b - t0]
@@ -290,7 +293,7 @@ def _start(op: Operator, phase: int, pad: int) -> Array:
 
 
 def _end(op: Operator, left: int, kept: int, pad: int) -> tuple[Array, Array]:
-    """Return the two matrices for the end of a record, after the last whole block of samples.
+    """Return two matrices that decimate the end of a record, after the last whole block.
 
     They give v before the last `kept` instants, and y at these instants. One matrix is applied to
     the last samples, shape (T, 2 m + kept), the other to x at the first of the `left` samples.
@@ -316,7 +319,7 @@ def _end(op: Operator, left: int, kept: int, pad: int) -> tuple[Array, Array]:
 
 
 def _output(op: Operator, factors: Array) -> Array:
-    """Write 2 Re c'(factors x) as a matrix on the pairs Re, Im of x, shape (k, 2 m).
+    """Return the matrix, shape (k, 2 m), that gives 2 Re c'(factors x) from the pairs Re, Im of x.
 
     Factors complex, shape (m, k).
     """
@@ -325,7 +328,7 @@ def _output(op: Operator, factors: Array) -> Array:
 
 
 def _pairs(C: Array) -> Array:
-    """Convert complex rows, shape (m, k), to rows Re, Im, shape (2 m, k)."""
+    """Convert complex rows, shape (m, k), to rows of real and imaginary parts, shape (2 m, k)."""
     return np.asarray(np.stack([C.real, C.imag], axis=1).reshape(-1, C.shape[-1]))
 
 

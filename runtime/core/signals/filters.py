@@ -42,13 +42,13 @@ class SpeedErrors:
         return SpeedErrors(self.deviation[samples], self.root)
 
     def along(self, G: Array) -> Array:
-        """Compute the standard deviation of s = G qd, shape (N,); G has shape (n,)."""
+        """Compute the standard deviation of the velocity s = G qd, shape (N,); G has shape (n,)."""
         finite = np.where(self.known[:, None], self.deviation, 0.0)
         return np.where(self.known, np.sqrt(finite**2 @ (G @ self.root) ** 2), np.inf)
 
     @property
     def known(self) -> Array:
-        """Whether the states of all joints are known, by sample, bool, shape (N,)."""
+        """Whether the states of all joints are known at each sample, bool, shape (N,)."""
         return np.asarray(np.isfinite(self.deviation).all(axis=1))
 
 
@@ -102,7 +102,7 @@ def filtered_states(q: Array, rate: float, signals: Signals, v: Array | None = N
 
 
 def blended(qd: Array, v: Array, rate: float, crossing: float | tuple[float, ...]) -> Array:
-    """Combine differences qd and recorded velocities v to v + L (qd - v), shape (N, n).
+    """Combine differentiated positions qd with recorded velocities v: v + L (qd - v), shape (N, n).
 
     L is the zero-phase first-order low-pass at `crossing`, Hz (`runtime.speeds`).
     """
@@ -141,7 +141,7 @@ def median_filtered(x: Array, window: int) -> Array:
 
 
 def _inner(a: Array, b: Array, c: Array, d: Array) -> tuple[Array, Array]:
-    """Find the two middle values of four: their median with a fifth value is that of all five."""
+    """Find the two middle values of four, from which the median with a fifth value follows."""
     return np.maximum(np.minimum(a, b), np.minimum(c, d)), np.minimum(
         np.maximum(a, b), np.maximum(c, d)
     )
@@ -157,7 +157,7 @@ def lowpass_filtered(x: Array, rate: float, low: Lowpass) -> Array:
 
 @lru_cache(maxsize=32)
 def butterworth(rate: float, low: Lowpass) -> tuple[Array, int]:
-    """Design the low-pass as second-order sections, shape (sections, 6).
+    """Design the Butterworth low-pass as second-order sections, shape (sections, 6).
 
     Returns also the number of samples that extend each end of a record.
     """
@@ -196,8 +196,8 @@ def decimation_factor(signals: Signals, rate: float) -> int:
         return signals.decimate.factor
     if signals.lowpass is None:
         raise InputError(
-            "signals.decimate.factor is auto but there is no low-pass to take the cut-off from, "
-            "eq. (13); give a number"
+            "signals.decimate.factor: auto needs the cut-off frequency of a low-pass, eq. (13), but "
+            "signals.lowpass is not set; give the factor as a number"
         )
     return max(1, floor(CUTOFF * rate / (2 * signals.lowpass.hertz) * (1 + CLOCK)))
 
@@ -228,7 +228,7 @@ def decimated(x: Array, factor: int, settings: Decimate | None) -> Array:
 def decimation_plan(
     N: int, factor: int, settings: Decimate | None, first: int | None = None
 ) -> Plan | None:
-    """Plan the decimation of N samples; None for a factor of 1.
+    """Compute the matrices for the decimation of N samples; None for a factor of 1.
 
     first : first kept sample; default: by the settings.
     """

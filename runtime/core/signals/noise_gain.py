@@ -69,8 +69,8 @@ def bandwidth(signals: Signals, rate: float) -> Bandwidth:
     if signals.median != 1:
         raise SettingsError(
             (
-                f"a median over {signals.median} samples is not linear, and no prediction is made "
-                "through it; use 1 and sample otherwise"
+                f"a median over {signals.median} samples is not linear, so its effect cannot be "
+                "predicted; set 1, or sample the effect by symgen cestac without --advise"
             ),
             path=("cestac", "median"),
         )

@@ -1,4 +1,4 @@
-"""Readers, which compute the joint states q, qd, qdd of a record, and the reader of the chapter."""
+"""Readers: functions that compute the joint states q, qd, qdd of a record from its positions."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class SignalReader:
             return to_mapping(structure(self.options, signals.options, path))
         if signals.options:
             raise SettingsError(
-                f"given, but reader {signals.reader} has no options; leave them out", path=path
+                f"given, but reader {signals.reader} has no options; remove this key", path=path
             )
         return {}
 
@@ -63,5 +63,6 @@ def require_motion(signals: Signals, who: str) -> None:
     """
     if signals.reader == "static":
         raise SettingsError(
-            f"static, poses at rest; {who} needs records of a motion", path=("signals", "reader")
+            f"static is for poses at rest, but {who} needs records of a motion; set another reader",
+            path=("signals", "reader"),
         )
