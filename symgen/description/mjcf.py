@@ -305,7 +305,7 @@ def _relations(growing: _Growing) -> dict[str, Expression]:
         free = [name for name in names if name in equation.atoms - growing.mjcf.driven]
         if not free:
             raise DescriptionError(
-                f"equality {model.equality(e).name!r}: the relation ties only driven joints, or follows "
+                f"equality {model.equality(e).name!r}: the relation ties driven joints only, or follows "
                 "from the other relations; remove the equality",
                 line=line,
             )

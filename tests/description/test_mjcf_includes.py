@@ -135,7 +135,7 @@ def test_a_free_base_rests_on_request(tmp_path):
     with pytest.raises(DescriptionError, match=r"free joint 'root'.*--lock root=0") as caught:
         read_robot(file)
     assert (caught.value.file, caught.value.line) == ("arm.xml", 4)
-    with pytest.raises(DescriptionError, match="where the file has it"):
+    with pytest.raises(DescriptionError, match="can only be locked at its pose in the file"):
         read_robot(file, lock={"root": 0.3})
     robot, notes = read_robot(file, lock={"root": 0.0})
     assert dict(robot.labels) == {1: "w", 2: "f"} and "held: root at 0" in notes

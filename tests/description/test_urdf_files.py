@@ -70,7 +70,7 @@ WRONG = [
     ('<child link="b"/>', '<child link="a"/>', 7, "has a parent already"),
     ('<parent link="base"/>', "", 6, "needs <parent"),
     ('<joint name="e"', '<joint name="s"', 7, "given twice"),
-    ('<parent link="base"/>', '<parent link="b"/>', 1, "do not hang"),
+    ('<parent link="base"/>', '<parent link="b"/>', 1, "are not connected to 'base'"),
     ('<axis xyz="1 0 0"/>', '<mimic joint="e"/>', 7, "in a circle"),
     ('<axis xyz="1 0 0"/>', '<mimic joint="x"/>', 7, "no moving joint 'x'"),
     ("<gazebo/>", '<xacro:include filename="x"/>', 8, "xacro"),
@@ -88,7 +88,7 @@ def test_a_free_base_rests_on_request(kind: str) -> None:
     )
     with pytest.raises(DescriptionError, match=r"free joint 'root'.*--lock root=0"):
         read_tree(free.replace("KIND", kind).encode(), "arm.urdf")
-    with pytest.raises(DescriptionError, match="where the file has it"):
+    with pytest.raises(DescriptionError, match="can only be locked at its pose in the file"):
         read_tree(free.replace("KIND", kind).encode(), "arm.urdf", part=TreePart({"root": 0.3}))
     held, notes = read_tree(
         free.replace("KIND", kind).encode(), "arm.urdf", part=TreePart({"root": 0.0})

@@ -71,7 +71,7 @@ def textbook(way: Way, _: Path) -> None:
     way.wait("!!document.getElementById('f-3-d')")
     way.page.run(STATES)
     way.type("f-3-d", "0.4")
-    way.wait("window.states.includes('stale') && window.states.at(-1) === 'valid'")
+    way.wait("window.states.includes('running') && window.states.at(-1) === 'valid'")
     way.wait("document.querySelectorAll('.formulas li').length > 0")
 
 

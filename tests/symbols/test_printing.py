@@ -214,8 +214,11 @@ BAD = [
     ({"robot": "planar_2r", "name": "pose", "format": "word"}, "expected one of text, latex"),
     ({"robot": "sr400", "name": "closure"}, "use passive=symbols to keep the passive joints"),
     ({"robot": "panda", "name": "determinant"}, "det(J*J.T) in SymPy"),
-    ({"robot": "tx40", "name": "gravity", "of": 3}, "leave out of and frame"),
-    ({"robot": "tx40", "name": "gravity", "rows": (1,)}, "rows are for the determinant"),
+    ({"robot": "tx40", "name": "gravity", "of": 3}, "leave out `of` and `frame`"),
+    (
+        {"robot": "tx40", "name": "gravity", "rows": (1,)},
+        "`rows` is only for the model determinant",
+    ),
 ]
 
 
