@@ -17,7 +17,7 @@ Element     FS      coulomb: along q1
 Element     OFFSET  offset: along q1
 
 Base parameters, 4 of 14; Gautier and Khalil (1990)
-    exact over F_p
+    exact, proved modulo primes
     FORMULAS says what they are made of; what it leaves out is as it is
     No effect: XX1 XY1 XZ1 YY1 YZ1 ZZ1 MX1 MY1 MZ1
 
@@ -51,7 +51,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: eb76c2048bc10d7c64cf9aa709ab19cc8b1e98e02e8612d68485b98438546e58
+sha256 of all but these lines: a511c8af82ca8329b67a4655ab115fb89c7163fc0e4e9d5b7a8cfd0f94b07d33
 """
 
 import numpy as np

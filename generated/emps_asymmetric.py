@@ -18,7 +18,7 @@ Element     FVN     viscous, negative motion only: along q1
 Element     FSN     coulomb, negative motion only: along q1
 
 Base parameters, 5 of 15; Gautier and Khalil (1990)
-    exact over F_p
+    exact, proved modulo primes
     FORMULAS says what they are made of; what it leaves out is as it is
     No effect: XX1 XY1 XZ1 YY1 YZ1 ZZ1 MX1 MY1 MZ1
 
@@ -52,7 +52,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: b0da799c0fab3cc645d5ab16e6372c1ca1547a82fd593646b429ea85ad488528
+sha256 of all but these lines: 12a17b9fd33cb458e37ed97dd310871d3fe47bb9e2fa6235dfaecc83829ebb52
 """
 
 import numpy as np

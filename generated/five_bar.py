@@ -27,7 +27,7 @@ Loop        q2, q4 from the closure equations by Newton; assembly mode of q1 = 2
             -1.464, q4 = 1.489
 
 Base parameters, 17 of 48; Gautier and Khalil (1990)
-    exact over F_p
+    exact, proved modulo primes
     FORMULAS says what they are made of; what it leaves out is as it is
     No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1 XX2 XY2 XZ2 YY2 YZ2 MZ2 XX3 XY3 XZ3 YY3 YZ3 MZ3 M3 XX4 XY4
         XZ4 YY4 YZ4 MZ4
@@ -76,7 +76,7 @@ with probability below 8e-15; base_parameters, regressor, observation_matrix, in
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints, elements
 at random states, parameters and random constants agree with Lagrange's equations and products of
 frames to 1e-09, on NumPy's arrays.
-sha256 of all but these lines: 2a018c35a8b9337ef9bd5f262b27736e5e75249b27d4ad0d01e9e8809bc269fe
+sha256 of all but these lines: d7d40a30beec91480fb24fc1cd037c636589f97e8bd444cb18416b1c297e09e4
 """
 
 import numpy as np

@@ -26,7 +26,7 @@ Loop        q2, q3 from the closure equations by Newton; assembly mode of q1 = 1
             1.296
 
 Base parameters, 11 of 34; Gautier and Khalil (1990)
-    exact over F_p
+    exact, proved modulo primes
     FORMULAS says what they are made of; what it leaves out is as it is
     No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1 XX2 XY2 XZ2 YY2 YZ2 MZ2 XX3 XY3 XZ3 YY3 YZ3 MZ3 M3
 
@@ -74,7 +74,7 @@ with probability below 6e-15; base_parameters, regressor, observation_matrix, in
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints, elements
 at random states, parameters and random constants agree with Lagrange's equations and products of
 frames to 1e-09, on NumPy's arrays.
-sha256 of all but these lines: 48e5ffda2d512bedb69c52c3c0467f1262672064d68e2cc72efb62040df6b7be
+sha256 of all but these lines: e4f545a9c645628d1827999936c13da8ae48e449c15d7bb988887bf22cb1c635
 """
 
 import numpy as np

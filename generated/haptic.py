@@ -32,7 +32,7 @@ Loop        q6 = q2 - q5
 Loop        q7 = pi - q2 + q5
 
 Base parameters, 30 of 78; Gautier and Khalil (1990)
-    exact over F_p
+    exact, proved modulo primes
     FORMULAS says what they are made of; what it leaves out is as it is
     No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1 M2 XZ4 YZ4 ZZ4 M5
 
@@ -89,7 +89,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 8e710dbe34ee917e196b0cffbeb3bb1654a6bdb2e2e47d19edaac81dd91cb51e
+sha256 of all but these lines: 4614540b951de09b8f34540c5802d7068f6bf971149712462c808ba89812f095
 """
 
 import numpy as np

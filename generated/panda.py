@@ -23,7 +23,7 @@ Element     FS      coulomb: along q1, q2, q3, q4, q5, q6, q7
 Element     OFFSET  offset: along q1, q2, q3, q4, q5, q6, q7
 
 Base parameters, 69 of 98; Gautier and Khalil (1990)
-    exact over F_p
+    exact, proved modulo primes
     FORMULAS says what they are made of; what it leaves out is as it is
     No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 MZ2 M2
 
@@ -80,7 +80,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 1dd6245194f011bd9f7771980083ecbca2a1a5c4140d26f7cf5f1cc564d9f3a4
+sha256 of all but these lines: 5ddfdce7355748243895a9c51c515a068ea6a13a9f486df6372529ecd51545ce
 """
 
 import numpy as np

@@ -18,7 +18,7 @@ Element     FS      coulomb: along q1, q2
 Element     OFFSET  offset: along q1, q2
 
 Base parameters, 13 of 28; Gautier and Khalil (1990)
-    exact over F_p
+    exact, proved modulo primes
     FORMULAS says what they are made of; what it leaves out is as it is
     No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1 XX2 XY2 XZ2 YY2 YZ2 MZ2
 
@@ -67,7 +67,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 67b32625fd752625033ee03ed7e2800206fedb4519269e133ddfb48dc7ff9fbd
+sha256 of all but these lines: daa119dd7b51692dcb82de357e2f58ba403fcdddbf44fd57ae12b8f6ea019ce7
 """
 
 import numpy as np

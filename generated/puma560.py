@@ -22,7 +22,7 @@ Element     FS      coulomb: along q1, q2, q3, q4, q5, q6
 Element     OFFSET  offset: along q1, q2, q3, q4, q5, q6
 
 Base parameters, 58 of 84; Gautier and Khalil (1990)
-    exact over F_p
+    exact, proved modulo primes
     FORMULAS says what they are made of; what it leaves out is as it is
     No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1
 
@@ -80,7 +80,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 5b76959a57ce57347c0e13d876100a2981d9f744ba0e7a91b43ccb2be8e95bc8
+sha256 of all but these lines: 430b5cb4f7a2895b311b540a45f4126f60af99374db1424d7e69ec4efa20479a
 """
 
 import numpy as np

@@ -22,7 +22,7 @@ Element     FS      coulomb: along q1, q2, q3, q4, q5, q6
 Element     OFFSET  offset: along q1, q2, q3, q4, q5, q6
 
 Base parameters, 58 of 84; Gautier and Khalil (1990)
-    exact over F_p
+    exact, proved modulo primes
     FORMULAS says what they are made of; what it leaves out is as it is
     No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 MZ2 M2
 
@@ -80,7 +80,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: b42fb097764bf07aa14bbf32cb38f55a45c5b35b899f9e288c70b04b6791a0cc
+sha256 of all but these lines: 2cabdcb1a3d8b3fd8a05d41ff20e0599cbab9eff08c9e47dc1b7dad9f9799beb
 """
 
 import numpy as np

@@ -20,7 +20,7 @@ Element     FS      coulomb: along q1, q2, q3, q4
 Element     OFFSET  offset: along q1, q2, q3, q4
 
 Base parameters, 22 of 56; Gautier and Khalil (1990)
-    exact over F_p
+    exact, proved modulo primes
     FORMULAS says what they are made of; what it leaves out is as it is
     No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 XX2 XY2 XZ2 YY2 YZ2 MZ2 XX3 XY3 XZ3 YY3 YZ3 MZ3
         XX4 XY4 XZ4 YY4 YZ4 MZ4
@@ -73,7 +73,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: b1a24abb9a7af4e55063e3a21eba5fcf015ff9aacd64ba4abe425e87169dacfb
+sha256 of all but these lines: b580d8eee2008a94a4c493cb4baa78069b7b47fc4da3dd16c9c24911abcd5b25
 """
 
 import numpy as np

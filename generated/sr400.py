@@ -30,7 +30,7 @@ Loop        q8 = q2 - q7
 Loop        q9 = pi - q2 + q7
 
 Base parameters, 60 of 104; Gautier and Khalil (1990)
-    exact over F_p
+    exact, proved modulo primes
     FORMULAS says what they are made of; what it leaves out is as it is
     No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 MZ2 MZ7
 
@@ -88,7 +88,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: a664b60dc1ff8d04aeca7937fc078155f36ceff2e8dccb9b540fb74e39805283
+sha256 of all but these lines: fa04af19967e21487ae46b3b090ea4f88e3f5f571a6056899efb4ebbb8d767e4
 """
 
 import numpy as np

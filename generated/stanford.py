@@ -22,7 +22,7 @@ Element     FS      coulomb: along q1, q2, q3, q4, q5, q6
 Element     OFFSET  offset: along q1, q2, q3, q4, q5, q6
 
 Base parameters, 55 of 84; Gautier and Khalil (1990)
-    exact over F_p
+    exact, proved modulo primes
     FORMULAS says what they are made of; what it leaves out is as it is
     No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1
 
@@ -78,7 +78,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: c7fba2a61b92b0a7500de4409d19d6fa6ec88425aaaf818ac71d5b344fec424c
+sha256 of all but these lines: cef310702d00938f9318334976a966a97e80d3ce6b3bc20c88ac52053903c053
 """
 
 import numpy as np

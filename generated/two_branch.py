@@ -25,7 +25,7 @@ Element     FS      coulomb: along q1, q2, q3, q4, q6, q7, q8
 Element     OFFSET  offset: along q1, q2, q3, q4, q6, q7, q8
 
 Base parameters, 67 of 108; Gautier and Khalil (1990)
-    exact over F_p
+    exact, proved modulo primes
     FORMULAS says what they are made of; what it leaves out is as it is
     No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1
 
@@ -85,7 +85,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: a438e39a4fbe4461db3ccf109a554195cfa5be0c504687ff8b40e4cdde929e67
+sha256 of all but these lines: d2c87c1ebea03eb9eb0600551edcf586db717a028cb1ba85a6eeeeb35b527ab7
 """
 
 import numpy as np

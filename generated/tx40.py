@@ -24,7 +24,7 @@ Element     FVM     viscous: FVM6 in the form 2*q5*q6
 Element     FSM     coulomb: FSM6 along q5 + q6
 
 Base parameters, 60 of 86; Gautier and Khalil (1990)
-    exact over F_p
+    exact, proved modulo primes
     FORMULAS says what they are made of; what it leaves out is as it is
     No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 MZ2 M2
 
@@ -82,7 +82,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 6a82ea44dd3bf7a5f1c4620bbb027b2d1d12d5e103015bcfec66bb9e69334b33
+sha256 of all but these lines: 6ec83a3c96c8c83f00ea790d71d918147b5cf772c9439b8d91ce75dd94fe22d8
 """
 
 import numpy as np

@@ -22,7 +22,7 @@ Element     FS      coulomb: along q1, q2, q3, q4, q5, q6
 Element     OFFSET  offset: along q1, q2, q3, q4, q5, q6
 
 Base parameters, 58 of 84; Gautier and Khalil (1990)
-    exact over F_p
+    exact, proved modulo primes
     FORMULAS says what they are made of; what it leaves out is as it is
     No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 MZ2 M2
 
@@ -80,7 +80,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 9ef3a94f8439930d579126b04e06cb39d1824d5ab77da61cf3cf77d5ba9a2a97
+sha256 of all but these lines: f8b50f791c021acadcc6c17e61c403d9275df4b32eaecdee10d9fe737028d164
 """
 
 import numpy as np

@@ -1,14 +1,11 @@
 """Derive base parameters and their formulas from a robot file, and generate its dynamic models.
 
-    model = symgen.model("arm.urdf")
-            # the module: derived, emitted, certified, imported
-    base = symgen.regrouping(symgen.load_robot("tx40"))   # base parameters, each with its formula
-    symgen.certificate(base).valid                    # exact formulas; the module by other dynamics
-    symgen.apply("results", "arm.urdf").write("new.urdf")
-            # identified values into the user's own URDF or MJCF
-    symgen.symbolic("tx40").inertia_matrix()          # any model as SymPy objects
-    symgen.variants("arm.urdf")
-            # the module with its table of frames as constants
+    model = symgen.model("arm.urdf")                      # the module, certified and imported
+    base = symgen.regrouping(symgen.load_robot("tx40"))   # base parameters with their formulas
+    symgen.certificate(base).valid                        # formulas proved, torques = Lagrange's
+    symgen.apply("results", "arm.urdf").write("new.urdf") # identified values into your own file
+    symgen.symbolic("tx40").inertia_matrix()              # any model as SymPy objects
+    symgen.variants("arm.urdf")                           # module with the frame table as constants
 
 Names are imported when they are first used.
 """

@@ -159,7 +159,7 @@ def test_deviations_by_row_group(name: str) -> None:
 def test_what_is_missing_is_said() -> None:
     model, _, record = measured("planar_2r")
     bare = runtime.Record(record.t, record.q, record.tau, rate=1000.0, name="bare")
-    with pytest.raises(InputError, match="no wrench0 of three forces"):
+    with pytest.raises(InputError, match="no signal wrench0 of three forces"):
         runtime.problem(model, [record, bare], STUDY)
     with pytest.raises(InputError, match="--with base_wrench_regressor"):
         runtime.identify(symgen.model("planar_2r"), record, STUDY)
@@ -169,6 +169,6 @@ def test_what_is_missing_is_said() -> None:
     elsewhere = runtime.Record(
         record.t, record.q, record.tau, rate=1000.0, channels={"wrench9": np.ones((6000, 6))}
     )
-    with pytest.raises(InputError, match="a wrench in frame 9 of planar_2r: no such frame"):
+    with pytest.raises(InputError, match="a wrench in frame 9 of planar_2r is not possible: no such frame"):
         runtime.identify(model, elsewhere, STUDY)
     assert runtime.problem(model, bare, STUDY).model is model

@@ -283,16 +283,16 @@ def _off(x: Array, off: float, step: float, own: bool) -> str:
 
     `off` is their distance from the nearest multiples, in steps (rms).
     """
-    text = f"positions lie {off:.2g} steps (rms) off the lattice of step {step:.6g}"
+    text = f"positions are {off:.2g} steps (rms) away from the values that an encoder of step {step:.6g} reports"
     suggested = 0.0 if own else smallest_step(x)
     if suggested and _distance(x, suggested, _phase(x, suggested)) < OFF / 5:
         part, remedy = step / suggested, f"set signals.step to {suggested:.6g} for this encoder"
         if part > 1.5 and abs(part - round(part)) < 0.01:
             return (
-                f"{text} and on a lattice {round(part)} times finer: {remedy}, or, if a driver "
+                f"{text}, but fit a step {round(part)} times finer: {remedy}, or, if a driver "
                 "averaged that number of samples, record the counts"
             )
-        return f"{text} and on the lattice of step {suggested:.6g}: {remedy}"
+        return f"{text}, but fit step {suggested:.6g}: {remedy}"
     return (
         f"{text}; the positions were filtered, interpolated or converted by a driver or by "
         "record.resample, or the step is wrong: correct signals.step, "

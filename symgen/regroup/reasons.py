@@ -105,7 +105,7 @@ def absorptions(regrouping: Regrouping) -> tuple[Absorption, ...]:
             name,
             tuple(into[name]),
             _columns(name, into[name]),
-            f"a relation of this robot, {regrouping.method}"
+            f"a relation of this robot ({regrouping.method})"
             if name in particular
             else _rule(regrouping.robot, name),
         )

@@ -39,7 +39,7 @@ from symgen.regroup.solve import coefficients
 from symgen.time_limit import limited
 
 FIRST_CHOICE = ("ZZ", "XX", "XY", "XZ", "YZ", "MX", "MY")
-EXACT = "exact over F_p"
+EXACT = "exact, proved modulo primes"
 NUMERIC = "numeric, for the constants of the robot file and no others"
 LAST_CHOICE = ("MZ", "M", "YY")
 

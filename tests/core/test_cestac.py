@@ -335,7 +335,7 @@ def test_runs_without_an_estimate_are_left_out_and_counted():
     ]
     result = level_result(Level(1e-3), Runs.of(runs, 3), Measured, reference)
     assert np.allclose(result.e, 1.0) and "1 of 3 runs found no estimate" in result.message
-    with pytest.raises(InputError, match=r"finds 1 estimates of 2 runs at 0\.001"):
+    with pytest.raises(InputError, match=r"finds an estimate in only 1 of 2 runs at 0\.001"):
         level_result(Level(1e-3), Runs.of(runs[1:], 3), Measured, reference)
 
 

@@ -366,7 +366,7 @@ def test_columns_restrict_the_estimate():
     ("settings", "text"),
     [
         (EstimateSettings(method="didim"), "section `controller`"),
-        (EstimateSettings(weights="joint"), "or method wls, which supports"),
+        (EstimateSettings(weights="joint"), "other weights need method wls"),
         (EstimateSettings(columns=("ZZ9",)), "no parameter ZZ9"),
         (EstimateSettings(options={"colour": 1}), "unknown key colour"),
         (EstimateSettings(options={"block": -1}), "expected more than 0"),

@@ -221,7 +221,7 @@ def test_errors_name_the_file(tmp_path):
     write_csv(tmp_path / "run.csv")
     with pytest.raises(InputError, match=r"^short\.csv: 5 samples; a record needs at least 10"):
         read_record(settings(files="short.csv"), folder=tmp_path)
-    with pytest.raises(InputError, match=r"^run\.csv: 2 joints; arm has 3"):
+    with pytest.raises(InputError, match=r"^run\.csv: the record has 2 joints, but arm has 3"):
         read_record(
             settings(files="run.csv"),
             SimpleNamespace(NAME="arm", JOINTS=(1, 2, 3), DRIVES=None),
@@ -424,11 +424,11 @@ def test_joint_angles_beside_motor_currents(tmp_path):
     [
         (
             {"torque_constant": 0.1},
-            r"record\.torque_constant: given, but units\.tau is N\*m; say mA",
+            r"record\.torque_constant: given, but units\.tau is N\*m; set units\.tau to mA",
         ),
         (
             {"counts_per_revolution": 4096, "units": {"q": "deg"}},
-            r"record\.counts_per_revolution: given, but units\.q is deg; say counts",
+            r"record\.counts_per_revolution: given, but units\.q is deg; set units\.q to counts",
         ),
         (
             {"columns": {"q": ["a", "a"]}},
@@ -590,7 +590,7 @@ def test_records_of_a_model(tmp_path):
         {"record": [{"files": "a.csv"}, {"files": "b.csv", "name": "second"}]}
     ).record
     assert [r.name for r in read_records(both, planar_2r_model, folder=tmp_path)] == ["a", "second"]
-    with pytest.raises(InputError, match="2 joints; emps has 1"):
+    with pytest.raises(InputError, match="the record has 2 joints, but emps has 1"):
         read_records(both, emps_model, folder=tmp_path)
 
 
@@ -661,7 +661,7 @@ def test_no_time_and_no_rate(tmp_path):
 
 def test_wrong_number_of_joints(tmp_path):
     write_csv(tmp_path / "a.csv")
-    with pytest.raises(InputError, match="2 joints; arm has 3"):
+    with pytest.raises(InputError, match="the record has 2 joints, but arm has 3"):
         read_record(settings(files="a.csv"), robot(Drives(np.eye(3), 0.0, 1.0)), folder=tmp_path)
 
 

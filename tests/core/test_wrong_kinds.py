@@ -196,7 +196,7 @@ def test_the_sentence_names_the_dtype(t: Any, text: str) -> None:
 )
 def test_other_ways_to_write_real_numbers_are_taken(same: Callable[[Any], Any]) -> None:
     np.testing.assert_allclose(runtime.Record(T, same(Q), TAU).q, Q, rtol=1e-15)
-    with pytest.raises(InputError, match="holds a Decimal; expected numbers"):
+    with pytest.raises(InputError, match="contains a Decimal; expected numbers"):
         runtime.Record(T, np.full(Q.shape, Decimal(1)), TAU)
 
 

@@ -236,8 +236,8 @@ def test_a_step_that_is_a_fraction_of_the_true_one_is_told():
 @pytest.mark.parametrize(
     ("change", "step", "words"),
     [
-        (lambda q: q + 0.003 * np.sin(40 * T)[:, None], 0.01, "off the lattice"),
-        (lambda q: q, 0.013, "set signals.step to 0.01, encoder"),
+        (lambda q: q + 0.003 * np.sin(40 * T)[:, None], 0.01, "away from the values that an encoder"),
+        (lambda q: q, 0.013, "set signals.step to 0.01 for this encoder"),
         (
             lambda q: (q[2:] + q[1:-1] + q[:-2]) / 3,
             0.01,
@@ -456,7 +456,7 @@ def test_encoders_on_the_motors_of_a_coupled_wrist():
     ]
     assert (worth[0] < worth[1] / 2).all()
     np.testing.assert_allclose(states.errors.root @ drives["ratio"], np.eye(6), atol=1e-12)
-    with pytest.raises(InputError, match="off the lattice"):
+    with pytest.raises(InputError, match="away from the values that an encoder"):
         observed_states(joint, 1000.0, replace(signals, side="joint"))
 
 

@@ -159,5 +159,5 @@ def test_what_cannot_be_asked(arm, study, record):  # noqa: F811
     with pytest.raises(SettingsError, match="place: loop simulates the closed loop"):
         cestac(arm[0], (), replace(in_loop(study), controller=None))
     once = method(study, "iv", passes=1, start=away(arm[3], arm[0].BASE_PARAMETERS), gains="one")
-    with pytest.raises(InputError, match="iv finds no estimate from the record as measured"):
+    with pytest.raises(InputError, match="iv finds no estimate from the measured record"):
         cestac(arm[0], record, once)

@@ -380,7 +380,7 @@ def test_needs_the_model_and_values_for_a_pull(arm) -> None:
     seen = simulated(arm, arm.base_parameters(arm.VALUES), 0.1)
     with pytest.raises(InputError, match="needs the model"):
         estimate_of(seen, FEASIBLE)
-    with pytest.raises(SettingsError, match="no values of"):
+    with pytest.raises(SettingsError, match="no inertial values of"):
         estimate_of(
             simulated(emitted("rx90"), np.ones(len(emitted("rx90").BASE_PARAMETERS)), 1.0),
             EstimateSettings("feasible", options={"prior": "euclidean"}),

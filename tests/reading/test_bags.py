@@ -111,7 +111,7 @@ def test_joints_change_places(tmp_path):
     ("spoil", "said"),
     [
         (lambda s, q, tau: (s, JOINTS, q, (), ()), "0 values of effort for 2 joints"),
-        (lambda s, q, tau: (s, JOINTS[:1], q[:1], (), tau[:1]), "no joint elbow; it has shoulder"),
+        (lambda s, q, tau: (s, JOINTS[:1], q[:1], (), tau[:1]), "no joint elbow among the joints shoulder"),
         (lambda s, q, tau: (s, JOINTS, q[:1], (), tau), "1 values of position for 2 joints"),
         (
             lambda s, q, tau: (s, ("shoulder", "elbow", "elbow"), (*q, 0), (), (*tau, 0)),
@@ -155,7 +155,7 @@ def test_several_publishers(tmp_path):
         *messages[8:],
     ]
     with pytest.raises(
-        InputError, match="message 94 of /joint_states: no joint elbow; it has shoulder"
+        InputError, match="message 94 of /joint_states: no joint elbow among the joints shoulder"
     ):
         read_record(settings(write_bag("mcap", tmp_path / "other", {"/joint_states": spoilt})))
     nan = [

@@ -91,5 +91,5 @@ def test_structures_of_matlab_by_their_fields(tmp_path):
 
 def test_a_table_of_columns_by_joint_is_refused_with_what_to_write():
     """{8: spring} is how one might say it; "expected a text" told nothing."""
-    with pytest.raises(InputError, match="a table of 8; expected a list, one column per joint"):
+    with pytest.raises(InputError, match="a mapping of 8; expected a list, one column per joint"):
         settings(columns={"tau_known": {8: "spring"}})

@@ -48,7 +48,7 @@ def test_rules_are_named() -> None:
         rules["M3"] == "the origin of frame 3 is fixed in link 2: mass there acts as mass of link 2"
     )
     assert rules["ZZ4"].startswith("link 4 does not turn against link 3: its inertia tensor")
-    assert rules["Ia1"] == "a relation of this robot, exact over F_p"
+    assert rules["Ia1"] == "a relation of this robot (exact, proved modulo primes)"
 
 
 def test_an_edit_and_what_becomes_of_the_base() -> None:

@@ -121,7 +121,8 @@ class Method:
         """
         message = (
             f"{settings.weights!r} with method {settings.method}; expected "
-            f"{' or '.join(self.weights)}, or method wls, which supports other weights"
+            f"{' or '.join(self.weights)}, since this method has its own weights or none; other "
+            "weights need method wls"
         )
         require(settings.weights in self.weights, message, "estimate", "weights")
         return structure(self.options, settings.options, OPTIONS)
