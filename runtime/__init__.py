@@ -1,12 +1,10 @@
 """Identify the parameters of a robot from measured records, and judge how far to trust them.
 
-    model = runtime.load_model("tx40")
-            # an emitted module: by name, by path, or the module itself
-    record = runtime.Record(t, q, tau)              # joint side, SI, shapes (N,), (N, n), (N, n)
-    result = runtime.identify(model, record)
-            # every function: model, record or records, study
+    model = runtime.load_model("tx40")            # an emitted module, by name or path
+    record = runtime.Record(t, q, tau)            # joint side, SI, shapes (N,), (N, n), (N, n)
+    result = runtime.identify(model, record)      # every function: model, record(s), study
     result.estimate, result.checklist
-    runtime.report(result, "out")                   # the page and the files of `symgen identify -o`
+    runtime.report(result, "out")                 # the page and files of `symgen identify -o out`
 
 Names are imported when they are first used, so that `import runtime` is fast. NumPy, SciPy and
 pydantic are enough for Record, resample, observe, estimate, essential and cestac. Other packages

@@ -2,10 +2,9 @@
 
 They come from samples, from a motion given by coefficients, from a record, or from random points.
 
-reference = Reference.sampled(q_r, rate=1000)
-        # derivatives by central differences
-reference = Reference(rate, q, qd, qdd)
-check_limits(reference, model.LIMITS)
+    reference = Reference.sampled(q_r, rate=1000)   # derivatives by central differences
+    reference = Reference(rate, q, qd, qdd)
+    check_limits(reference, model.LIMITS)
 """
 
 from __future__ import annotations

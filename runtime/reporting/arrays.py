@@ -1,10 +1,8 @@
 """Write results for other programs: named arrays of an Estimate or a resolution study.
 
-    arrays = estimate_arrays(fit)
-            # names as text arrays, X, sigma ..., joints, figures of the fit
-    np.load(BytesIO(npz(arrays)))                   # without pickles
-    load estimate.mat
-            # MATLAB, Octave: names as cell arrays, value.ZZ1R beside X
+    arrays = estimate_arrays(fit)         # names as texts, X, sigma ..., figures of the fit
+    np.load(BytesIO(npz(arrays)))         # without pickles
+    load estimate.mat                     % MATLAB, Octave: names as cell arrays, value.ZZ1R
 
 Equal results give equal bytes: no file contains the time at which it was written.
 """

@@ -157,7 +157,7 @@ def _entry(text: str) -> Path | None:
         return None
     if shared and os.environ.get("SYMGEN_CACHE"):
         raise SymgenError(
-            f"SYMGEN_CACHE: others can write to {folder}, or to a folder above it, and could put "
+            f"SYMGEN_CACHE: other users can write to {folder}, or to a folder above it, and could put "
             "code there that this program would run; choose a folder of your own (chmod 700)"
         )
     if shared:

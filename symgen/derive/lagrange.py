@@ -607,7 +607,7 @@ def sampled(
     raise DescriptionError(
         (
             f"{robot.name}: the loops close in {len(D)} of {DRAWS * states} random states near "
-            "their start; give each loop a `start` that closes it"
+            "their start; give each loop a `start` at which the loop closes"
         ),
         path=("loops",),
     )

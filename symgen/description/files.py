@@ -198,7 +198,7 @@ def content_of(path: Path) -> bytes:
     names = ", ".join(packaged_robots())
     try:
         if path.exists() and not path.is_file():  # a pipe may never answer, a device never end
-            raise OSError(0, "it is a folder, a pipe or a device")
+            raise OSError(0, "the path is a folder, a pipe or a device")
         with path.open("rb") as stream:
             return stream.read(MAX_BYTES + 1)
     except FileNotFoundError as error:

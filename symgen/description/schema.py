@@ -53,7 +53,7 @@ def robot_of(data: Mapping[str, Any], file: str, sha256: str) -> Robot:
     distal = convention == "distal"
     if distal and data.get("loops"):
         raise DescriptionError(
-            "loops: a distal table cannot describe closed loops; write it in Khalil's convention",
+            "loops: a distal table cannot describe closed loops; write the table in Khalil's convention",
             path=("loops",),
         )
     declared = Declared(frozenset(constants), frozenset(joints.union(constants)), len(rows), distal)

@@ -276,6 +276,6 @@ def _root(links: dict[str, Inertial | None], joints: list[Joint], line: int) -> 
         none = "none: the joints form a cycle" if links else "none: there is no <link>"
         roots_text = ", ".join(map(repr, roots[:5])) or none
         raise DescriptionError(
-            f"links without parent: {roots_text}; expected one, the base", line=line
+            f"links without parent: {roots_text}; expected one such link, the base", line=line
         )
     return roots[0]

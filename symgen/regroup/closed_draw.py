@@ -97,9 +97,7 @@ class ClosedDraw(Draw):
         algebra = GraphAlgebra(geometry_of_all.robot)
         ends = loop_ends(geometry_of_all.robot, algebra, geometry_of_all.closure)
         if any(self.residues(x).any() for x in interpret(coincidence(ends), self)):
-            raise ArithmeticError(
-                "closing the loops in position does not close them in orientation"
-            )
+            raise ArithmeticError("the loops close in position, but not in orientation")
         self._move()
 
     def _array(self, x: Scalar) -> Array:

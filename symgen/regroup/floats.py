@@ -85,7 +85,7 @@ def float_regressor(robot: Robot, names: Sequence[str]) -> Array:
         if tried > MOST_STATES + 10 * count:
             raise SymgenError(
                 f"robot {robot.name}: the loops close in {closed} of {tried} states near the "
-                "start; give each loop a `start` that closes it"
+                "start; give each loop a `start` at which the loop closes"
             )
         blocks.append(_columns_near_start(system, names, count, rng))
         closed += blocks[-1].shape[1]

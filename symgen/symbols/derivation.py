@@ -150,8 +150,8 @@ def source_of(
         if passive == "functions" and relations.tied:
             tied = ", ".join(f"q{u}" for u in relations.tied)
             raise SymgenError(
-                f"{tied} of {robot.name} have no closed form: only the closure equations tie them "
-                "to the actuated joints; "
+                f"{tied} of {robot.name} have no closed form: only the closure equations relate "
+                "these joints to the actuated joints; "
                 "leave out passive, or use passive='symbols' with the equations of the model closure"
             )
         if passive == "symbols":

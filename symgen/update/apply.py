@@ -84,7 +84,7 @@ def apply(
     links = text.links
     if not links:
         raise DescriptionError(
-            "no moving link has an <inertial>; add one, so that values can be written into it",
+            "no moving link has an <inertial>; add <inertial> to a moving link",
             file=path.name,
         )
     families = one_joint_parameters(described, UNITS)

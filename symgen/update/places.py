@@ -301,7 +301,7 @@ class Places:
             K, offset = (values.get(family, before[family]) for family in SPRING)
             if K <= 0:
                 raise DescriptionError(
-                    f"joint {joint.name!a:.60}: a stiffness of {K:.4g} would result; MuJoCo needs a positive one",
+                    f"joint {joint.name!a:.60}: a stiffness of {K:.4g} would result; MuJoCo needs a positive stiffness",
                     line=e.line,
                 )
             turns = self.degrees and joint.kind != "prismatic"

@@ -133,7 +133,7 @@ class Writing:
             if attribute and abs(again.joint_values(j)[family] - x) > AGREE * max(1.0, abs(x)):
                 raise DescriptionError(
                     f"joint {again.table.joint[j].name!a:.60}: a program that reads the new file would "
-                    f"change the written {attribute}; remove the settings of the file that change it"
+                    f"change the written {attribute}; remove the settings of the file that change {attribute}"
                 )
         if len(again.links) != len(self.nearest.links):
             raise DescriptionError(

@@ -237,7 +237,7 @@ def test_a_cache_that_others_may_write_to_is_refused(cache, place, mode) -> None
     if mode == 0o1777:  # as /tmp: names belong to their makers
         assert Path(symgen.model("planar_2r").__file__).is_relative_to(cache)
         return
-    with pytest.raises(SymgenError, match=r"SYMGEN_CACHE: others can write to .*chmod 700"):
+    with pytest.raises(SymgenError, match=r"SYMGEN_CACHE: other users can write to .*chmod 700"):
         symgen.model("planar_2r")
 
 

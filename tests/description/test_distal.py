@@ -195,7 +195,7 @@ def test_values_are_read_in_the_frames_of_the_table(rows):
 def test_values_without_those_that_enter_are_refused():
     text = table(((0, 0.4, 0), (0, 0.3, 0))) + "\nvalues: {ZZ1: 0.2, M2: 1.0}\n"
     with pytest.raises(
-        DescriptionError, match=r"values of link 1 .* with ZZ1 expected MX1, M1 too"
+        DescriptionError, match=r"values of link 1 .* to convert ZZ1, also give MX1, M1"
     ):
         parse_robot(text.encode(), "arm.yaml")
     some = table(((0, 0.4, 0), (0, 0.3, 0))) + "\nvalues: {M1: 3.0, MX1: -0.6, ZZ1: 0.16}\n"

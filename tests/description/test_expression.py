@@ -101,7 +101,7 @@ def test_outside_the_grammar(text):
 
 def test_undeclared_symbol_lists_the_declared_ones():
     with pytest.raises(
-        ExpressionError, match=r"undeclared symbol 'L2'; declared here: D2, g at column 5"
+        ExpressionError, match=r"undeclared symbol 'L2'; declared symbols: D2, g at column 5"
     ):
         parse("2 * L2", {"D2", "g"})
 
