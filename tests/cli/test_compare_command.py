@@ -136,7 +136,7 @@ def test_several_studies_are_treatments_by_their_names(folder):
         2
     ].startswith("ignored ")
     assert (
-        "\nempty: a.csv: none of its" in result.stdout
+        "\nempty: a.csv: none of the" in result.stdout
         and "rows.low_speed leaves out" in result.stdout
     )
 
@@ -147,7 +147,7 @@ def test_several_studies_are_treatments_by_their_names(folder):
         (None, "plain has no validation record"),
         ("zero", "zero.csv: all torques are zero"),
         ("other", "other.csv"),
-        ("still", "still.csv: none of its"),
+        ("still", "still.csv: none of the"),
     ],
 )
 def test_what_cannot_be_compared_is_one_sentence(folder, validate, message):

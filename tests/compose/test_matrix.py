@@ -36,7 +36,7 @@ MOTION = "of a motion"
 NO_SLIPS = "not judged for a robot with force sensors"
 REFUSED: Mapping[tuple[str, str], tuple[str, str]] = {
     ("force sensors", "advise"): (
-        "the axes of a sensor have none",
+        "only encoders of joints",
         "an advice is the step of an encoder by joint; an axis of a sensor has no encoder",
     ),
     ("force sensors", "plausibility"): (
@@ -73,7 +73,7 @@ REFUSED: Mapping[tuple[str, str], tuple[str, str]] = {
 MISSING: Mapping[str, tuple[tuple[str, str], ...]] = {
     "force sensors": (
         (NO_SLIPS, "as above"),
-        ("the axes of a sensor have none", "as above"),
+        ("only encoders of joints", "as above"),
     ),
     "poses at rest": (
         ("not judged for poses at rest", "as above"),

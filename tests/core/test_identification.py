@@ -267,7 +267,7 @@ def test_records_that_do_not_belong_together_are_told_in_a_sentence(model):
     with pytest.raises(
         InputError,
         match=(
-            r"still: none of its \d+ rows per joint is used: rows.trim leaves out 3?\d, "
+            r"still: none of the \d+ rows per joint is used: rows.trim leaves out 3?\d, "
             r"rows.low_speed leaves out"
         ),
     ):

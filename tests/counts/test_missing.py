@@ -148,7 +148,7 @@ def test_arrays():
     with pytest.raises(
         InputError,
         match=(
-            r"none of its 200 rows per joint is used: rows.trim leaves out 40, positions "
+            r"none of the 200 rows per joint is used: rows.trim leaves out 40, positions "
             r"that are missing leaves? out"
         ),
     ):
@@ -172,7 +172,7 @@ def test_short_gaps_are_filled_and_long_ones_left_out():
     assert all(lost < k < 1.1 * lost for k in observation.dropped["missing"])
     assert (
         f"encoder 1: {MISSING[:, 0].sum()} samples are missing, at most 15 in a row (0.015 s); the "
-        "counts around them tell"
+        "counts around them determine"
     ) in " ".join(observation.findings)
     assert "at most 600 in a row (0.6 s); where the counts around a gap" in observation.findings[-1]
 

@@ -226,6 +226,6 @@ def test_what_does_not_have_channels_refuses(model) -> None:
         ):
             with pytest.raises(
                 InputError,
-                match=r"FT1, FT2.* read .*temperature|temperature.* need at every sample",
+                match=r"FT1, FT2.* need .*temperature|temperature.* need at every sample",
             ):
                 ask()

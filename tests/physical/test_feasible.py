@@ -353,7 +353,7 @@ def test_json_keeps_the_standard_parameters(arm) -> None:
                 "bounds": {"M1": [3, None], "MX1": [None, -9]},
                 "centre": {"1": [[0, 1], [0, 1], [0, 1]]},
             },
-            "one without bounds of MX1 or without centre of link 1",
+            "a solution exists without bounds of MX1 or without centre of link 1",
         ),
         (
             {"bounds": {"M1": [3, None], "M2": [3, None]}, "total_mass": [0, 4]},

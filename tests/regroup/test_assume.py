@@ -62,7 +62,7 @@ def test_written_and_refused() -> None:
     assert robot.assume == {"XY2", "XY3", "XZ3", "MX3"}
     assert parse_robot(write_yaml(robot).encode(), "a.yaml").assume == robot.assume
     for wrong, sentence in (
-        ("M2: 1.2", "stands under values"),
+        ("M2: 1.2", "write another known value under `values`"),
         ("link 3: symmetric z", "symmetric xy"),
         ("XX9: 0", "not a standard parameter"),
     ):
