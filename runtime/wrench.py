@@ -139,7 +139,7 @@ class WrenchModel:
         frames, self._model, self._n = getattr(model, "ANTECEDENTS", None), model, len(model.JOINTS)
         if frames is None:
             raise InputError(
-                f"{model.NAME} has no base_wrench_regressor; emit the module by symgen generate "
+                f"{model.NAME} has no base_wrench_regressor; generate the module with symgen generate "
                 "ROBOT --with base_wrench_regressor"
             )
         if wrong := [f for f in sensors if f and (f not in frames or hasattr(model, "PASSIVE"))]:

@@ -24,7 +24,7 @@ from types import ModuleType
 from runtime.core.errors import ModelError
 
 KEY = 32  # digits of the SHA-256 that name a text in the cache
-UNTRUSTED = "is code that this installation has not emitted and certified; pass trust=True (--trust) if you trust the author of this file, or emit the model here with `symgen generate`"
+UNTRUSTED = "is code that this installation has not generated and certified; pass trust=True (--trust) if you trust the author of this file, or generate the model here with `symgen generate`"
 
 
 def cache_folder(of: str) -> Path:
@@ -111,6 +111,6 @@ def run(text: str, path: Path) -> ModuleType:
         ) from e
     except Exception as e:  # whatever a broken file raises becomes one kind of error
         raise ModelError(
-            f"fails on import with {type(e).__name__}: {e}; emit the model again", file=str(path)
+            f"fails on import with {type(e).__name__}: {e}; generate the module again (symgen generate)", file=str(path)
         ) from e
     return module

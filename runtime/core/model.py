@@ -111,7 +111,7 @@ def load_model(
     if isinstance(model, ModuleType):
         return checked_model(model)
     require_kind(
-        model, (str, Path), "model", "the name or path of an emitted module, or the module"
+        model, (str, Path), "model", "the name or path of a generated module, or the module"
     )
     path = Path(model)
     if isinstance(model, str) and re.fullmatch(r"\w+", model):
@@ -123,8 +123,8 @@ def load_model(
             else []
         )
         raise ModelError(
-            f"no emitted model {path}; {path.parent} contains {', '.join(present) or 'none'}: emit the "
-            f"model with `symgen generate {path.stem}`"
+            f"no generated model {path}; {path.parent} contains {', '.join(present) or 'none'}: "
+            f"generate it with `symgen generate {path.stem}`"
         )
     return checked_model(module_of(path, trust=trust))
 
@@ -133,7 +133,7 @@ def require_emitted(model: Any) -> None:
     """Raise InputError unless `model` is an emitted model or has its interface."""
     if not all(hasattr(model, name) for name in ("NAME", "JOINTS", "DRIVES")):
         raise InputError(
-            f"model is {kind_of(model)}; expected an emitted model, such as symgen.model('arm.urdf') "
+            f"model is {kind_of(model)}; expected a generated model, such as symgen.model('arm.urdf') "
             "or runtime.load_model('arm.py')"
         )
 
@@ -169,7 +169,7 @@ def checked_model(module: ModuleType) -> GeneratedModel:
     missing = [name for name in (*CONSTANTS, *FUNCTIONS) if not hasattr(module, name)]
     if missing:
         raise ModelError(
-            f"no {', '.join(missing)}; expected an emitted model: emit the model again", file=label
+            f"no {', '.join(missing)}; expected a module that symgen generated; generate it again", file=label
         )
     model = cast(GeneratedModel, module)
     _check_names(model, label)
@@ -209,12 +209,12 @@ def require(model: GeneratedModel, *functions: str) -> None:
         )
     if missing == ["casadi"]:
         raise ModelError(
-            "no casadi(): the loops of this robot are closed by iteration, which CasADi cannot express, or another version of symgen emitted the model; in this case emit the model again",
+            "no casadi(): the loops of this robot are closed by iteration, which CasADi cannot express, or another version of symgen emitted the model; in this case generate the module again",
             file=model.NAME,
         )
     if missing:
         raise ModelError(
-            f"no function {', '.join(missing)}; emit the model again with the target that contains these functions",
+            f"no function {', '.join(missing)}; generate the module again with the target that contains these functions",
             file=model.NAME,
         )
 
@@ -304,7 +304,7 @@ def elements_of(
     if not hasattr(model, table):
         raise ModelError(
             (
-                f"no {table}, the directions along which friction acts; emit the model again with this "
+                f"no {table}, the directions along which friction acts; generate the module again with this "
                 "version of symgen"
             ),
             file=model.NAME,
@@ -399,7 +399,7 @@ def _check_store(model: GeneratedModel, b: int, n: int, label: str) -> None:
             )
     except Exception as e:  # whatever a broken file raises becomes one kind of error
         raise ModelError(
-            f"fails on two samples at rest with {type(e).__name__}: {e}; emit the model again",
+            f"fails on two samples at rest with {type(e).__name__}: {e}; generate the module again",
             file=label,
         ) from e
     if shape != (b, n, N):

@@ -152,7 +152,7 @@ def physical_model(
     elements = elements_of(model, constants)
     if missing := [name for name in ("STANDARD_PARAMETERS", "LINKS") if not hasattr(model, name)]:
         raise ModelError(
-            f"no {', '.join(missing)}; emit the model again with this version of symgen",
+            f"no {', '.join(missing)}; generate the module again with this version of symgen",
             file=model.NAME,
         )
     emitted = cast(Any, model)

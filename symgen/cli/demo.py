@@ -16,7 +16,7 @@ def demo(
         bool,
         typer.Option(
             "--quick",
-            help="Shorter: only two runs per encoder step, and no torque steps or advice.",
+            help="Shorter demo: two runs per encoder step, no rounding of torques, and no prediction of the coarsest encoder.",
         ),
     ] = False,
 ) -> None:

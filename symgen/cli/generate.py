@@ -29,7 +29,7 @@ def generate(
             ),
         ),
     ],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the modules.")] = Path(
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder into which the files are written.")] = Path(
         "generated"
     ),
     target: Annotated[
@@ -47,7 +47,7 @@ def generate(
         typer.Option(
             "--with",
             help=(
-                "Further functions to emit: coriolis, slotine_li, momentum, energy, "
+                "Further functions to generate: coriolis, slotine_li, momentum, energy, "
                 "base_wrench_regressor, or several as coriolis,energy."
             ),
         ),

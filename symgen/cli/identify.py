@@ -51,7 +51,7 @@ def identify(
     suggest: Annotated[
         Path | None,
         typer.Option(
-            help="Write a study file that can read the records (columns guessed by name, resampling, units), then identify with it."
+            help="Write a study file with the settings that the records need (columns guessed from their names, resampling, units), then identify with it."
         ),
     ] = None,
     json: options.Json = False,

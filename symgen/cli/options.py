@@ -78,7 +78,7 @@ Side = Annotated[
 Rounding = Annotated[
     Text,
     typer.Option(
-        help="How positions are rounded: two-point (up or down by one step at random, as in the chapter), "
+        help="How positions are rounded: two-point (up or down by one step at random), "
         "uniform, gaussian, quantise, or phase (a real encoder with a random zero in each run)."
     ),
 ]

@@ -64,7 +64,7 @@ def show(
     format: Annotated[
         str,
         typer.Option(
-            help="text, latex or json; with --model also sympy, and latex-fragment: no document around it."
+            help="text, latex or json. With --model also sympy, or latex-fragment (LaTeX without a document around it)."
         ),
     ] = "text",
     at_values: options.AtValues = False,

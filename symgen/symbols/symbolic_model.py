@@ -264,7 +264,7 @@ class SymbolicModel:
             raise SymgenError(
                 f"the direct model of {robot.name} has {len(n)} joints; the closed form is limited to "
                 f"{LARGEST_DIRECT} joints; solve A qdd = Gamma - H with "
-                "inertia_matrix and bias, or take forward_dynamics of the emitted module"
+                "inertia_matrix and bias, or use forward_dynamics of the generated module"
             )
         algebra, A, H = self._entries(MODELS["inertia_matrix"], MODELS["bias"])
         torques = {(k,): algebra.graph.symbol(Symbol("torque", f"GAM{robot.joints[k]}")) for k in n}

@@ -44,7 +44,7 @@ def test_one_more_line_is_refused_without_trust(generated):
     mark = generated / "mark"
     file = generated / "planar_2r.py"
     appended(file, f"__import__('pathlib').Path({str(mark)!r}).touch()")
-    with pytest.raises(ModelError, match="has not emitted and certified; pass trust=True"):
+    with pytest.raises(ModelError, match="has not generated and certified; pass trust=True"):
         load_model(file)
     assert not mark.exists()
     assert load_model(file, trust=True).NAME == "planar_2r" and mark.exists()

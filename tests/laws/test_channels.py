@@ -149,7 +149,7 @@ def test_laws_that_no_record_can_give_are_refused(column: str, message: str) -> 
 
 
 def test_a_channel_is_no_length_and_a_load_that_of_one_joint() -> None:
-    with pytest.raises(DescriptionError, match="the measured quantity channel.temperature"):
+    with pytest.raises(DescriptionError, match=r"the measured quantity channel\.temperature"):
         robot(d="temperature")
     with pytest.raises(DescriptionError, match="one actuated joint"):
         robot("LD: {kind: load_dependent, along: {2: q1 + q2}}")

@@ -97,7 +97,9 @@ def test_models_are_shown(ratio: str, form: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("ratio", "number"), [("L*q2", "0.08"), ("pi*q2", "3.14159265359")])
 def test_a_ratio_that_is_no_number_is_refused_with_the_number(ratio: str, number: str) -> None:
-    with pytest.raises(DescriptionError, match=rf"q3: q3 turns .* with q2; .* write {number}"):
+    with pytest.raises(
+        DescriptionError, match=rf"q3: the ratio of q3 to q2 is .*; .* write {number}"
+    ):
         regroup(hand(ratio, "q1"))
 
 

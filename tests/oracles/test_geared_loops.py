@@ -86,7 +86,7 @@ def test_a_motor_before_a_loop_that_follows_a_joint_of_it(kind: str, tmp_path: P
     frames = tuple(replace(f, mu=int(f.mu and f.j != 1)) for f in robot.frames)
     robot = replace(robot, frames=frames, constraints={**robot.constraints, 1: relation})
     found = regroup(robot)
-    assert "turns 333/1000 times with q3" in found.method
+    assert "an angle contains 333/1000 times q3" in found.method
     assert certify(found).valid
     torques_agree(robot, module_of(generate_module(robot), tmp_path))
 
