@@ -51,7 +51,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: a511c8af82ca8329b67a4655ab115fb89c7163fc0e4e9d5b7a8cfd0f94b07d33
+sha256 of all but these lines: f1c23f1d430c0530534b1c0e111c7de2e126ece3748c956e579e88c830a18839
 """
 
 import numpy as np
@@ -402,7 +402,7 @@ def _stored(q, qd, qdd, out, constants):
     xp = _package(*states)
     if xp is not np:
         if out is not None:
-            raise ValueError("out: a store holds NumPy's arrays alone")
+            raise ValueError("out: only NumPy arrays can be written into a store")
         D = _gathered(xp, _constant({}), _regressor_block, (4, 1), states, (), constants)
         return xp, xp.matrix_transpose(D)
     states = _states(*states)

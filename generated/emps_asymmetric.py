@@ -52,7 +52,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 12a17b9fd33cb458e37ed97dd310871d3fe47bb9e2fa6235dfaecc83829ebb52
+sha256 of all but these lines: ff1f278737d3340fb1fdacefcaf1a5ac1776ae2253e48a4fad2d2d4bf3af525e
 """
 
 import numpy as np
@@ -403,7 +403,7 @@ def _stored(q, qd, qdd, out, constants):
     xp = _package(*states)
     if xp is not np:
         if out is not None:
-            raise ValueError("out: a store holds NumPy's arrays alone")
+            raise ValueError("out: only NumPy arrays can be written into a store")
         D = _gathered(xp, _constant({}), _regressor_block, (5, 1), states, (), constants)
         return xp, xp.matrix_transpose(D)
     states = _states(*states)

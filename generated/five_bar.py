@@ -76,7 +76,7 @@ with probability below 8e-15; base_parameters, regressor, observation_matrix, in
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints, elements
 at random states, parameters and random constants agree with Lagrange's equations and products of
 frames to 1e-09, on NumPy's arrays.
-sha256 of all but these lines: d7d40a30beec91480fb24fc1cd037c636589f97e8bd444cb18416b1c297e09e4
+sha256 of all but these lines: 39e0e8193bae9ab493a1aaeadd2187a0f8317a6b44f8fb14e03e9892c86c01c6
 """
 
 import numpy as np
@@ -523,7 +523,7 @@ def _start(constants):
             raise ValueError(
                 "the loops do not close in the assembly mode of _START at the constants "
                 f"L0, L1, L2, L3, L4 = {given + away}; "
-                "emit the model anew from a robot file with these constants"
+                "generate the model from a robot file with these constants"
             )
     return q, x[0]
 

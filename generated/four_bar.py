@@ -74,7 +74,7 @@ with probability below 6e-15; base_parameters, regressor, observation_matrix, in
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints, elements
 at random states, parameters and random constants agree with Lagrange's equations and products of
 frames to 1e-09, on NumPy's arrays.
-sha256 of all but these lines: e4f545a9c645628d1827999936c13da8ae48e449c15d7bb988887bf22cb1c635
+sha256 of all but these lines: c9bb040b5bd96f1b7a87fb547b26559df7021c9b45f52bc2225edd5934395730
 """
 
 import numpy as np
@@ -510,7 +510,7 @@ def _start(constants):
             raise ValueError(
                 "the loops do not close in the assembly mode of _START at the constants "
                 f"L0, L1, L2, L3 = {given + away}; "
-                "emit the model anew from a robot file with these constants"
+                "generate the model from a robot file with these constants"
             )
     return q, x[0]
 

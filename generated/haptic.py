@@ -89,7 +89,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 4614540b951de09b8f34540c5802d7068f6bf971149712462c808ba89812f095
+sha256 of all but these lines: a7d9458a26d6c7908f64de25a467aafd2a9738d28d784ed94e541ad6d32e159b
 """
 
 import numpy as np
@@ -525,7 +525,7 @@ def _stored(q, qd, qdd, out, constants):
     xp = _package(*states)
     if xp is not np:
         if out is not None:
-            raise ValueError("out: a store holds NumPy's arrays alone")
+            raise ValueError("out: only NumPy arrays can be written into a store")
         D = _gathered(xp, _constant({}), _regressor_block, (30, 3), states, (), constants)
         return xp, xp.matrix_transpose(D)
     states = _states(*states)

@@ -80,7 +80,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 5ddfdce7355748243895a9c51c515a068ea6a13a9f486df6372529ecd51545ce
+sha256 of all but these lines: e23261a3dce33f1a875deff0efad83da3dd5b9510bf0441bbcc4f67ff9c6d7d4
 """
 
 import numpy as np
@@ -531,7 +531,7 @@ def _stored(q, qd, qdd, out, constants):
     xp = _package(*states)
     if xp is not np:
         if out is not None:
-            raise ValueError("out: a store holds NumPy's arrays alone")
+            raise ValueError("out: only NumPy arrays can be written into a store")
         D = _gathered(xp, _constant({}), _regressor_block, (69, 7), states, (), constants)
         return xp, xp.matrix_transpose(D)
     states = _states(*states)

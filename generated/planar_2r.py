@@ -67,7 +67,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: daa119dd7b51692dcb82de357e2f58ba403fcdddbf44fd57ae12b8f6ea019ce7
+sha256 of all but these lines: 44ed046cfa7dfc093e2e604c788c7881a53f2924e1b5d4aa9624cdbd00edf444
 """
 
 import numpy as np
@@ -434,7 +434,7 @@ def _stored(q, qd, qdd, out, constants):
     xp = _package(*states)
     if xp is not np:
         if out is not None:
-            raise ValueError("out: a store holds NumPy's arrays alone")
+            raise ValueError("out: only NumPy arrays can be written into a store")
         D = _gathered(xp, _constant({}), _regressor_block, (13, 2), states, (), constants)
         return xp, xp.matrix_transpose(D)
     states = _states(*states)

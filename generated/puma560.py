@@ -80,7 +80,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 430b5cb4f7a2895b311b540a45f4126f60af99374db1424d7e69ec4efa20479a
+sha256 of all but these lines: 74f8f1c2760fbe8feb4ecc78cf98a5ab17f8a5f6afeb97e2561a1386f0e79c97
 """
 
 import numpy as np
@@ -516,7 +516,7 @@ def _stored(q, qd, qdd, out, constants):
     xp = _package(*states)
     if xp is not np:
         if out is not None:
-            raise ValueError("out: a store holds NumPy's arrays alone")
+            raise ValueError("out: only NumPy arrays can be written into a store")
         D = _gathered(xp, _constant({}), _regressor_block, (58, 6), states, (), constants)
         return xp, xp.matrix_transpose(D)
     states = _states(*states)

@@ -80,7 +80,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 2cabdcb1a3d8b3fd8a05d41ff20e0599cbab9eff08c9e47dc1b7dad9f9799beb
+sha256 of all but these lines: 4825834ae9b1caca27053897cf5dc61ed454afc6fd1abf6fe8de1cc452811d70
 """
 
 import numpy as np
@@ -501,7 +501,7 @@ def _stored(q, qd, qdd, out, constants):
     xp = _package(*states)
     if xp is not np:
         if out is not None:
-            raise ValueError("out: a store holds NumPy's arrays alone")
+            raise ValueError("out: only NumPy arrays can be written into a store")
         D = _gathered(xp, _constant({}), _regressor_block, (58, 6), states, (), constants)
         return xp, xp.matrix_transpose(D)
     states = _states(*states)

@@ -73,7 +73,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: b580d8eee2008a94a4c493cb4baa78069b7b47fc4da3dd16c9c24911abcd5b25
+sha256 of all but these lines: ee3d44d08046e4606e4e4d945ac07f799ad5a598de1fa63abe5d037b6cf8fe73
 """
 
 import numpy as np
@@ -465,7 +465,7 @@ def _stored(q, qd, qdd, out, constants):
     xp = _package(*states)
     if xp is not np:
         if out is not None:
-            raise ValueError("out: a store holds NumPy's arrays alone")
+            raise ValueError("out: only NumPy arrays can be written into a store")
         D = _gathered(xp, _constant({}), _regressor_block, (22, 4), states, (), constants)
         return xp, xp.matrix_transpose(D)
     states = _states(*states)

@@ -88,7 +88,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: fa04af19967e21487ae46b3b090ea4f88e3f5f571a6056899efb4ebbb8d767e4
+sha256 of all but these lines: a450fc8c65ecd9c2f64a3af166eacc8e5dbf5bdeec83158009ad5313c7782c02
 """
 
 import numpy as np
@@ -544,7 +544,7 @@ def _stored(q, qd, qdd, out, constants):
     xp = _package(*states)
     if xp is not np:
         if out is not None:
-            raise ValueError("out: a store holds NumPy's arrays alone")
+            raise ValueError("out: only NumPy arrays can be written into a store")
         D = _gathered(xp, _constant({}), _regressor_block, (60, 6), states, (), constants)
         return xp, xp.matrix_transpose(D)
     states = _states(*states)

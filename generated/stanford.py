@@ -78,7 +78,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: cef310702d00938f9318334976a966a97e80d3ce6b3bc20c88ac52053903c053
+sha256 of all but these lines: b2dd65d37f621720d4dc16c0d14c2774651c3c2f15c67c10609da83b15325f0a
 """
 
 import numpy as np
@@ -498,7 +498,7 @@ def _stored(q, qd, qdd, out, constants):
     xp = _package(*states)
     if xp is not np:
         if out is not None:
-            raise ValueError("out: a store holds NumPy's arrays alone")
+            raise ValueError("out: only NumPy arrays can be written into a store")
         D = _gathered(xp, _constant({}), _regressor_block, (55, 6), states, (), constants)
         return xp, xp.matrix_transpose(D)
     states = _states(*states)

@@ -85,7 +85,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: d2c87c1ebea03eb9eb0600551edcf586db717a028cb1ba85a6eeeeb35b527ab7
+sha256 of all but these lines: 36a70d34ba7fd4ef1fc49865cf17e7810f36895009f5ad0c57017c7761f36f54
 """
 
 import numpy as np
@@ -553,7 +553,7 @@ def _stored(q, qd, qdd, out, constants):
     xp = _package(*states)
     if xp is not np:
         if out is not None:
-            raise ValueError("out: a store holds NumPy's arrays alone")
+            raise ValueError("out: only NumPy arrays can be written into a store")
         D = _gathered(xp, _constant({}), _regressor_block, (67, 7), states, (), constants)
         return xp, xp.matrix_transpose(D)
     states = _states(*states)

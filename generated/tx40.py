@@ -82,7 +82,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 6ec83a3c96c8c83f00ea790d71d918147b5cf772c9439b8d91ce75dd94fe22d8
+sha256 of all but these lines: 201544cc856fb7869f3b252add364be3183d1f00f28c4958abedcbbdc628971a
 """
 
 import numpy as np
@@ -505,7 +505,7 @@ def _stored(q, qd, qdd, out, constants):
     xp = _package(*states)
     if xp is not np:
         if out is not None:
-            raise ValueError("out: a store holds NumPy's arrays alone")
+            raise ValueError("out: only NumPy arrays can be written into a store")
         D = _gathered(xp, _constant({}), _regressor_block, (60, 6), states, (), constants)
         return xp, xp.matrix_transpose(D)
     states = _states(*states)

@@ -80,7 +80,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: f8b50f791c021acadcc6c17e61c403d9275df4b32eaecdee10d9fe737028d164
+sha256 of all but these lines: 3ec3c88f2ad9e34ac0077625dadba758be250f9867b503eb2840f9730e9ade6a
 """
 
 import numpy as np
@@ -501,7 +501,7 @@ def _stored(q, qd, qdd, out, constants):
     xp = _package(*states)
     if xp is not np:
         if out is not None:
-            raise ValueError("out: a store holds NumPy's arrays alone")
+            raise ValueError("out: only NumPy arrays can be written into a store")
         D = _gathered(xp, _constant({}), _regressor_block, (58, 6), states, (), constants)
         return xp, xp.matrix_transpose(D)
     states = _states(*states)

@@ -67,7 +67,7 @@ def test_constants_by_keyword(name: str, tmp_path: Path) -> None:
 def test_constants_at_which_the_loop_does_not_close(tmp_path: Path) -> None:
     module = emitted(load_robot("four_bar"), tmp_path)
     with pytest.raises(
-        ValueError, match=r"do not close .* L0, L1, L2, L3 = \[1\.5 .*emit the model"
+        ValueError, match=r"do not close .* L0, L1, L2, L3 = \[1\.5 .*generate the model"
     ):
         module.passive_joints(np.array([[1.0]]), L0=1.5)
 
