@@ -169,6 +169,8 @@ def test_what_is_missing_is_said() -> None:
     elsewhere = runtime.Record(
         record.t, record.q, record.tau, rate=1000.0, channels={"wrench9": np.ones((6000, 6))}
     )
-    with pytest.raises(InputError, match="a wrench in frame 9 of planar_2r is not possible: no such frame"):
+    with pytest.raises(
+        InputError, match="a wrench in frame 9 of planar_2r is not possible: no such frame"
+    ):
         runtime.identify(model, elsewhere, STUDY)
     assert runtime.problem(model, bare, STUDY).model is model

@@ -111,6 +111,7 @@ def run(text: str, path: Path) -> ModuleType:
         ) from e
     except Exception as e:  # whatever a broken file raises becomes one kind of error
         raise ModelError(
-            f"fails on import with {type(e).__name__}: {e}; generate the module again (symgen generate)", file=str(path)
+            f"fails on import with {type(e).__name__}: {e}; generate the module again (symgen generate)",
+            file=str(path),
         ) from e
     return module

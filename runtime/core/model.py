@@ -169,7 +169,8 @@ def checked_model(module: ModuleType) -> GeneratedModel:
     missing = [name for name in (*CONSTANTS, *FUNCTIONS) if not hasattr(module, name)]
     if missing:
         raise ModelError(
-            f"no {', '.join(missing)}; expected a module that symgen generated; generate it again", file=label
+            f"no {', '.join(missing)}; expected a module that symgen generated; generate it again",
+            file=label,
         )
     model = cast(GeneratedModel, module)
     _check_names(model, label)

@@ -350,7 +350,9 @@ def _names_of(model: Any) -> tuple[str, ...]:
     if not isinstance(names, Mapping) or not all(
         isinstance(name, str) and name.isprintable() for name in names.values()
     ):
-        raise ModelError("LABELS must map joints to names; generate the module again", file=model.NAME)
+        raise ModelError(
+            "LABELS must map joints to names; generate the module again", file=model.NAME
+        )
     if model is None or not names.keys() >= {*model.JOINTS}:
         return ()
     return tuple(names[j] for j in model.JOINTS)

@@ -32,9 +32,7 @@ def test_load_by_name(tmp_path, monkeypatch):
     assert load_model("axis", trust=True).NAME == "emps"
     assert load_model("axis", folder=tmp_path / "generated", trust=True).NAME == "emps"
     assert not list(tmp_path.rglob("__pycache__"))
-    with pytest.raises(
-        ModelError, match=r"contains axis: generate it with `symgen generate arm`"
-    ):
+    with pytest.raises(ModelError, match=r"contains axis: generate it with `symgen generate arm`"):
         load_model("arm")
 
 

@@ -94,7 +94,9 @@ def test_steps_near_those_of_the_record_are_put_into_draws():
         coarse,
         q=coarse.q + np.random.default_rng(1).uniform(-0.45, 0.45, coarse.q.shape).round(1) * d,
     )
-    with pytest.raises(InputError, match=r"away from the values that an encoder of step 0\.001 reports"):
+    with pytest.raises(
+        InputError, match=r"away from the values that an encoder of step 0\.001 reports"
+    ):
         cestac(planar, filtered, replace(study(delta=(1.5 * d,)), signals=replace(SIGNALS, step=d)))
 
 

@@ -236,7 +236,11 @@ def test_a_step_that_is_a_fraction_of_the_true_one_is_told():
 @pytest.mark.parametrize(
     ("change", "step", "words"),
     [
-        (lambda q: q + 0.003 * np.sin(40 * T)[:, None], 0.01, "away from the values that an encoder"),
+        (
+            lambda q: q + 0.003 * np.sin(40 * T)[:, None],
+            0.01,
+            "away from the values that an encoder",
+        ),
         (lambda q: q, 0.013, "set signals.step to 0.01 for this encoder"),
         (
             lambda q: (q[2:] + q[1:-1] + q[:-2]) / 3,

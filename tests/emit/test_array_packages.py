@@ -208,7 +208,7 @@ def test_lists_and_a_store_of_numpy():
     )
     strict = package("array_api_strict")
     states = [strict.asarray(x) for x in (q, qd, qdd)]
-    with pytest.raises(ValueError, match="out: a store holds NumPy's arrays alone"):
+    with pytest.raises(ValueError, match="out: only NumPy arrays can be written into a store"):
         model.regressor(*states, out=model.store(N))
 
 

@@ -111,7 +111,10 @@ def test_joints_change_places(tmp_path):
     ("spoil", "said"),
     [
         (lambda s, q, tau: (s, JOINTS, q, (), ()), "0 values of effort for 2 joints"),
-        (lambda s, q, tau: (s, JOINTS[:1], q[:1], (), tau[:1]), "no joint elbow among the joints shoulder"),
+        (
+            lambda s, q, tau: (s, JOINTS[:1], q[:1], (), tau[:1]),
+            "no joint elbow among the joints shoulder",
+        ),
         (lambda s, q, tau: (s, JOINTS, q[:1], (), tau), "1 values of position for 2 joints"),
         (
             lambda s, q, tau: (s, ("shoulder", "elbow", "elbow"), (*q, 0), (), (*tau, 0)),
