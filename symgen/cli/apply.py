@@ -16,7 +16,10 @@ def apply(
         Path, typer.Argument(help="Folder of `symgen identify -o`, or its estimate.json.")
     ],
     model: Annotated[
-        Path, typer.Argument(help="File into which the values are written: .urdf, or MJCF as .xml or .mjcf.")
+        Path,
+        typer.Argument(
+            help="File into which the values are written: .urdf, or MJCF as .xml or .mjcf."
+        ),
     ],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="File to write; MODEL stays as it is.")

@@ -22,7 +22,8 @@ def simulate(
     ideal: Annotated[
         bool,
         typer.Option(
-            "--ideal", help="Simulate without noise and without the quantisation of encoder and analogue-digital converter."
+            "--ideal",
+            help="Simulate without noise and without the quantisation of encoder and analogue-digital converter.",
         ),
     ] = False,
     trust: options.Trust = False,
