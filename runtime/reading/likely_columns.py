@@ -146,6 +146,13 @@ def known_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str,
     return {**({"columns": columns} if columns else {}), **({"units": units} if units else {})}
 
 
+def speak_of_current(names: Sequence[str]) -> bool:
+    """Whether a column name has a word for current or effort, whose unit depends on the driver."""
+    words = {*CURRENTS, "effort", "efforts"}
+    meanings = map(_quantity, names)
+    return any(key == "tau" and WORDS["tau"][place] in words for key, place in meanings)
+
+
 def candidates(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str, list[str]]:
     """List the columns that may be t, q or tau, the likeliest first.
 

@@ -145,11 +145,12 @@ def preview(path: str, request: Mapping[str, Any]) -> dict[str, Any]:
     `columns`, names separated by commas, selects the columns with rows and lines. The result
     includes the roles of columns as far as their names show them, as in `identify --suggest`, and
     sampling rate and gaps of the time column `t` in its `unit`. If `decimal` is not given, the
-    decimal mark that reads more columns is used.
+    decimal mark that reads more columns is used. `currents` says whether a name in `tau` has a
+    word for current or effort.
     """
     from runtime.core.clock import time_stamps
     from runtime.reading.formats import read_table
-    from runtime.reading.likely_columns import known_columns
+    from runtime.reading.likely_columns import known_columns, speak_of_current
     from runtime.reading.units import time_unit
 
     topic, mark = request["topic"], request.get("decimal", "") or "."
@@ -175,6 +176,7 @@ def preview(path: str, request: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "names": names,
         "known": known | ({"decimal": mark} if mark != "." else {}),
+        "currents": speak_of_current(request.get("tau", "").split(",")),
         "rows": N,
         "stamps": "" if t is None else time_stamps(t).to_text(),
         "first": [[f"{x[k]:.6g}" for x in values] for k in range(min(N, FIRST_ROWS))],

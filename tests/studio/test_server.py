@@ -200,6 +200,11 @@ def test_a_new_record_is_what_the_page_shows(studio: Any) -> None:
     assert studio.get("view/preview").json()["names"] == ["t", "q1", "q2", "tau1", "tau2"]
     studio.upload("record", "other.csv", csv().replace(b"tau", b"effort_"))
     assert studio.get("view/preview").json()["names"][-1] == "effort_2"
+    asked = {
+        names: {"tau": names} for names in ("effort_1,effort_2", "tau1,tau2", "q1,i_motor", "")
+    }
+    answers = {names: studio.get("view/preview", params=asked[names]).json() for names in asked}
+    assert [answer["currents"] for answer in answers.values()] == [True, False, False, False]
 
 
 def test_a_folder_of_ros_2_is_a_record_of_the_command_line(studio: Any, tmp_path: Path) -> None:

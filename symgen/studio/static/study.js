@@ -26,7 +26,6 @@
       choose(field, listed(of(record) ?? of(guess)));
     }
     if (!one("[name='units.t']", form).value) one("[name='units.t']", form).value = "s";
-    one("#currents").hidden = !/cur|effort|(^|[_, ])i\d/i.test(one("[name='columns.tau']", form).value);
     ask();
   }
 
@@ -91,8 +90,9 @@
     const place = one("#preview"), text = (name) => one(`#questions [name='${name}']`).value.trim();
     const [t, q, tau] = ["t", "q", "tau"].map((key) => text(`columns.${key}`).split(",").map((name) => name.trim()).filter(Boolean));
     const asked = [...t, ...q, ...tau], columns = (asked.length ? asked : names.slice(0, 12)).join(",");
-    const value = await previewed({ columns, t: t[0] || "", unit: text("units.t"), decimal: text("decimal") });
+    const value = await previewed({ columns, t: t[0] || "", unit: text("units.t"), decimal: text("decimal"), tau: tau.join(",") });
     if (value.error || value.late) return;
+    one("#currents").hidden = !value.currents;
     const cells = (kind, row) => node("tr", {}, ...row.map((x) => node(kind, { textContent: x })));
     const first = node("div", { className: "scroll", tabIndex: 0 }, node("table", {}, node("caption", { textContent: "First rows" }), cells("th", Object.keys(value.lines)), ...value.first.map((row) => cells("td", row))));
     first.setAttribute("role", "region");
