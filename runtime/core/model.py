@@ -215,7 +215,7 @@ def require(model: GeneratedModel, *functions: str) -> None:
         )
     if missing:
         raise ModelError(
-            f"no function {', '.join(missing)}; generate the module again with the target that contains these functions",
+            f"no function {', '.join(missing)}; generate the module again, with --target or --with for these functions",
             file=model.NAME,
         )
 

@@ -170,8 +170,8 @@ def weights_of(
         largest[units.get(name, "")] = max(largest.get(units.get(name, ""), 0.0), abs(X[name]))
     if not all(largest.values()):
         raise InputError(
-            f"every parameter in {', '.join(u for u, x in largest.items() if not x)} is zero; give "
-            "the values in the robot file, or an estimate"
+            f"all parameters in {', '.join(u for u, x in largest.items() if not x)} are zero, so their "
+            "columns have no scale; give values in the robot file, or an estimate"
         )
     return Weights(
         names,

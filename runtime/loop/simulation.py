@@ -289,7 +289,7 @@ class Simulator:
         if size.any():
             if torque.bandwidth >= rate / 2:
                 raise SettingsError(
-                    f"{torque.bandwidth} Hz; expected less than half the controller's rate",
+                    f"{torque.bandwidth} Hz is too fast a disturbance; expected less than half the controller's rate",
                     path=("controller", "torque", "bandwidth"),
                 )
             pushed = lfilter(*butter(2, torque.bandwidth, fs=rate), pushed, axis=0)

@@ -22,7 +22,10 @@ def cestac(
         typer.Option(help="Position step, rad or m, such as 2*pi/5000; repeat for several."),
     ] = None,
     torque: Annotated[
-        list[str] | None, typer.Option(help="Motor torque step, N m or N; repeat for several.")
+        list[str] | None,
+        typer.Option(
+            help="Resolution of the torques of the motors, N m or N, such as 0.02; repeat for several."
+        ),
     ] = None,
     runs: Annotated[int | None, typer.Option(help="Runs per step, at least 2.")] = None,
     rounding: options.Rounding = None,

@@ -23,7 +23,8 @@ def check(
     claim: Annotated[
         Path | None,
         typer.Option(
-            "--certificate", help="Write the claims as JSON, so that others can verify them."
+            "--certificate",
+            help="Write what the certificate states (rank, formulas, hashes of the files) as JSON, so that others can verify it.",
         ),
     ] = None,
 ) -> None:

@@ -16,8 +16,8 @@ def excite(
     record: Annotated[
         str | None,
         typer.Argument(
-            help="Dataset, study file or measured file. Its estimate gives the parameters and the noise of the "
-            "torques; its motion is compared with the new one."
+            help="Dataset, study file or measured file. Parameters and torque noise are identified from it first; "
+            "its motion is compared with the new one."
         ),
     ] = None,
     output: Annotated[

@@ -99,7 +99,7 @@ Reader = Annotated[
     Text,
     typer.Option(
         help="How velocities are computed: lowpass filters the positions; counts estimates the motion from "
-        "encoder counts (with --rounding phase)."
+        "encoder counts and needs --rounding phase."
     ),
 ]
 Place = Annotated[

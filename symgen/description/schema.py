@@ -85,7 +85,7 @@ def _with_columns(data: dict[str, Any]) -> dict[str, Any]:
             raise DescriptionError(f"{key}: found {table!r:.60}; expected a table", path=(key,))
     if both := [name for name in columns if name in elements]:
         raise DescriptionError(
-            f"columns: {both[0]!r} is also the name of an element; give the column another name",
+            f"columns: {both[0]!r} is already the name of an entry of `elements` (friction, spring, ...); give the column another name",
             path=("columns", both[0]),
         )
     return {**data, "elements": {**elements, **columns}}

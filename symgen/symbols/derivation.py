@@ -152,7 +152,7 @@ def source_of(
             raise SymgenError(
                 f"{tied} of {robot.name} have no closed form: only the closure equations relate "
                 "these joints to the actuated joints; "
-                "leave out passive, or use passive='symbols' with the equations of the model closure"
+                "leave the argument `passive` out, or use passive='symbols' and solve the equations of the model `closure` too"
             )
         if passive == "symbols":
             closure = open_tree(robot)

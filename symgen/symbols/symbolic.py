@@ -98,7 +98,7 @@ class SymbolicRobot:
             )
         if rows is not None and name != "determinant":
             raise SymgenError(
-                f"`rows` is only for the model determinant; leave `rows` out for {name}"
+                f"only the model `determinant` has `rows`; leave them out for {name}"
             )
         of = robot.frames[-1].j if of is None else of
         for j in (of, frame):

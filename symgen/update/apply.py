@@ -190,8 +190,7 @@ def _determined_names(
     """
     if unknown := [name for name in result.names if name not in physical.base]:
         raise DescriptionError(
-            f"{', '.join(unknown[:8])} of the estimate are no base parameters of {of}; give the "
-            "robot file that was identified (--robot), and the --chain and --lock of its conversion"
+            f"{', '.join(unknown[:8])} of the estimate are no base parameters of {of}; give the robot file that was identified (--robot), and the same --chain and --lock options with which it was converted"
         )
     silent = {group[0] for group in result.groups if len(group) == 1}
     places = [

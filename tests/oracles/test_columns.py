@@ -224,7 +224,7 @@ def test_robots_with_columns_are_written_as_they_are_read() -> None:
         ("A: {along: 1, torque: 1/qd, unit: N*m}", "not finite"),
         ("A: {kind: tanh, along: 1, torque: qd}", "tanh already defines the law"),
         ("A: {along: 9, torque: qd, unit: N*m}", "frame 9 does not exist"),
-        ("FV: {along: 1, torque: qd, unit: N*m}", "is also the name of an element"),
+        ("FV: {along: 1, torque: qd, unit: N*m}", "is already the name of an entry of `elements`"),
         ("A: {kind: tanh, along: 1, fit: {v: 1}}", "has no constant v to fit"),
         ("A: {kind: tanh, along: 1, fit: {vs: {bounds: [1, 2], start: 3}}}", "start 3"),
         ("A: {along: 1, torque: __import__('os'), unit: N*m}", "unexpected"),
