@@ -104,7 +104,7 @@ class Homogeneity(Result, Part, keys="records parameters agree disagreements unt
         return any(d.difference > LIMIT.RELEVANT_DIFFERENCE for d in self.disagreements)
 
     def checks(self) -> tuple[Check, ...]:
-        """Return the check that judges whether the records agree."""
+        """Return the check of the report that asks whether the records agree, as a tuple."""
         return (agreeing(self),)
 
     def text(self) -> str:
@@ -126,7 +126,7 @@ class Homogeneity(Result, Part, keys="records parameters agree disagreements unt
         return f"The records {names} differ. {where}.{left_out}"
 
     def tables(self) -> list[Table]:
-        """Return a table of the parameters that differ; no table if none differs."""
+        """Return a table of the parameters that differ between records; no table if none does."""
         if not self.disagreements:
             return []
         rows = [
@@ -168,7 +168,7 @@ def agreeing(found: Homogeneity) -> Answer:
 
 
 def agreement(result: Identification) -> Homogeneity | None:
-    """Compare the parameters from all records, fitted or predicted; None for a single record.
+    """Compare the parameters that each record alone gives; validation records are included.
 
     All parameters are compared. If one record does not determine all of them, only the essential
     parameters are compared.

@@ -44,7 +44,7 @@ class Assumption:
 
     @property
     def text(self) -> str:
-        """Sentence that says whether the record contradicts the assumption."""
+        """Sentence that says whether the record contradicts the assumed value zero."""
         if np.isnan(self.p_value):
             return f"{self.name} = 0 cannot be tested: its torque is one of other parameters"
         said = f"{self.value:.3g} ± {1.96 * self.sigma:.2g} (p = {self.p_value:.2g})"

@@ -1,4 +1,4 @@
-"""The public functions, and the lists of preparation steps, readers, methods and analyses.
+"""Public functions of identification, and lists of preparation steps, readers, methods, analyses.
 
     STEPS      Problem -> Problem: changes of a problem before its rows are made, in this order
     READERS    Record, Signals -> States: signals.reader of a study
@@ -187,7 +187,7 @@ def list_records(records: Records) -> tuple[Record, ...]:
 
 
 def complete_study(study: Study) -> Study:
-    """Check that the method and the reader of a study exist, and complete the reader options.
+    """Check that the method and the signal reader of a study exist; add missing reader options.
 
     SettingsError if the method or the reader is unknown.
     """
@@ -240,7 +240,7 @@ def problem(
     unseen: Sequence[Record] = (),
     simulator: Simulator | None = None,
 ) -> Problem:
-    """Prepare model, records and study for all analyses: every step of `STEPS` is applied.
+    """Build a Problem from model, records and study, and apply every preparation step of `STEPS`.
 
     Parameters
     ----------
@@ -279,7 +279,7 @@ def observe(
     *,
     simulator: Simulator | None = None,
 ) -> Observation:
-    """Build the rows Y = W X + rho, eqs. (6) and (14), from one or several records.
+    """Build the rows Y = W X + rho of one or several records, eqs. (6) and (14) of the chapter.
 
     The study specifies filters, decimation and selection of rows.
     """
@@ -637,7 +637,7 @@ def simulate(
     ideal: bool = False,
     name: str | None = None,
 ) -> Simulation:
-    """Simulate the closed loop of study.controller along its reference.
+    """Simulate the control loop of study.controller along its reference motion.
 
     To run one loop many times, use `runtime.loop.simulation.Simulator`.
 
@@ -721,7 +721,7 @@ def _with_loaded(
 
 
 def _candidate(model: GeneratedModel, candidate: Study | tuple[Study, Records, Records]) -> Problem:
-    """Build the Problem of one study to compare and its records, without any preparation step."""
+    """Build the Problem of one of the studies that are compared, without any preparation step."""
     if isinstance(candidate, Study):
         fitted = records_of(candidate.record, model, candidate)
         predicted = records_of(candidate.validate.record, model, candidate)

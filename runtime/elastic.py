@@ -143,7 +143,7 @@ def elasticity(problem: Problem, names: Sequence[str], X: Array) -> Elasticity |
 
 
 def _gear(records: Sequence[Prepared], j: int, Ia: float | None) -> tuple[float, ...]:
-    """Fit stiffness K and damping D of the gear of joint j: return K, its sigma, D, its sigma, lag.
+    """Fit stiffness K and damping D of one gear; return K, its sigma, D, its sigma, and time lag.
 
     K and D are nan if the records do not determine the stiffness.
     """

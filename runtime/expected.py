@@ -1,4 +1,4 @@
-"""Estimate the likely error of predictions of other motions.
+"""Estimate the likely error of the torques that the parameters predict for other motions.
 
 Standard deviations of the parameters, and the effect of encoder steps on them, are converted to
 torque errors of motions within the range of the robot.
@@ -59,7 +59,7 @@ Array = np.ndarray
 
 
 class Expected(NamedTuple):
-    """Expected error of predictions, and the limits of the interval in which it is likely, %."""
+    """Expected error of predicted torques, and the limits of its likely interval, %."""
 
     error: float
     low: float
@@ -75,7 +75,7 @@ class Expected(NamedTuple):
     "positions (symgen excite; signals: {reader: counts})",
 )
 def expected_off(likely: Expected) -> Answer | None:
-    """Judge whether the expected prediction error is small enough; None if the error is unknown."""
+    """Judge whether the expected error of predicted torques is small enough; None if unknown."""
     if np.isnan(likely.error):
         return None
     limit = LIMIT.EXPECTED_ERROR
@@ -93,7 +93,7 @@ def expected_off(likely: Expected) -> Answer | None:
 
 @dataclass(frozen=True, eq=False)
 class ExpectedError(Part):
-    """Expected error of predictions by the used parameters, computed at first use."""
+    """Report part on the expected error of torques that the final parameters predict."""
 
     result: Identification
 
@@ -103,12 +103,12 @@ class ExpectedError(Part):
 
     @property
     def expected_error(self) -> float:
-        """Expected error of predictions over the whole range at up to half speed, %."""
+        """Expected error of torques predicted over the joint ranges at up to half speed, %."""
         return self.expected.error
 
     @cached_property
     def expected(self) -> Expected:
-        """Expected error of predictions, and the interval in which it is likely to be, %."""
+        """Expected error of predicted torques, and the interval in which it is likely to be, %."""
         result = self.result
         if not result.usable:
             return Expected(*3 * (float("nan"),))
@@ -126,7 +126,7 @@ class ExpectedError(Part):
         )
 
     def checks(self) -> tuple[Check, ...]:
-        """Return the check of the expected error; no check if the error is not known."""
+        """Return the check of the expected error of predicted torques; no check if unknown."""
         check = expected_off(self.expected)
         return () if check is None else (check,)
 
@@ -139,7 +139,7 @@ def expected_error(
     records: Sequence[Prepared],
     steps: float = 0.0,
 ) -> Expected:
-    """Compute the expected error of predictions, %, at most LIMIT.LARGEST_EXPECTED.
+    """Compute the expected error of torques predicted for other motions, with its interval, %.
 
     The error is nan if neither the robot file nor the records give a range, or if a loop cannot
     close in the range.

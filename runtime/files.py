@@ -127,7 +127,7 @@ def _(result: Identification, folder: Path, study: Study) -> Files:
 
 @files_of.register
 def _(result: Ranking, folder: Path, study: Study) -> Files:
-    """Make the files of a comparison and of its best identification."""
+    """Make the result files of a comparison of studies, and those of its best identification."""
     section = Section(
         "Treatments compared", (result.verdict, *result.missing), tables=(result.table(),)
     )
@@ -159,7 +159,7 @@ def _(result: Advice, folder: Path, study: Study) -> Files:
 
 @files_of.register
 def _(result: Simulation, folder: Path, study: Study) -> Files:
-    """Make the files of a simulation: the record, a study that reads it, key numbers, a figure."""
+    """Make the files of a simulation: simulated record, its study file, key numbers, and figure."""
     figure = simulation_figure(joint_labels(result.model), result, result.units)
     record = RecordSettings(
         files=(str(folder / RECORD),), rate=result.rate, name=result.name, simulated=True

@@ -15,7 +15,7 @@ OF_DRIVES = ("inertia", "viscous", "coulomb")
 
 
 def torques_of_links(problem: Problem) -> Problem:
-    """Leave friction and inertia of the drives out if torques are measured behind the gears.
+    """Leave friction and inertia of drives out of the fit if torques are measured behind gears.
 
     This is a step of the preparation of a problem. It acts only if estimate.columns is all.
     """

@@ -26,7 +26,7 @@ Array = np.ndarray
 
 
 def share_taken(tau: Array, q: Array, rate: float, window: int) -> Array:
-    """Compute the share of each joint torque that a median removes and that depends on the motion.
+    """Compute the share of each joint torque that a running median removes in time with the motion.
 
     Return the shares, shape (n,). The share of a joint is 0 if most of the removed torque does not
     depend on the motion.
@@ -54,7 +54,7 @@ def share_taken(tau: Array, q: Array, rate: float, window: int) -> Array:
 
 
 def torque_median(problem: Problem) -> Problem:
-    """Switch the median of the torques off if it would remove torque that depends on the motion.
+    """Switch the running median of the torques off if it removes torque that follows the motion.
 
     This is a step of the preparation of a problem. It acts only if signals.torque_median is auto.
     """
@@ -75,6 +75,6 @@ def torque_median(problem: Problem) -> Problem:
 
 
 def _with_window(problem: Problem, window: int) -> Study:
-    """Return the settings with a median of `window` samples on the torques."""
+    """Return the study settings with a running median of `window` samples for the torques."""
     settings = problem.settings
     return replace(settings, signals=replace(settings.signals, torque_median=window))

@@ -30,7 +30,7 @@ def at_rest(record: Record, signals: Signals) -> States:
 
 
 def poses_at_rest(problem: Problem) -> Problem:
-    """Keep only the base parameters that cause a torque in static poses.
+    """Restrict the estimate to the base parameters that cause a torque in static poses.
 
     This is a step of the preparation of a problem. A problem whose records are motions is not
     changed.

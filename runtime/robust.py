@@ -57,7 +57,7 @@ class IrlsOptions(LinearOptions):
 
 @dataclass(frozen=True, eq=False)
 class Robust:
-    """State of robust least squares after one pass: parameters, residuals, weights and scales.
+    """State of robust least squares after one pass: X, residuals, weights and residual scales.
 
     X are the parameters, shape (b,), u the scaled residuals and w the weights, shape (r,), and S
     the scales of the joints, shape (n,). T fulfils T T' = (sum_j W_j'W_j / S_j^2)^-1.
@@ -73,7 +73,7 @@ class Robust:
 
 
 def fit(start: Beginning) -> Fitted:
-    """Fit the parameters by robust least squares.
+    """Fit the parameters X by robust least squares with Huber's or Tukey's loss function.
 
     `details` of the result has the scales S_j, and the share of down-weighted rows of each joint.
     """
@@ -86,14 +86,14 @@ def fit(start: Beginning) -> Fitted:
 
 
 def weight(u: Array, loss: str, tuning: float) -> Array:
-    """Compute the weights w(u) of scaled residuals u, shape of u."""
+    """Compute the weights w(u), between 0 and 1, of rows with scaled residuals u."""
     if loss == "huber":
         return np.asarray(np.minimum(1.0, tuning / np.maximum(np.abs(u), np.finfo(float).tiny)))
     return np.where(np.abs(u) < tuning, (1 - (u / tuning) ** 2) ** 2, 0.0)
 
 
 def slope(u: Array, loss: str, tuning: float) -> Array:
-    """Compute the derivative psi'(u) of psi = w u, shape of u."""
+    """Compute the derivative psi'(u) of psi(u) = w(u) u at scaled residuals u."""
     inside = np.abs(u) < tuning
     v = (u / tuning) ** 2
     return np.where(inside, 1.0 if loss == "huber" else (1 - v) * (1 - 5 * v), 0.0)
@@ -127,7 +127,7 @@ def _weighted(observation: Observation, W: Array, raw: Factor, root: Array) -> F
 
 
 def _scales(observation: Observation, raw: Factor, e: Array) -> Array:
-    """Compute the residual scale S_j of each joint, shape (n,), at least the rounding of Y_j."""
+    """Compute the robust scale S_j of the residuals of each joint from their median, shape (n,)."""
     by_joint = [e[observation.joint(j)] for j in range(observation.n)]
     S = np.array(
         [
@@ -139,7 +139,7 @@ def _scales(observation: Observation, raw: Factor, e: Array) -> Array:
 
 
 def _fit_of_last_pass(start: Beginning, W: Array, fit: Robust) -> Fitted:
-    """Build the result of the last pass, with the covariance of a robust estimate."""
+    """Build the result from the last pass of the iteration, with a robust covariance."""
     observation, options = start.observation, start.options
     r, b = W.shape
     loss, tuning = options.loss, _tuning(options, options.loss)
@@ -197,7 +197,7 @@ def _note_of_shares(shares: Mapping[str, float]) -> str:
 
 
 def _tuning(options: IrlsOptions, loss: str) -> float:
-    """Return the constant k of Huber or c of Tukey for `loss`.
+    """Return the tuning constant of the loss function `loss`: k of Huber, or c of Tukey.
 
     The option `tuning` is for the chosen loss only: a Huber fit that starts a Tukey fit uses k =
     1.345.

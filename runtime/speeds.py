@@ -57,7 +57,7 @@ def crossings(
 
 
 def recorded_speeds(problem: Problem) -> Problem:
-    """Set the frequencies, Hz, above which recorded velocities replace differences of positions.
+    """Set the frequencies, Hz, above which recorded velocities replace differentiated positions.
 
     This is a step of the preparation of a problem. It acts if signals.velocity is auto, the reader
     is lowpass, and all fitted records have velocities.

@@ -186,7 +186,7 @@ def read_record(
     folder: str | Path = ".",
     missing: bool = False,
 ) -> Record:
-    """Read one measured record, converted to the joint side and SI.
+    """Read one measured record, converted to the joint side and SI units.
 
     Parameters
     ----------
@@ -319,7 +319,7 @@ def study_text(study: Study, destination: Path, *, defaults: bool = True) -> str
 
 
 def _differing(mapping: Mapping[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the entries of a mapping that differ from `usual`, also inside sections."""
+    """Return the settings in `mapping` that differ from the defaults `usual`, at every depth."""
     return {
         key: _differing(value, usual[key])
         if isinstance(value, Mapping) and isinstance(usual.get(key), Mapping)

@@ -63,7 +63,9 @@ class Ranking:
 
     @property
     def best(self) -> Identification:
-        """Identification with the treatment of the records that predicts best."""
+        """Identification with the settings (treatment) of the records that predict unseen data
+        best.
+        """
         return next(iter(self.results.values()))
 
     @property
@@ -88,7 +90,7 @@ class Ranking:
         return f"Predicts {self.best.unseen} best: {first}{then} of the measured torques."
 
     def table(self) -> Table:
-        """Return a table with one line for each treatment."""
+        """Return a table with a line for each treatment of the records: parameters, errors, use."""
         header = (
             "treatment",
             "parameters",
@@ -203,7 +205,7 @@ def treatments(
     steps: Sequence[Step],
     speed_of_rest: Callable[[Problem], float | tuple[float, ...] | None],
 ) -> dict[str, Problem]:
-    """Make up to three variants of a problem that differ in the treatment of the records.
+    """Return one to three variants of a problem, which treat its records in different ways.
 
     The variants are: as stated, without the rows of resting joints, and without known torques. All
     steps are applied to each.
@@ -229,7 +231,9 @@ def treatments(
 
 
 def standing_set(result: Identification) -> tuple[SetName, Estimate]:
-    """Find the set of parameters that predicts unseen data best: its name and its estimate."""
+    """Find which set of parameters (all, essential ...) predicts unseen data best, and its
+    estimate.
+    """
     name = best_set(result.set_errors, essential=True) if result.set_errors else "all"
     fit = result.sets.get(name, result.estimate)
     if name == "essential" and not result.sets:  # of a method that is not linear
@@ -266,7 +270,7 @@ def _require_alike(name: str, further: Sequence[Record], first: Sequence[Record]
 
 
 def _error(problem: Problem, fit: Estimate, treatment: Problem) -> float:
-    """Compute the error, %, of an estimate on validation rows made with other settings.
+    """Compute the error, %, of torques that an estimate predicts for the validation records.
 
     The error is the norm of the residual, % of the norm of the measured torque.
     """

@@ -100,7 +100,7 @@ def force_sensors(problem: Problem) -> Problem:
 
 
 def _record(record: Record, channels: Sequence[str]) -> Record:
-    """Add to a record six fixed joints for each force sensor; their torques are the wrench."""
+    """Add to a record six fixed joints for each force sensor; their torques are its wrench."""
     rest = np.zeros((len(record), 6 * len(channels)))
     others = {
         c: np.hstack([x, rest * (np.nan if c == "q_link" else 0)]) if c in JOINT_CHANNELS else x

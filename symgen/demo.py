@@ -208,7 +208,7 @@ def prepare(*, quick: bool) -> Prepared:
 def demonstrate(
     prepared: Prepared, *, quick: bool, progress: Callable[[str], None] = lambda step: None
 ) -> Demonstration:
-    """Identify the robot and study its encoder and torque resolution.
+    """Identify the robot, and study how encoder and torque resolution change the estimate.
 
     quick : whether to make two runs per step and to leave further studies out.
     progress : called with the name of each computation before it begins.
@@ -322,7 +322,7 @@ class Demonstration:
 
 
 def sections(demo: Demonstration) -> list[Section]:
-    """Build the report sections: comparisons with Tables 2 to 4 of the chapter, and contradictions.
+    """Build the report sections: comparisons with Tables 2 to 4 and contradictions of the chapter.
 
     Contradictions are statements of the chapter that do not agree with each other.
     """
@@ -336,7 +336,7 @@ def sections(demo: Demonstration) -> list[Section]:
 
 
 def differences(demo: Demonstration) -> dict[str, float]:
-    """Compute the difference of our values from those of Table 2, %, for essential parameters."""
+    """Compute, in per cent, how far our essential parameters differ from Table 2 of the chapter."""
     fit = demo.result.essential.estimate
     return {n: percent(fit[n], value) for n, value in TABLE_2.items() if n in fit.names}
 
@@ -347,7 +347,7 @@ def percent(value: float, reference: float) -> float:
 
 
 def _fit_cells(fit: Estimate, name: str) -> tuple[str, str, str]:
-    """Write the value of a parameter, its difference from Table 2, %, and its %sigma.
+    """Write an estimated parameter, its difference from Table 2, and its relative sigma, both in %.
 
     A parameter that is not in the fit gives "removed".
     """

@@ -19,7 +19,7 @@ class SymgenError(Exception):
         super().__init__(printable(message))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return what pickle needs to rebuild the error without a call of __init__.
+        """Return the data from which pickle rebuilds the error without a call of __init__.
 
         The subclasses have an __init__ with more arguments than the message.
         """
@@ -41,7 +41,7 @@ def printable(text: str) -> str:
 
 
 class CertificateError(SymgenError):
-    """Error for a certificate that does not hold: the robot file is valid, but a check has failed.
+    """Error raised if a check of generated formulas or code fails for a valid robot file.
 
     Parameters
     ----------

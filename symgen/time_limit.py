@@ -20,7 +20,7 @@ _end: ContextVar[tuple[float, str]] = ContextVar("_end", default=(math.inf, ""))
 
 @contextmanager
 def limited(what: str) -> Iterator[None]:
-    """Limit processor time in the block to SECONDS; after it, `require_time` raises an error.
+    """Limit the processor time of the block to SECONDS; then `require_time` raises an error.
 
     what : name of the task for the message, such as "the regrouping of tx40".
     """
@@ -32,7 +32,7 @@ def limited(what: str) -> Iterator[None]:
 
 
 def require_time() -> None:
-    """Raise SymgenError if the processor time of the present task is over."""
+    """Raise SymgenError if the present task has used up its processor time."""
     end, what = _end.get()
     if time.process_time() > end:
         raise SymgenError(

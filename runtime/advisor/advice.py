@@ -31,7 +31,7 @@ NAMES = {"lowpass": "positions", "counts": "counts"}  # of the readers, in words
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """Result of several CESTAC runs, which round all positions at random to one encoder step.
+    """Mean change of the estimate over several CESTAC runs with one encoder step, and its interval.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Sampled:
 
 
 def sampled(delta: float, ratios: Array) -> Sampled:
-    """Compute the mean change of the estimate over several runs, eqs. (18), (21).
+    """Compute the mean change of the estimate over several CESTAC runs, eqs. (18) and (21).
 
     ratios : estimate of each run over that of the record, shape (runs, b).
     """
@@ -62,7 +62,7 @@ def sampled(delta: float, ratios: Array) -> Sampled:
 
 @dataclass(frozen=True, eq=False)
 class Limit:
-    """Coarsest encoder step before a parameter that decides the verdict changes by `percent` %.
+    """Coarsest encoder step that changes no parameter of small %sigma by more than `percent` %.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Limit:
 
 @dataclass(frozen=True, eq=False)
 class EncoderAdvice:
-    """Coarsest steps that some encoders may have, if all other encoders are exact.
+    """Coarsest steps that one encoder, or all together, may have; all other encoders are exact.
 
     Attributes
     ----------
@@ -136,7 +136,7 @@ class EncoderAdvice:
 
 @dataclass(frozen=True, eq=False)
 class ReaderAdvice:
-    """Coarsest steps that real encoders may have, if read as positions or if read as counts.
+    """Coarsest allowed steps of real encoders, read either as positions or as counts of lines.
 
     Attributes
     ----------
@@ -197,7 +197,7 @@ class Advice(Result, Part):
     title = "Resolution advice"
 
     def text(self) -> str:
-        """Write the verdict, the changes at the requested steps, and the assumptions."""
+        """Write the verdict, parameter changes at the requested encoder steps, and assumptions."""
         return "\n".join([self.verdict, *self.asked_lines(), *self.assumptions])
 
     def figures(self) -> tuple[Figure, ...]:
@@ -208,20 +208,20 @@ class Advice(Result, Part):
         return (advice_figure(self),) if self.deciding else ()
 
     def checks(self) -> tuple[Check, ...]:
-        """Return the check with the question "Does the encoder resolve enough?", as a tuple."""
+        """Return the check "Does the encoder resolve enough?" of the report, as a tuple."""
         return (answer(self),)
 
     def entries(self) -> dict[str, Any]:
-        """Return no entries: the advice is written to its own file, advice.json."""
+        """Return no entries for estimate.json: the advice has a file of its own, advice.json."""
         return {}
 
     def files(self) -> dict[str, str]:
-        """Return the text of the file advice.json, by name."""
+        """Return a mapping from the file name advice.json to the text of the file."""
         return {"advice.json": self.to_json()}
 
     @property
     def deciding(self) -> tuple[str, ...]:
-        """Names of the parameters that decide the verdict.
+        """Names of the parameters that decide the verdict: those with a small %sigma (11).
 
         Their relative standard deviation %sigma, eq. (11), is at most 10 %.
         """
@@ -229,7 +229,8 @@ class Advice(Result, Part):
 
     @property
     def ways(self) -> tuple[tuple[str, tuple[EncoderAdvice, ...], Array], ...]:
-        """For each way to treat rounding: its label, the advice and the changes at requested steps.
+        """For each rounding law or way to read encoders: its label, the advice for each encoder,
+        and the changes of the parameters at the requested encoder steps.
 
         A way is a rounding law, or a reader of real encoders; there is one advice for each choice
         of encoders. The chapter's law is first, with an empty label, unless only real encoders were
@@ -250,13 +251,13 @@ class Advice(Result, Part):
 
     @property
     def place(self) -> str:
-        """Side of the encoders in words: "at the joints" or "at the motors"."""
+        """Side of the gears where the encoders are, in words, for instance "at the joints"."""
         return {"joint": "at the joints", "motor": "at the motors"}[
             self.settings.get("cestac", {}).get("side", "joint")
         ]
 
     def worst(self, step: int, steps: Array | None = None) -> tuple[str, float]:
-        """Find which of the deciding parameters changes most at a requested encoder step.
+        """Find which parameter of small %sigma changes most at a requested encoder step.
 
         Return its name and its change %e.
 
@@ -270,7 +271,7 @@ class Advice(Result, Part):
 
     @property
     def negative(self) -> bool:
-        """Whether a requested step biases least squares, or CESTAC runs contradict the prediction.
+        """Whether a requested encoder step biases X, or CESTAC runs contradict the prediction.
 
         The runs are those of CESTAC at the steps of the limits.
         """
@@ -359,7 +360,7 @@ class Advice(Result, Part):
         return text + ")."
 
     def brief(self) -> str:
-        """Write the verdict, the coarsest step of each encoder, and changes at requested steps."""
+        """Write the verdict, each encoder's coarsest step, and changes of X at requested steps."""
         steps = [f"{table.caption}\n{table.to_text()}" for table in self.tables()[:-1]]
         return "\n\n".join([self.verdict, *steps, *self.asked_lines()])
 
@@ -420,7 +421,8 @@ class Advice(Result, Part):
         return Table(caption, headers, rows)
 
     def parameter_table(self) -> Table:
-        """Tabulate, for each parameter, %sigma, the steps for 1 % and 5 % change, and noise effect.
+        """Make the table of the parameters: %sigma, the encoder steps that change each parameter by
+        1 % and 5 %, and the increase of %sigma by torque noise.
 
         The steps are those of all encoders together. The effect is %sigma added by torque noise,
         per N m (N) of its standard deviation.
@@ -496,7 +498,7 @@ class Advice(Result, Part):
 
 
 def advice_figure(advice: Advice) -> Figure:
-    """Plot the change %e of each deciding parameter against the step Delta of all encoders.
+    """Plot the change %e of each parameter of small %sigma against the step Delta of all encoders.
 
     Lines are predicted; points are CESTAC runs with their Student intervals. If real encoders were
     judged, both readers are shown, otherwise the rounding law of the paper.
@@ -597,7 +599,7 @@ def answer(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer
 
 @dataclass(frozen=True, eq=False)
 class NoAdvice(Part):
-    """Report part used without an advice: it judges the encoder steps seen in the positions."""
+    """Part of a report without resolution advice: judges the encoder steps seen in positions."""
 
     result: Identification
 
@@ -605,7 +607,7 @@ class NoAdvice(Part):
     title = "Resolution advice"
 
     def checks(self) -> tuple[Check, ...]:
-        """Return the check with the question "Does the encoder resolve enough?", as a tuple."""
+        """Return the check "Does the encoder resolve enough?" of the report, as a tuple."""
         simulated = self.result.study.estimate.method in ("iv", "didim")
         return (answer(None, *(("", 0.0) if simulated else visible_steps(self.result))),)
 
@@ -625,7 +627,7 @@ def _summary(advice: EncoderAdvice) -> dict[str, Any]:
 def confirm_by_runs(
     advice: EncoderAdvice, reference: Estimate, level: Callable[[float], Sampled]
 ) -> EncoderAdvice:
-    """Add CESTAC runs at the coarsest allowed steps, which confirm or contradict the prediction.
+    """Add CESTAC runs at the coarsest allowed encoder steps, to confirm or refute the prediction.
 
     If all encoders are coarse together, runs between these steps and above them are added, too.
 
@@ -654,7 +656,7 @@ def confirm_by_runs(
 
 
 def limits_of(delta: Array, change: Array, reference: Estimate) -> tuple[Limit, ...]:
-    """Find the coarsest encoder steps that change the deciding parameters by at most 1 % and 5 %.
+    """Find the coarsest encoder steps that change parameters of small %sigma by up to 1 % and 5 %.
 
     nan if the finest step is already too coarse or no parameter is judged; inf if every step is
     fine enough.

@@ -83,7 +83,7 @@ class Predictor:
     share: float
 
     def change(self, delta: float, encoders: Sequence[int]) -> Array:
-        """Predict the change of X if the given encoders have the step `delta`, shape (b,), %.
+        """Predict the change of the estimate X, in %, if the given encoders have the step `delta`.
 
         It is 100 (X(v)/X(0) - 1).
         """
@@ -97,7 +97,7 @@ class Predictor:
         return solution(self._total(0.0, ()), self.weights)
 
     def rate(self, encoders: Sequence[int]) -> Array:
-        """Compute how fast X changes with the squared step Delta^2 at Delta = 0, shape (b,), %.
+        """Compute the derivative of the change of X, in %, by Delta^2 at Delta = 0, shape (b,).
 
         Errors of columns that switch sign are left out.
         """
@@ -334,7 +334,7 @@ def assumptions(
     *,
     real: bool = False,
 ) -> tuple[str, ...]:
-    """Write the assumptions of the prediction, one sentence or more for each.
+    """Write the assumptions behind the predicted effect of coarse encoders, as a tuple of texts.
 
     real : whether real encoders were judged, too.
     """

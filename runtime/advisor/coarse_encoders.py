@@ -1,4 +1,4 @@
-"""Simulate coarse and exact encoders together, with one rounding law and one way to read them.
+"""Simulate records in which some encoders are coarse and the others exact, and estimate X anew.
 
     error of encoder i, as read
             e_i = reader(rounded(x_i)) - reader of the record, filtered alike
@@ -131,7 +131,7 @@ class CoarseEncoders:
 
     @property
     def coarsest(self) -> Array:
-        """Largest step that can be judged for each encoder, shape (n,), rad or m.
+        """Largest step of each encoder whose effect the records can show, shape (n,), rad or m.
 
         LIMIT.LINES_IN_MOTION steps of this size are in the motion of the encoder; inf for an
         encoder at rest.
@@ -141,7 +141,7 @@ class CoarseEncoders:
 
     @property
     def finest(self) -> float:
-        """Smallest encoder step that can be judged, rad or m.
+        """Smallest encoder step whose effect the records can show, rad or m.
 
         It is LIMIT.EXACT_FROM times the largest step of the encoders that made the records, so that
         the recorded positions are exact in comparison; 0 if those encoders are unknown.
@@ -164,7 +164,7 @@ class CoarseEncoders:
         return np.full(len(self.reference), np.nan)
 
     def locking(self, delta: Array) -> Array:
-        """Compute the power of rounding errors that passes the low-pass, relative to white noise.
+        """Compute the power of rounding errors after the low-pass filter, relative to white noise.
 
         The rounding error is a sawtooth. The result, shape (m,), is the largest power of all
         records and speeds.
@@ -189,7 +189,7 @@ class CoarseEncoders:
         return most
 
     def nodes(self, delta: float, moving: Sequence[int], read: int = 0) -> list[list[Array]]:
-        """Compute the errors of q, qd and qdd in every record for several phases of encoder lines.
+        """Compute errors of q, qd and qdd for several offsets (phases) of the encoder lines.
 
         These phases are the nodes of a quadrature. At first there are PHASES nodes. If `read` nodes
         are known already, as many new ones are computed, in the middle between the known ones.
@@ -231,7 +231,7 @@ class CoarseEncoders:
         return sampled(delta, np.array(ratios))
 
     def _rounded(self, delta: float, encoders: Sequence[int], run: int) -> list[Array]:
-        """Draw errors of q, qd and qdd for a law that rounds each sample independently.
+        """Draw random errors of q, qd and qdd for encoders that round each sample independently.
 
         The random numbers of an encoder do not depend on which other encoders are coarse.
         """
@@ -243,14 +243,14 @@ class CoarseEncoders:
         return self._read(drawn, encoders, delta)
 
     def _counted_at_random(self, delta: float, encoders: Sequence[int], run: int) -> list[Array]:
-        """Draw errors of q, qd and qdd for encoders that count lines, with random phases."""
+        """Draw errors of q, qd and qdd for encoders that count lines at random offsets (phases)."""
         phases = stream(self.task.settings.seed, run, *encoders).random(len(self.root))
         return self._counts(delta, delta * phases, encoders, (run, *encoders, 0))
 
     def _counts(
         self, delta: float, phases: Array, encoders: Sequence[int], key: tuple[int, ...]
     ) -> list[Array]:
-        """Compute the errors of q, qd and qdd for encoders that count lines, at given phases.
+        """Compute errors of q, qd and qdd for encoders that count lines at the given offsets.
 
         key : selects the random numbers of uneven lines, which are the same in every record.
         """
@@ -288,7 +288,7 @@ class CoarseEncoders:
         return of_records
 
     def _ratio(self, errors: Sequence[Array], encoders: Sequence[int]) -> Array:
-        """Compute the ratio of X with some encoders in error to X without errors, shape (b,).
+        """Compute the estimate X with errors of some encoders, divided by X without, shape (b,).
 
         Both are estimated on the same rows.
         """
@@ -328,7 +328,7 @@ class CoarseEncoders:
 
 
 def mean_change(ratios: Array) -> Array:
-    """Compute the mean change of the estimate over several phases, and its standard deviation.
+    """Compute the mean change of X, and its standard deviation, over offsets of the encoder lines.
 
     Return both in one array, shape (2, b), %. The standard deviation is that of the mean, if the
     phases (nodes) were independent.

@@ -81,7 +81,7 @@ class Perturbation:
     known: dict[tuple[int, int], Switched] = field(default_factory=dict)
 
     def expected(self, variance: float, encoders: Sequence[int]) -> Array:
-        """Compute the Gram matrices expected if some encoders have errors of the given variance.
+        """Compute the expected Gram matrices of [W Y] if some encoders have random errors.
 
         The encoders are numbered from 0; all others are exact.
         """
@@ -92,7 +92,7 @@ class Perturbation:
         return np.asarray(gram)
 
     def _add_switches(self, gram: Array, variance: float, encoders: list[int]) -> None:
-        """Add to the Gram matrices the expected effect of the errors on columns that switch sign.
+        """Add to the Gram matrices the effect of encoder errors on columns of W that switch sign.
 
         This is the change of their means, covariances and variances.
         """
@@ -123,7 +123,7 @@ class Perturbation:
             gram[j][np.ix_(columns, columns)] += shift.T @ shift + both
 
     def _at(self, switch: Switch, sigma: float) -> Switched:
-        """Interpolate how a velocity error changes a column of W that switches sign.
+        """Interpolate the effect of a velocity error on a column of W that switches sign.
 
         sigma : standard deviation of the error; the effect is computed at the two nearest nodes.
         """
@@ -231,7 +231,7 @@ def _smooth(
     root: Array,
     switching: Sequence[Switch],
 ) -> tuple[Array, Array]:
-    """Compute what position errors of variance 1 of each encoder add to the Gram matrices.
+    """Compute what position errors of variance 1 of each encoder add to the Gram matrices of [W Y].
 
     Columns that switch sign are left out. Return these additions, and the sensitivities of the rows
     to the error of the velocity.

@@ -101,7 +101,7 @@ def curves(
         return float(np.abs(mean_change(known[label][k])[0, decisive]).max(initial=0.0))
 
     def read(k: float, labels: Iterable[str], nodes: int = 0) -> list[str]:
-        """Compute the changes of the estimate at step number k of the curve, for several groups.
+        """Compute the changes of X at encoder step number k, for several groups of encoders.
 
         They are computed at the first phases of the encoder, or at `nodes` more phases. Return the
         labels of the choices for which this is possible.
@@ -165,7 +165,7 @@ def curves(
 def vague_steps(
     changes: Mapping[float, Array], decisive: Sequence[int], limit: float
 ) -> list[float]:
-    """Find the encoder steps around a limit, 1 or 5 %, at which the change is too uncertain.
+    """Find the encoder steps next to the limit 1 or 5 % at which the change of X is too uncertain.
 
     The limit is between two steps. A step is returned if the standard deviation of its change moves
     the limit by more than LIMIT.CURVE_SHARPNESS of it, by straight lines on logarithmic axes. If
@@ -193,7 +193,7 @@ def vague_steps(
 def uncertain(
     reader: ReaderName, advice: EncoderAdvice, error: Array, names: Sequence[str]
 ) -> list[str]:
-    """Write a warning for each limit, 1 or 5 %, if the curve is too flat to find its encoder step.
+    """Warn, for each limit of change (1 or 5 %), if the curve is too flat to give its encoder step.
 
     error : standard deviation of the change, shape (m, b), %.
     """

@@ -63,7 +63,7 @@ class Switched:
     variance: Array
 
     def between(self, other: Switched, sigma: float) -> Switched:
-        """Interpolate the effect linearly to a standard deviation between those of self and other.
+        """Interpolate the effect of a velocity error linearly between two standard deviations.
 
         The interpolated quantities are shift, slope*sigma and variance/sigma. This is exact if the
         speed rests (slope as 1/sigma, variance as sigma) or passes zero quickly (slope constant,
@@ -139,7 +139,7 @@ def _coefficients(switch: Switch, u: Array, m: Array, phi: Array, sigma: float) 
 
 @dataclass(frozen=True, eq=False)
 class Kernels:
-    """Fourier transforms with which the variances of columns that switch sign are summed.
+    """Fourier transforms of the correlation of velocity errors, used to sum variances over time.
 
     They are those of rho_k^n r_k, with rho_k the correlation of velocity errors k samples apart,
     and r_k the same for the decimation filter.
@@ -156,7 +156,7 @@ class Kernels:
 
 
 def kernels(band: Bandwidth, N: int, factor: int) -> Kernels:
-    """Compute the Fourier transforms with which variances over N samples are summed.
+    """Compute the Fourier transforms of the correlation of velocity errors over N samples.
 
     factor : the samples are decimated by this factor. Kernels change little over an eighth of it,
         so sums over this number of samples suffice.

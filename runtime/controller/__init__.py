@@ -1,1 +1,1 @@
-"""Torque computed by the law of the controller, for records without a measured torque."""
+"""Joint torques computed by the control law, for records that contain no measured torque."""

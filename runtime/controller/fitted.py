@@ -102,7 +102,7 @@ def law_of_controller(problem: Problem) -> Problem:
 
 @dataclass(frozen=True)
 class GainDoubt(Part):
-    """Warning that another gain kd than the stated gain explains the records better."""
+    """Warning that another velocity gain kd than the one in the settings fits much better."""
 
     sentence: str
 
@@ -110,21 +110,24 @@ class GainDoubt(Part):
     title = "Law of the controller"
 
     def warnings(self) -> tuple[str, ...]:
-        """Return the only warning: a question to the user whether the stated gains are right."""
+        """Return the only warning: a question whether the gains in the settings are right."""
         return (self.sentence,)
 
 
 def doubt_of_gains(result: Identification) -> GainDoubt | None:
-    """Return a warning if other gains kd than the stated ones fit much better, else None."""
+    """Return a warning if other velocity gains kd than those in the settings fit much better.
+
+    None if there is no such doubt.
+    """
     sentence = gain_doubt(result.problem, result.estimate.relative_error)
     return GainDoubt(sentence) if sentence else None
 
 
 def gain_doubt(problem: Problem, error: float) -> str:
-    """Write a warning if another gain kd than the stated gain fits much better, else "".
+    """Write a warning if other velocity gains kd than those in the settings fit much better.
 
-    The warning is written if another kd more than halves the error. It is also "" if the records
-    do not use the torque of the law.
+    The warning is written if another kd more than halves the error. Otherwise the text is "", also
+    if the records do not use the torque of the law.
 
     error : relative error of the torque with the stated kd, %.
     """
@@ -147,7 +150,7 @@ def gain_doubt(problem: Problem, error: float) -> str:
 
 
 def law_estimate(problem: Problem, law: Law, saturation: Array) -> LawEstimate:
-    """Estimate kd of every joint and the delay, if `law` sets them to "fit".
+    """Estimate the velocity gains kd and the delay of a control law, if they are set to "fit".
 
     saturation : ndarray, shape (n,), N m or N
         Largest torque of the drives; inf if they do not cut.
@@ -182,7 +185,7 @@ def law_estimate(problem: Problem, law: Law, saturation: Array) -> LawEstimate:
 def _search_kd(
     torques: TorquesOfLaw, gains: Sequence[str], late_too: bool, kd: Array, cuts: bool
 ) -> tuple[Array, float, float]:
-    """Search kd and the delay by Gauss-Newton iterations that start from the given kd.
+    """Search velocity gains kd and delay by Gauss-Newton iterations that start from the given kd.
 
     Returns kd, the delay and their misfit, which is nan if the drives do not cut.
 
@@ -234,14 +237,18 @@ class TorquesOfLaw:
     saturation: Array
 
     def torques(self, kd: Array, delay: float) -> list[Array]:
-        """Compute the torques of the law for all records, given kd and delay, shape (N, n) each."""
+        """Compute the torques of the control law for all records, shape (N, n) each.
+
+        kd : velocity gains. delay : of the torque, s.
+        """
         records = [prepared.record for prepared in self.records]
         return [torque_of(record, kd, delay, self.saturation) for record in records]
 
     def slopes(self, kd: Array, delay: float) -> list[Array]:
-        """Compute the derivatives of the torques with respect to kd: v, or zero at saturation.
+        """Compute dtau/dkd of each torque: the velocity error, or zero where the torque saturates.
 
-        v = qd_ref - qd, late by the delay.
+        The velocity error is v = qd_ref - qd, late by the delay; kd is the velocity gain of the
+        joint.
         """
         slopes = []
         for prepared in self.records:
@@ -252,7 +259,7 @@ class TorquesOfLaw:
         return slopes
 
     def fit(self, gains: Sequence[str], late_too: bool, kd: Array, delay: float) -> Estimate:
-        """Estimate X and the corrections of kd and of the delay by one linear fit."""
+        """Estimate X, and corrections of the gains kd and of the delay, by one linear fit."""
         torques = self.torques(kd, delay)
         Y = with_torques(self.rows, self.records, torques)
         columns: dict[str, Array] = {}
@@ -271,9 +278,10 @@ class TorquesOfLaw:
         return linear_estimate(wide, EstimateSettings("wls", "joint"), model=self.model)
 
     def misfit(self, kd: Array, delay: float) -> float:
-        """Compute the misfit sum_j N_j log ||Y_j - W_j X|| for given kd and delay.
+        """Compute the misfit between the model and the torques of the control law (kd, delay).
 
-        X is the least-squares estimate weighted by joint.
+        With N_j rows of joint j it is sum_j N_j log ||Y_j - W_j X||, X the estimate by least
+        squares weighted by joint.
         """
         fit = self.fit((), False, kd, delay)
         return float(

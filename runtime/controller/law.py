@@ -1,4 +1,4 @@
-"""Torque computed by the law of a controller, for records that contain no measured torque.
+"""Joint torques computed by the control law, for records that contain no measured torque.
 
 Many legged robots log only q, the reference and the gains.
 
@@ -47,16 +47,17 @@ class TorqueLaw:
     delay: float = 0.0
 
     def signals(self, t: Array, own: Mapping[str, Array], rate: float) -> dict[str, Array]:
-        """Add the torque tau of the law, and law_v = qd_ref - qd, to the signals of a record.
+        """Add the torques of the control law and the velocity errors to the signals of a record.
 
-        Both are late by the delay. own : signals of the whole record, by name.
+        The new signals are tau and law_v = qd_ref - qd; both are late by the delay. own : signals
+        of the whole record, by name.
         """
         v = own.get("qd_ref", 0.0) - velocity(own["q"], own, rate)
         made = {"tau": self.torque(own["q"], own, rate), "law_v": v}
         return {**own, **{key: late(t, x, self.delay) for key, x in made.items()}}
 
     def torque(self, q: Array, channels: Mapping[str, Array], rate: float) -> Array:
-        """Compute the torques of the law, shape (N, n), N m or N.
+        """Compute the torques of the control law, shape (N, n), N m or N.
 
         Parameters
         ----------
@@ -95,7 +96,7 @@ def late(t: Array, x: Array, delay: float) -> Array:
 
 
 def torque_law(controller: Controller | None, n: int, limits: Mapping[str, Any]) -> TorqueLaw:
-    """Make the torque law of n joints from the settings of a controller.
+    """Make the control law that gives the torques of n joints from the controller settings.
 
     SettingsError for gains that need more than the recorded signals, such as that of an integral.
 

@@ -76,7 +76,7 @@ class Checklist(Result):
 
     @property
     def doubt(self) -> str:
-        """Sentence on the largest doubt; without a doubt, on the questions that were not judged."""
+        """Sentence on the check with the worst answer; if all are good, on the open questions."""
         if self.worst is not None:
             return f"{self.worst.question} {self.worst.finding}."
         unanswered = [check.question for check in self.checks if check.state == "open"]
@@ -84,7 +84,7 @@ class Checklist(Result):
 
     @property
     def next(self) -> str:
-        """Sentence that says what the user should do next."""
+        """Advice to the user: the remedy of the worst check, or how to use the parameters."""
         if self.worst is not None:
             return f"{self.worst.remedy}."
         asked = [c.remedy for c in self.checks if c.state == "open" and c.remedy][:1]
@@ -211,7 +211,7 @@ def checklist_of(
 
 
 def remark(check: Check, counts: bool) -> Check:
-    """Change a check into a remark, which the verdict does not count.
+    """Turn a check that is not good into a remark, which does not count in the verdict.
 
     A remark has the state "open". The check is returned unchanged if `counts` is true or if it is
     good.
@@ -259,7 +259,7 @@ def rank_and_condition(estimate: Estimate, fit: Estimate) -> Answer:
     "(--friction)",
 )
 def total_error(fit: Estimate) -> Answer:
-    """Check the relative error of the fit over all joints."""
+    """Check the relative error 100 ||Y - W X|| / ||Y|| of the fit over all joints, in %."""
     text = f"{fit.relative_error:.1f} % of them stay unexplained"
     return Answer(state_of(fit.relative_error, *LIMIT.TOTAL_ERROR), text)
 
@@ -268,7 +268,7 @@ def total_error(fit: Estimate) -> Answer:
 def explained_by_joint(
     estimate: Estimate, fit: Estimate, expected: float = float("nan")
 ) -> Answer | None:
-    """Check the largest relative error of a single joint, which the total error may hide.
+    """Check the largest relative error of the fit on a single joint; the total error may hide it.
 
     Return None if fewer than two joints have a motor. If predictions are expected to be good
     (`expected`, %), the answer is never "no".
@@ -287,7 +287,7 @@ def explained_by_joint(
 
 
 def lost_joints(estimate: Estimate, fit: Estimate) -> str:
-    """Name the joints that are badly explained because parameters were removed, and give a remedy.
+    """Name the joints whose torques fit badly because parameters were removed, and give a remedy.
 
     Return "" if there are none.
 
@@ -328,7 +328,7 @@ def predicted(
     differ: bool = False,
     expected: float = float("nan"),
 ) -> Answer:
-    """Check the relative error, %, of the model on data that were not fitted.
+    """Check the relative error, %, of torques that the model predicts for data not fitted.
 
     error : the largest one; the answer is "open" if it is nan.
 
@@ -416,7 +416,7 @@ def certain(fit: Estimate, bootstrap: Mapping[str, float]) -> Answer:
     "use these values only together, or record a motion that separates them (symgen excite)",
 )
 def separate(fit: Estimate) -> Answer:
-    """Check that no two parameters have strongly correlated estimates, eq. (10)."""
+    """Check that no two parameters have strongly correlated estimates, by the covariance of X."""
     deviation = np.sqrt(np.diag(fit.covariance))
     with np.errstate(divide="ignore", invalid="ignore"):
         correlation = fit.covariance / np.outer(deviation, deviation)

@@ -32,13 +32,13 @@ BRIDGED_PERIODS = 10.0
 
 
 def sample(i: int) -> str:
-    """Name sample i, counted from 0, in messages about arrays: "sample 1" for i = 0."""
+    """Return the name of sample i, counted from 0, for messages: "sample 1" for i = 0."""
     return f"sample {i + 1}"
 
 
 @dataclass(frozen=True)
 class Stamps:
-    """What a record states about its time stamps: file, column, sampling rate and allowed jitter.
+    """Data to check the time stamps of a record: file, column, stated rate and allowed jitter.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Stamps:
 
 
 def rate_of(stamps: Stamps, t: Array) -> float:
-    """Compute the sampling rate, Hz, of the time stamps t, shape (N,), s.
+    """Compute the sampling rate, Hz, from uniform time stamps t, shape (N,), s.
 
     If the user stated a rate and the stamps agree, the stated rate is returned.
 
@@ -235,7 +235,7 @@ class TimeStamps:
 
 
 def times(number: int, kind: str) -> str:
-    """Write a number with its noun in singular or plural: "1 gap", "2 steps back"."""
+    """Write a count with its noun in singular or plural: "1 gap", "2 steps back"."""
     several = "steps back" if kind == "step back" else f"{kind}s"
     return f"{number} {kind if number == 1 else several}"
 

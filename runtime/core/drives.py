@@ -1,4 +1,4 @@
-"""Drives: conversion of positions and torques between motors and joints (section 4.2.1).
+"""Conversion of positions and torques between motors and joints (chapter, section 4.2.1).
 
 One matrix R serves both directions, so that the power tau' qd is that of the motors:
 
@@ -134,7 +134,7 @@ class Drives:
 
     @property
     def motion(self) -> Array:
-        """Motor turns per joint turn, shape (n, n): R, or its diagonal if couplings are ignored."""
+        """Gear-ratio matrix R of the positions, shape (n, n); diagonal if couplings are ignored."""
         return self._matrix("position")
 
     def _matrix(self, quantity: str) -> Array:
@@ -150,7 +150,7 @@ class Drives:
 
 
 def encoder_drives(side: str, drives: Drives | None, section: str = "signals") -> Drives | None:
-    """Return the drives between joints and encoders; None if the encoders are at the joints.
+    """Return the drives that link joint and encoder positions; None for encoders at the joints.
 
     Raise SettingsError if the encoders are at the motors and the robot has no drives. section :
     section of the study whose key `side` is "joint" or "motor", for messages.

@@ -1,4 +1,4 @@
-"""Essential parameters: the few that explain the torques nearly as well as all (section 4.1.1).
+"""Essential parameters: the few that explain the torques nearly as well as all (chapter, 4.1.1).
 
 The parameter with the largest %sigma, eq. (11), is removed and the rest is fitted again, as long as
 sigma_rho, eq. (9), stays below threshold times its first value. To remove a parameter, its column
@@ -30,7 +30,7 @@ THRESHOLDS = (1.02, 1.03, 1.04, 1.05, 1.06, 1.07, 1.08, 1.09, 1.10)
 
 @dataclass(frozen=True)
 class Removal:
-    """One step of the elimination: parameter with the largest %sigma, and whether it was removed.
+    """One elimination step: the parameter with the largest %sigma, and whether it was removed.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class Essential(Result):
         return tuple(step.name for step in self.trail if step.removed)
 
     def to_table(self) -> str:
-        """Write the removed parameters as a table, then how many are left at each threshold."""
+        """Write a table of the removed parameters, then the number left at each threshold."""
         first = len(self.all_parameters.names)
         lines: list[Sequence[str]] = [("removed", "left", "%sigma", "sigma_rho ratio")]
         for k, step in enumerate(self.trail):
@@ -106,7 +106,7 @@ class Essential(Result):
         )
 
     def summary(self) -> dict[str, Any]:
-        """Return the result as a mapping, for JSON."""
+        """Return names, threshold and steps of the elimination as a mapping, for JSON."""
         return {
             "schema": 1,
             "names": self.names,
@@ -125,7 +125,7 @@ def essential_of(
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Essential:
-    """Find the essential parameters of a system Y = W X + rho (section 4.1.1).
+    """Find the essential parameters of a system Y = W X + rho (chapter, section 4.1.1).
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def _trail(system: System, threshold: float) -> list[Removal]:
 
 
 def _relative(C: np.ndarray, X: np.ndarray) -> np.ndarray:
-    """Compute %sigma of each parameter, shape (b,), from the covariance C and the values X.
+    """Compute the relative standard deviations %sigma, shape (b,), from covariance C and values X.
 
     %sigma is inf if the record does not determine the parameter, which is therefore removed first.
     """

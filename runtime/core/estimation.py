@@ -1,4 +1,4 @@
-"""Estimation of X from the rows Y = W X + rho of a prepared problem, by eqs. (6) to (11).
+"""Estimation of the parameters X from records, by eqs. (6) to (11) of the chapter.
 
 rows = observe_rows(problem)
 fit  = estimated(problem, rows)
@@ -27,7 +27,9 @@ Array = np.ndarray
 
 
 def observe_rows(problem: Problem) -> Observation:
-    """Build the rows Y = W X + rho of the fitted records, as the estimation method needs them.
+    """Build the observation matrix W and the torques Y of all fitted records.
+
+    A method of estimation may have its own function for this step (`Method.observe`).
 
     Parameters
     ----------
@@ -53,7 +55,7 @@ def observe_rows(problem: Problem) -> Observation:
 
 
 def observed_unseen(problem: Problem, k: int) -> Observation:
-    """Build the rows Y = W X + rho of validation record k, which is not fitted; k counts from 0."""
+    """Build the matrix W and the torques Y of validation record k, not fitted; k counts from 0."""
     alone = problem.changed(records=(problem.unseen[k],), unseen=())
     if "prepared_unseen" in vars(problem):
         alone.prepared[0].take_states(problem.prepared_unseen[k])
@@ -66,7 +68,7 @@ def estimated(
     settings: EstimateSettings | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Estimate:
-    """Estimate the parameters from the rows Y = W X + rho of a prepared problem.
+    """Estimate the parameters X of a problem from given rows Y = W X + rho of its records.
 
     settings : method of estimation; default: the settings of the problem.
     """
@@ -75,12 +77,12 @@ def estimated(
 
 
 def estimate(problem: Problem) -> Estimate:
-    """Estimate all parameters of a prepared problem by the method of its settings."""
+    """Estimate all parameters from the records of a problem, by the method in its settings."""
     return estimated(problem, observe_rows(problem), provenance=problem.provenance)
 
 
 def essential(problem: Problem) -> Essential:
-    """Find the essential parameters of a prepared problem.
+    """Find the essential parameters of a problem (model, records and settings).
 
     A method of estimation that is not linear is replaced by least squares with the same weights
     (`linear_companion`).
@@ -148,7 +150,7 @@ def method_of(settings: EstimateSettings, methods: Mapping[str, Method]) -> Meth
 
 
 def point_estimate(settings: EstimateSettings, methods: Mapping[str, Method]) -> EstimateSettings:
-    """Return settings that estimate the values only, without standard deviations, to save time.
+    """Return faster settings that omit resampled records, if only the values of X are needed.
 
     Methods that have no such options use the settings unchanged.
     """

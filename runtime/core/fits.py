@@ -89,9 +89,9 @@ def validated(
     unseen: Mapping[str, Observation],
     name: str,
 ) -> tuple[Fits, tuple[CrossValidation, ...], tuple[str, ...]]:
-    """Predict data that were not fitted: other parts of the records, then separate records.
+    """Validate each set of parameters: predict the torques of data that were not fitted.
 
-    The parts are time windows, or fifths of the records.
+    The data are other parts of the records (time windows or fifths), then separate records.
 
     Return three values: the fits, with the physical set if it may be used; the predictions; and
     sentences on the predictions or fits that failed. Fifths of the records are used if their halves
@@ -136,7 +136,7 @@ def _validation(
     choices: Mapping[Any, EstimateSettings],
     known: Mapping[Any, Estimate],
 ) -> tuple[tuple[CrossValidation, ...], tuple[str, ...]]:
-    """Validate sets of parameters: predict other time windows of the records, then other records.
+    """Predict, by each set of parameters, other time windows of the records, then other records.
 
     Between windows, the sets `choices` are fitted again; on further records the estimates `known`,
     from all rows, are used. Return the validations, and sentences on those that failed.

@@ -63,7 +63,7 @@ Whole = Annotated[
 
 
 def from_text(kind: type[T], text: str, schema: str, file: str) -> T:
-    """Read a result from JSON text.
+    """Read a result, for instance an Estimate, from JSON text, and check its values.
 
     Parameters
     ----------

@@ -53,7 +53,7 @@ class Missing:
         return self.samples if self.follows is not None else self.samples @ (drives.motion != 0).T
 
     def near_gaps(self, longest: int, reach: int) -> Array:
-        """Return a mask of the samples in or near long gaps of the positions, bool, shape (N,).
+        """Return a mask of the samples in or near long runs of missing positions, bool, shape (N,).
 
         A gap is long if it has more than `longest` samples; near means at most `reach` samples
         away.
@@ -92,7 +92,7 @@ def held_samples(q: Array) -> Array:
 
 
 def bridged(q: Array, missing: Array) -> Array:
-    """Replace missing positions in q, shape (N, n), by straight lines between their neighbours.
+    """Replace missing positions in q, shape (N, n), by linear interpolation between neighbours.
 
     At the ends of the record, the nearest position is repeated; a column without any position
     becomes 0.

@@ -69,7 +69,7 @@ class GeneratedModel(Protocol):
     casadi: Callable[..., Any]  # casadi.Function of a function of the module, by name
 
     def store(self, N: int) -> Array:
-        """Make a workspace array, shape (b, n, N), for the argument `out` of the other functions.
+        """Make a workspace array, shape (b, n, N), for argument `out` of the regressor functions.
 
         Entries that are always zero are already zero in this array.
         """
@@ -77,12 +77,12 @@ class GeneratedModel(Protocol):
     def regressor(
         self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float
     ) -> Array:
-        """Compute the regressor D, shape (N, n, b), eq. (5)."""
+        """Compute the regressor D of the base parameters, shape (N, n, b): Gamma = D X, eq. (5)."""
 
     def observation_matrix(
         self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float
     ) -> Array:
-        """Compute the observation matrix W, shape (n*N, b), eq. (6).
+        """Compute the observation matrix W, shape (n*N, b), of Y = W X + rho, eq. (6).
 
         Rows are joint-major: first all samples of joint 1. The array is in Fortran order.
         """
@@ -240,7 +240,7 @@ def constants_of(model: GeneratedModel, constants: Mapping[str, float]) -> dict[
 
 
 def channels_of(model: GeneratedModel) -> Mapping[str, tuple[str, ...]]:
-    """Return, for each measured signal in the model (a temperature), the parameters that need it.
+    """Return the parameters that depend on each extra measured signal, such as a temperature.
 
     A channel is a measured quantity in a law of the robot file, such as a temperature: a constant
     that is a function of time.

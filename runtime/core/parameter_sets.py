@@ -47,7 +47,7 @@ ORDER: tuple[SetName, ...] = ("essential", "feasible", "all")
 def least_squares_sets(
     settings: EstimateSettings, reduced: Essential
 ) -> tuple[dict[SetName, Estimate], dict[SetName, EstimateSettings]]:
-    """Return the estimates of the essential and of all parameters, and the settings that fit each.
+    """Return two estimates, of the essential and of all parameters, and settings to repeat each.
 
     The method of estimation is linear.
     """
@@ -57,7 +57,7 @@ def least_squares_sets(
 
 
 def physical_asked(errors: Mapping[Any, float], first: bool) -> bool:
-    """Whether to fit physically consistent parameters, which may be the set that is used.
+    """Whether a fit of physically consistent parameters is needed for the final model.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def physical_asked(errors: Mapping[Any, float], first: bool) -> bool:
 
 
 def physical_possible(observation: Observation, settings: EstimateSettings, fit: Estimate) -> bool:
-    """Whether physically consistent parameters can be fitted in addition to `fit`.
+    """Whether settings and fit permit a second fit, of physically consistent parameters.
 
     `fit` has all parameters. This needs all columns, a fit with status ok, and weights other than
     "covariance".
@@ -83,10 +83,10 @@ def physical_possible(observation: Observation, settings: EstimateSettings, fit:
 
 
 def physical_set(problem: Problem, observation: Observation) -> tuple[Estimate, EstimateSettings]:
-    """Fit physically consistent parameters to all rows; also return settings to fit only some rows.
+    """Fit physically consistent parameters to all rows; return the fit, and settings to repeat it.
 
-    The settings are for fits of parts of the rows: they fix the prior, its weight and the bounds by
-    reach as found from all rows.
+    The settings are for later fits to parts of the rows: they fix the prior, its weight and the
+    bounds by reach as found from all rows.
     """
     at("physical parameters")
     settings = problem.settings.estimate
@@ -136,7 +136,7 @@ def best_set(errors: Mapping[Any, float], essential: bool = False) -> SetName:
 
 
 def whole_set(names: Collection[SetName], model_columns: SetName) -> SetName:
-    """Name the set of parameters to use if values of all base parameters are needed.
+    """Return the name of the set of parameters to use if all base parameters need values.
 
     A robot file, for instance, needs all of them.
 

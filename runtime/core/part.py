@@ -92,7 +92,7 @@ class Part:
 
     @property
     def expected_error(self) -> float:
-        """Expected error of predictions of other motions, %, for the verdict; nan if unknown."""
+        """Expected relative error of torques predicted for other motions, %; nan if unknown."""
         return float("nan")
 
     @property
@@ -105,7 +105,7 @@ class Part:
         return ""
 
     def brief(self) -> str:
-        """Return a shorter text on this analysis, for a short print."""
+        """Return a short text on this analysis, for the short printed form of the result."""
         return ""
 
     def warnings(self) -> Sequence[str]:

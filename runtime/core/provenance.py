@@ -23,7 +23,7 @@ def record_names(records: Sequence[Record]) -> tuple[str, ...]:
 
 
 def origin(records: Sequence[Record]) -> dict[str, Any]:
-    """Return the provenance of a result: names and time stamps of its records, whether simulated.
+    """Return the origin of the data: names and time stamps of records, measured or simulated.
 
     Texts about subtracted known torques are included.
     """
@@ -50,9 +50,9 @@ def processor() -> str:
 
 
 def cpuinfo(*starts: str) -> str:
-    """Return the first line of the processor information that begins with a text of `starts`.
+    """Return the first line of /proc/cpuinfo that begins with one of the texts `starts`.
 
-    Return "" if there is no such line.
+    Without this file, the name of the processor is searched. Return "" if there is no such line.
     """
     info = Path("/proc/cpuinfo")
     text = info.read_text(errors="replace") if info.is_file() else platform.processor()

@@ -166,10 +166,10 @@ def effective_share(joints: Sequence[Whiteness]) -> float:
 
 
 def unseen_by_blocks(observation: Observation, fit: Estimate) -> float:
-    """Compute the factor by which variances from blocks of time are too small for slow residuals.
+    """Compute the factor that corrects block variances for residuals correlated beyond a block.
 
-    The corrected variance assumes that blocks of L seconds are independent. With residuals that are
-    correlated as exp(-t/tau), the factor is
+    Variances from blocks of L seconds assume that the blocks are independent. With residuals that
+    are correlated as exp(-t/tau), the factor is
 
         c = 1/(1 - (tau/L) (1 - exp(-L/tau)))
 

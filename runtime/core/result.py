@@ -185,7 +185,7 @@ class Identification:
 
     @property
     def model_columns(self) -> SetName:
-        """Name of the set of parameters that is used: "essential", "feasible" or "all".
+        """Name of the set of parameters in the final model: "essential", "feasible" or "all".
 
         `runtime.core.parameter_sets` explains the choice; it is "all" if the method is not linear.
         """
@@ -195,7 +195,7 @@ class Identification:
 
     @property
     def model_estimate(self) -> Estimate:
-        """Estimate of the set of parameters that is used; see `model_columns`.
+        """Estimate of the parameters in the final model; `model_columns` names their set.
 
         It is `estimate` if the method is not linear.
         """
@@ -213,7 +213,7 @@ class Identification:
 
     @cached_property
     def written_sets(self) -> Mapping[SetName, Estimate]:
-        """Estimates by set of parameters; a physical set is added if the essential set is used.
+        """Estimates by parameter set; a physical set is added if the final model is "essential".
 
         A robot file or a program needs all parameters, which the essential set does not have.
         """
@@ -239,7 +239,7 @@ class Identification:
 
     @cached_property
     def record_errors(self) -> tuple[RecordError, ...]:
-        """Relative error of each fitted record with the used parameters; empty for one record."""
+        """Relative error of each fitted record with the final model; empty for one record."""
         names = record_names(self.records)
         return record_errors(self.observation, self.model_estimate, names) if len(names) > 1 else ()
 
@@ -264,7 +264,7 @@ class Identification:
 
     @property
     def prediction_error(self) -> float:
-        """Largest relative error, %, of the used parameters on data that were not fitted.
+        """Largest relative error, %, of the final model on data that were not fitted.
 
         These data are the validation records, or else parts of the records; nan without such data.
         """
@@ -280,7 +280,7 @@ class Identification:
 
     @property
     def expected_error(self) -> float:
-        """Expected error of predictions of other motions, %; nan if no analysis computed it.
+        """Expected relative error of torques predicted for other motions, %; nan if not computed.
 
         If the records do not determine the parameters, it is LIMIT.LARGEST_EXPECTED.
         """
@@ -310,7 +310,7 @@ class Identification:
 
     @property
     def verdict(self) -> str:
-        """Sentence on the number of parameters used and the torques that they leave unexplained, %.
+        """Sentence on the number of fitted parameters and the unexplained part of the torques, %.
 
         If there are no usable values, the sentence gives the reason.
         """
@@ -512,7 +512,7 @@ class Identification:
         return Table("Simulated minus measured motion", header, rows)
 
     def to_json(self) -> str:
-        """Write estimate.json: the Estimate of all parameters and all other results."""
+        """Return the text of estimate.json: Estimate of all parameters, and all other results."""
         return json_text({**json.loads(self.estimate.to_json()), **self.summary()})
 
     def summary(self) -> dict[str, Any]:

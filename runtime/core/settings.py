@@ -53,7 +53,7 @@ LIMITS = {
 
 
 class Written:
-    """Annotation, for the JSON Schema, of a type whose values a file may write in several forms.
+    """Annotation of a type for the JSON Schema: a file may write its values in several forms.
 
     For instance, a number may also be written as a text.
 

@@ -216,7 +216,7 @@ class EstimateSettings(Settings):
 
 
 class EssentialSettings(Settings):
-    """Elimination of parameters while sigma_rho stays below a threshold (section 4.1.1).
+    """Elimination of parameters while sigma_rho stays below a threshold (chapter, section 4.1.1).
 
     Attributes
     ----------
@@ -255,7 +255,7 @@ class ValidateSettings(Settings):
 
 
 class CestacSettings(Settings):
-    """Encoder-resolution study, eqs. (15)-(22), (28).
+    """Settings of the CESTAC study of encoder resolution, eqs. (15)-(22), (28) of the chapter.
 
     Attributes
     ----------

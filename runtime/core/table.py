@@ -98,7 +98,7 @@ def aligned(lines: Sequence[Sequence[str]]) -> str:
 
 
 def in_lines(cells: Sequence[str]) -> list[str]:
-    """Pad the cells to equal width, and join as many per line as LINE characters allow."""
+    """Pad cells of text to equal width, and join them into lines of at most LINE characters."""
     width = max(map(len, cells), default=0) + 2
     many = max((LINE + 2) // width, 1)
     rows = [cells[k : k + many] for k in range(0, len(cells), many)]
@@ -132,7 +132,7 @@ def with_intervals(
 
 
 def interval(value: float, half: float) -> tuple[str, str]:
-    """Write a value and half of its interval as text, both to the second digit of the interval."""
+    """Write a value and the half-width of its interval, both to two digits of the half-width."""
     if not (isfinite(half) and half > 0 and isfinite(value)):
         return f"{value:.4g}", f"{half:.2g}"
     place = floor(log10(half)) - 1

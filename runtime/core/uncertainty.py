@@ -1,4 +1,4 @@
-"""Tests of the assumptions behind eqs. (9)-(11) and behind the threshold 1.04 on sigma_rho.
+"""Tests of the assumptions behind the standard deviations and the essential parameters.
 
     bootstrap     blocks of time are drawn again with replacement, least squares each time: this
                   gives standard deviations without the assumption of independent residuals, to
@@ -44,7 +44,7 @@ SEED = 1
 
 @dataclass(frozen=True, eq=False)
 class BlockBootstrap:
-    """Standard deviations of the essential parameters by three methods.
+    """Standard deviations of the essential parameters: by eq. (10), jackknife and bootstrap.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class BlockBootstrap:
 
     @property
     def ratio(self) -> Array:
-        """Standard deviations from the bootstrap divided by those from eq. (10), shape (b,)."""
+        """Standard deviations from the bootstrap, divided by those from eq. (10), shape (b,)."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(self.drawn / self.sigma)
 
@@ -180,7 +180,7 @@ class Uncertainty(Result):
 
     @property
     def too_short(self) -> str:
-        """Sentence with a remedy, for residuals that are correlated for longer than a block."""
+        """Sentence with a remedy, if residuals are correlated for longer than a block of time."""
         return (
             f"The residuals remember {self.memory:.2g} s, the blocks last "
             f"{self.bootstrap.length:.2g} s: the corrected deviations may be too small. Find what "

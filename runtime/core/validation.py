@@ -88,7 +88,7 @@ def direct_comparison(observation: Observation, fit: Estimate) -> tuple[JointCom
 
 @dataclass(frozen=True)
 class Prediction:
-    """Error of one set of parameters on one part of the data.
+    """Relative torque error of one set of parameters on one part of the data.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ class Prediction:
 
 @dataclass(frozen=True)
 class CrossValidation(Result):
-    """Errors of every set of parameters on every part of the data.
+    """Relative torque errors of every set of parameters on every part of the data.
 
     missing : sentences on the sets that could not be fitted. further : whether the predicted parts
     are separate records.
@@ -377,7 +377,7 @@ def weak_directions(
     *,
     threshold: float = LIMIT.CORRELATION,
 ) -> WeakDirections:
-    """Find pairs of correlated parameters, and the three directions that change W X least.
+    """Find correlated parameters, and the three parameter combinations that change W X least.
 
     threshold : smallest |correlation| that is reported.
     """

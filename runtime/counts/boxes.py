@@ -169,7 +169,7 @@ class Boxes:
         return Posterior(c, used, t, u, Z, factor, errors, likely, without)
 
     def again(self, errors: Errors, start: Posterior) -> Posterior:
-        """Estimate the motion again with other assumed errors of counts, starting from `start`."""
+        """Estimate the motion again with other sizes of the count errors, starting from `start`."""
         return self.posterior(errors, start.c, start.density, start.tau, start.nu)
 
     def promised(self, errors: Errors, read: Posterior) -> float:
@@ -248,7 +248,7 @@ class Boxes:
         return int(self.sites[at[best]]), float(number[best]), float(0.5 * g[best] * number[best])
 
     def later(self, at: int, counts: int, read: Posterior) -> tuple[Boxes, Posterior]:
-        """Estimate the motion after adding `counts` to all counts from sample `at` on.
+        """Add `counts` to all counts from sample `at` on, and estimate the motion again.
 
         Returns the new bounds and the motion.
         """
@@ -258,7 +258,7 @@ class Boxes:
         return boxes, boxes.posterior(read.errors, read.c, read.density, read.tau, nu)
 
     def _tilted(self, m: Array, v: Array, e2: Array) -> tuple[Array, Array, Array]:
-        """Update the normal law (site) that replaces the bounds of each sample.
+        """Update the normal distribution (site) that replaces the bounds of each sample.
 
         The other samples give the position m and its variance v. Returns the logarithm of the mass
         of the tilted law, and the precision and precision times mean of the new site.
@@ -316,7 +316,7 @@ def box_moments(a: Array, b: Array) -> tuple[Array, Array, Array]:
 
 
 def jerk_density(basis: Basis, c: Array, Z: Array, density: Array) -> Array:
-    """Estimate the power spectral density of the jerk in windows of time, shape (M,).
+    """Estimate the spectral density of the jerk around each of the M intervals of the spline.
 
     The estimate follows MacKay's rule. The whole record has the weight of OF_RECORD determined
     jerks in every window.

@@ -91,7 +91,7 @@ def encoder_sentences(
 def acceleration_error(
     record: Record, states: States, signals: Signals, drives: Drives | None
 ) -> float:
-    """Compute the share of a mean squared acceleration due to encoder steps, largest over joints.
+    """Compute the share of encoder-step errors in the mean squared acceleration of the worst joint.
 
     The accelerations are filtered. 0 if the positions show no steps.
     """

@@ -1,4 +1,4 @@
-"""Encoder positions as counts: position = count step + phase.
+"""Conversion of encoder positions to counts: position = count step + phase (a constant offset).
 
 Contradictions in the record are reported or refused. The step comes from a data sheet or from the
 record, the phase from the record alone. Counts cannot show whether a driver truncates or rounds,
@@ -46,7 +46,7 @@ or two where a joint turns back near a line.
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """Grid of the positions that n encoders can report: position = count step + phase.
+    """Grid of the positions that n encoders can report: counts times step, plus an offset (phase).
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ def lattice(
     *,
     name: str = "record",
 ) -> Lattice:
-    """Find the step and phase of encoder positions, shape (N, n): position = count step + phase.
+    """Find the step and the offset (phase) of encoder positions: position = count step + phase.
 
     step : step in rad or m, for all encoders or for each; default: from the record.
 
@@ -194,7 +194,7 @@ def unwrapped_counts(
     *,
     name: str = "record",
 ) -> tuple[Lattice, Array, tuple[str, ...]]:
-    """Convert positions to counts, and undo the overflows of a counter of 16 or 32 bits (WRAPS).
+    """Convert positions to counts, and undo the overflows of a 16-bit or 32-bit counter.
 
     Returns the lattice of the positions (see `lattice`), the counts, shape (N, n), and a sentence
     for each encoder that overflows. Raises InputError if counts jump otherwise.

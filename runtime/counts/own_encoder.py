@@ -70,7 +70,9 @@ class OwnEncoder:
 
 
 def own_encoder(record: Record, study: Study, drives: Drives | None) -> OwnEncoder | None:
-    """Find the encoder of a record, for a study of coarser encoders (`rounding: phase`).
+    """Determine the encoder steps of a record, for a study that simulates coarser encoders.
+
+    The study has the setting `rounding: phase`.
 
     None for other kinds of rounding, which take every position as exact.
 

@@ -62,6 +62,6 @@ def unwrapped(record: Record, signals: Signals, drives: Drives | None = None) ->
 
 
 def encoder_position(q: Array, drives: Drives | None, missing: Missing | None = None) -> Array:
-    """Convert joint positions q to encoder positions, shape (N, n); nan if missing."""
+    """Convert joint positions q to encoder positions, shape (N, n); nan at missing samples."""
     x = q.copy() if drives is None else drives.motor_position(q)
     return x if missing is None else np.where(missing.at_encoders(drives), np.nan, x)

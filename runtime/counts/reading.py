@@ -92,7 +92,7 @@ class Reading:
 
     @property
     def starts(self) -> Starts:
-        """Starting values to estimate the same motion again with other phases of the encoders.
+        """Starting values to estimate the same motion again with other encoder offsets (phases).
 
         They are listed by the first sample of a stretch and the encoder, from 0.
         """
@@ -350,7 +350,7 @@ class Gaps:
 
 
 def stretches(N: int) -> list[tuple[int, int, int, int]]:
-    """Split a record of N samples into overlapping stretches (begin, first, stop, end).
+    """Split N samples into stretches [first, stop), each with the overlapping range [begin, end).
 
     The samples [begin, end) are processed in order to find the motion in [first, stop).
     """

@@ -73,7 +73,7 @@ SPACING = 0.3
 
 
 class SearchStart(NamedTuple):
-    """Starting values to estimate the same motion again with another encoder phase.
+    """Starting values to estimate the same motion again with other encoder offsets (phases).
 
     errors : errors of the counts.
     m : samples from knot to knot of the spline.
@@ -391,7 +391,7 @@ def _spline_through_sites(
 
 
 def _through(basis: Basis, tau: Array, nu: Array, density: Array, c: Array) -> tuple[Array, Factor]:
-    """Fit a spline to positions with Gaussian errors, starting from the coefficients c.
+    """Fit a spline to positions with Gaussian errors, starting from given spline coefficients c.
 
     tau and nu, shape (m M,), are the precisions and the precisions times means. Returns the
     coefficients and the Cholesky factor of their precision.

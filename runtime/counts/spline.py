@@ -43,7 +43,7 @@ CONDITION = 1e-9
 
 
 class Basis:
-    """Cubic splines over N samples of period Ts, with a knot every m samples.
+    """Cubic splines over N samples of sampling period Ts, with a knot every m samples.
 
     Samples are padded to whole intervals: M intervals, m M samples, P = M + 3 coefficients.
 
@@ -70,21 +70,23 @@ class Basis:
         )
 
     def filled(self, x: Array) -> Array:
-        """Pad samples, shape (N,), with zeros up to whole intervals, shape (m M,)."""
+        """Pad N samples with zeros up to M whole intervals of m samples, shape (m M,)."""
         return np.pad(x, (0, self.M * self.m - self.N))
 
     @property
     def least_density(self) -> float:
-        """Least spectral density of the jerk with which A can be factored in double precision.
+        """Least jerk density with which the precision matrix A can be factored in double precision.
 
-        A is the precision matrix of the coefficients. Unit: steps^2/s^5.
+        A is that of the spline coefficients. Unit: steps^2/s^5.
 
         The precision of a site is 0.06 or more.
         """
         return CONDITION / (self.h**5 * self.m)
 
     def at_samples(self, c: Array, order: int = 0) -> Array:
-        """Compute the spline or a derivative at all samples, shape (m M,), from its coefficients c.
+        """Compute the spline of coefficients c, or a derivative, at all samples.
+
+        The shape is (m M,), for M intervals of m samples.
 
         `order` is the order of the derivative, 0 for the position.
         """
@@ -92,14 +94,16 @@ class Basis:
         return np.asarray((windows @ self.values[order].T).ravel())
 
     def rows(self, samples: Array) -> csr_array:
-        """Return the values of the B-splines at some samples, a sparse matrix of shape (S, P)."""
+        """Return the values of the P B-splines at S samples, a sparse matrix of shape (S, P)."""
         interval, u = np.divmod(samples, self.m)
         columns = (interval[:, None] + np.arange(4)).ravel()
         ends = np.arange(0, len(columns) + 1, 4)
         return csr_array((self.values[0][u].ravel(), columns, ends), shape=(len(samples), self.P))
 
     def variances(self, Z: Array, order: int = 0) -> Array:
-        """Compute the variances of the spline or of its derivative at all samples, shape (m M,).
+        """Compute the variance of the spline, or of a derivative, at all samples.
+
+        The shape is (m M,), for M intervals of m samples.
 
         Z : covariances of its coefficients, from `Factor.inverse`, shape (4, P).
         """
@@ -109,11 +113,11 @@ class Basis:
         return np.asarray((pairs.T @ squares).ravel())
 
     def jerk(self, c: Array) -> Array:
-        """Compute the jerk of the spline in every interval, shape (M,)."""
+        """Compute the jerk of the spline in each of its M intervals between knots, shape (M,)."""
         return third_differences(c) / self.h**3
 
     def jerk_variances(self, Z: Array) -> Array:
-        """Compute the variance of the jerk in every interval of the spline, shape (M,).
+        """Compute the variance of the jerk in each of the M intervals of the spline, shape (M,).
 
         Z : covariances of its coefficients, shape (4, P).
         """
@@ -133,7 +137,11 @@ class Basis:
         return np.asarray(self.of_samples(tau) + self.of_prior(density))
 
     def of_samples(self, tau: Array) -> Array:
-        """Compute the part of the precision matrix A from the samples, sum_k tau_k b_k b_k'."""
+        """Compute the part of the precision matrix A that comes from the samples, shape (4, P).
+
+        It is sum_k tau_k b_k b_k', with tau_k the precision of sample k and b_k the B-splines
+        there.
+        """
         samples = self.products.T @ tau.reshape(-1, self.m).T
         A = np.zeros((4, self.P))
         for (i, j), of_pair in zip(PAIRS, samples, strict=True):
@@ -141,7 +149,10 @@ class Basis:
         return A
 
     def of_prior(self, density: Array) -> Array:
-        """Compute the part of the precision matrix A from the prior, sum_i (h/r_i) d_i d_i'."""
+        """Compute the part of the precision matrix A that comes from the prior, white jerk.
+
+        It is sum_i (h/r_i) d_i d_i', with r_i the density and d_i'c the jerk in interval i.
+        """
         prior = 1 / (self.h**5 * density)
         A = np.zeros((4, self.P))
         for i, j in PAIRS:
@@ -149,7 +160,7 @@ class Basis:
         return A
 
     def gradient(self, pull: Array, density: Array, c: Array) -> Array:
-        """Compute the gradient of the log posterior with respect to the coefficients c, shape (P,).
+        """Compute the gradient of the log posterior with respect to the P spline coefficients c.
 
         pull : nu - tau x(c) at all samples, shape (m M,).
         """
@@ -162,7 +173,7 @@ class Basis:
 
 
 def third_differences(c: Array) -> Array:
-    """Compute the third differences of the coefficients c, shape (M,).
+    """Compute the third differences of the spline coefficients c, one for each of M intervals.
 
     They are c_(i+3) - 3 c_(i+2) + 3 c_(i+1) - c_i.
     """
@@ -171,7 +182,7 @@ def third_differences(c: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Factor:
-    """Cholesky factor L of the precision matrix A, by its diagonals, shape (4, P)."""
+    """Cholesky factor of the precision matrix of P coefficients: 4 diagonals, shape (4, P)."""
 
     L: Array
 
@@ -198,7 +209,7 @@ class Factor:
         return np.asarray(dpbtrs(self.L, g, lower=1)[0].reshape(g.shape))
 
     def draw(self, rng: np.random.Generator) -> Array:
-        """Draw a random vector from the normal law of mean 0 and covariance A^-1, shape (P,)."""
+        """Draw a random vector from the normal distribution of mean 0 and covariance A^-1."""
         z = rng.standard_normal((self.L.shape[1], 1))
         return np.asarray(dtbtrs(self.L, z, uplo="L", trans="T")[0].ravel())
 

@@ -29,7 +29,7 @@ from runtime.documents.files import result_text
 
 @dataclass(frozen=True, eq=False)
 class EssentialDocument:
-    """Essential parameters (they suffice to explain the torques), fitted without the others.
+    """Estimate of the essential parameters alone, the subset that suffices to explain the torques.
 
     Attributes
     ----------
@@ -232,7 +232,7 @@ class CestacDocument:
 
 
 def load_estimate(path: Path | str) -> Estimate:
-    """Read the Estimate from a file that `Estimate.to_json` or `symgen identify -o` wrote.
+    """Read an estimate from a file that `Estimate.to_json` or `symgen identify -o` wrote.
 
     InputError as for `Estimate.from_json`.
     """

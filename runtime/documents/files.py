@@ -106,6 +106,6 @@ def lines_of(path: str | Path) -> Iterator[None]:
 def _at_line(
     error: SettingsError, lines: Mapping[tuple[str | int, ...], int], file: str
 ) -> SettingsError:
-    """Add to an error the line number of its key, or of the section that should contain the key."""
+    """Add to a settings error the line of its key, or of the section where this key is missing."""
     places = (error.path[:k] for k in range(len(error.path), -1, -1) if error.path[:k] in lines)
     return SettingsError(error.reason, path=error.path, file=file, line=lines.get(next(places, ())))

@@ -61,7 +61,7 @@ class MotionLimits:
     tau: Array
 
     def of(self, share: float) -> MotionLimits:
-        """Return narrower limits: the fraction `share` of each limit stays unused.
+        """Return limits that are narrower by the fraction `share` of each limit.
 
         The range of positions shrinks about its middle.
         """
@@ -149,7 +149,7 @@ def weights_of(
     essential: Sequence[str] = (),
     s: Sequence[float] = (),
 ) -> Weights:
-    """Choose the columns of W, and the factors that scale its rows and columns.
+    """Choose the columns of W for the search, and the factors that scale its rows and columns.
 
     The rows are scaled by the standard deviations of the torques, the columns by the sizes of the
     parameters, from their values X.
@@ -275,7 +275,7 @@ def excesses(
 def usage(
     model: GeneratedModel, motion: Motion, limits: MotionLimits, rate: float, X: Array
 ) -> dict[str, list[float]]:
-    """Compute which share of each limit the motion uses at most, by quantity and joint.
+    """Compute the largest value of each quantity and joint in a motion, as a share of its limit.
 
     A share of 1 is the limit. The motion is sampled at `rate`, Hz. The share of a position range is
     measured from the middle of the range.

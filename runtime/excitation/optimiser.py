@@ -58,7 +58,7 @@ class Search:
 
 
 def one_start(search: Search, number: int) -> Start:
-    """Optimise a motion by IPOPT from the random start `number`."""
+    """Optimise a motion by IPOPT, beginning with a random motion drawn for start `number`."""
     rng = np.random.default_rng([search.settings.seed, number])
     guess = Motion(
         tuple(Part(family, _guess(search, family, rng)) for family in search.settings.parts)
@@ -114,9 +114,9 @@ def _information(
     qd: Any,
     qdd: Any,
 ) -> Any:
-    """Write the information matrix A = sum_j W_wj'W_wj / M over the M instants of the grid.
+    """Write the information matrix A = W_w'W_w / M, W_w the weighted W at M grid instants.
 
-    W_wj holds the weighted rows of joint j; A has shape (c, c).
+    A = sum_j W_wj'W_wj / M, with W_wj the weighted rows of joint j; A has shape (c, c).
     """
     n, M = len(weights.s), q.shape[0]
     inputs = [ca.SX.sym(name, n) for name in ("q", "qd", "qdd")]
@@ -130,14 +130,14 @@ def _information(
 
 
 def _logdet(A: Any) -> Any:
-    """Write -log det A as an expression of the Cholesky factor of A."""
+    """Write -log det A of the information matrix A as an expression of its Cholesky factor."""
     S = ca.SX.sym("A", A.shape[0], A.shape[0])
     R = ca.chol(S)
     return ca.Function("logdet", [S], [-2 * ca.sum1(ca.log(ca.diag(R)))])(A)
 
 
 def _spread(A: Any, criterion: str) -> Any:
-    """Write the logarithm of a smooth bound of cond(W_w)^2, or of the largest variance C_ii.
+    """Write the log of a smooth bound of cond(W_w)^2 or of the largest variance, W_w weighted W.
 
     For criterion sigma or record the bound is that of the variance, else that of cond(W_w)^2.
     """
@@ -151,9 +151,10 @@ def _spread(A: Any, criterion: str) -> Any:
 def _constraints(
     model: GeneratedModel, search: Search, p: Sequence[Any], q: Any, qd: Any, qdd: Any
 ) -> tuple[Any, Array, Array]:
-    """Write the constraints lower <= g(p) <= upper of the motion, each divided by its scale.
+    """Write limits and end conditions of the motion as constraints lower <= g(p) <= upper.
 
-    Returns g, lower and upper.
+    p holds the coefficients of the motion. Each constraint is divided by its scale. Returns g,
+    lower and upper.
     """
     settings, limits = search.settings, search.limits.of(search.settings.margin)
     M = q.shape[0]
@@ -321,7 +322,7 @@ def _minimised(
 
 
 def smoothed(function: Any, v0: float) -> Any:
-    """Copy a CasADi function of scalars, with tanh(u/v0) in place of every sign(u)."""
+    """Copy a CasADi function, with the smooth tanh(u/v0) in place of every sign(u)."""
     inputs = function.sx_in()
     columns = [ca.vertsplit(x) if x.numel() else [] for x in inputs]
     results = [[0.0] * function.nnz_out(k) for k in range(function.n_out())]
@@ -369,5 +370,5 @@ def _guess(search: Search, family: Any, rng: np.random.Generator) -> Array:
 
 
 def _rows(x: Array, M: int) -> Any:
-    """Repeat x, shape (n,), in each of M rows."""
+    """Return a matrix of M rows that are all equal to x, shape (n,)."""
     return ca.DM(np.tile(x, (M, 1)))

@@ -172,7 +172,7 @@ def _rows_at_rest(model: GeneratedModel, q: Array, names: Sequence[str]) -> Arra
 
 
 def _acting(model: GeneratedModel, q: Array, columns: Any) -> tuple[str, ...]:
-    """Find the base parameters among `columns` that cause a torque at rest in the poses q.
+    """Find the base parameters in the setting `columns` that cause torques at rest in the poses q.
 
     The values essential and all of `columns` mean all base parameters.
     """
@@ -197,7 +197,7 @@ def _sum(A: Array, M: Array, chosen: Array) -> Array:
 
 
 def _exchanged(A: Array, M: Array, chosen: Array) -> Array:
-    """Exchange poses one by one while this enlarges det M; return the indices of the poses."""
+    """Exchange poses while this raises det M of the information matrix; return pose indices."""
     chosen, before = chosen.copy(), np.empty(0)
     while not np.array_equal(chosen, before):
         before = chosen.copy()

@@ -52,7 +52,7 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """Parameter values for the search, and how precisely the recorded motion determines parameters.
+    """Parameter values used in the search, and the precision that the recorded motion gives.
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ class Excitation(Result):
 
     @property
     def usage(self) -> dict[str, list[float]]:
-        """Share of each limit that the motion uses at most, by quantity and joint; 1: the limit."""
+        """Largest value of each quantity and joint in the motion, as a share of its limit."""
         return usage(self.model, self.motion, self.limits, self.settings.rate, self.known.X)
 
     @property
@@ -192,7 +192,7 @@ class Excitation(Result):
 
     @property
     def verdict(self) -> str:
-        """Text with the condition number, the least certain parameter, and the unknown limits.
+        """Text with cond(W), the least certain parameter, and the joints without torque limit.
 
         It also names the parameters that the motion of the record determines better.
         """
@@ -263,7 +263,7 @@ class Excitation(Result):
         )
 
     def usage_table(self) -> Table:
-        """Make a table of the share of each limit that the motion uses, %, by joint."""
+        """Make a table of the largest share of each limit that the motion uses, %, by joint."""
         rows = [(what, *(f"{100 * x:.1f}" for x in shares)) for what, shares in self.usage.items()]
         note = "At the controller rate. 100 is the limit; the optimiser keeps a margin."
         return Table(

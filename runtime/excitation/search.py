@@ -44,7 +44,7 @@ def excite(
     map: Callable[..., Iterable[Any]] = map,
     progress: Callable[[int, int], None] | None = None,
 ) -> Excitation:
-    """Search the motion of best criterion that respects the limits at every controller tick.
+    """Search the motion of best criterion within the limits at every sample of the controller.
 
     The search runs from all starts of study.excitation.
 
@@ -134,7 +134,7 @@ def excite(
 def _within(
     model: GeneratedModel, search: Search, starts: Sequence[Start]
 ) -> Iterator[tuple[Motion, float]]:
-    """Yield motions that respect the limits at every controller tick, each with its margin.
+    """Yield motions within the limits at every controller sample, each with its safety margin.
 
     If a motion exceeds a limit between grid points, it is optimised again with twice the margin, a
     few times. A start that still exceeds a limit yields nothing.

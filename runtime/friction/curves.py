@@ -68,7 +68,7 @@ OWN = ("viscous", "coulomb", "offset")  # kinds of elements that make the curve
 
 @dataclass(frozen=True)
 class FrictionLaw:
-    """One friction law fitted to one joint.
+    """One friction law, fitted to the friction torque of one joint, with its errors and tests.
 
     Attributes
     ----------
@@ -133,11 +133,11 @@ class FrictionCurve:
 
     @property
     def law(self) -> FrictionLaw:
-        """The chosen friction law."""
+        """The friction law chosen for the joint, by its prediction of data not used in the fit."""
         return next(law for law in self.laws if law.name == self.law_name)
 
     def to_table(self) -> str:
-        """Write a table of the laws, the parameters of the chosen law, and the note on its FST."""
+        """Tabulate the laws; add parameters of the chosen law and a note on its Stribeck term."""
         compared, predicting = law_tables([self])
         parts = [compared.to_text(), f"{self.label}: {predicting.rows[0][2]}", self.note]
         return "\n".join(part for part in parts if part)

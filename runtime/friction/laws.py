@@ -48,7 +48,7 @@ class Terms:
 
     @cached_property
     def grid(self) -> tuple[Array, Array]:
-        """Starting values of log VS, VS the Stribeck velocity, and the Stribeck term for each.
+        """Grid of Stribeck velocities, as log VS, and the Stribeck term for each velocity.
 
         Their shapes are (k,) and (k, N).
         """
@@ -81,7 +81,7 @@ def joined(parts: Sequence[Terms]) -> Terms:
 
 
 def _columns(terms: Terms, names: Sequence[str], VS: float | None) -> Array:
-    """Build the matrix of the terms of a friction law that have linear parameters.
+    """Build the matrix whose columns are the terms with linear parameters of a friction law.
 
     Shape (N, terms).
     """
@@ -107,7 +107,7 @@ def fit_law(terms: Terms, names: Sequence[str], rows: Array) -> dict[str, float]
 
 
 def _excess_velocity(terms: Terms, names: Sequence[str], rows: Array) -> float:
-    """Find the Stribeck velocity VS with which a law has the least sum of squares.
+    """Find the Stribeck velocity VS with which a law has the least sum of squared residuals.
 
     With e the Stribeck term orthogonal to the other terms, and r the residual of the other terms,
     it reduces the sum of squares by (e'r)^2 / e'e.
@@ -118,7 +118,9 @@ def _excess_velocity(terms: Terms, names: Sequence[str], rows: Array) -> float:
     r = terms.f[rows] - Q @ (Q.T @ terms.f[rows])
 
     def left(excess: Array) -> Array:
-        """Return the change of the sum of squares if the Stribeck term is added, zero or negative.
+        """Return the change of the sum of squared residuals by adding the Stribeck term.
+
+        The change is zero or negative.
 
         `excess` has shape (..., N).
         """

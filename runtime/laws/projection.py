@@ -68,7 +68,7 @@ class LawProblem:
         return np.where(self.log, np.exp(np.where(self.log, u, 0.0)), u)
 
     def bound(self, u: Array) -> Any:
-        """Return the model with the nonlinear constants of its laws set to the values at u."""
+        """Return the model, with its nonlinear constants computed from search coordinates u."""
         return BoundModel(self.model, dict(zip(self.scalars, self.values(u).tolist(), strict=True)))
 
     def _varying(self) -> list[list[int]]:
@@ -97,7 +97,7 @@ class LawProblem:
         return [record.observation(model, columns or self.names) for record in self.records]
 
     def column(self, c: int, u: Array) -> Array:
-        """Compute column c of W at all rows, for the nonlinear constants at u."""
+        """Compute column c of W at all rows; u: search coordinates of the nonlinear constants."""
         own = [k for k, columns in enumerate(self.varying) if c in columns]
         key = (c, *(float(u[k]) for k in own))
         if key not in self._columns:
@@ -108,7 +108,7 @@ class LawProblem:
         return self._columns[key]
 
     def slope(self, k: int, u: Array, X: Array) -> Array:
-        """Compute the derivative (dW/du_k) X by a central difference."""
+        """Compute the derivative of W X with respect to coordinate u_k, by a central difference."""
         h = SLOPE_STEP if self.log[k] else SLOPE_STEP * (self.upper[k] - self.lower[k])
         ahead, behind = u.copy(), u.copy()
         ahead[k], behind[k] = u[k] + h, u[k] - h
@@ -119,7 +119,7 @@ class LawProblem:
 
 
 class Projection:
-    """Least squares over the nonlinear constants alone: X is eliminated; a subset of rows is used.
+    """Least-squares problem of the nonlinear constants alone, on a subset of rows: X is eliminated.
 
     Each row is divided by its scale.
     """
@@ -135,7 +135,7 @@ class Projection:
         return np.asarray(A - self.Q @ (self.Q.T @ A))
 
     def parts(self, u: Array) -> tuple[Array, Array, Array]:
-        """Compute the residual P Y at u, and fit the columns with nonlinear constants.
+        """Compute the residual of the best X at the search coordinates u.
 
         Returns P Y, an orthonormal basis of these columns (projected orthogonally to the fixed
         columns), and their coefficients in X.
@@ -151,7 +151,10 @@ class Projection:
         return self.parts(u)[0]
 
     def jacobian(self, u: Array) -> Array:
-        """Compute Kaufman's Jacobian of the residual, -P (dW/du) X."""
+        """Compute Kaufman's Jacobian of the residual with respect to the search coordinates u.
+
+        It is -P (dW/du) X, with P the projector orthogonal to the columns of W.
+        """
         p = self.problem
         _, B, X = self.parts(u)
         whole = np.zeros(len(p.names))

@@ -218,7 +218,7 @@ def fit_laws(
 
 
 def fitted_laws(problem: LawProblem, weights: bool = False) -> FittedLaws:
-    """Fit the nonlinear constants of laws to the W and Y of a LawProblem; see `fit_laws`."""
+    """Fit the nonlinear constants of laws to the W and Y of all records; see `fit_laws`."""
     every, scale = np.ones(len(problem.Y), dtype=bool), np.ones(len(problem.Y))
     groups: dict[str, list[int]] = {}
     for k, name in enumerate(problem.scalars):
@@ -253,7 +253,7 @@ def fitted_laws(problem: LawProblem, weights: bool = False) -> FittedLaws:
 
 
 def _joint_deviations(problem: LawProblem, u: Array, scale: Array) -> tuple[Array, Array, Array]:
-    """Compute W, X, and the standard deviations of X and of the nonlinear constants at u.
+    """Compute W and X for nonlinear constants at u, and the standard deviations of X and u.
 
     Both standard deviations come from one covariance. Blocks of time are taken as independent.
     """
@@ -273,7 +273,7 @@ def _joint_deviations(problem: LawProblem, u: Array, scale: Array) -> tuple[Arra
 def _half(
     problem: LawProblem, rows: Array, scale: Array, members: Sequence[Sequence[int]], u: Array
 ) -> Array:
-    """Fit the nonlinear constants of the laws to a subset of the rows, from the initial value u."""
+    """Fit the nonlinear constants of the laws to a subset of the rows; u: starting values."""
     return Projection(problem, rows, scale).polished(u)[0]
 
 

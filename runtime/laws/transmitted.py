@@ -89,7 +89,7 @@ def _solve(observations: Sequence[Observation], weights: bool) -> Array:
 
 
 class TransmittedTorque:
-    """Calculator of the torque tau_m that a joint transmits, from the columns of W without tau_m.
+    """Computation of the torque tau_m that a joint transmits, from columns of W without tau_m.
 
     `read` lists, by channel of tau_m, the parameters whose columns depend on this channel.
     """
@@ -102,7 +102,7 @@ class TransmittedTorque:
         self.place = {c: model.JOINTS.index(int(c.removeprefix(TRANSMITTED))) for c in read}
 
     def given(self, record: Prepared, X: Array | None) -> Prepared:
-        """Add tau_m, computed from X, to the signals of a record; add zeros if X is None."""
+        """Add the transmitted torque tau_m, computed from X, to a record; zeros if X is None."""
         tau = np.zeros((len(record.record), len(self.model.JOINTS)))
         if X is not None:
             s = record.states

@@ -1,1 +1,1 @@
-"""Simulation of the closed loop that moves the arm, and the methods that use it (IV, DIDIM)."""
+"""Simulation of controller and arm in closed loop, and methods that use it (IV, DIDIM)."""

@@ -1,4 +1,4 @@
-"""The simulated closed loop of a study of encoder resolution (CESTAC).
+"""The closed loop (arm, controller, encoders) of a study of encoder resolution (CESTAC).
 
 The loop serves methods that simulate it (iv, didim), and encoders inside the loop:
 
@@ -68,7 +68,10 @@ class Loop:
     simulator: Simulator
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return the data to pickle: the problem alone; every process makes its own simulator."""
+        """Return the data for pickle: the identification problem, from which a copy is made.
+
+        A copy makes its own simulator.
+        """
         return _loop, (self.problem,)
 
     @property
@@ -83,7 +86,10 @@ class Loop:
 
     @property
     def options(self) -> Mapping[str, Any]:
-        """Options of the estimation method that concern the loop: `around` and `reference`."""
+        """Options of the closed loop that the study sets: `around` and `reference`.
+
+        around : s, rows near slow rows are left out. reference : how the reference is known.
+        """
         return {
             key: self.study.estimate.options[key]
             for key in ALIKE
@@ -102,9 +108,9 @@ class Loop:
 
     @cached_property
     def closed(self) -> ClosedLoop:
-        """Closed loop of the measured records, or of a record simulated with encoders in the loop.
+        """Closed loop of the measured records, or of a simulated record if `place` is loop.
 
-        The second case is place: loop. The simulated record is made with the encoder of the study.
+        The simulated record is made with the encoder of the study.
         """
         if self.study.cestac.place == "record":
             return closed_loop(self.problem, self.problem.prepared, self.simulator, **self.options)
@@ -112,12 +118,15 @@ class Loop:
 
     @property
     def parts(self) -> tuple[LoopPart, ...]:
-        """Data of each record that the loop simulates: reference, filtered states, rows used."""
+        """Data of each record to simulate: reference motion, filtered states, rows of W to use."""
         return tuple(self.closed.parts)
 
     @property
     def estimate(self) -> EstimateSettings:
-        """Estimate settings; without `around` and `reference` if the method simulates no loop."""
+        """Settings of the estimate, without loop options if its method simulates no closed loop.
+
+        The loop options are `around` and `reference`.
+        """
         settings: EstimateSettings = self.study.estimate
         if self.problem.method.observe is not None:
             return settings
@@ -131,7 +140,7 @@ class Loop:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Remarks for the user of a study, such as an assumption on the reference."""
+        """Remarks for the user of a study, such as an assumption on the reference motion."""
         method = self.study.estimate.method
         notes = [self.closed.assumption] if self.closed.assumption else []
         if self.study.cestac.place == "loop":
@@ -149,11 +158,11 @@ class Loop:
         return tuple(notes)
 
     def measured(self) -> Observation:
-        """Build the system Y = W X + rho of the records without the encoder steps under study."""
+        """Build the system Y = W X + rho of the records, before encoder steps are applied."""
         return self.closed.measured()
 
     def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
-        """Attach the closed loop to a system Y = W X + rho computed from perturbed positions.
+        """Store the closed loop with a system Y = W X + rho computed from perturbed positions.
 
         positions : shape (N, n) per record.
         """
@@ -169,14 +178,14 @@ class Loop:
         )
 
     def rows(self, level: Level, draw: tuple[int, ...]) -> Observation:
-        """Simulate a record with encoder steps level.delta, and build its system Y = W X + rho."""
+        """Simulate a record with the encoder step of `level`; build its system Y = W X + rho."""
         return self.simulated(level, draw).measured()
 
     def simulated(self, level: Level, draw: tuple[int, ...]) -> ClosedLoop:
-        """Simulate a record with encoder steps level.delta, and return its closed loop.
+        """Simulate a record with the encoder step of `level`, and return its closed loop.
 
-        If level.delta is 0, the encoder is that of the study. draw : numbers of the run; the last
-        sets its seed.
+        If the step level.delta is 0, the encoder is that of the study. draw : numbers of the run;
+        the last sets its seed.
         """
         random = stream(self.study.cestac.seed, draw[-1])
         law, n = self.simulator.law, len(self.model.JOINTS)
@@ -213,7 +222,7 @@ class Loop:
 
 
 def _loop(problem: Problem) -> Loop:
-    """Make the Loop of an identification problem; section `controller` gives the simulator."""
+    """Make the closed loop of a study; the settings section `controller` gives its simulator."""
     from runtime.loop.simulation import Simulator
 
     settings: Any = problem.settings
@@ -221,7 +230,7 @@ def _loop(problem: Problem) -> Loop:
 
 
 def loop_of(problem: Problem, simulator: Simulator | None = None) -> Loop | None:
-    """Make the Loop of an identification problem; None if no closed loop has to be simulated.
+    """Make the closed loop of a study of encoder resolution; None if the study simulates none.
 
     simulator : default: made from the section `controller`; SettingsError if that is missing.
     """

@@ -64,7 +64,7 @@ ASSUMED = (
 
 
 class LoopOptions(Settings):
-    """Options (estimate.options) of every method that simulates the closed loop.
+    """Options (estimate.options) of every estimation method that simulates the closed loop.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class LoopOptions(Settings):
 
 @dataclass(frozen=True, eq=False)
 class LoopPart:
-    """One record of a closed loop, with its reference and the rows of W that are used.
+    """One record of a closed loop, with the reference of its controller and the rows of W to use.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class LoopPart:
 
     @property
     def given(self) -> dict[str, Any]:
-        """Arguments for a simulation: first position, disturbance, recorded feed-forward torque."""
+        """Data to simulate this record: first position, disturbance torque, feed-forward torque."""
         return {
             "start": self.record.q[0],
             "disturbance": self.disturbance,
@@ -120,7 +120,7 @@ class LoopPart:
         }
 
     def decimated(self, x: Array) -> Array:
-        """Decimate signals of the record as Y was: from shape (N, n, ...) to shape (n, ..., K)."""
+        """Decimate signals, shape (N, n, ...), in the same way as the torques in Y: (n, ..., K)."""
         window = np.moveaxis(x[: len(self.record)][self.selection.samples], 0, -1)
         return decimated(
             np.ascontiguousarray(window), self.selection.factor, self.selection.signals.decimate
@@ -154,7 +154,7 @@ class ClosedLoop:
         ]
 
     def torques(self, runs: Sequence[Simulation]) -> list[Array]:
-        """Compute the drive torque of each simulation, shape (N, n), minus the known torque.
+        """Compute the drive torque of each simulation minus the known torque, shape (N, n) each.
 
         The known torque is that of the record (`tau_known`). The result is comparable with
         `Record.torque`.
@@ -163,7 +163,7 @@ class ClosedLoop:
         return [run.tau if known is None else run.tau[: len(known)] - known for run, known in pairs]
 
     def measured(self) -> Observation:
-        """Build the system Y = W X + rho from measured positions, and attach this loop to it."""
+        """Build the system Y = W X + rho from measured positions, and store this loop with it."""
         states = [p.prepared.states for p in self.parts]
         observation = self._observed([replace(s, errors=None) for s in states])
         observation = replace(
@@ -203,7 +203,7 @@ class ClosedLoop:
         return replace(observation, W=np.asfortranarray(Z[observation.closed_loop.rows]))
 
     def outputs(self, signals: Sequence[Array], observation: Observation) -> Array:
-        """Decimate signals of every record as Y was, and select the rows that `observation` uses.
+        """Decimate signals of every record in the same way as Y; select the rows of `observation`.
 
         The signals have shape (N, n) or (N, n, c) per record, the result shape (r,) or (r, c).
         """
@@ -239,7 +239,7 @@ class ClosedLoop:
 
 
 def observed_loop(problem: Problem, simulator: Simulator | None = None) -> Observation:
-    """Build the system Y = W X + rho of all records, and attach their closed loop to it.
+    """Build the system Y = W X + rho of all records, together with the closed loop to simulate.
 
     Methods that simulate the loop need this. simulator : default: made from the section
     `controller` of the settings; without this section no loop is attached.
@@ -268,7 +268,7 @@ def closed_loop(
     keep: Sequence[Array] = (),
     **options: Any,
 ) -> ClosedLoop:
-    """Make the closed loop of records: references, rows used, and a check of the control law.
+    """Prepare the closed loop of the records: find references and rows, check the control law.
 
     measured : the records with filtered states.
     keep : bool, shape (N,) or (N, n) per record: samples that may be used.
@@ -318,7 +318,7 @@ def closed_loop(
 
 
 def _at_ticks(x: Array, every: int, ticks: int) -> Array:
-    """Interpolate samples, shape (N, n), linearly at the ticks of the controller: shape (T, n).
+    """Interpolate recorded samples, shape (N, n), linearly at T controller samples: shape (T, n).
 
     The last sample is held.
     """
@@ -365,7 +365,7 @@ def _reference(
 
 
 def slips(qd: Array, G: Array) -> Array:
-    """Compute, by joint, the smallest of its speed and the slip speeds of its friction elements.
+    """Compute for each joint j the smallest of |qd_j| and the slip speeds of its dry friction.
 
     The result has shape (N, n), like qd. G : shape (elements, n); G qd are the slips of the
     friction elements.
@@ -378,7 +378,9 @@ def slips(qd: Array, G: Array) -> Array:
 
 
 def _usable(simulator: Simulator, record: Record, keep: Array | None) -> Array | None:
-    """Select the samples with torque below its limit and no long gap of positions nearby.
+    """Select the samples whose torque is below its limit, and that are not near a long gap.
+
+    A gap is a time without measured positions.
 
     keep : samples that may be used; None: all.
     """
@@ -394,7 +396,7 @@ def _usable(simulator: Simulator, record: Record, keep: Array | None) -> Array |
 
 
 def loop_of(observation: Observation, method: str) -> ClosedLoop:
-    """Return the closed loop that is attached to the system Y = W X + rho of an observation.
+    """Return the closed loop that was stored with the system Y = W X + rho of an observation.
 
     SettingsError if there is none; the message names `method`, which needs the loop.
     """

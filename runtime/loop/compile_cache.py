@@ -47,9 +47,9 @@ def shared_object(
     opened: Callable[[Path], ctypes.CDLL],
     flags: Sequence[str],
 ) -> ctypes.CDLL:
-    """Load the shared object of a C file from the cache, or compile it.
+    """Load the compiled library of a C file from the cache, or compile the file first.
 
-    An object that does not open is compiled again, once.
+    A library that does not open is compiled again, once.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def shared_object(
 
 
 def _cached(folder: Path, key: str, opened: Callable[[Path], ctypes.CDLL]) -> ctypes.CDLL | None:
-    """Open the cached object with the hash `key`; return None if there is none.
+    """Open the compiled library that the cache holds for the hash `key`; None if there is none.
 
     Files that are damaged or do not open are removed.
     """

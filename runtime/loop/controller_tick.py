@@ -1,4 +1,4 @@
-"""One controller tick of a closed loop as a CasADi function, compiled to C if there is a compiler.
+"""One sampling period (tick) of a closed loop as a CasADi function, compiled to C if possible.
 
     y     = position that the encoder shows for q         qd_m = its difference
     u     = P e + Vr qd_r - Vm qd_m + K I + feed-forward,  e = q_r - y
@@ -82,7 +82,7 @@ class LoopInputs:
 
 
 def blocks(rows: Array, size: int) -> Iterator[tuple[Array, int]]:
-    """Yield input samples in blocks of `size` rows, each with its number of rows without padding.
+    """Split input samples into blocks of `size` rows; yield each with its number of real rows.
 
     The last block is filled up with copies of its last row.
     """
@@ -98,7 +98,7 @@ def tick_function(
     substeps: int,
     integrator: str,
 ) -> Any:
-    """Make the CasADi function of one controller tick of the closed loop.
+    """Make the CasADi function that simulates the closed loop over one sampling period (tick).
 
     (x, signals, X, law, flags) -> x at the next tick, and y, tau, qdd of this tick.
 
@@ -135,7 +135,7 @@ def tick_function(
 
 
 def control_function(n: int) -> Any:
-    """Make the CasADi function of the control law at one tick.
+    """Make the CasADi function that computes the control law in one sampling period (tick).
 
     (q, y1 y2, I, u of the tick before, q_r qd_r ff, noise, law, flags) -> y, tau, I, u.
     """
@@ -207,13 +207,13 @@ def plant_function(
 
 
 def sliding_friction(friction: DryFriction, qd: MX, plus: MX, minus: MX) -> tuple[MX, MX]:
-    """Compute friction forces f and directions of slip if no friction element is at rest."""
+    """Compute dry friction forces f and slip directions, if all friction elements slip."""
     direction = ca.sign(ca.DM(friction.G) @ qd)
     return kinetic(direction, plus, minus), direction
 
 
 def keeps_sliding(friction: DryFriction, direction: MX, qd: MX, end: MX) -> MX:
-    """Whether no friction element stops or reverses between the velocities qd and `end`."""
+    """Whether every friction element slips, in the same direction at velocities qd and `end`."""
     G = ca.DM(friction.G)
     return ca.mmin(ca.vertcat(ca.fabs(G @ qd), direction * (G @ end))) > LIMIT.SLIP_REST
 
@@ -289,10 +289,11 @@ def round_function(
 
 
 def plant_inputs(model: GeneratedModel, friction: DryFriction | None = None) -> list[MX]:
-    """Make the symbolic inputs of the arm functions: q, qd, tau, Xs, plus, minus, h.
+    """Make the symbolic inputs of the functions that move the arm: state, torques, parameters.
 
-    Xs : parameters without dry friction; plus, minus : largest friction forces in each direction; h
-    : time step. Without dry friction, plus and minus are empty.
+    They are q, qd, tau, Xs, plus, minus, h. Xs : parameters without dry friction; plus, minus :
+    largest friction forces in each direction; h : time step. Without dry friction, plus and minus
+    are empty.
     """
     n, m = len(model.JOINTS), 0 if friction is None else len(friction.G)
     names = ("q", "qd", "tau", "X", "plus", "minus", "h")
@@ -351,7 +352,7 @@ def _cvodes(model: GeneratedModel, constants: dict[str, float]) -> Any:
 
 
 def compiled(function: Any, cache: Path | None = None) -> Any:
-    """Compile the C code of a CasADi function, or load it from the cache of compiled files.
+    """Compile a CasADi function as C code, or load its compiled form from the cache.
 
     If this fails, the result is the function itself, with a FallbackWarning.
     """

@@ -1,4 +1,4 @@
-"""Dry (Coulomb) friction of a robot model: its columns of W, and the directions it acts along.
+"""Dry (Coulomb) friction of a robot model: its columns of W, and the directions of its forces.
 
 Every Coulomb element acts along a row of G. Its slip is s = G qd; its force is c_plus if s > 0 and
 -c_minus if s < 0. There may be more elements than joints (on a wrist, FS5, FS6 and FSM6 act along
@@ -19,7 +19,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class DryFriction:
-    """Coulomb friction elements of a model: their directions, and the parameters of their forces.
+    """Coulomb friction elements of a model: the directions of their forces, and their parameters.
 
     Attributes
     ----------

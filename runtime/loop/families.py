@@ -60,14 +60,14 @@ class Family:
         raise NotImplementedError
 
     def guess(self, rng: np.random.Generator, lower: float, upper: float, speed: float) -> Array:
-        """Draw random coefficients, shape (P,), of a motion around the middle of [lower, upper].
+        """Draw P random coefficients p of a joint motion around the middle of [lower, upper].
 
         The motion is not faster than about `speed`.
         """
         raise NotImplementedError
 
     def bounds(self) -> tuple[Array, Array]:
-        """Return the smallest and the largest coefficients p that are allowed, shape (P,) each.
+        """Return the smallest and the largest allowed values of the P coefficients p of a joint.
 
         They are infinite for coefficients that only the limits of the motion restrict.
         """
@@ -75,7 +75,7 @@ class Family:
 
 
 class Fourier(Family, Settings):
-    """Finite Fourier series.
+    """Joint motion q(t) as a finite Fourier series.
 
     The motion is at rest at its ends if sum a_l = 0 and sum l b_l = 0; the search imposes these
     conditions on the coefficients.
@@ -127,7 +127,7 @@ class Fourier(Family, Settings):
 
 
 class Sinusoids(Family, Settings):
-    """Sum of sinusoids of free frequency, which rise at the start and fall at the end.
+    """Joint motion as a sum of sinusoids with free frequencies; amplitudes grow and fade at the ends.
 
     Attributes
     ----------
@@ -200,7 +200,7 @@ class Sinusoids(Family, Settings):
 
 
 class Polyline(Family):
-    """Motion with constant velocities between positions p0, p1 ... and rounded corners.
+    """Joint motion of constant velocity between positions p0, p1 ..., smoothed at the positions.
 
     `ramps` has the start and end times of each constant velocity, as if the corners were sharp.
     """
@@ -210,11 +210,11 @@ class Polyline(Family):
 
     @property
     def ramps(self) -> list[tuple[float, float]]:
-        """Start and end time, s, of the move to each next position; corners not yet rounded."""
+        """Start and end time, s, of the move to each next position, before smoothing."""
         raise NotImplementedError
 
     def stride(self, speed: float) -> float:
-        """Return the largest distance between neighbouring random positions, rad or m."""
+        """Return the largest distance, rad or m, between successive positions of a random draw."""
         raise NotImplementedError
 
     @property

@@ -64,7 +64,7 @@ class FixedPointOptions(LoopOptions):
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """Result of one pass: the parameters, their covariance, and the norm of the residual.
+    """Result of one pass of IV or DIDIM: parameters, their covariance, norm of the residual.
 
     X has shape (c,). `result` holds other data that the method needs later.
     """
@@ -77,7 +77,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Fixed:
-    """Result of the iteration: last pass, all passes, convergence, ratio of last two changes."""
+    """Result of an IV or DIDIM iteration: last pass, all passes, and how it converged."""
 
     step: Step
     trail: tuple[dict[str, Any], ...]
@@ -87,13 +87,13 @@ class Fixed:
 
 
 def full(names: Sequence[str], X: Array, every: Sequence[str]) -> Array:
-    """Extend X of the columns `names` to all base parameters; missing parameters are zero."""
+    """Extend X, given for the parameters `names`, to all base parameters; the rest are zero."""
     by_name = dict(zip(names, X, strict=True))
     return np.array([by_name.get(name, 0.0) for name in every])
 
 
 def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]) -> Array:
-    """Choose the parameters X that the iteration starts from.
+    """Choose the parameters X from which the iteration of IV or DIDIM starts.
 
     `which` : ols (ordinary least squares), values (of the robot file), unit (unit inertias), or
     values by name.
@@ -137,7 +137,7 @@ def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]
 def iterate(
     loop: ClosedLoop, start: Beginning, update: Callable[[Sequence[Simulation], Array], Step]
 ) -> Fixed:
-    """Repeat the simulation and the update of the parameters X until X no longer changes.
+    """Repeat the simulation and the estimation of the parameters X until X no longer changes.
 
     X holds the parameters of the columns of the rows.
     """
@@ -195,7 +195,7 @@ def iterate(
 
 
 def _physical_start(loop: ClosedLoop, start: Beginning) -> str:
-    """Write which start values to set if the iteration starts from unphysical parameters.
+    """Write advice: which start values to set if the iteration starts from unphysical ones.
 
     The advice is the values of the robot file if they give a positive inertia about every joint,
     else the parameters of method feasible.
@@ -225,7 +225,9 @@ def _simulated(
     J: Array | None,
     remedy: str,
 ) -> tuple[Array, Array, Sequence[Simulation], str]:
-    """Simulate the loop with X; if this fails, try X halfway to the last X that succeeded.
+    """Simulate the closed loop with X; if this fails, try X nearer to the last X that succeeded.
+
+    Each further try halves the distance.
 
     Returns X, the gains g, the runs, and the reason if no simulation was possible. remedy : advice
     in the error if the first simulation fails.
@@ -270,7 +272,7 @@ def _accelerated(last: Sequence[Mapping[str, Any]], size: Array) -> Array:
 
 
 def _contraction(trail: Sequence[Mapping[str, Any]]) -> float:
-    """Compute the ratio of the last two changes of X; nan if there are fewer than two."""
+    """Compute the ratio of the last change of X to the change before; nan for fewer than two."""
     changes = [
         float(np.linalg.norm((own["next"] - own["X"]) / np.maximum(np.abs(own["next"]), 1e-12)))
         for own in trail[-2:]

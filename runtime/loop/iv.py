@@ -40,7 +40,7 @@ from runtime.loop.result import Simulation
 
 
 def fit(start: Beginning) -> Fitted:
-    """Fit the parameters by method IDIM-IV on the rows of the measured positions.
+    """Estimate the parameters by method IDIM-IV, with W computed from the measured positions.
 
     SettingsError if no loop is attached to the observation.
     """
@@ -111,7 +111,10 @@ def hausman(names: Sequence[str], d: Array, U: Array) -> dict[str, Any]:
 
 
 def _solve(W: Array, Z: Array, Y: Array) -> tuple[Array, Array, Array]:
-    """Solve the weighted system with instruments Z; return X, its covariance C, A = (Z'VW)^-1."""
+    """Solve Z'W X = Z'Y with instruments Z; return X, its covariance C, and A = (Z'W)^-1.
+
+    W, Z and Y are already weighted.
+    """
     size = np.linalg.norm(W, axis=0)
     W, Z = W / size, Z / size
     try:
@@ -144,10 +147,10 @@ def _quality(W: Array, Z: Array) -> dict[str, float]:
 
 
 def _by_block(observation: Observation, Z: Array, residual: Array, A: Array) -> Array:
-    """Compute the change of X = A Z'Y if a block of rows is left out, for each block: shape (K, b).
+    """Compute how the estimate X changes if one of K blocks of rows is left out: shape (K, b).
 
-    The changes are multiplied by sqrt((K - 1)/K) (`runtime.core.least_squares.block_covariance`);
-    they are nan if there is only one block.
+    X = A Z'Y. The changes are multiplied by sqrt((K - 1)/K)
+    (`runtime.core.least_squares.block_covariance`); they are nan if there is only one block.
 
     Z, residual : weighted rows of the instruments, shape (r, b), and Y - W X, shape (r,).
     """

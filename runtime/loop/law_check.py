@@ -121,7 +121,7 @@ def _integral(steps: Array, first: float, bound: float) -> Array:
 
 
 def law_text(fits: Sequence[LawFit]) -> str:
-    """Write which share of each joint torque the law explains, and causes of a small share."""
+    """Write which share of each joint torque the control law explains, and why it may be small."""
     shares = ", ".join(f"{max(one.share, 0.0):.0f} % of joint {one.joint}" for one in fits)
     poor = [one for one in fits if one.share < LIMIT.LAW_POOR]
     if not poor:
@@ -140,7 +140,7 @@ def law_text(fits: Sequence[LawFit]) -> str:
 
 
 def _share(y: Array, x: Array) -> tuple[float, float, float]:
-    """Compute how well a signal x explains a signal y, %, without and with a best factor on x.
+    """Compute the share of signal y, %, that x explains, and that the best multiple of x explains.
 
     Returns the share, %; the best factor of x; and the share with this factor, %.
     """

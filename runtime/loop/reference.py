@@ -34,7 +34,7 @@ UNITS = {"q": "", "qd": "/s", "qdd": "/s^2"}
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """Reference positions, velocities and accelerations of all joints at the times k/rate.
+    """Reference positions, velocities and accelerations of all joints, sampled at `rate`.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Reference:
 
     @classmethod
     def sampled(cls, q: Array, rate: float) -> Reference:
-        """Make a reference from positions alone, shape (N, n).
+        """Make a reference motion from N sampled positions of n joints, shape (N, n).
 
         Velocities and accelerations are central differences.
         """
@@ -158,7 +158,7 @@ def _check_length(duration: float, rate: float, key: str) -> None:
 
 
 def read_reference(path: Path, rate: float, n: int) -> Reference:
-    """Read a reference at `rate`, Hz, from the columns q1 ... qn of a file.
+    """Read a reference motion at `rate`, Hz, from the columns q1 ... qn of a file.
 
     The columns qd1 ... and qdd1 ... are used if the file has them; else central differences.
     """

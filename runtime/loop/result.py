@@ -32,7 +32,7 @@ class SimulationError(InputError):
 
 @dataclass(frozen=True, eq=False)
 class Simulation(Result):
-    """Signals of one simulation at the recorded controller ticks; shape (N, n), joint side, SI.
+    """Signals of one closed-loop simulation at N recorded samples: (N, n), joint side, SI.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class Simulation(Result):
 
     @property
     def at_rest(self) -> Array:
-        """Share of the recorded ticks at which each joint is at rest, shape (n,)."""
+        """Share of the recorded samples at which each joint is at rest, shape (n,)."""
         return np.asarray((np.abs(self.qd) <= LIMIT.SLIP_REST).mean(axis=0))
 
     def summary(self) -> dict[str, Any]:

@@ -93,10 +93,10 @@ class Law(Settings):
             require(none, f"{value}, but a {self.kind} law has no gain {key}; remove {key}", key)
 
     def gains(self, n: int) -> dict[str, np.ndarray]:
-        """Return the gains P, Vr, Vm, K of u = P e + Vr qd_r - Vm qd_m + K I, shape (n,) each.
+        """Return the gains P (position error), Vr, Vm (reference, measured velocity), K (integral).
 
-        They contain the gain of the drive: N m or N per unit of e, of its rate, and of I. kd: fit
-        counts as 0.
+        They are those of u = P e + Vr qd_r - Vm qd_m + K I, shape (n,) each, and contain the gain
+        of the drive: N m or N per unit of e, of its rate, and of I. kd: fit counts as 0.
         """
 
         def each(key: str) -> np.ndarray:
@@ -136,7 +136,7 @@ class Encoder(Settings):
 
 
 class Torque(Settings):
-    """Settings of the torque between command, arm and record, N m or N at the joint.
+    """Settings of the joint torques: limit, resolution, disturbance on the arm, noise of the record.
 
     Attributes
     ----------
@@ -159,7 +159,7 @@ class Torque(Settings):
     bandwidth: Positive = 50.0
 
     def largest(self, limits: Mapping[str, Any]) -> PerJoint[float] | None:
-        """Return the largest torque, N m or N, from the settings or the LIMITS of a model.
+        """Return the largest joint torque, N m or N, from the settings or the limits of the model.
 
         None if the torque is unlimited.
         """

@@ -88,7 +88,7 @@ class Simulator:
         seed: int | None = None,
         name: str = "simulation",
     ) -> Simulation:
-        """Simulate the closed loop along the reference.
+        """Simulate the arm and the controller in closed loop along a reference motion.
 
         Parameters
         ----------
@@ -201,7 +201,7 @@ class Simulator:
         )
 
     def substeps(self, X: Array, reference: Reference, g: Array) -> int:
-        """Compute the number of integration steps per tick from the fastest pole of the loop.
+        """Compute the integration steps per sampling period from the fastest closed-loop pole.
 
         SimulationError if, on the reference, the inertia is not positive definite or the sampled
         loop is unstable.
@@ -243,7 +243,10 @@ class Simulator:
         return steps
 
     def _ticks(self, substeps: int) -> Any:
-        """Return the CasADi function that simulates BLOCK ticks, made once for each `substeps`."""
+        """Return the CasADi function that simulates BLOCK ticks of `substeps` steps each.
+
+        A tick is a sampling period of the controller. Each function is made once.
+        """
         if substeps not in self._compiled:
             tick = tick_function(
                 self.model, self.friction, self.constants, substeps, self.controller.integrator
@@ -252,7 +255,7 @@ class Simulator:
         return self._compiled[substeps]
 
     def _iterated(self, inputs: LoopInputs) -> tuple[Array, Array]:
-        """Simulate all ticks of a run, BLOCK ticks in one call.
+        """Simulate all sampling periods (ticks) of a run, in calls of BLOCK ticks each.
 
         Returns the states after each tick, shape (S + N, 6n), and the outputs y, tau, qdd, shape
         (S + N, 3n).
@@ -310,7 +313,7 @@ def simulate(
     ideal: bool = False,
     name: str | None = None,
 ) -> Simulation:
-    """Simulate the closed loop of a controller along its reference.
+    """Simulate arm and controller in closed loop along the reference motion of the settings.
 
     records : records that may hold the reference. folder : folder of relative file names.
     ideal, name : as for `runtime.simulate`.

@@ -1,7 +1,7 @@
-"""Trajectories of the joints, in parts: each part is a family of motions with its coefficients.
+"""Joint trajectories made of successive parts; each part has a formula and its coefficients.
 
-A family is, for instance, Fourier series (`runtime.loop.families`). Each part begins where the part
-before it ends. SI units, rad.
+A formula is a family of motions, for instance Fourier series (`runtime.loop.families`). Each part
+begins where the part before it ends. SI units, rad.
 """
 
 from __future__ import annotations

@@ -53,7 +53,9 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class DriveGains(Result, keys="joints constant together sigma alone sigma_alone refused"):
-    """Correction factors g of the torque constants, one per motor; nan if a method gives no factor.
+    """Correction factors g of the torque constants of the motors, estimated by two methods.
+
+    A factor is nan if a method cannot estimate it.
 
     Attributes
     ----------
@@ -282,10 +284,11 @@ def _together(
     drives: Drives,
     seed: int,
 ) -> tuple[Array, Array]:
-    """Estimate g, X and the load by total least squares, with errors in the motor torques only.
+    """Estimate g, X and the load by total least squares, with errors in motor torques only.
 
-    Returns the values and their standard deviations over resampled blocks of time, for g, X and the
-    load in this order; nan for columns that depend on others.
+    g : factors of the torque constants. Returns the values and their standard deviations over
+    resampled blocks of time, for g, X and the load in this order; nan for columns that depend on
+    others.
     """
     weight = np.repeat(
         1 / np.maximum(deviation, 1e-12 * np.abs(observation.Y).max()), observation.rows
@@ -306,9 +309,10 @@ def _together(
 
 
 def _gains(R: Array, D: Array) -> Array:
-    """Compute g and the parameters of the error-free columns from the QR factor R.
+    """Compute the factors g, X and the load from the QR factor R of all columns.
 
-    Columns of R: columns without errors, known load, motor torques V.
+    Columns of R: columns without errors (of X and the load), known load, motor torques V. D :
+    standard deviations of the errors in V.
     """
     n = len(D)
     e = len(R) - n - 1
@@ -341,7 +345,7 @@ def _independent(A: Array) -> Array:
 
 
 def scaled(model: GeneratedModel, record: Prepared, gains: DriveGains) -> Observation:
-    """Build the system Y = W X + rho of a record, with motor torques times their factors g."""
+    """Build the system Y = W X + rho of a record, each motor torque multiplied by its factor g."""
     n = len(model.JOINTS)
     motors = _with_motors(model, record, _drives(model))
     Y = motors.W[:, -n:] @ gains.factors

@@ -53,7 +53,7 @@ class Mount:
 
     @property
     def action(self) -> Array:
-        """Matrix A, shape (10, 10), from inertial parameters in `frame` to those in the link frame.
+        """Matrix A, (10, 10), that transforms inertial parameters from `frame` to the link frame.
 
         Their order is that of INERTIAL.
         """

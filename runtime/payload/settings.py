@@ -12,7 +12,9 @@ LOAD = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 
 
 class PayloadSettings(Settings):
-    """Settings of a load fixed to a link; the other records of the study are without the load.
+    """Settings of a load that is fixed to a link in some records: its place, known parameters.
+
+    All other records of the study are without the load.
 
     Attributes
     ----------

@@ -95,7 +95,7 @@ class Consistency(Part):
         }
 
     def files(self) -> dict[str, str]:
-        """Return a CSV file with one complete set of standard parameters, if `fit` has one."""
+        """Return a CSV file with one complete set of standard parameters, if the fit gave one."""
         if not self.fitted:
             return {}
         standard = list(self.fit.details["standard"].items())

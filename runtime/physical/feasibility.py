@@ -286,7 +286,7 @@ def limit_rows(physical: PhysicalModel, limits: RobotLimits | None) -> LinearBou
 
 
 def scales(physical: PhysicalModel) -> Array:
-    """Return typical sizes of the standard parameters, shape (p,), to scale the solver's unknowns.
+    """Return a typical size of each standard parameter, shape (p,), in SI units.
 
     They are the absolute values of the robot file, but at least a hundredth of a typical size; if
     the file has no values, they are typical sizes.
@@ -301,7 +301,7 @@ def scales(physical: PhysicalModel) -> Array:
 
 
 def units(physical: PhysicalModel) -> Array:
-    """Return the units in which the solver counts the unknown standard parameters, shape (p,).
+    """Return the scales, shape (p,), by which the solver divides the unknown standard parameters.
 
     For a link with values in the robot file they follow from the size of its condition (second
     moment and mass); for all others they are `scales`.
@@ -315,7 +315,7 @@ def units(physical: PhysicalModel) -> Array:
 
 
 def pull_to_file(physical: PhysicalModel, kind: Distance, weight: float) -> Prior | None:
-    """Make the prior that pulls inertial parameters towards the values of the robot file.
+    """Make the penalty (prior) that pulls inertial parameters towards the robot file values.
 
     None if there is no prior or its weight is 0. SettingsError if the file has no values of links.
     """
@@ -366,10 +366,9 @@ def unsolved(status: str, rows: LinearBounds, attempt: Callable[[LinearBounds], 
 
 
 def _inside(e: Ellipsoid) -> Array:
-    """Return the matrix Q of an ellipsoid: tr(P Q) >= 0 if the mass of the link lies inside.
+    """Return the matrix Q of an ellipsoid: tr(P Q) >= 0 if a link of pseudo-inertia P is inside.
 
-    P is the pseudo-inertia of the link. With homogeneous coordinates on the left,
-    x'Qx = 1 - (x - c)' A^-1 (x - c), A = diag(axes^2).
+    With homogeneous coordinates on the left, x'Qx = 1 - (x - c)' A^-1 (x - c), A = diag(axes^2).
     """
     A, c = np.diag(1 / np.square(e.axes)), np.array([e.centre]).T
     return np.block([[-A, A @ c], [c.T @ A, 1 - c.T @ A @ c]])

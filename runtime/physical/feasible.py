@@ -115,7 +115,7 @@ class FeasibleOptions(RobotLimits):
 
 
 def fit(start: Beginning) -> Fitted:
-    """Fit the parameters by method feasible.
+    """Fit the base parameters by least squares under the conditions of a physical robot.
 
     `details` holds the standard parameters, the smallest eigenvalue of each condition, and the
     least-squares estimate.
@@ -358,10 +358,10 @@ def reach_text(options: FeasibleOptions) -> str:
 def by_reach(
     rows: Factor, physical: PhysicalModel, unbounded: FeasibleOptions, bounded: FeasibleOptions
 ) -> tuple[Array | None, Array | None]:
-    """Fit chi twice: without and with mass and centre bounds guessed from the robot size.
+    """Fit the standard parameters chi twice: without and with bounds guessed from the robot size.
 
-    No prior is used. Returns both standard parameter vectors chi; None for a fit without solution,
-    for instance if no robot is within the bounds.
+    The bounds are on masses and centres of mass. No prior is used. Returns both vectors chi; None
+    for a fit without solution, for instance if no robot is within the bounds.
     """
     found: list[Array | None] = []
     for limits in (unbounded, bounded):
@@ -390,7 +390,7 @@ def bounds_contradict(
 
 
 def prior_text(physical: PhysicalModel, options: FeasibleOptions, weight: float) -> str:
-    """Write a sentence on the prior: its kind, its weight, number of parameters without value."""
+    """Write a sentence on the prior (values of the robot file): kind, weight, missing values."""
     if options.prior == "none":
         return ""
     missing = len(physical.links) * 10 - len(known_inertia(physical))
@@ -399,7 +399,7 @@ def prior_text(physical: PhysicalModel, options: FeasibleOptions, weight: float)
 
 
 def part_factor(part: Observation, system: System) -> Factor:
-    """Compute the QR factor of a subset of the rows, weighted by joint as all rows are."""
+    """Compute the QR factor of a part of the record, with the joint weights of the whole record."""
     chosen = part.columns(system.names)
     return factor(chosen.W, chosen.Y, chosen.rows, chosen.names).weighted(
         1 / np.array(system.scales)

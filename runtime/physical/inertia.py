@@ -40,7 +40,9 @@ FORMED = ("inertia", "viscous")  # kinds whose forms must be positive semidefini
 
 @dataclass(frozen=True, eq=False)
 class Condition:
-    """One physical condition: the matrix P = sum_k chi[numbers[k]] B[k] is positive semidefinite.
+    """One physical condition: a matrix P, linear in standard parameters, is positive semidefinite.
+
+    P = sum_k chi[numbers[k]] B[k], with chi the standard parameters.
 
     Attributes
     ----------
@@ -63,18 +65,18 @@ class Condition:
 
     @property
     def scaled(self) -> Array:
-        """Matrices B of the scaled condition S^-1/2 P S^-1/2, S = diag(size)."""
+        """Matrices B[k] divided by the scale S of the condition: S^-1/2 B[k] S^-1/2, (k, m, m)."""
         root = np.sqrt(self.size)
         return np.asarray(self.B / np.outer(root, root))
 
     def matrix(self, chi: Array) -> Array:
-        """Compute the matrix P of the condition at chi, shape (m, m)."""
+        """Compute the matrix P of the condition, shape (m, m), from standard parameters chi."""
         return np.asarray(np.tensordot(chi[list(self.numbers)], self.B, axes=1))
 
     def smallest(self, chi: Array) -> float:
-        """Compute the smallest eigenvalue of P relative to S = diag(size).
+        """Compute the smallest eigenvalue of the matrix P of the condition, relative to its scale.
 
-        It is the largest t for which P - t S is positive semidefinite.
+        S = diag(size). The result is the largest t for which P - t S is positive semidefinite.
         """
         P = np.tensordot(chi[list(self.numbers)], self.scaled, axes=1)
         return float(np.linalg.eigvalsh(P)[0])
@@ -226,10 +228,11 @@ def _forms(
 def _signs(
     elements: Mapping[str, Any], standard: Sequence[str], least: float
 ) -> Iterator[Condition]:
-    """Yield the conditions c >= 0 on motor inertias and friction that act along one direction G.
+    """Yield the conditions that motor inertias and friction coefficients are not negative.
 
-    If friction of one direction adds to friction of both directions, their sum must be >= 0 in each
-    direction.
+    There is one condition c >= 0 for each such element along one direction G. If friction of one
+    direction of motion adds to friction of both, their sum must be >= 0 in each direction of
+    motion.
     """
     along: dict[tuple[Any, ...], dict[str, list[str]]] = {}
     for name, (kind, when, acts) in elements.items():

@@ -78,7 +78,7 @@ class LinearBounds:
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Set of the standard parameters chi = origin + basis w with free w.
+    """Affine set of standard parameters: all chi = origin + basis w, with w any vector.
 
     origin has shape (p,), basis (p, m).
     """
@@ -88,12 +88,15 @@ class Space:
 
 
 def everything(scale: Array) -> Space:
-    """Make the space of all standard parameters chi, in units of `scale`, shape (p,)."""
+    """Return the set of all standard parameters chi, shape (p,), each in units of `scale`."""
     return Space(np.zeros(len(scale)), np.diag(scale))
 
 
 def solutions(K: Array, X: Array, scale: Array) -> Space:
-    """Make the space of all standard parameters chi with K chi = X; K has full row rank."""
+    """Return the set of all standard parameters chi with the base parameters X: K chi = X.
+
+    K has full row rank. scale : units of the unknowns, shape (p,).
+    """
     return Space(
         scale * np.linalg.lstsq(K * scale, X, rcond=None)[0], scale[:, None] * null_space(K * scale)
     )
@@ -172,7 +175,9 @@ class Optimum:
 
 
 class Program:
-    """A cone program over w, with chi = origin + basis w, built constraint by constraint.
+    """A cone program for standard parameters chi = origin + basis w, with the unknowns w.
+
+    It is built constraint by constraint.
 
     It starts with the constraint P >= least S of every condition, or P >= t S with an unknown t,
     and with the linear rows. The criterion may add further unknowns.
@@ -230,7 +235,7 @@ class Program:
         return A, M @ self.space.origin
 
     def at_least_zero(self, A: Array, b: Array) -> None:
-        """Add the constraints A x + b >= 0, row by row."""
+        """Add one constraint per row of A x + b >= 0, with x the unknowns of the program."""
         if len(b):
             self.constraints.append((_clarabel().NonnegativeConeT(len(b)), A, b))
 
@@ -243,7 +248,7 @@ class Program:
         self.constraints.append((_clarabel().ZeroConeT(len(z)), A, b - z))
 
     def solve(self) -> Optimum:
-        """Solve the program with the tightest of TOLERANCES that Clarabel reaches."""
+        """Solve the program with the tightest tolerances that Clarabel reaches (TOLERANCES)."""
         cones, A, b = zip(*self.constraints, strict=True)
         count, status = len(self.linear), ""
         Q = np.diag(self.diagonal)
@@ -289,9 +294,10 @@ def closest(
     least: float,
     pull: Prior | None = None,
 ) -> Optimum:
-    """Find the chi of `space` that minimises ||R chi - z|| under `conditions` and `rows`.
+    """Find the standard parameters chi that minimise ||R chi - z|| under physical conditions.
 
-    R has shape (m, p), z shape (m,); the caller scales both so that ||z|| is about 1.
+    R has shape (m, p), z shape (m,); the caller scales both so that ||z|| is about 1. chi is in
+    `space` and fulfils the inequalities `rows`.
 
     least : lower bound, above zero, of the smallest eigenvalue of every condition, relative to its
     size. pull : adds weight D(chi) to ||R chi - z||^2.
@@ -308,9 +314,10 @@ def closest(
 
 
 def margin(conditions: Sequence[Condition], rows: LinearBounds, space: Space) -> Optimum:
-    """Find the largest t for which P - t S of every physical condition is positive semidefinite.
+    """Find the standard parameters that fulfil all physical conditions with the largest margin t.
 
-    t is negative if there is no physical robot in `space`.
+    With margin t, P - t S is positive semidefinite for the matrix P and the scale S of every
+    condition. t is negative if there is no physical robot in `space`.
     """
     program = Program(space, rows, conditions, None)
     program.linear[-1] = -1.0
@@ -349,9 +356,9 @@ class Quadratic:
         self.solver: Any = None
 
     def minimum(self, A: Array, g: Array) -> Array:
-        """Find the chi, shape (p,), that minimises 1/2 chi'A chi - g'chi for this A and g.
+        """Find the standard parameters chi, shape (p,), that minimise 1/2 chi'A chi - g'chi.
 
-        The result is zeros if Clarabel finds no minimum.
+        chi is that of a physical robot; zeros if Clarabel finds no minimum.
         """
         squares = (A * self.scale * self.scale[:, None])[self.upper]
         linear = -g * self.scale
@@ -416,7 +423,7 @@ def triangle(B: Array) -> Array:
 
 @lru_cache(maxsize=8)
 def _triangles(conditions: tuple[Condition, ...], p: int) -> tuple[Array, Array]:
-    """Write the scaled matrices of all conditions as upper triangles, one below the other.
+    """Write the scaled matrices of all physical conditions as upper triangles, in one matrix.
 
     The triangles are over all p standard parameters, shape (rows, p). The second result has the
     triangles of identity matrices, shape (rows,).
@@ -434,7 +441,7 @@ def trace(z: Array) -> float:
 
 
 def on_standard(M: Array, numbers: Sequence[int], p: int) -> Array:
-    """Extend the columns of M, shape (k, len(numbers)), to all p standard parameters: shape (k, p).
+    """Put the columns of M at the indices `numbers` of a matrix with p columns, shape (k, p).
 
     The other columns are zero.
     """

@@ -1,4 +1,4 @@
-"""Fit selected samples of a record, with free parameters or with those of bodies that can exist.
+"""Fit robot parameters to samples of a record: any values, or only those that bodies can have.
 
 Bodies stay near the values that are known. Rows of a joint are weighted by its own residuals, so
 that a wrist counts as much as a shoulder. The score is the negative logarithm of the likelihood
@@ -74,7 +74,10 @@ class Grams:
         return cls(np.array(grams), mask.sum(axis=0), measured)
 
     def mapped(self, K: Array) -> Grams:
-        """Replace the unknowns X of the normal equations by chi: X = K chi, K of shape (b, p)."""
+        """Change the unknowns of the normal equations from base to standard parameters: X = K chi.
+
+        K has the shape (b, p): it gives the b base parameters X from the p standard parameters chi.
+        """
         M = np.zeros((K.shape[0] + 1, K.shape[1] + 1))
         M[:-1, :-1], M[-1, -1] = K, 1.0
         return Grams(M.T @ self.of_joints @ M, self.rows, self.measured)
@@ -95,7 +98,7 @@ class Grams:
         return np.asarray(np.where(square > 0, np.sqrt(square), 1.0), dtype=float)
 
     def weighted(self, sigma: Array) -> tuple[Array, Array]:
-        """Add up the normal equations of all joints, each divided by sigma_j^2.
+        """Sum the normal equations of all joints, each divided by the residual variance sigma_j^2.
 
         Return A = sum_j W_j'W_j / sigma_j^2 and g = sum_j W_j'Y_j / sigma_j^2.
         """
@@ -127,7 +130,7 @@ class Fit:
 
 
 def fit_of(grams: Grams, X: Array, N: float, penalty: float = 0.0) -> Fit:
-    """Compute, for given parameters X, the residual and the error of each joint, and the score.
+    """Compute the residual and the relative error of each joint, and the score, for parameters X.
 
     N : number of independent rows of a joint.
     penalty : added to the score, nats.
@@ -148,7 +151,7 @@ def solve_scaled(A: Array, g: Array, ridge: float = LIMIT.RIDGE) -> Array:
 
 
 def least_squares(grams: Grams, N: float, bodies: Bodies | None = None) -> Fit:
-    """Fit by least squares, with the rows of each joint divided by the residual of this joint.
+    """Fit the parameters by least squares, with each joint's rows divided by its rms residual.
 
     If `bodies` is given, the parameters are the standard parameters, and they are drawn towards the
     values of the robot file.
@@ -164,7 +167,7 @@ def least_squares(grams: Grams, N: float, bodies: Bodies | None = None) -> Fit:
 
 
 class Bodies:
-    """Conditions and penalties of a fit that keep the parameters physical and near known values.
+    """Conditions for physical parameters of bodies, and penalties that draw them to known values.
 
     Parameters
     ----------
@@ -283,19 +286,22 @@ class Bodies:
 
     @property
     def near_values(self) -> bool:
-        """Whether the robot file gives values of links, towards which the fit is drawn."""
+        """Whether the fit is drawn towards values of links that the robot file gives."""
         return bool(self.known_links.any())
 
     def distance(self, chi: Array) -> float:
-        """Compute the penalty on the distance of chi from the values of the robot file, nats."""
+        """Compute the penalty if parameters chi differ from the robot file's values, nats."""
         return float(0.5 * chi @ self.H @ chi - self.h @ chi + self.constant)
 
     def penalty(self, chi: Array) -> float:
-        """Compute D(chi), nats: penalty on the distance from known values and on unknown masses."""
+        """Compute the penalty D of standard parameters chi, nats.
+
+        It is the distance from known values, plus a price for the masses of links without values.
+        """
         return self.distance(chi) + float(self.heavy @ chi)
 
     def minimum(self, A: Array, g: Array) -> Array:
-        """Find the physical parameters chi that minimise a quadratic function plus penalties.
+        """Find the physical parameters chi that minimise a least-squares cost plus the penalties.
 
         The function is 1/2 chi'A chi - g'chi + D(chi) + price'chi, D the distance from known values
         plus the price of the masses.
@@ -303,7 +309,7 @@ class Bodies:
         return self.program.minimum(A + self.H, g + self.h - self.heavy - self.price)
 
     def stiffness(self, chi: Array) -> Array:
-        """Compute the second derivatives of the penalty D, and of a barrier against unphysical chi.
+        """Compute the second derivatives of the penalty D plus a barrier at the physical bounds.
 
         The barrier is logarithmic, has the weight LIMIT.WEAK_PRICE, and bounds the parameters by
         the physical conditions. It makes the matrix large in the directions in which parameters
@@ -340,7 +346,7 @@ def physical_fit(grams: Grams, bodies: Bodies, N: float, sigma: Array, rounds: i
 
 
 def quick_fit(grams: Grams, bodies: Bodies, N: float, sigma: Array) -> Fit:
-    """Fit a physical robot with weights that are computed only once.
+    """Fit the standard parameters of a physical robot once, with weights from given residuals.
 
     The score is at most a few nats above that of `physical_fit`.
     """

@@ -80,7 +80,7 @@ class Case:
         return list(joint_units(self.model))
 
     def grams(self, mask: Array) -> Grams:
-        """Form the normal equations from the samples that a mask, bool (K, n), selects."""
+        """Form the normal equations of the samples that `mask`, bool (K, n), selects."""
         tau = self.samples.tau
         return Grams.of(self.D, tau - self.samples.tau_known, mask, tau)
 
@@ -98,7 +98,7 @@ class Case:
         return given if given.shape == (self.samples.n, *shape) else None
 
     def joints(self, chosen: Array) -> str:
-        """List the labels of the joints that the mask selects, separated by commas."""
+        """List the labels of the joints that the mask `chosen` selects, separated by commas."""
         return ", ".join(self.labels[j] for j in np.flatnonzero(chosen))
 
     def reaching(self, values: Array, units: Sequence[str], chosen: Array) -> str:
@@ -113,7 +113,7 @@ class Case:
 
     @cached_property
     def observation(self) -> Observation | None:
-        """Observation matrix W and torques Y of the study.
+        """Observation matrix W and torques Y of all records, with the study as given.
 
         None if they cannot be computed, for instance if no row is left.
         """
@@ -135,12 +135,12 @@ class Case:
 
     @property
     def silent(self) -> str:
-        """Reason why possible errors (causes) cannot be tried; an empty string if they can."""
+        """Reason why errors of the study cannot be searched for; an empty string if they can."""
         return self.unfit or self.few
 
     @cached_property
     def few(self) -> str:
-        """Remark that the samples are too few to try possible errors; an empty string if enough.
+        """Remark that samples are too few to search for study errors; empty if they suffice.
 
         Too few samples do not prevent the check of the robot file's values, because gravity needs
         no motion.
@@ -181,7 +181,7 @@ class Case:
 
     @cached_property
     def validation(self) -> Baseline | None:
-        """The reference fit `baseline`, with the samples and regressor of the validation records.
+        """The reference fit `baseline`, with samples and regressor of the validation records.
 
         None if there are no validation records, or if they cannot be used.
         """

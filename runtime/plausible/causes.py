@@ -118,7 +118,7 @@ class Cause:
         return np.asarray(samples.tau @ self.T.T - self.subtracted(samples))
 
     def subtracted(self, samples: Samples) -> Array:
-        """Compute the torques to subtract from the measured ones: the model does not contain them.
+        """Compute the torques that the model lacks, to subtract from the measured torques.
 
         They are s known + rho, shape (K, n).
         """
@@ -190,7 +190,7 @@ class Robot:
         return np.where(np.arange(self.n) == j, value, others)
 
     def positions(self, E: Array) -> Maps:
-        """Convert a correction E of the position columns in the files to joint positions.
+        """Convert a correction matrix E of the position columns in the files to the joint side.
 
         Return P of q' = P q + p, and p for files on the side of the motors. For these files,
         with R the gear ratio,
@@ -203,7 +203,7 @@ class Robot:
         return {"P": E}
 
     def torques(self, E: Array) -> Maps:
-        """Convert a correction E of the torque columns in the files to joint torques.
+        """Convert a correction matrix E of the torque columns in the files to the joint side.
 
         Return T of the correction tau' = T tau. For files on the side of the motors, with R the
         gear ratio,
@@ -236,7 +236,7 @@ class Robot:
 
 @dataclass(frozen=True)
 class Row:
-    """One row of the tables CAUSES and NUMBERS: a kind of error, and how its causes are made.
+    """One kind of possible error (a row of the tables CAUSES and NUMBERS), and how to correct it.
 
     Attributes
     ----------
@@ -287,23 +287,23 @@ class Row:
 
 
 def study(robot: Robot) -> Iterator[Item]:
-    """Yield one empty item: the error is tried once, for the whole study."""
+    """Yield one error to try, as an empty mapping: it concerns the whole study."""
     yield {}
 
 
 def several_joints(robot: Robot) -> Iterator[Item]:
-    """Yield one empty item, for an error of all joints together, if there are several joints."""
+    """Yield one error of all joints together, as an empty mapping, if there are several joints."""
     yield from [{}] if robot.n > 1 else []
 
 
 def joints(robot: Robot) -> Iterator[Item]:
-    """Yield an item for each joint, with its number from 0 and its label."""
+    """Yield, for each joint, a mapping (item) with its number from 0 and its label."""
     for j, label in enumerate(robot.labels):
         yield {"j": j, "joint": label}
 
 
 def senses(robot: Robot) -> Iterator[Item]:
-    """Yield each joint, with the matrix E that reverses the sign of its column in the files."""
+    """Yield each joint, with the matrix E that reverses the sign of its signals in the record."""
     for item in joints(robot):
         yield {**item, "E": np.diag(robot.one(item["j"], -1.0))}
 
@@ -326,7 +326,7 @@ def turns(robot: Robot) -> Iterator[Item]:
 
 
 def pairs(robot: Robot) -> Iterator[Item]:
-    """Yield each pair of joints, with the matrix E that exchanges their columns in the files."""
+    """Yield each pair of joints, with the matrix E that exchanges their columns in the record."""
     for i, k in combinations(range(robot.n), 2):
         E = np.eye(robot.n)
         E[[i, k]] = E[[k, i]]
@@ -334,7 +334,7 @@ def pairs(robot: Robot) -> Iterator[Item]:
 
 
 def orders(robot: Robot) -> Iterator[Item]:
-    """Yield matrices E that reorder the columns of the files: reversed, or moved by one joint.
+    """Yield matrices E that reorder the joint columns of a record: reversed, or moved by one joint.
 
     Nothing is yielded for fewer than three joints.
     """
@@ -396,7 +396,7 @@ def times(factor: float) -> str:
 
 
 def neighbours(robot: Robot) -> Iterator[Item]:
-    """Yield each pair of neighbouring joints of the same kind: their drives may be coupled.
+    """Yield neighbouring joints, both revolute or both prismatic, whose drives may be coupled.
 
     Each pair is tried with both senses in which the motor of the second joint may turn with the
     first joint.
@@ -416,20 +416,26 @@ def known_torques(robot: Robot) -> Iterator[Item]:
 
 
 def geared(robot: Robot) -> Iterator[Item]:
-    """Yield one empty item if the robot has gears: a ratio may be missing or applied twice."""
+    """Yield one error to try, as an empty mapping, if the robot has gears.
+
+    A ratio may be missing or applied twice.
+    """
     yield from [{}] if not np.allclose(robot.R, np.eye(robot.n)) else []
 
 
 def with_constants(robot: Robot) -> Iterator[Item]:
-    """Yield one empty item if the drives have torque constants, which may be wrongly applied.
+    """Yield one error to try, as an empty mapping, if the drives have torque constants.
 
-    They may be missing, or applied to signals that are torques already.
+    The torque constants may be missing, or applied to signals that are torques already.
     """
     yield from [{}] if not np.allclose(robot.constant, np.eye(robot.n)) else []
 
 
 def with_offsets(robot: Robot) -> Iterator[Item]:
-    """Yield one empty item if the drives have position offsets: they may be missing or wrong."""
+    """Yield one error to try, as an empty mapping, if the drives have position offsets.
+
+    The offsets may be missing or wrong.
+    """
     yield from [{}] if robot.offset.any() else []
 
 
@@ -447,14 +453,14 @@ def other_ratios(robot: Robot) -> Iterator[Item]:
 
 
 def other_gravity(robot: Robot) -> Iterator[Item]:
-    """Yield gravity with the size 9.81 m/s^2 if that of the robot file has another size."""
+    """Yield the gravity vector scaled to 9.81 m/s^2 if the robot file gives another magnitude."""
     size = float(np.linalg.norm(robot.gravity))
     if size and abs(size / 9.81 - 1) > LIMIT.GRAVITY_VARIES:
         yield {"size": f"{size:.4g}", "g": 9.81 / size * robot.gravity}
 
 
 def axes(robot: Robot) -> Iterator[Item]:
-    """Yield gravity along +-x, +-y and +-z of frame 0, except the vector of the robot file."""
+    """Yield gravity vectors along +-x, +-y and +-z of frame 0, except that of the robot file."""
     size = float(np.linalg.norm(robot.gravity))
     for k, axis in enumerate("xyz"):
         for sign in (1.0, -1.0):
@@ -499,7 +505,7 @@ def lengths(robot: Robot) -> Iterator[Item]:
 
 
 def odd_lengths(robot: Robot) -> Iterator[Item]:
-    """Yield each unusual length with the factors 1000 and 1/1000: mm and m may be confused."""
+    """Yield each unusual entry d, r, b of the table of frames, times 1000 and 1/1000 (mm for m)."""
     for item in lengths(robot):
         if not LIMIT.MM_BELOW < abs(item["length"]) < LIMIT.MM_ABOVE:
             for text, factor in LENGTHS.items():
@@ -507,7 +513,7 @@ def odd_lengths(robot: Robot) -> Iterator[Item]:
 
 
 def exchanged_lengths(robot: Robot) -> Iterator[Item]:
-    """Yield each frame whose d and r differ, and so may have been exchanged."""
+    """Yield each frame of the table with different d and r, which may have been exchanged."""
     for frame in robot.frames:
         d, r = robot.free[f"free_d{frame}"], robot.free[f"free_r{frame}"]
         if d != r:
@@ -529,10 +535,10 @@ def odd_tables(robot: Robot) -> Iterator[Item]:
 
 
 def conventions(robot: Robot) -> Iterator[Item]:
-    """Yield the table of frames converted to the other convention, distal or Khalil's.
+    """Yield the table of frames converted from the distal convention to Khalil's, and the reverse.
 
     To convert it, alpha and d of each frame are copied from the frame before or after. This
-    corrects a table in the distal convention that is read as Khalil's, or the reverse.
+    corrects a table that is read in the wrong one of the two conventions.
     """
     for step, mistake, remedy in (
         (
@@ -567,7 +573,7 @@ def entries(robot: Robot, names: str) -> Iterator[Item]:
 
 
 def slow_joints(robot: Robot) -> Iterator[Item]:
-    """Yield one item with all joints whose friction at low speed is missing in the model.
+    """Yield one error to try: all joints whose friction at low speed is missing in the model.
 
     Nothing is yielded if no joint certainly has such friction.
     """
@@ -580,17 +586,17 @@ def slow_joints(robot: Robot) -> Iterator[Item]:
 
 
 def in_positions(robot: Robot, item: Item) -> Maps:
-    """Correct the position columns by the matrix E of an item, which may reverse a sign."""
+    """Make the correction of the positions from a matrix E that reorders or reverses columns."""
     return robot.positions(item["E"])
 
 
 def in_torques(robot: Robot, item: Item) -> Maps:
-    """Correct the torque columns by the matrix E of an item, which may reverse a sign."""
+    """Make the correction of the torques from a matrix E that reorders or reverses columns."""
     return robot.torques(item["E"])
 
 
 def in_both(robot: Robot, item: Item) -> Maps:
-    """Correct position and torque columns by the matrix E of an item, which may reverse a sign."""
+    """Make the correction of positions and torques from E, which reorders or reverses columns."""
     return robot.positions(item["E"]) | robot.torques(item["E"])
 
 
@@ -610,7 +616,7 @@ def turned(*quantities: str) -> Callable[[Robot, Item], Mapping[str, Any]]:
 
 
 def transmitted(robot: Robot, *, positions: bool, torques: bool, to_joints: bool) -> Maps:
-    """Convert positions, torques or both from the motors to the joints, or the reverse."""
+    """Make the correction that converts positions, torques or both from motor to joint or back."""
     inverse = np.linalg.inv(robot.R)
     P, p, T = (
         (inverse, robot.offset, robot.R.T)
@@ -621,7 +627,11 @@ def transmitted(robot: Robot, *, positions: bool, torques: bool, to_joints: bool
 
 
 def coupled(robot: Robot, item: Item, *, positions: bool, torques: bool) -> Maps:
-    """Couple two joints i and k: q_k' = q_k + share q_i and tau_i' = tau_i - share tau_k."""
+    """Make the correction for a missing coupling of the drives of two joints i and k.
+
+    The corrected signals are q_k' = q_k + share q_i and tau_i' = tau_i - share tau_k, with share 1
+    or -1.
+    """
     P, T = np.eye(robot.n), np.eye(robot.n)
     P[item["k"], item["i"]] = item["share"]
     T[item["i"], item["k"]] = -item["share"]
@@ -637,7 +647,7 @@ def constants_as_currents(robot: Robot) -> Array:
 
 
 def exchanged_ratios(robot: Robot, item: Item) -> Maps:
-    """Correct positions and torques of the motors if the gear ratios of two joints are exchanged.
+    """Make the correction of motor positions and torques for exchanged gear ratios of two joints.
 
     Only torques or positions on the side of the motors change.
     """
@@ -647,7 +657,7 @@ def exchanged_ratios(robot: Robot, item: Item) -> Maps:
 
 
 def gravity(item: Item) -> Maps:
-    """Set gravity in frame 0 to the vector g of an item, m/s^2."""
+    """Make the correction that sets the gravity vector in frame 0 to `g` of an item, m/s^2."""
     return {"constants": dict(zip(GRAVITY, map(float, item["g"]), strict=True))}
 
 
@@ -968,7 +978,7 @@ CAUSES = (
 
 
 def factor_words(robot: Robot, item: Item, xi: float) -> Item:
-    """Write the factor exp(xi) in words, and the mistake that may explain it."""
+    """Write a fitted factor exp(xi) of a signal in words, and a mistake that may explain it."""
     near = [text for value, text in GUESSES.items() if abs(abs(xi) - np.log(value)) < 0.05]
     guess = near[0] if near else "they are right when this factor is 1"
     return {"factor": f"{np.exp(xi):.3g}", "times": times(float(np.exp(xi))), "guess": guess}
@@ -981,13 +991,13 @@ def size_of_torque(robot: Robot, j: int) -> float:
 
 
 def offset_words(robot: Robot, item: Item, xi: float) -> Item:
-    """Write the constant torque of a joint: xi times its root mean square torque."""
+    """Write the fitted constant torque of a joint: xi times its root mean square torque."""
     j = item["j"]
     return {"offset": f"{xi * size_of_torque(robot, j):.3g} {'N m' if robot.turning[j] else 'N'}"}
 
 
 def angle_words(robot: Robot, item: Item, xi: float) -> Item:
-    """Write the error xi of an angle in degrees, and the corrected angle in rad."""
+    """Write a fitted angle error xi in degrees, and the corrected angle in rad."""
     return {"degrees": f"{np.degrees(xi):.3g}", "fits": f"{item.get('value', 0.0) + xi:.3f}"}
 
 
@@ -1094,5 +1104,8 @@ NUMBERS = (
 
 
 def causes(robot: Robot) -> list[Cause]:
-    """Make, for a robot, every possible error of study or table (cause) that CAUSES lists."""
+    """List the possible errors (causes) of the study and of the table of frames for a given robot.
+
+    They are those of the table CAUSES, without an unknown number.
+    """
     return [row.cause(robot, item) for row in CAUSES for item in row.of(robot)]

@@ -203,7 +203,10 @@ class Shifts:
         self.mask = moving & ~(np.any(steps, axis=0) & flat).any(axis=2)
 
     def shifted(self, shift: Array) -> Array:
-        """Interpolate the torque of each joint at times later by its `shift`, s; shape (K, n)."""
+        """Interpolate each joint torque at times later by the `shift` of the joint, s.
+
+        The result has the shape (K, n).
+        """
         return np.column_stack(
             [torque(self.t + d) for torque, d in zip(self.torques, shift, strict=True)]
         )
@@ -229,7 +232,7 @@ class Shifts:
         return np.asarray(100 * left / np.maximum(size, 1e-300))
 
     def step(self, shift: Array) -> tuple[Array, Array, Array]:
-        """Compute one Gauss-Newton step of the delays.
+        """Compute one Gauss-Newton step of the torque delays of all joints.
 
         Return the step and its standard deviation for each joint, s, and whether the record
         determines this delay.

@@ -113,7 +113,10 @@ def jumps(case: Case) -> Answer:
 
 
 def _usual(x: Array) -> Array:
-    """Compute the 90 % quantile of the positive values of each column, shape (n,)."""
+    """Compute the usual change of each joint: the 90 % quantile of its changes above zero.
+
+    `x` holds the sizes of the changes, shape (N, n); the result has the shape (n,).
+    """
     return np.array([np.quantile(own[own > 0], 0.9) if own.any() else np.inf for own in x.T])
 
 
@@ -144,7 +147,7 @@ def _runs(high: Array, median: int) -> tuple[Array, Array]:
 
 
 def _wrap(q: Array, high: Array, usual: Array, median: int) -> bool:
-    """Whether each joint that jumps does so by one size, as if an angle or counter wraps around.
+    """Whether all jumps of each joint have one size, as if its angle or counter wraps around.
 
     A joint that jumps must do so more than once.
     """

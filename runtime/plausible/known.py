@@ -64,7 +64,10 @@ class KnownValues(Result):
     complete: bool
 
     def table(self) -> Table:
-        """Tabulate, for each joint, measured over computed torque, and the error of the latter."""
+        """Tabulate, by joint, the ratios of measured to computed torque, and the relative error.
+
+        The error is that of the computed torque, in % of the measured one.
+        """
         rows = zip(self.joints, self.gravity, self.inertia, self.error, strict=True)
         return Table(
             "Values of the robot file against the record, friction fitted",
@@ -79,7 +82,7 @@ class KnownValues(Result):
 
     @property
     def heavy(self) -> bool:
-        """Whether measured gravity torques of all joints are far above computed ones, or far below.
+        """Whether measured gravity torques are far above computed ones in all joints, or far below.
 
         All ratios are then on the same side of the range LIMIT.CAD_RATIOS. Wrong time stamps cannot
         cause this.
@@ -112,7 +115,7 @@ class KnownValues(Result):
 
 
 def known_values(baseline: Baseline) -> KnownValues | None:
-    """Compare the torques computed from the robot file's values with the record.
+    """Compare torques computed from the inertial values of the robot file with measured torques.
 
     None if the file does not give all ten values of any link.
     """
@@ -170,7 +173,7 @@ class TorqueUnit(Part):
     title = "Unit of the torques"
 
     def warnings(self) -> tuple[str, ...]:
-        """Return the warning, as a tuple: the question whether the torques have another unit."""
+        """Return the warning, as a tuple of one text: may the torques have another unit?"""
         return (self.sentence,)
 
 
@@ -182,7 +185,7 @@ def torque_unit(result: Identification) -> TorqueUnit | None:
 
 
 def torque_unit_doubt(model: GeneratedModel, observation: Observation, by_law: bool) -> str:
-    """Write the question whether torques are in N m, if their size contradicts the robot file.
+    """Ask the user whether torques are in N m, if their size contradicts the robot file.
 
     An empty string if nothing contradicts the unit, or if the file lacks values.
     """

@@ -100,7 +100,7 @@ def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ..
 
 
 def speed_of_rest(problem: Problem) -> float | tuple[float, ...] | None:
-    """Propose the speed threshold that leaves out rows at rest, for the records of a problem.
+    """Propose the speed threshold that leaves out rows at rest, for an identification problem.
 
     See `low_speed_of_rest`.
     """

@@ -24,7 +24,7 @@ Array = np.ndarray
     "Does physics agree?", "", "record a longer motion, or give a higher signals.lowpass.cutoff"
 )
 def not_asked(case: Case) -> Answer | None:
-    """Report why possible errors (causes) are not tried; None if they are tried.
+    """Report why a search for possible errors of the study is not made; None if it is made.
 
     Too few samples are a doubt, because a wrong sign or unit would not be detected.
     """
@@ -206,7 +206,7 @@ def _from_to(text: str, before: float, after: float) -> str:
 
 
 def late_joints(late: Delay) -> Array:
-    """Whether the delay of each joint is large against its standard deviation, bool (n,).
+    """Whether the torque delay of each joint is far above its standard deviation, bool (n,).
 
     If one delay suits all joints, all are marked; otherwise only joints whose delays have the same
     sign.

@@ -115,7 +115,7 @@ class Plausibility(
 
     @property
     def worst(self) -> Check | None:
-        """Check with the worst finding; None if all findings are good."""
+        """The check that has the worst finding; None if all findings are good."""
         return worst_of(self.answers)
 
     @property

@@ -217,7 +217,7 @@ def usable(record: Record, study: Study, before: int, after: int) -> Array:
 
 
 def _instants(through: Filtered, number: int) -> Samples:
-    """Select filtered samples of one record, spaced by about 0.8 rate/(2 cutoff) samples.
+    """Select filtered samples of one record, about 0.4/f seconds apart; f: cut-off frequency.
 
     If these are fewer than LIMIT.INSTANTS_LEAST in a long record, twice as many are chosen. A time
     of 2/cutoff is left out at each end.

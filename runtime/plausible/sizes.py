@@ -79,7 +79,7 @@ def _joint_names(case: Case, still: Array) -> list[tuple[int, str]]:
     "the columns, the unit and the side of the positions",
 )
 def positions(case: Case) -> Answer:
-    """Compare the positions of each joint with limits.q of the robot file, or with usual sizes."""
+    """Compare the positions of each joint with limits.q of the robot file, or with usual ranges."""
     q, turning = case.samples.q, case.turning
     low, high = q.min(axis=0), q.max(axis=0)
     largest = np.maximum(-low, high)
@@ -112,7 +112,7 @@ def positions(case: Case) -> Answer:
 
 
 def _against(case: Case, key: str, values: Array, sane: dict[str, tuple[float, float]]) -> Answer:
-    """Compare the largest speeds or accelerations with limits of the robot file, or usual ones."""
+    """Compare the largest speeds or accelerations with limits of the robot file or usual limits."""
     unit = {"qd": "s", "qdd": "s^2"}[key]
     limits = case.limits(key)
     if limits is not None:

@@ -155,7 +155,7 @@ class Baseline:
 
     @cached_property
     def as_given(self) -> tuple[Array, Array, Array]:
-        """Regressor, torques and mask of the rows used, with no error corrected."""
+        """Regressor, torques and mask of used rows for the study as given."""
         rows = self.rows(unchanged_study(self.samples.n))
         assert rows is not None
         return rows
@@ -172,7 +172,7 @@ class Baseline:
         return np.asarray(Q[:, np.abs(np.diag(R)) > 1e-9])
 
     def grams(self, cause: Cause) -> Grams | None:
-        """Form the normal equations with one possible error (cause) corrected.
+        """Form the normal equations of least squares with one possible error (cause) corrected.
 
         None if the regressor cannot be evaluated.
         """
@@ -185,7 +185,7 @@ class Baseline:
         return grams if grams.of_joints.shape[1] == p + 1 else grams.mapped(self.physical.K)
 
     def bound(self, grams: Grams) -> Fit:
-        """Fit by least squares: no physical robot can have a better score on the same rows.
+        """Fit without physical conditions: no physical robot has a better score on the same rows.
 
         If the robot file has values of links, the parameters are drawn towards them.
         """
@@ -196,7 +196,7 @@ class Baseline:
     def fit(
         self, grams: Grams, how: Callable[..., Fit] = physical_fit, sigma: Array | None = None
     ) -> Fit:
-        """Fit the standard parameters of a physical robot by the function `how`.
+        """Fit the standard parameters of a physical robot by `how`: physical_fit or quick_fit.
 
         sigma : residuals of the joints that give the first weights; default: those of least
             squares.
@@ -242,7 +242,7 @@ class Baseline:
         return score
 
     def beyond(self, V: Array) -> float:
-        """Compute the largest relative part of the torques V that no parameters explain.
+        """Compute, for m sets of torques V, the largest relative part that no parameters explain.
 
         This part is outside the span of W.
 
@@ -278,9 +278,9 @@ class Baseline:
 
     @cached_property
     def normal(self) -> tuple[Array, Array, Array, Array]:
-        """Linearised fit of a physical robot, to estimate an unknown number xi such as an offset.
+        """Terms of linear equations for the parameters and an unknown number xi, such as an offset.
 
-        It consists of W over the standard parameters, shape (K, n, p), the torques that W explains,
+        They are W over the standard parameters, shape (K, n, p), the torques that W explains,
         shape (K, n), the residuals e divided by sigma, shape (K, n), and the matrix A + B.
         """
         D, Y, mask = self.as_given
@@ -649,7 +649,7 @@ def leaves_values(fit: Fit, baseline: Baseline) -> bool:
 
 
 def helps(trial: Trial, baseline: Baseline, other: Baseline) -> bool:
-    """Whether parameters fitted with a correction predict the validation records better.
+    """Whether a correction improves the prediction of the validation records by the fitted model.
 
     A validation record may or may not have the same error: the better result counts.
 
@@ -672,7 +672,7 @@ def _misfit(grams: Grams, X: Array) -> float:
 
 
 def loads(baseline: Baseline) -> list[Trial]:
-    """Fit free values of the last link in place of those of the robot file, as if it held a load.
+    """Fit the last link with free inertial parameters, not those of the file: it may hold a load.
 
     The ten parameters of this link cost half of log N each. The list is empty if the file does not
     give them.

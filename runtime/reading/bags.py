@@ -72,12 +72,12 @@ class JointState:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class JointTable(Table):
-    """Table of the messages of one topic; its columns are empty until the joints are chosen."""
+    """Table of the messages of one ROS topic; its columns are empty until `chosen` selects some."""
 
     messages: tuple[JointState, ...]
 
     def chosen(self, names: Sequence[str]) -> Table:
-        """Make the table of these columns, from the messages that contain one of their joints.
+        """Make the table of the named columns, from the messages that contain one of their joints.
 
         If no message contains such a joint, all messages are used, so that the error names the
         missing joint.
@@ -205,7 +205,7 @@ def stored_files(folder: Path) -> list[Path]:
 
 
 def _inside(folder: Path, name: str, where: str) -> Path:
-    """Return the path of the file `name`; raise InputError if it is not inside the folder.
+    """Return the path of the file `name` of a ROS 2 bag; InputError if it is outside the folder.
 
     Bags of the first ROS 2 versions write the name of the folder before the name of the file.
     """
@@ -228,7 +228,7 @@ def _inside(folder: Path, name: str, where: str) -> Path:
 
 
 def _topic(connections: list[Any], wanted: str | None, file: str) -> str:
-    """Return the name of the topic that is read: `wanted`, or the only topic with JointState.
+    """Return the name of the ROS topic to read: `wanted`, or the only topic of type JointState.
 
     Raise InputError if there is no such topic, or if its messages are not defined as in ROS.
     """
@@ -266,7 +266,7 @@ def _as_defined(definition: Any) -> bool:
 
 
 def _messages(reader: Any, topic: str, decode: Any) -> list[JointState]:
-    """Read the messages of one topic of a bag, in the order of the log.
+    """Read the messages JointState of one ROS topic of a bag, in the order of the log.
 
     Their time is the stamp of the header, or the time of the log if every stamp is zero.
     """

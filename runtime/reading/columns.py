@@ -34,7 +34,7 @@ def column_names(
     joints: Sequence[str] = (),
     motors: Sequence[bool] = (),
 ) -> Columns:
-    """Find the names of the columns to read: given in the settings, or default names.
+    """Find the names of the columns of a record to read: given in the settings, or default names.
 
     Default names are t, q1 ... qn, tau1 ... taun; in a bag, the joints of its messages.
 
@@ -102,7 +102,7 @@ def _of_motors(names: tuple[str, ...], motors: Sequence[bool]) -> tuple[str, ...
 def _meant(
     table: Table, key: str, quantity: str, names: Sequence[str], joints: Sequence[str]
 ) -> tuple[str, ...]:
-    """Find the columns of positions, torques or references that the setting `names` means.
+    """Find the columns of positions, torques or references that the setting `names` lists.
 
     key : "q", "tau" or "qr". quantity : name of the same quantity in bags, such as "effort".
     """
@@ -134,7 +134,7 @@ def _numbered(quantity: str, table: Table, joints: Sequence[str]) -> tuple[str, 
 
 
 def _numbered_joints(table: Table) -> tuple[str, ...]:
-    """Return the joints of a bag in the order of the numbers in their names.
+    """Return the names of the joints of a bag, sorted by the number in each name.
 
     The names must differ in a number only, 1, 2 ... or 0, 1 ...; otherwise InputError.
     """
@@ -152,7 +152,7 @@ def _numbered_joints(table: Table) -> tuple[str, ...]:
 
 
 def _of_joint(table: Table, key: str, joint: str) -> str:
-    """Find the column of a joint by its name, alone or with a word for the quantity.
+    """Find the column of one joint, whose name is the joint's, perhaps with a word like pos or tau.
 
     For instance q_elbow, elbow.pos or effort/elbow.
     """
@@ -178,7 +178,7 @@ def _of_joint(table: Table, key: str, joint: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Conversion:
-    """Conversion of the columns of a record to the joint side and SI units.
+    """Conversion of measured positions and torques to the joint side and SI units.
 
     Attributes
     ----------
@@ -210,14 +210,14 @@ class Conversion:
         return q if self.of_positions is None else self.of_positions.joint_position(q)
 
     def continued(self, q: Array) -> Array:
-        """Remove jumps of a full turn from angles q, rad, shape (N, n)."""
+        """Remove jumps of a full turn from measured angles q, rad, shape (N, n)."""
         if self.turns is None:
             return q
         return np.asarray(np.where(self.turns, np.unwrap(q, axis=0), q))
 
     @property
     def follows(self) -> Array | None:
-        """Whether the position of joint j depends on column i of the file, bool, shape (n, n).
+        """Whether the position of joint j depends on position column i of the file, shape (n, n).
 
         None means that the columns are joints.
         """
@@ -240,7 +240,7 @@ class Conversion:
 def conversion(
     settings: RecordSettings, drives: Drives | None, first: Table, last: Table, n: int
 ) -> Conversion:
-    """Make the Conversion of the columns of a record to the joint side and SI units.
+    """Make the Conversion of measured positions and torques to the joint side and SI units.
 
     Parameters
     ----------
@@ -329,7 +329,7 @@ def _units(units: str | tuple[str, ...], n: int, key: str) -> tuple[str, ...]:
 
 
 def _position_units(settings: RecordSettings, n: int) -> tuple[Array, Array]:
-    """Return the factors from the units of positions to rad or m, and which units are angles.
+    """Return the factors from the units of q to rad or m, and which positions are angles.
 
     Both have shape (n,).
     """

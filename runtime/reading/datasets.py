@@ -129,7 +129,7 @@ DATASETS: Mapping[str, Dataset] = {"tx40": TX40, "emps": EMPS}
 
 
 def listing() -> list[dict[str, Any]]:
-    """List all datasets as JSON values: name, title, source, licence and files.
+    """List all public datasets as JSON values: name, title, source, licence and files.
 
     Each file has its address, its hash and its path, which is None if the file is not on this
     machine.
@@ -161,7 +161,7 @@ def locate(name: str, file: str, *, cache: Path | None = None) -> Path | None:
 
 
 def fetch(name: str, file: str, *, cache: Path | None = None) -> Path:
-    """Return the path of a file of a dataset, from SYMGEN_DATA, the cache, or its source.
+    """Return the path of a file of a dataset: found on this machine, or downloaded from its source.
 
     Raise DataUnavailableError if the file is at none of these places.
     """

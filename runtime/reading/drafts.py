@@ -13,7 +13,7 @@ from runtime.reading.settings import RecordSettings
 
 
 def draft(settings: RecordSettings, path: Path, joints: Sequence[str]) -> str:
-    """Write a draft of a study file for one record; `# ?` marks the settings that are still open.
+    """Write a draft of a study file for one record; `# ?` marks settings that the user must fill.
 
     Candidates for a column follow the mark. The draft is "" if the file cannot be read.
 

@@ -22,7 +22,7 @@ GZIP = b"\x1f\x8b"  # first bytes
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is a file of that name; False also for an impossible name."""
+    """Whether `path` is an existing file; False also for a path that the system does not allow."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -30,7 +30,7 @@ def is_file(path: Path) -> bool:
 
 
 def require_size(unpacked: int, size: int, file: str) -> None:
-    """Raise InputError if a file of `size` bytes unpacks to more bytes than a record may have."""
+    """Raise InputError if a compressed file unpacks to more bytes than a record may have."""
     if unpacked > max(ALWAYS, RATIO * size):
         raise InputError(
             f"unpacks to {unpacked / 2**20:.0f} MiB or more from {size / 2**20:.3g} MiB; the limit is the larger of {ALWAYS // 2**20} MiB and {RATIO} times the file size: store the record without compression if the file is genuine",
@@ -40,7 +40,7 @@ def require_size(unpacked: int, size: int, file: str) -> None:
 
 @contextmanager
 def opened(path: Path) -> Iterator[BinaryIO]:
-    """Yield the uncompressed bytes of a file as a stream; errors of reading name the file."""
+    """Yield the uncompressed bytes of a file as a stream; error messages then name the file."""
     require_file(path)
     try:
         with path.open("rb") as plain:
@@ -91,7 +91,7 @@ def sha256(data: bytes) -> str:
 
 
 def _parts(path: Path) -> Iterator[bytes]:
-    """Yield the uncompressed bytes of a file, part by part; InputError if there are too many."""
+    """Yield the uncompressed bytes of a file, part by part; InputError if they exceed the limit."""
     size = require_file(path)
     total = 0
     with opened(path) as stream:

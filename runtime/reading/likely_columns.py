@@ -77,7 +77,7 @@ UNITS = {"grad": "deg", "gradi": "deg", "degrés": "deg", "degres": "deg", "sek"
 
 @dataclass(frozen=True)
 class Family:
-    """Columns of one quantity, one per joint: their names differ only by the joint.
+    """Columns of one quantity, one per joint, whose names differ by the joint: q1, q2, q3.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class Family:
 
 
 def likely_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str, Any]:
-    """Propose settings of a record from the names of its columns: t, q, tau and units.
+    """Propose settings of a record (columns t, q, tau and their units) from its column names.
 
     Currents are in A unless names say mA. The result is {} if the names do not show positions and
     as many torques. joints : names of the joints in the robot file.

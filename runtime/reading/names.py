@@ -20,7 +20,7 @@ class Label:
 
 
 def labels(settings: Sequence[RecordSettings]) -> list[Label]:
-    """Give each record a unique name, and names to its files.
+    """Give each record, and each file of the records, a unique name for results.
 
     A record has the name in its settings, else that of its dataset, else that of its first file
     without ending. Equal names are preceded by the folder (day1/run, day2/run), by more folders if

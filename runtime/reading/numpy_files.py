@@ -66,7 +66,7 @@ def archive_of(path: Path) -> dict[str, Array]:
 
 
 def _plain(arrays: Any, name: str) -> Array:
-    """Return one array of an archive; raise ValueError for pickled objects and damaged data."""
+    """Return one array of a .npz archive; ValueError for pickled objects and damaged data."""
     try:
         return np.asarray(arrays[name])
     except ValueError as e:

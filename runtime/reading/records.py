@@ -71,7 +71,7 @@ def _pieces(
     folder: Path,
     missing: bool,
 ) -> list[Record]:
-    """Read one record; return it alone, or the pieces into which it is split at gaps of time.
+    """Read one record; return it alone, or the records into which gaps of the time split it.
 
     `resample` splits a record at gaps and where time goes back.
     """
@@ -185,7 +185,7 @@ def _signals(
 def _require_shapes(
     columns: Columns, signals: Mapping[str, Signal], first: Table, last: Table
 ) -> None:
-    """Raise InputError unless all signals have the same N samples and columns for n joints."""
+    """Raise InputError unless all signals have N samples, and one column for each of n joints."""
     N, n = signals["q"].values.shape
     rows, width = signals.get("tau", signals["q"]).values.shape
     width += columns.tau.count(NONE) if "tau" in signals else 0
@@ -260,12 +260,12 @@ def _joint_side(
 
 
 def _columns_of_joints(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of the columns without NONE, which stands for a joint without a column."""
+    """Return column names without the mark NONE, which replaces the column of some joints."""
     return tuple(name for name in names if name != NONE)
 
 
 def _spread(values: Array, names: Sequence[str], absent: float) -> Array:
-    """Arrange columns for all joints, shape (N, n); a joint without a column gets `absent`."""
+    """Insert columns of the value `absent` for joints without a column; return shape (N, n)."""
     present = [name != NONE for name in names]
     if all(present):
         return values
@@ -277,7 +277,7 @@ def _spread(values: Array, names: Sequence[str], absent: float) -> Array:
 def _uniform(
     settings: RecordSettings, columns: Columns, table: Table, samples: Mapping[str, Array]
 ) -> tuple[list[Stretch], float, str]:
-    """Return the samples at a uniform rate, this rate in Hz, and a sentence on the time stamps.
+    """Return samples at a uniform rate, this rate in Hz, and a sentence on the time stamps.
 
     The samples are unchanged, or resampled if the settings request it. table : file of the
     positions and of the time.
@@ -315,7 +315,7 @@ def _uniform(
 
 
 def _places(settings: RecordSettings, tables: Sequence[Table]) -> tuple[Table, Table, Table]:
-    """Find which file holds the positions, which the torques, and which the known torques.
+    """Find the tables that contain the positions, the torques, and the known torques of a record.
 
     The second of two files holds the torques, unless it alone has the known torques and the first
     file has the torques.

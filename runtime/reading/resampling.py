@@ -41,7 +41,7 @@ LAST = 1e-6  # periods; a last instant so little beyond the last sample is that 
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Uniform samples without a gap: t, shape (K,), s, and signals, each of shape (K, n)."""
+    """Part of a record without gaps, sampled uniformly: times t, shape (K,), s, and signals."""
 
     t: Array
     signals: tuple[Array, ...]
@@ -55,7 +55,8 @@ def resample(
     method: Literal["cubic", "linear"] = "cubic",
     longest: float = GAP,
 ) -> tuple[Array, Array]:
-    """Interpolate signals with irregular time stamps at a uniform rate, by a spline or lines.
+    """Interpolate signals with irregular time stamps at a uniform rate, by a spline or straight
+    lines.
 
         t_k = t[0] + k / rate,   k = 0 ... floor((t[-1] - t[0]) rate)
 
@@ -119,7 +120,8 @@ def resampled(
     *,
     file: str,
 ) -> tuple[list[Stretch], float, str]:
-    """Resample signals; return stretches without gaps, the rate in Hz, a text on what was done.
+    """Resample signals at a uniform rate; return parts without gaps, the rate in Hz, and a sentence
+    for the user that says what was resampled.
 
     Parameters
     ----------
@@ -180,7 +182,7 @@ def resampled(
 
 
 def _counted(t: Array, signals: Sequence[Array], rate: float, file: str) -> Stretch:
-    """Give the samples the uniform times t[0] + k/rate, and leave the signals unchanged.
+    """Replace the time stamps by uniform times t[0] + k/rate, without a change of the signals.
 
     Raise InputError if the time stamps last longer or shorter than this number of samples.
     """

@@ -122,7 +122,7 @@ class Columns(Settings):
 
     @property
     def further(self) -> dict[str, tuple[str, ...]]:
-        """Columns of quantities that belong to no joint: channels (temperature ...) and wrenches.
+        """Columns of signals that belong to no joint: channels (temperature ...) and wrenches.
 
         They are listed by name of the channel or wrench.
         """
@@ -328,19 +328,19 @@ class RecordSettings(Settings):
 
     @property
     def by_law(self) -> bool:
-        """Whether a control law gives the torque: q_ref is named, tau is not."""
+        """Whether a control law gives the torque: the settings name q_ref, but no column tau."""
         return bool(self.columns.q_ref) and not self.columns.tau
 
     @property
     def sides(self) -> tuple[str, str]:
-        """Sides on which positions and torques were measured, each motor, joint or link."""
+        """Sides on which positions and torques were measured: each "motor", "joint" or "link"."""
         return self.side, self.torque_side or self.side
 
 
 def with_law(
     records: Sequence[RecordSettings], controller: Controller | None
 ) -> tuple[RecordSettings, ...]:
-    """Set `controller` in each record whose torque is computed by a control law.
+    """Set the control law `controller` in each record whose torque that law has to compute.
 
     A record that names its own controller is not changed.
     """

@@ -161,7 +161,7 @@ class Table:
         return float(x.reshape(()))
 
     def _by_samples(self, name: str) -> Array:
-        """Return the array called `name` with one row per sample, shape (N, k); else InputError."""
+        """Return the array called `name` as columns of N samples, shape (N, k); else InputError."""
         x = self.columns[name]
         problem = ""
         if x.ndim > 2:
@@ -184,7 +184,7 @@ def is_numeric(x: Array) -> bool:
 
 @contextmanager
 def damage_named(title: str, file: str) -> Iterator[None]:
-    """Convert errors of a library on damaged files into InputError, for the duration of the block.
+    """Turn errors of a file-reading library into InputError, for the duration of the block.
 
     title : what the file should be, for the message.
     """

@@ -85,7 +85,7 @@ def _lines(path: Path) -> Lines:
 
 
 def _not_utf8(path: Path) -> InputError:
-    """Make the error for a file that is not UTF-8; it names the first wrong byte and its line."""
+    """Make the error for a text file that is not UTF-8; it names the first wrong byte and line."""
     with opened(path) as stream:
         for number, line in enumerate(stream, 1):
             try:
@@ -98,13 +98,13 @@ def _not_utf8(path: Path) -> InputError:
 
 
 def _row(path: Path, has_header: bool, i: int) -> str:
-    """Name the line of sample i, counted from 0, for messages: "line 12"."""
+    """Name the line of the text file that contains sample i, for messages: "line 12"."""
     number, _ = next(islice(_lines(path), i + has_header, None))
     return f"line {number}"
 
 
 def _parsed(path: Path, has_header: bool, delimiter: str | None, decimal: str) -> Array | None:
-    """Parse all numbers of a file, shape (N, k), by NumPy.
+    """Parse all numbers of a text file by NumPy, shape (N, k).
 
     Return None if a field is not a number, or if lines have different numbers of fields.
     """
@@ -125,7 +125,7 @@ def _parsed(path: Path, has_header: bool, delimiter: str | None, decimal: str) -
 
 
 def _with_point(line: str, decimal: str) -> str:
-    """Replace decimal commas in a line by points.
+    """Replace the decimal commas in a line of numbers by decimal points.
 
     Raise ValueError if the line has points already, since 1.234 may mean a thousand.
     """
@@ -173,7 +173,7 @@ def _by_fields(
 
 
 def _width(line: str, delimiter: str | None) -> int:
-    """Count the fields of a line."""
+    """Count the fields of a line of a text file."""
     return len(line.split()) if delimiter is None else line.count(delimiter) + 1
 
 
@@ -182,7 +182,7 @@ def _fields(line: str, delimiter: str | None) -> list[str]:
 
 
 def _number(text: str, decimal: str) -> float | None:
-    """Return the number in a field; None if the text is not a number."""
+    """Return the number in one field of a text file; None if the field is not a number."""
     if "_" in text or not text.isascii() or (decimal != "." and "." in text):
         return None
     try:
@@ -200,7 +200,7 @@ def _width_hint(delimiter: str | None, wider: bool) -> str:
 def _no_number(
     file: str, name: str, row: str, field: str, decimal: str, *, first: bool
 ) -> InputError:
-    """Make the error for a field that is not a number.
+    """Make the error for a field of a text file that is not a number.
 
     first : whether the field belongs to the first sample.
     """

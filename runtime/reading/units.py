@@ -106,7 +106,7 @@ def time_unit(text: str) -> float:
 
 
 def speed(value: Any) -> Any:
-    """Convert a speed such as "30 rpm", or a list of speeds, to rad/s or m/s.
+    """Convert a speed with a unit, such as "30 rpm", or a list of speeds, to rad/s or m/s.
 
     A value without unit is returned as it is.
     """

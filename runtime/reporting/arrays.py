@@ -78,12 +78,12 @@ def estimate_arrays(fit: Estimate) -> dict[str, Array]:
 
 
 def array_files(stem: str, arrays: Mapping[str, Array]) -> dict[str, str | bytes]:
-    """Write the arrays as two files, for NumPy (stem.npz) and for MATLAB (stem.mat)."""
+    """Return the contents of two files with named arrays: stem.npz (NumPy), stem.mat (MATLAB)."""
     return {f"{stem}.npz": npz(arrays), f"{stem}.mat": mat(arrays)}
 
 
 def npz(arrays: Mapping[str, Array]) -> bytes:
-    """Write the arrays as a NumPy archive (.npz) without Python objects."""
+    """Convert named arrays to the bytes of a NumPy archive (.npz) without Python objects."""
     for name, array in arrays.items():
         if array.dtype.hasobject:
             raise TypeError(f"{name} contains Python objects; expected numbers or texts")
@@ -94,7 +94,7 @@ def npz(arrays: Mapping[str, Array]) -> bytes:
 
 
 def mat(arrays: Mapping[str, Array]) -> bytes:
-    """Write the arrays as a MATLAB file (version 5).
+    """Convert named arrays to the bytes of a MATLAB file (version 5).
 
     Vectors are columns, texts are cell arrays, and `value` is a structure of X (or X_LS) by name.
     """
@@ -108,7 +108,7 @@ def mat(arrays: Mapping[str, Array]) -> bytes:
 
 
 def matlab_names(names: Iterable[str]) -> tuple[str, ...]:
-    """Change names so that MATLAB accepts them, all different.
+    """Change names into different names that MATLAB accepts as variables.
 
     A name has a letter first, then letters, digits and _, at most 63 characters; it is no keyword.
     """
@@ -129,7 +129,7 @@ def _texts(texts: Iterable[str]) -> Array:
 
 
 def _cells(array: Array) -> Array | str | Sequence[str]:
-    """Convert an array of texts to the MATLAB form; other arrays are not changed.
+    """Convert an array of texts to MATLAB strings or cells; return other arrays unchanged.
 
     A single text becomes a character string, several texts become a cell array.
     """

@@ -65,12 +65,12 @@ def draw_figure(
 
 
 def svg(figure: Figure) -> bytes:
-    """Write the figure as SVG, with letters as outlines."""
+    """Convert a matplotlib figure to the bytes of an SVG file, with letters as outlines."""
     return _rendered(figure, "svg")
 
 
 def png(figure: Figure) -> bytes:
-    """Write the figure as PNG, 150 dots per inch."""
+    """Convert a matplotlib figure to the bytes of a PNG file, 150 dots per inch."""
     return _rendered(figure, "png")
 
 
@@ -149,7 +149,7 @@ def spectra_figure(
 
 
 def _torques(upper: Axes, lower: Axes, joint: JointComparison, source: str) -> None:
-    """Plot measured torque, predicted torque and error of a joint, at the instants that are shown.
+    """Plot measured torque, predicted torque and error of one joint into the given axes.
 
     Lines break where rows were left out or another record starts.
     """
@@ -174,7 +174,7 @@ def panels(
     legend: int = 0,
     letters: float = STYLE["font.size"],
 ) -> Figure:
-    """Draw a figure with one panel for each item, row by row.
+    """Draw a figure with one panel for each item (for instance each joint), row by row.
 
     Parameters
     ----------
@@ -258,7 +258,7 @@ def empty_figure(size: tuple[float, float]) -> Figure:
 
 
 def _rendered(figure: Figure, form: str) -> bytes:
-    """Write the figure in a file format, "svg" or "png"."""
+    """Convert a matplotlib figure to the bytes of a file in the format "svg" or "png"."""
     stream = BytesIO()
     with mpl.rc_context(STYLE):
         figure.savefig(

@@ -34,7 +34,7 @@ WORDS = {"good": "good", "doubtful": "doubtful", "no": "no", "open": "not judged
 
 @dataclass(frozen=True)
 class Matrix:
-    """A square table of numbers between -1 and 1, shaded by their size.
+    """Square table of correlations between parameters on a report page; cells are shaded by size.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class Image:
 
 @dataclass(frozen=True)
 class Section:
-    """A section of a page: a heading, paragraphs, then figures, tables and a listing.
+    """A section of a report page: a heading, paragraphs, then figures, tables and a listing.
 
     folded : whether the section is closed until the reader opens it.
     """
@@ -106,7 +106,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Number:
-    """One of the numbers that are shown below the verdict, with its label."""
+    """A number that a report page shows below its verdict, with its label."""
 
     label: str
     value: str
@@ -149,7 +149,7 @@ class Page:
 
     @property
     def files(self) -> dict[str, bytes]:
-        """Figures that are written beside the page, by file name."""
+        """Contents of the figure files that are written next to the page, by file name."""
         return {
             name: content
             for section in self.sections
@@ -159,7 +159,7 @@ class Page:
 
 
 def state_mark(state: State) -> Markup:
-    """Write the state of a check as a coloured sign and word, such as "✓ good"."""
+    """Write the state of a check of the report as an HTML sign and word, such as "✓ good"."""
     return element(
         "span", f"{SIGNS[state]} {WORDS[state]}" if state else "", class_=f"state {state}"
     )
@@ -192,7 +192,7 @@ def render(page: Page) -> str:
 
 
 def embedded(value: Any) -> Markup:
-    """Write a value as JSON that can be placed inside a script element.
+    """Write a value as JSON that can be placed inside a script element of an HTML page.
 
     The characters <, > and & are escaped, so that no text can end the element or open a comment.
     """

@@ -133,7 +133,7 @@ def checks_section(checklist: Checklist) -> Section:
 
 
 def settings_section(study: str) -> Section:
-    """Build the folded section that lists every setting with a value.
+    """Build the folded section that lists every setting of the study that has a value.
 
     study : text of study.yaml.
     """
@@ -149,7 +149,7 @@ def settings_section(study: str) -> Section:
 
 
 def provenance_section(result: Identification) -> Section:
-    """Build the section with the file hashes and versions that reproduce the result."""
+    """Build the section with the file hashes and versions needed to reproduce the result."""
     provenance = result.estimate.provenance
     rows = [("robot file", provenance["robot"], f"SHA-256 {provenance['robot_sha256']}")]
     rows += [

@@ -43,7 +43,7 @@ def cad_values(model: GeneratedModel) -> dict[str, float]:
 
 
 def parameter_section(result: Identification) -> Section:
-    """Build the section of the parameters to use: value, 95 % interval, unit."""
+    """Build the section of the final parameters of the robot model: value, 95 % interval, unit."""
     fit = result.model_estimate
     rows = [
         (symbol(name), *_with_interval(fit, name), unit(fit.units.get(name, "")))
@@ -123,7 +123,7 @@ def _half(fit: Estimate, name: str) -> float:
 
 
 def _difference(fit: Estimate, name: str, given: float) -> str:
-    """Write how far a fitted value is from the value of the robot file, in % of the latter.
+    """Write the difference of a fitted value from the robot file's value, in % of the robot file's.
 
     The text is empty if the value of the robot file is smaller than half the width of the 95 %
     interval.

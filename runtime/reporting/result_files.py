@@ -73,7 +73,7 @@ class Results:
         return [self.folder / name for name in contents]
 
     def recover(self) -> None:
-        """Finish interrupted commands: move their complete files up, delete incomplete files."""
+        """Finish interrupted writing: move complete files up, delete incomplete files."""
         for unfinished in self.folder.glob(f"{UNFINISHED}*"):
             if unfinished.is_dir() and not unfinished.is_symlink():  # rmtree waits for a pipe
                 shutil.rmtree(unfinished, ignore_errors=True)
@@ -110,7 +110,7 @@ def write_all(folder: str | Path, contents: Mapping[str, str | bytes]) -> list[P
 
 @contextmanager
 def results_in(folder: str | Path | None) -> Iterator[Any]:
-    """Yield the folder as a Results object, made if it is missing; None if no folder is given.
+    """Yield a Results object for a folder, which is made if missing; None if no folder is given.
 
     Raises OutputError if nothing can be written there.
     """

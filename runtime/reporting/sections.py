@@ -20,7 +20,7 @@ FIGURES_SHOWN = 8  # of joints, before the table of parameters
 
 
 def detail_sections(result: Identification) -> list[Section]:
-    """Build the folded report sections with details: errors, removals, validation, residuals."""
+    """Build the folded report sections: fit errors, removed parameters, validation, residuals."""
     trust = result.uncertainty
     sections = [
         *other_torques_section(result),
@@ -188,7 +188,7 @@ def motion_section(result: Identification) -> Section:
 
 
 def trail_section(result: Identification) -> Section:
-    """Build the section on the essential parameters: which ones were removed, with F-tests.
+    """Build the section on the parameters removed to find the essential ones, with F-tests.
 
     The table lists each removed parameter, in order, with the ratio of sigma_rho after its removal.
     """
@@ -279,7 +279,7 @@ def residual_section(result: Identification, unit: str = "N m") -> Section:
 
 
 def decimation_cutoff(result: Identification) -> float | None:
-    """Return the cut-off frequency of the parallel decimation, Hz; None without decimation."""
+    """Return the cut-off frequency of the decimation filter, Hz; None without decimation."""
     if result.study.signals.decimate is None or result.observation.settings.get("factor") == 1:
         return None
     return CUTOFF * result.observation.rate / 2

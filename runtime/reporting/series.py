@@ -43,7 +43,7 @@ class Series:
 
     @property
     def data(self) -> Mapping[str, Any]:
-        """The lines for JSON; times are counted from the first instant, and nan breaks a line."""
+        """Samples of the two lines as JSON values; times start at zero, and nan breaks a line."""
         start = float(np.nanmin(self.t)) if len(self.t) else 0.0
         arrays = {"t": self.t - start, "first": self.first, "second": self.second}
         return {
@@ -69,7 +69,7 @@ def series(
 
 
 def extremes(values: Array, most: int) -> Array:
-    """Select samples of m curves, at most `most`, so that their extreme values remain.
+    """Select at most `most` samples of m curves for a plot, so that their extreme values remain.
 
     values : shape (m, N), one curve per row. Return the indices of the first and the last sample,
     and of the smallest and the largest value of every curve in each of several intervals of equal

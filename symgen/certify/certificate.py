@@ -143,7 +143,7 @@ class Certificate:
 
     @property
     def errors(self) -> dict[str, float]:
-        """Error of each function of each emitted file, by a name such as `bias of arm.py`."""
+        """Error of each emitted function against independent values, by name: `bias of arm.py`."""
         return {
             f"{name} of {file}": error
             for file, text in self.texts.items()

@@ -45,7 +45,7 @@ def requested_values(
         return np.asarray((columns(q, qd, zero) - columns(q, zero, zero)) * rubs)
 
     def slotine_li() -> Array:
-        """Compute the regressor of the torque A qddr + C qdr + Q + friction.
+        """Compute the regressor of Slotine and Li's torque A qddr + C qdr + Q + friction.
 
         C qdr is a difference of torques that are quadratic in the velocities.
         """
@@ -58,7 +58,7 @@ def requested_values(
         return np.asarray(columns(q, zero, qd) - columns(q, zero, zero))
 
     def momentum_rate() -> Array:
-        """Compute the regressor of (1/2) d(qd' p)/dq - Q - friction, with p = A qd (momentum)."""
+        """Compute the regressor of the momentum rate (1/2) d(qd' p)/dq - Q - friction, p = A qd."""
         slope = np.zeros((*q.shape, len(own)))
         for i, e in enumerate(np.eye(q.shape[1])):
             for m, c in SIX_POINTS.items():

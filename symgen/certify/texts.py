@@ -230,7 +230,7 @@ def largest(
     call: Use,
     witness: Witness,
 ) -> tuple[float, str]:
-    """Compute the largest error of a function over all its test calls.
+    """Compute the largest error of an emitted function over all its test calls.
 
     Return the error, and the message if the function failed. The error is infinite if the defaults
     of the function are not the constants of the robot file.
@@ -304,7 +304,7 @@ def _function(module: ModuleType, name: str, *frame: int) -> Any:
 
 
 def _derivative_error(module: ModuleType, witness: Witness) -> float:
-    """Compare emitted derivatives of the torques by qdd and X with inertia matrix A, regressor D.
+    """Compare emitted torque derivatives: by qdd with the inertia matrix A, by X with regressor D.
 
     Return the larger of the two errors.
     """

@@ -73,7 +73,7 @@ def generate(
 
 
 def _among(known: Collection[str], what: str, text: str) -> tuple[str, ...]:
-    """Split an option at commas into words; an unknown word ends the program.
+    """Split the value of an option at commas; end the program if a word is unknown.
 
     The error message lists the known words.
     """

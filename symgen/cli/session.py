@@ -43,7 +43,7 @@ def single_thread() -> None:
 
 @contextmanager
 def reported_errors() -> Iterator[None]:
-    """Turn errors of a command inside the block into messages, with one BLAS thread.
+    """Report errors inside the block as messages of the command line; use one BLAS thread there.
 
     Bad input gives one message on the error stream and exit code 2, a false certificate exit code
     1, never a traceback. A note is printed for each angle whose value differs from the text of the
@@ -158,7 +158,7 @@ def _wrapped(line: str, width: int) -> str:
 
 
 def end(*, good: bool) -> None:
-    """End the command with exit code 1 if its answer is negative."""
+    """End the command with exit code 1 if its answer is negative, for instance the verdict No."""
     if not good:
         raise typer.Exit(NEGATIVE)
 
@@ -325,7 +325,7 @@ def require_record(study: Study, file: str) -> None:
 
 
 def changed(study: Study, **sections: Mapping[str, Any]) -> Study:
-    """Replace settings of a study, with the same checks as for a file; None changes nothing."""
+    """Replace settings of a study and check them like a study file; None leaves a setting as is."""
     from runtime.core.settings import to_mapping
     from runtime.study import study_from_mapping
 

@@ -164,7 +164,7 @@ def page_file(regrouping: Regrouping, output: Path | None) -> Path:
 
 
 def model_text(robot: Robot, model: str, kind: str, asked: Mapping[str, Any]) -> str:
-    """Print a symbolic model of a robot in one of FORMATS.
+    """Return a symbolic model of a robot, such as its inertia matrix, as text in one of FORMATS.
 
     asked : options of --model that the user gave.
     """

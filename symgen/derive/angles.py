@@ -1,4 +1,4 @@
-"""Fixed angles and square roots of a robot, for exact arithmetic modulo a prime p (field F_p).
+"""Fixed angles and square roots in a robot's description, for arithmetic modulo a prime p (F_p).
 
 A fraction of pi with a moderate denominator is a whole multiple of pi/D, which is a root of unity
 of F_p. Every other fixed angle is a sum of monomials in constants and in numbers kept as written
@@ -66,7 +66,7 @@ class Units:
 
     @property
     def all(self) -> list[Unit]:
-        """All unit angles of a robot: first pi/D (D is a common denominator), then the others."""
+        """All unit angles: first pi/D, with a common denominator D of the angles, then others."""
         return [(PI, Fraction(1, self.D)), *self.free.items()]
 
     def of(self, angle: Expression) -> list[tuple[Unit, int]]:
@@ -86,7 +86,7 @@ class Units:
         return parts
 
     def _is_turn(self, m: Monomial, c: Fraction) -> bool:
-        """Whether the angle c*m (m is pi or a product of constants) is a whole multiple of pi/D."""
+        """Whether the angle c*m has m = pi and is a whole multiple of the unit angle pi/D."""
         return m == PI and (c * self.D).denominator == 1
 
 
@@ -155,8 +155,7 @@ def rows_of(robot: Robot) -> list[Expression]:
 
 
 def atoms_of(robot: Robot) -> Iterator[str | Number | Call]:
-    """Yield the symbols, numbers and function calls in constant expressions (lengths, gravity,
-    ...).
+    """Yield the symbols, numbers and function calls in the constant expressions of a robot.
 
     The expressions are lengths, gravity, joint relations and element rows; fixed angles are left
     out. The argument of a function call, such as a square root, is searched too.

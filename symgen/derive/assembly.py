@@ -1,4 +1,4 @@
-"""Closed loops of a mechanism: residuals, Newton's method, closed configurations and mobility.
+"""Closed kinematic loops: closure residuals, configurations that close the loops, mobility.
 
 A loop closes where its cut frame and its twin coincide, rT_cut = rT_twin. Frame r is the root of
 the loop: the last frame on the paths of both. `coincidence` has twelve differences between the two
@@ -49,7 +49,7 @@ def loop_ends(robot: Robot, algebra: GraphAlgebra, closure: Closure) -> list[tup
 
 
 def coincidence(ends: list[tuple[Pose, Pose]]) -> list[Scalar]:
-    """Return twelve pose differences for each loop, all zero if its two frames at the cut coincide.
+    """Return twelve pose differences per loop, zero if the two frames at its cut joint coincide.
 
     The differences are P_cut - P_twin and A_cut - A_twin.
     """
@@ -174,9 +174,9 @@ def declared_relations(robot: Robot) -> dict[int, tuple[dict[int, Expression], E
 
 @lru_cache(maxsize=16)
 def open_loops(robot: Robot) -> list[Scalar]:
-    """Return the pose differences at the cut of each loop, as functions of all moving joints.
+    """Return the pose differences of the two frames at the cut joint of each loop, as graph nodes.
 
-    Every moving joint is independent here.
+    They are functions of all moving joints, each of which is independent here.
     """
     return coincidence(loop_ends(robot, GraphAlgebra(robot), open_tree(robot)))
 
@@ -238,7 +238,7 @@ class Assembly:
         return dict(zip(self.robot.moving, (self.N @ q + self.c).tolist(), strict=True))
 
     def residual(self, q: Array) -> Array:
-        """Return twelve pose differences at the cut of each loop, shape (..., loops, 12).
+        """Return twelve pose differences at the cut joint of each loop, shape (..., loops, 12).
 
         Positions are divided by the longest length.
         """
@@ -268,7 +268,7 @@ class Assembly:
         return self.robot.loops[int(gaps.argmax())], float(gaps.max())
 
     def closest(self) -> Array:
-        """Return the configuration in which the loops are nearest to closing.
+        """Find the configuration with the smallest closure error, for loops that may not close.
 
         It is the best result of several descents, in all free joints, from random configurations.
         """
@@ -278,7 +278,7 @@ class Assembly:
         return min(ends, key=self.gap)
 
     def solve(self, q: Array) -> Array | None:
-        """Move the passive joints from configuration q until the loops close; None on failure."""
+        """Return q with the passive joints moved so that the loops close; None if this fails."""
         closed = newton(self.rows, q, self.passive, steps=STEPS, tolerance=TOLERANCE)
         return closed if self.gap(closed) < 10 * TOLERANCE else None
 
@@ -290,7 +290,7 @@ class Assembly:
         )
 
     def mobility(self, q: Array) -> tuple[int, int]:
-        """Return the number of degrees of freedom, and the number left with actuators blocked."""
+        """Return the degrees of freedom with free actuators, and those with blocked actuators."""
         J = differences(self.rows, q)[1]
         return len(self.free) - _rank(J), len(self.passive) - _rank(J[:, self.passive])
 

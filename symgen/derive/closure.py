@@ -64,9 +64,9 @@ class Closure:
         return sum((g * Expression.symbol(f"q{i}") for i, g in self.row[j].items()), self.offset[j])
 
     def turn(self, j: int) -> tuple[Turn, Expression]:
-        """Return the angle of revolute joint j: multiples of independent angles, and a constant.
+        """Return the pairs (i, n_i) and the constant c of q_j = sum n_i q_i + c, j revolute.
 
-        Raises DescriptionError if a multiple is not a number.
+        The joints i are independent. Raises DescriptionError if a multiple is not a number.
         """
         turn = []
         for i, g in sorted(self.row[j].items()):
@@ -86,7 +86,7 @@ class Closure:
         return tuple(turn), self.offset[j]
 
     def relation(self, row: Mapping[int, Expression], c: Expression = ZERO) -> Relation:
-        """Rewrite s = row q + c with the independent joints only; return the new row and constant.
+        """Rewrite a sum row q + c in the independent joints only; return the new row and constant.
 
         The given row may contain any moving joints.
         """
@@ -98,11 +98,14 @@ class Closure:
         return {i: g for i, g in sorted(total.items()) if g}, c
 
     def in_independent(self, row: Mapping[int, Expression]) -> ActiveRow:
-        """Rewrite s = row q with the independent joints only; return pairs (joint, coefficient)."""
+        """Rewrite a velocity row qd in the independent joints: pairs (joint, coefficient)."""
         return tuple(self.relation(row)[0].items())
 
     def project(self, algebra: GraphAlgebra, torque: Mapping[int, Scalar]) -> dict[int, Scalar]:
-        """Convert torques of all moving joints to torques G' Gamma_tree of the actuated joints."""
+        """Convert torques of all moving joints to torques of the actuated joints, by virtual work.
+
+        Gamma_a = G' Gamma_tree, with G = dq/dq_a; `torque` is Gamma_tree by joint.
+        """
         if not self.robot.passive:
             return dict(torque)
         total: dict[int, Scalar] = dict.fromkeys(self.independent, 0)

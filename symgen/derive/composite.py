@@ -116,7 +116,7 @@ class CompositeLinks:
         return A
 
     def _column(self, k: int) -> dict[int, Scalar]:
-        """Return the entries {i: A_ik} of column k of the inertia matrix, from the links only.
+        """Return the entries {i: A_ik} of column k of the inertia matrix without actuator inertias.
 
         The joints i are those between the base and joint k.
         """

@@ -58,8 +58,8 @@ HALF = Expression.number(Fraction(1, 2))
 
 
 class CompositeRates(CompositeLinks):
-    """The sums HP = sum m rd and BP = sum m r rd' over the mass points m of each link and all links
-    after it, where r is the position and rd the velocity of a point.
+    """The sums HP = sum m rd and BP = sum m r rd' over the points of each link and all links after
+    it; m, r and rd are the mass, position and velocity of a point.
 
     A composite link is a link with all links mounted on it. r is in the frame of the link, rd is
     relative to the origin of the frame.
@@ -97,7 +97,9 @@ class CompositeRates(CompositeLinks):
         return v
 
     def _link(self, d: Derivation, j: int) -> None:
-        """Compute HP = sum m rd and BP = sum m r rd' over the mass points of link j alone."""
+        """Compute the sums HP = sum m rd and BP = sum m r rd' over the points of link j alone; m, r
+        and rd are the mass, position and velocity of a point.
+        """
         w, half = self.motion.link[j].w, self.algebra.constant(HALF)
         XX, XY, XZ, YY, YZ, ZZ = self.own[j][:6]
         K = (
@@ -130,7 +132,7 @@ class CompositeRates(CompositeLinks):
         return C
 
     def _joint(self, k: int) -> dict[tuple[int, int], Scalar]:
-        """Return the entries C_ik and C_ki of the Coriolis matrix, i from the base to joint k."""
+        """Return the Coriolis entries C_ik and C_ki for all joints i from the base to joint k."""
         self.algebra.section(f"Unit rate of joint {k}")
         x, y, _ = self.MSP[k]
         B, H = self.BP[k], self.HP[k]

@@ -36,7 +36,7 @@ ABSORBED = ("YY", "MZ", "M")
 
 @dataclass(frozen=True)
 class Derivation:
-    """The derived formulas of a robot, as nodes of one graph.
+    """The formulas of a robot (torques, regressor, inertia matrix, poses) as nodes of one graph.
 
     Models may later add nodes to this graph, but change none.
 
@@ -76,9 +76,10 @@ class Derivation:
     poses: Mapping[int, tuple[Matrix, Vector]]
 
     def actuated(self, torque: Mapping[int, Scalar]) -> dict[int, Scalar]:
-        """Convert torques of the moving joints to torques G' Gamma of the actuated joints.
+        """Convert torques of all moving joints to torques of the actuated joints, by virtual work.
 
-        Every actuated joint has an entry, also if its torque is zero.
+        They are G' Gamma, with G = dq/dq_a and the torques Gamma of the moving joints. Every
+        actuated joint has an entry, also if its torque is zero.
         """
         projected = self.geometry.closure.project(self.algebra, torque)
         return {i: projected.get(i, 0) for i in self.robot.joints}
@@ -86,18 +87,18 @@ class Derivation:
 
 @lru_cache(maxsize=8)
 def derive(robot: Robot) -> Derivation:
-    """Derive the formulas of a robot; a second call returns the stored result.
+    """Derive torques, regressor, inertia matrix and poses of a robot as nodes of one graph.
 
-    Raises DescriptionError if the loops of the robot cannot close.
+    A second call returns the stored result. Raises DescriptionError if the loops cannot close.
     """
     return derived(robot, close)
 
 
 def derived(robot: Robot, closing: Callable[[Robot], Closure]) -> Derivation:
-    """Derive the formulas of a robot, with the independent joints chosen by the function `closing`.
+    """Derive the formulas of a robot, with the joint relations that the function `closing` returns.
 
-    The closure defines the independent joints. Decimal numbers of the robot file stay inputs of the
-    graph, so that formulas show them as written.
+    These relations (a `Closure`) define the independent joints. Decimal numbers of the robot file
+    stay inputs of the graph, so that formulas show them as written.
     """
     written = numbered(robot)
     closure, algebra = closing(written), GraphAlgebra(written)
@@ -124,7 +125,7 @@ def derived(robot: Robot, closing: Callable[[Robot], Closure]) -> Derivation:
 def projected_twice(
     closure: Closure, algebra: GraphAlgebra, A: Mapping[tuple[int, int], Scalar]
 ) -> dict[tuple[int, int], Scalar]:
-    """Return the matrix G' A G of the actuated joints from the matrix A of all moving joints."""
+    """Return G' A G of the actuated joints from the matrix A of all moving joints; G = dq/dq_a."""
     robot = closure.robot
     AG = {j: closure.project(algebra, {k: A[j, k] for k in robot.moving}) for j in robot.moving}
     columns = {

@@ -128,7 +128,7 @@ def equal_sides(robot: Robot) -> list[str]:
 
 
 def far_starts(robot: Robot) -> list[str]:
-    """Warn of joints whose `start` is far from the nearest position found that closes the loops."""
+    """Warn of joints whose start position is far from the nearest one that closes the loops."""
     closed, longest = close(robot).start, robot.longest
     units = {j: 1.0 if robot.frame(j).sigma == REVOLUTE else longest for j in robot.start}
     far = [j for j, x in robot.start.items() if abs(closed[j] - x) > FAR * units[j]]

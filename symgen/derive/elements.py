@@ -24,7 +24,7 @@ from symgen.description.robot import Element, Form, Row, parameter
 
 
 def element_column(motion: Motion, e: Element, j: int) -> dict[int, Scalar]:
-    """Return the regressor column {i: D_ik} of an element parameter, such as FV2, by joint i.
+    """Return the regressor column {joint i: D_i} of an element parameter, such as FV2.
 
     The joints i are the moving joints that this parameter acts on.
     """
@@ -43,7 +43,7 @@ def element_column(motion: Motion, e: Element, j: int) -> dict[int, Scalar]:
 
 
 def law_value(motion: Motion, e: Element, j: int, law: Expression) -> Scalar:
-    """Convert a torque law or an energy of an element to a node of the expression graph."""
+    """Convert the torque law or energy of an element (friction, spring, ...) to a graph node."""
     return _Law(motion, e, j).of(law)
 
 
@@ -74,7 +74,7 @@ class _Law:
         return total
 
     def one_sided(self, law: Expression) -> Scalar:
-        """Return the velocity sd, or its sign, for motion in the direction `when`, else zero."""
+        """Return the velocity sd or its sign; zero if the motion is not in the direction `when`."""
         rate, key = self._atom("qd"), self.motion.geometry.closure.in_independent(self.row)
         if type(rate) is int or not key:
             return 0  # at rest, or the closure holds s still

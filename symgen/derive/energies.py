@@ -124,7 +124,10 @@ def potential_energy(d: Derivation) -> Scalar:
 
 
 def _square(d: Derivation, e: Element, j: int, x: Mapping[int, Scalar]) -> Scalar:
-    """Return the squared motion of an element: (G x)**2 for a row G, or x' B x for a matrix B."""
+    """Return twice the energy of an inertia or spring whose parameter is 1: (G x)**2 or x' B x.
+
+    x are joint velocities (inertia) or positions (spring). The element has a row G or a matrix B.
+    """
     if j in e.along:
         s = linear(d.algebra, e.along[j], x)
         return mul(s, s)
@@ -132,7 +135,7 @@ def _square(d: Derivation, e: Element, j: int, x: Mapping[int, Scalar]) -> Scala
 
 
 class AtRates(Motion):
-    """Link accelerations that need the joint torques C qdr: Coriolis torques at reference rates.
+    """Link accelerations for which Newton-Euler gives the torques C qdr, with reference rates qdr.
 
     These accelerations are sum_k qdr_k (a_k + U_k r), see the head of this module; `joint_torques`
     turns them into C qdr. With qdr_k = 1 as the only rate, the result is column k of C.
@@ -203,7 +206,7 @@ Columns = Mapping[str, Mapping[int, Scalar]]
 
 
 def _accelerated(d: Derivation, qdd: Mapping[int, Scalar]) -> Motion:
-    """Return a motion in which the links start from rest with accelerations qdd, under gravity.
+    """Compute the motion of links at rest with joint accelerations qdd, gravity included.
 
     Friction still acts with the actual joint velocities.
     """

@@ -190,7 +190,7 @@ class Draw:
         return value
 
     def residues(self, value: Scalar) -> Array:
-        """Convert a value modulo p to an array, with one entry or one per geometry or state."""
+        """Convert a value modulo p to an array: one entry, or one entry per geometry or state."""
         return value.x if isinstance(value, Fp) else np.array([value % self.p])
 
     def spread(self, value: Scalar) -> Array:
@@ -227,7 +227,7 @@ class Draw:
         return (a[0] * b[0] - a[1] * b[1] % p) % p, (a[0] * b[1] + a[1] * b[0] % p) % p
 
     def _multiple(self, a: Point, n: int) -> Point:
-        """Return cosine and sine, modulo p, of n a, from cosine and sine of the angle a."""
+        """Return cosine and sine, modulo p, of the angle n a, from cosine and sine of a."""
         if n < 0:
             a, n = (a[0], -a[1] % self.p), -n
         if n == 1:
@@ -241,7 +241,10 @@ class Draw:
         return result
 
     def _joint(self, j: int) -> Point:
-        """Return cos(q_j/D) and sin(q_j/D), modulo p, at each state; D is a common denominator."""
+        """Return cosine and sine, modulo p, of the angle q_j/D at each state.
+
+        D is a common denominator of the ratios between passive and independent joint angles.
+        """
         if j not in self._points:
             self._points[j] = self._point_at(self._random(("angle", j), self.samples))
         return self._points[j]
@@ -263,7 +266,7 @@ class Draw:
 
     @cached_property
     def half_turn(self) -> Point:
-        """Cosine and sine, modulo p, of the smallest unit angle pi/D, a root of unity of order 2D.
+        """Cosine and sine, modulo p, of the unit angle pi/D; 2*D such angles make a full turn.
 
         Its multiple pi/2 has the cosine 0 and the sine 1.
         """
@@ -281,7 +284,7 @@ class Draw:
                 return root
 
     def _angle(self, angle: Angle) -> Point:
-        """Return cosine and sine, modulo p, of an angle: a constant plus joint-angle multiples."""
+        """Return cosine and sine, modulo p, of an angle sum_j n_j q_j + constant."""
         turns, rest = quarter_turns(angle.offset)
         quarter = ((1, 0), (0, 1), (-1, 0), (0, -1))[turns % 4]
         point: Point = (np.array([quarter[0] % self.p]), np.array([quarter[1] % self.p]))

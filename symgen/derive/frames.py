@@ -93,7 +93,7 @@ class Frames:
         return ((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])), self.position(j, i, i)
 
     def columns(self, j: int, i: int) -> dict[int, tuple[Vector, Vector]]:
-        """Return the Jacobian of frame j, in frame i: one column per moving joint up to frame j.
+        """Return the Jacobian of frame j in frame i: a column per moving joint from base to j.
 
         Column k is the pair (velocity of O_j, angular velocity of frame j) per unit rate of joint
         k.
@@ -127,7 +127,7 @@ class Frames:
         return Rotation(None, *self.geometry.algebra.cos_sin(*self._between(j, i)))
 
     def _between(self, j: int, i: int) -> tuple[Turn, Expression]:
-        """Return the angle from frame i to frame j about z: joint multiples, and a constant."""
+        """Return pairs (k, n_k) and c of the angle sum n_k q_k + c about z from frame i to j."""
         (turn, offset), (other, other_offset) = self.geometry.turn[j], self.geometry.turn[i]
         return summed((*turn, *((k, -n) for k, n in other))), offset - other_offset
 

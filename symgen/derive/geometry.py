@@ -35,7 +35,7 @@ from symgen.description.robot import PRISMATIC, REVOLUTE, Frame, Robot
 
 @dataclass(frozen=True)
 class Rotation:
-    """The rotation A Rot(z, theta) of a frame j in a frame i, with A fixed.
+    """The rotation iRj = A Rot(z, theta) of frame j in frame i, with a constant matrix A.
 
     Attributes
     ----------
@@ -171,7 +171,7 @@ class Geometry:
 
 
 def summed(turn: Turn) -> Turn:
-    """Merge pairs (joint, multiple) of the same joint by a sum; sort, and leave out zero sums."""
+    """Add up the multiples of each joint in pairs (joint, multiple); sort, and drop zero sums."""
     total: dict[int, int | Fraction] = {}
     for j, n in turn:
         total[j] = total.get(j, 0) + n

@@ -73,7 +73,7 @@ class Velocity(NamedTuple):
 
 
 class Node:
-    """One operation of the graph, with its operands and the name of its result.
+    """One operation of the expression graph, with its operands and the name of its result.
 
     `operands` are Scalars. A `fixed` node depends on constants and parameters only, not on the
     sample. `value` describes the node for exact arithmetic: the Symbol of an input, the number of a
@@ -101,7 +101,7 @@ class Node:
 
 
 class Scalar:
-    """A node of the graph with a sign; the operators + - * / make new nodes."""
+    """A node of the expression graph with a sign; the operators + - * / make new nodes."""
 
     __slots__ = ("graph", "node", "sign")
 
@@ -203,7 +203,7 @@ class Graph:
         return s if c >= 0 else -s
 
     def add(self, a: Scalar, b: Scalar) -> Scalar | int:
-        """Return a + b.
+        """Return the node of the sum a + b, simplified if an operand is zero or both are one node.
 
         The first operand of the node has a positive sign, so that a - b and b - a share one node.
         """

@@ -1,4 +1,4 @@
-"""Symbols of a robot as nodes of one graph: constants, angles, joint rates, signs.
+"""Constants, joint variables, cosines, sines and velocity signs of a robot as graph nodes.
 
 Inputs of the graph are q1, QP1, QDP1 ... and the constants of the robot file under their names.
 Numbers that formulas keep as written are inputs too, so that one graph serves all numbers. Each
@@ -60,7 +60,7 @@ class GraphAlgebra:
         self.sections.append((len(self.graph.nodes), title))
 
     def constant(self, e: Expression) -> Scalar | int:
-        """Return the node of a constant expression: a length, or the cosine of a fixed angle."""
+        """Return the node of a constant expression, such as a length or cosine of a fixed angle."""
         value: Scalar | int = e.evaluate(
             self._constant, self._call, self.graph.number, self._number
         )
@@ -114,9 +114,7 @@ class GraphAlgebra:
         return ((c, s), (-s, c), (-c, -s), (s, -c))[quarters % 4]
 
     def _label(self, turn: Turn) -> str:
-        """Return the end of names such as C23, for a sum of angles: 23 for q2 + q3, 2m5 for q2 -
-        q5, 2o5x3 for 2/5 q3.
-        """
+        """Return the index in names like C23: 23 for q2 + q3, 2m5 for q2 - q5, 2o5x3 for 2/5 q3."""
         text = ""
         for j, n in turn:
             times = f"{abs(n)}x".replace("/", "o") if abs(n) != 1 else ""
@@ -149,7 +147,7 @@ class GraphAlgebra:
         return self.graph.symbol(Symbol("rate", self.named("G", u, i)))
 
     def sign(self, rate: Scalar, row: ActiveRow) -> Scalar:
-        """Return sign(sd) of a velocity sd = G qd, given sd as `rate` and G as `row`."""
+        """Return the node of sign(sd) of a velocity sd = G qd; `rate` is sd, `row` is G."""
         return self.graph.call(SIGN, rate, of=Velocity(row))
 
     def one_sided(self, rate: Scalar, row: ActiveRow, when: str) -> tuple[Scalar, Scalar]:

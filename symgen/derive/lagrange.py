@@ -143,7 +143,7 @@ def _floats(function: Any, *arguments: Array) -> Array:
 
 
 def _matrices(columns: Array) -> Array:
-    """Reshape columns of stacked 4 x 4 matrices, (..., 16 F, n), to shape (..., n, F, 4, 4)."""
+    """Reshape n columns of F stacked 4 x 4 matrices, (..., 16 F, n), to shape (..., n, F, 4, 4)."""
     stacked = np.moveaxis(columns, -1, -2)
     return np.swapaxes(stacked.reshape(*stacked.shape[:-1], -1, 4, 4), -1, -2)
 
@@ -235,10 +235,10 @@ class Lagrange:
         return G
 
     def _form(self, e: Element, j: int) -> Array:
-        """Return the matrix B, shape (n, n), of an element with torque c B q, c B qd or c B qdd.
+        """Return the matrix B of an element: spring torque c B q, viscous c B qd, inertial c B qdd.
 
-        B is G'G if the element acts along a row G. j is the number in the name of the parameter c,
-        for instance 2 for FV2.
+        B has shape (n, n). It is G'G if the element acts along a row G. j is the number in the name
+        of the parameter c, for instance 2 for FV2.
         """
         G, moving = self._row(e, j), self.robot.moving
         B = np.outer(G, G)
@@ -305,7 +305,7 @@ class Lagrange:
         return D
 
     def potential_energy(self, q: Array, chi: Array) -> Array:
-        """Return the potential energy U of gravity, springs and offsets, shape (...)."""
+        """Return the potential energy U of gravity, springs, constant torques and user laws."""
         value, T = dict(zip(self.names, chi, strict=True)), self.poses(q)
         g = np.array([e.value(self.constants) for e in self.robot.gravity] + [0.0])
         U = np.zeros(np.shape(q)[:-1])
@@ -385,10 +385,10 @@ class Lagrange:
         return np.asarray(s[..., -1] / s[..., 0])
 
     def actuated_regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """Return the standard regressor G' D_tree of the actuated joints, shape (..., n_a, p).
+        """Return the standard regressor D of the actuated joint torques D chi, (..., n_a, p).
 
-        The arguments q, qd, qdd of the actuated joints have shape (..., n_a), in the order of
-        `robot.joints`.
+        D = G' D_tree, with G = dq/dq_a and the regressor D_tree of the open tree. The arguments q,
+        qd, qdd of the actuated joints have shape (..., n_a), in the order of `robot.joints`.
         """
         *state, G = self.motion(q, qd, qdd)
         return np.swapaxes(G, -1, -2) @ self.regressor(*state)
@@ -532,7 +532,7 @@ class Sample:
 
     @property
     def W(self) -> Array:
-        """Observation matrix, shape (n*N, p): D of all states, first the rows of joint 1."""
+        """Observation matrix, shape (n*N, p): regressors of all N states, rows of joint 1 first."""
         return self.D.transpose(1, 0, 2).reshape(-1, self.D.shape[2])
 
 

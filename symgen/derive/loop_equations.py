@@ -65,7 +65,7 @@ class LoopSystem:
 
     @property
     def tied(self) -> slice:
-        """Slice of the independent joints that selects the joints given by closure equations."""
+        """Slice of arrays q with the passive joints that only the closure equations determine."""
         return slice(len(self.robot.joints), len(self.closure.independent))
 
     @cached_property
@@ -81,23 +81,24 @@ class LoopSystem:
 
     @cached_property
     def jacobian(self) -> list[list[Scalar]]:
-        """Jacobian dr/dq in graph nodes: rows for equations, columns for independent joints."""
+        """Jacobian dr/dq of the closure residuals r as nodes: a column per independent joint."""
         columns = [rates(self.rows, {Symbol("q", f"q{i}"): 1}) for i in self.closure.independent]
         return [[column[k] for column in columns] for k in self.equations]
 
     @cached_property
     def curvature(self) -> list[Scalar]:
-        """The term Jd qd in the second time derivative of the closure residuals, as graph nodes."""
+        """Term Jd qd in the second derivative J qdd + Jd qd of the closure residuals, as nodes."""
         qd = self.derivation.algebra.qd
         along = {Symbol("q", f"q{i}"): qd(i) for i in self.closure.independent}
         return rates(rates(self.residual, along), along)
 
     @cached_property
     def alignment(self) -> list[Scalar]:
-        """Trace of A_cut' A_twin per loop: 3 if it closes, -1 if its ends are half a turn apart.
+        """Trace of A_cut' A_twin per loop: 3 if the loop closes, -1 if half a turn from closing.
 
-        The axial vector of A_cut' A_twin is zero in both cases. A loop whose cut joint is not tied
-        is left out: there the angle is a sum of other angles, and the orientations always agree.
+        A_cut and A_twin are the orientations of the two frames at the cut joint. The axial vector
+        of A_cut' A_twin is zero in both cases. A loop whose cut joint is not tied is left out:
+        there the angle is a sum of other angles, and the orientations always agree.
         """
         geometry = self.derivation.geometry
         ends = loop_ends(geometry.robot, geometry.algebra, geometry.closure)
@@ -118,11 +119,11 @@ class LoopSystem:
         return np.stack([np.broadcast_to(x, q.shape[:-1]) for x in values], axis=-1)
 
     def residual_floats(self, q: Array) -> Array:
-        """Evaluate the closure residual r at q, shape (..., m)."""
+        """Compute the m closure residuals r at positions q in floating point, shape (..., m)."""
         return self.floats(self.residual, q)
 
     def jacobian_floats(self, q: Array) -> Array:
-        """Evaluate the Jacobian J = dr/dq at q, shape (..., m, n + m)."""
+        """Compute the Jacobian dr/dq of the m closure residuals at q, shape (..., m, n + m)."""
         J = self.floats([x for row in self.jacobian for x in row], q)
         return J.reshape(*q.shape[:-1], len(self.equations), -1)
 
@@ -144,7 +145,7 @@ class LoopSystem:
 
     @property
     def units(self) -> tuple[float, ...]:
-        """Unit of motion of each independent joint: 1 rad, or the longest length if prismatic."""
+        """Unit of motion per independent joint: 1 rad; for a prismatic joint the longest length."""
         frames = map(self.robot.frame, self.closure.independent)
         return tuple(1.0 if f.sigma == REVOLUTE else self.robot.longest for f in frames)
 
@@ -154,7 +155,7 @@ class LoopSystem:
         return 1e-13 if self.robot.longest > IN_METRES else 1e-16
 
     def pace(self) -> float:
-        """Return a step size of the actuated joints in which no passive joint moves far.
+        """Return a step of the actuated joints so small that no passive joint moves far.
 
         It is computed from the rates at the start configuration (PACE); in rad, or as a fraction of
         the longest length if prismatic.

@@ -164,7 +164,7 @@ def _general(assembly: Assembly, q: Array) -> Closure:
 def _angle_sum(
     assembly: Assembly, loop: Loop, configuration: Mapping[int, float]
 ) -> dict[int, Expression] | None:
-    """Return the multiples {j: n_j} in q_cut = sum n_j q_j + c for a planar loop, else None.
+    """Return {j: n_j} in the cut joint angle q_cut = sum n_j q_j + c of a planar loop, else None.
 
     In a planar loop all hinges have parallel axes, in equal or opposite directions, with or without
     prismatic joints between them. The axes are compared in two configurations of the open tree;
@@ -297,7 +297,7 @@ def _offset(
 
 
 def _beside(robot: Robot, row: Mapping[int, Expression]) -> Expression:
-    """Return sum n_i c_i, where c_i is the constant theta or r that frame i adds to q_i."""
+    """Return sum n_i c_i for a row {i: n_i}; frame i adds the constant c_i (theta or r) to q_i."""
     frames = {i: robot.frame(i) for i in row}
     terms = ((f.theta0 if f.sigma == REVOLUTE else f.r0) * row[i] for i, f in frames.items())
     return sum(terms, ZERO)

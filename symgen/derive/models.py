@@ -35,7 +35,7 @@ HOMOGENEOUS = (0, 0, 0, 1)  # last row of a pose
 
 
 def _still(d: Derivation, *kinds: str, tied: bool = True) -> dict[Symbol, Input]:
-    """Return replacements that set the joint velocities (qd) or accelerations (qdd) to zero.
+    """Return replacements of inputs that set joint velocities (qd) or accelerations (qdd) to zero.
 
     If `tied` is true, those of the tied passive joints are zero too.
     """
@@ -142,7 +142,10 @@ def _by_column(d: Derivation, r: Request, columns: Columns) -> list[Entry]:
 
 
 def _momentum_regressor(d: Derivation, r: Request) -> Iterator[Case]:
-    """Yield the regressor of p = A qd, equal to Gamma for qdd = qd at rest without gravity."""
+    """Yield the regressor of the momentum p = A qd.
+
+    It is the regressor of Gamma at rest and without gravity, with qd in place of qdd.
+    """
     elements = element_names(d.robot)
     moved = {
         own: {} if own in elements and elements[own][0].kind != "inertia" else d.columns[own]

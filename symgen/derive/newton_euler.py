@@ -123,7 +123,7 @@ class Motion:
         return linear(self.algebra, self.geometry.closure.row[j], self._qdd)
 
     def vector(self, family: str, value: Vector, *indices: int) -> Vector:
-        """Name the components of a vector, such as W12 for component 1 of link 2, and return it."""
+        """Name the components of a vector, such as W12 (component 1, link 2); return the vector."""
         x, y, z = (
             self.algebra.name(v, self.named(family, k, *indices, *self.tag))
             for k, v in enumerate(value, start=1)

@@ -57,7 +57,7 @@ class Angles:
         return None if self.exact else k
 
     def report(self, file: str) -> tuple[str, tuple[str, ...]]:
-        """Describe how the angles near multiples of pi/12 were read, for headers and for users.
+        """Describe, for file headers and users, if angles near multiples of pi/12 were rounded.
 
         Return a text for file headers, and notes. If angles were rounded, a note names the largest
         change, and an AngleWarning is issued. Both results are empty if the file has no such angle.

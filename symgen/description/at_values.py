@@ -23,7 +23,7 @@ WITHIN = 1e-6  # rad, of a multiple of pi/12: rounding of 1.570796
 
 
 def at_values(robot: Robot, values: Mapping[str, Expression] | None = None) -> Robot:
-    """Replace all constants of `robot` by their numbers, or those in `values` by given expressions.
+    """Replace all constants of `robot` by numbers, or some by the expressions in `values`.
 
     Decimals are exact. An angle near a multiple of pi/12 becomes this multiple if `values` is left
     out.

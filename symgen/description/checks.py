@@ -205,9 +205,9 @@ def _check_declared(e: Expression, path: Path, symbols: Collection[str]) -> None
 
 
 def _check_exact(e: Expression, path: Path, *, angle: bool) -> None:
-    """Refuse pi outside an angle, and functions inside an angle: they have no exact value there.
+    """Refuse expressions without exact values: pi outside an angle, or functions inside an angle.
 
-    A declared constant may have such a value instead.
+    For instance, pi in a length, or cos in an angle, must be written as a declared constant.
     """
     for a in e.atoms:
         if isinstance(a, Call) and not angle:

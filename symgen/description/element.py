@@ -50,7 +50,7 @@ class LawScalar:
 
     @property
     def value(self) -> float:
-        """Value of the constant before a fit of the law: `start`, or the middle of the bounds."""
+        """Start value of this constant in a fit of the law: `start`, or the middle of its range."""
         lower, upper = self.bounds
         middle = (lower * upper) ** 0.5 if lower > 0 else (lower + upper) / 2
         return middle if self.start is None else self.start
@@ -61,7 +61,7 @@ class LawScalar:
 
 
 def _scalars(table: Mapping[str, Any], declared: Any) -> dict[str, LawScalar]:
-    """Convert the nonlinear constants of a law to LawScalar objects; a plain number is fixed."""
+    """Convert the nonlinear constants of a law to LawScalars; a plain number is not fitted."""
     return {
         name: x if isinstance(x, LawScalar) else LawScalar((float(x), float(x)))
         for name, x in table.items()
@@ -77,7 +77,10 @@ def _law(text: str | None, declared: Any) -> Expression | None:
 
 
 def _scalar(name: str, given: Any) -> LawScalar:
-    """Make a LawScalar from a default in KINDS: a fixed number, or bounds and a start value."""
+    """Make a nonlinear constant (LawScalar) of an element from its default in the table KINDS.
+
+    The default is a fixed number, or bounds and a start value.
+    """
     if not isinstance(given, Mapping):
         return LawScalar((float(given), float(given)))
     lower, upper = map(float, given["bounds"])
@@ -139,7 +142,7 @@ class Element:
 
     @property
     def scalars(self) -> dict[str, LawScalar]:
-        """Nonlinear constants of the law, by name: values of the file replace default values."""
+        """Nonlinear constants of the law, by name: from the robot file, or defaults of the kind."""
         kind = KINDS.get(self.kind)
         return {name: _scalar(name, x) for name, x in (kind.fit if kind else {}).items()} | {
             **self.fit
@@ -158,7 +161,7 @@ class Element:
         return {parameter(name, j): x for name, x in values.items() for j in self.keys}
 
     def _of_key(self, law: Expression, j: int) -> Expression:
-        """Replace fitted constants in `law` by symbols of frame j (vs3), fixed ones by numbers.
+        """Replace fitted constants in the law by symbols for frame j (vs3), others by numbers.
 
         A constant to be fitted becomes a symbol (vs3 for vs), a fixed one a number. The transmitted
         torque tau_model becomes channel.tau_model3.
@@ -180,18 +183,18 @@ class Element:
         return sorted(name.removeprefix(CHANNEL) for name in names if name.startswith(CHANNEL))
 
     def law(self, j: int) -> Expression:
-        """Return the law for frame j: the torque along s = G q for the parameter value 1.
+        """Return the torque law for frame j, along the coordinate s = G q, for a unit parameter.
 
         It is zero if the law is an energy.
         """
         return self._of_key(self.torque or KINDS[self.kind].torque, j)
 
     def potential(self, j: int) -> Expression:
-        """Return the energy for frame j and the parameter value 1; zero if there is none."""
+        """Return the energy of the element for frame j and a unit parameter; zero if undefined."""
         return self._of_key(self.energy or ZERO, j)
 
     def laws(self, j: int) -> tuple[Expression, dict[int, Expression]]:
-        """Return the torque of the element along s = G q, and its torques at single joints.
+        """Return the element's torque along the coordinate s = G q, and torques at single joints.
 
         They are those for frame j and the parameter value 1. With the torque x along s and the
         energy U, Gamma = G' x + dU/dq_i. The torque x includes the derivative of U with respect to
@@ -203,7 +206,10 @@ class Element:
 
     @property
     def is_own(self) -> bool:
-        """Whether the law is none of inertia, viscous or Coulomb friction, offset and spring."""
+        """Whether the law is other than inertia, viscous or Coulomb friction, offset or spring.
+
+        This includes every law that the user writes, and every law with nonlinear constants.
+        """
         return (
             bool(self.torque or self.energy or self.scalars)
             or self.kind not in USUAL_KINDS.values()
@@ -229,7 +235,7 @@ class Element:
 
     @property
     def keys(self) -> tuple[int, ...]:
-        """Numbers of the frames for which `along` or `form` has an entry, in ascending order."""
+        """Numbers of the frames for which the element has a parameter, in ascending order."""
         return tuple(sorted({*self.along, *self.form}))
 
 

@@ -59,7 +59,7 @@ class Call:
         return (self.argument,) if self.exponent is None else (self.argument, self.exponent)
 
     def of(self, *operands: Expression) -> Expression:
-        """Apply the same function to other operands."""
+        """Return the same function of other arguments, for instance cos(q2) for cos(q1)."""
         if self.exponent is not None:
             return power(*operands)
         return call(self.function, *operands)
@@ -70,7 +70,7 @@ class Call:
 
 @dataclass(frozen=True)
 class Number:
-    """A positive rational that stays as the robot file writes it: 0.4318**2, not 0.18645124.
+    """A positive rational number that is printed as in the robot file: 0.4318**2, not 0.18645124.
 
     See `derive.numbers`.
     """

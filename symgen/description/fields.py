@@ -59,7 +59,7 @@ def located(file: str, line: Callable[[Path], int] = lambda _: 1) -> Iterator[No
 
 @dataclass
 class Declared:
-    """Facts needed to read the tables of a robot file: declared names, frame count, convention.
+    """Data needed to read the tables of a robot file: declared names, frames, and frame convention.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class Declared:
 
 @dataclass(frozen=True)
 class Given:
-    """A field value that is not in the robot file but added by its reader, such as the file name.
+    """A field value added by the reader of a robot file, not written there, such as the file name.
 
     The file has no key for this field.
     """
@@ -125,7 +125,7 @@ class Written:
 
 
 def problem(error: SymgenError) -> PydanticCustomError:
-    """Convert `error` to a pydantic error with the same message."""
+    """Convert an error of symgen to a pydantic error with the same message."""
     return PydanticCustomError("described", "{error}", {"error": error})
 
 

@@ -77,7 +77,7 @@ def read_robot(
     lock: Mapping[str, float] | None = None,
     chain: tuple[str, str] | None = None,
 ) -> tuple[Robot, tuple[str, ...]]:
-    """Read a robot as `load_robot` does; return it and notes on changed or omitted data.
+    """Read a robot file; return the Robot, and notes on data that were changed or left out.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def _beside(path: Path) -> Callable[[str, int], bytes]:
 def write_robot(
     robot: Robot, file: str, *, comments: Sequence[str] = ()
 ) -> tuple[str, tuple[str, ...]]:
-    """Return `robot` as text in the format given by the suffix of `file`, and notes on losses.
+    """Convert `robot` to text in the format of the suffix of `file`, and note data it cannot store.
 
     The notes list what the format cannot store. No file is written.
 

@@ -216,7 +216,7 @@ def parse(
     symbols: Iterable[str] | None = None,
     functions: tuple[str, ...] = FUNCTIONS,
 ) -> Expression:
-    """Parse one expression from a text or a number.
+    """Parse an expression of a robot file, given as text or number, into an exact Expression.
 
     `symbols` are the declared names (None: any name is allowed). `functions` is FUNCTIONS, or LAWS
     for the law of a column. Raises ExpressionError, with the column, at the first text that is not

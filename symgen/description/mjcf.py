@@ -209,9 +209,10 @@ def _body(growing: _Growing, b: int) -> None:
 
 
 def _joint(growing: _Growing, k: int, parent: str, child: str, pose: Array) -> tuple[Joint, Array]:
-    """Return joint k from link `parent` to `child`, and the pose of the body in the joint frame.
+    """Convert joint k of an MJCF model; return the Joint, and its body's pose in the joint frame.
 
-    `pose` is the pose of the body in the frame of `parent` at q = ref.
+    The joint leads from the link `parent` to the link `child`. `pose` is the pose of the body in
+    the frame of `parent` at q = ref.
     """
     model, line = growing.mjcf.model, growing.mjcf.joints[k]
     name, kind = growing.names[k], int(model.jnt_type[k])
@@ -319,7 +320,7 @@ def _relations(growing: _Growing) -> dict[str, Expression]:
 
 
 def _equation(model: Any, names: list[str], e: int, line: int) -> Expression:
-    """Return the expression that relation number e of the MJCF file sets to zero.
+    """Return the expression in joint positions that relation e of the MJCF file sets to zero.
 
     It is y1 - y1_0 - a0 - a1 (y2 - y2_0), where y is a joint position or the length of a fixed
     tendon, and y_0 is its value at ref.

@@ -42,7 +42,7 @@ TEXTS = re.compile(r"\w*(name|class|joint\d?|tendon\d?|body\d?|model|mesh|materi
 
 @dataclass(frozen=True)
 class Mjcf:
-    """The mechanism of an MJCF file: the compiled model, and the lines of bodies and joints.
+    """The mechanism of an MJCF file: the compiled model, and the line numbers of bodies and joints.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ def with_includes(content: bytes, read: Callable[[str, int], bytes]) -> bytes:
 
 
 def compiled(content: bytes) -> Mjcf:
-    """Compile an MJCF file and return its mechanism.
+    """Compile the content of an MJCF file with MuJoCo, and return its mechanism.
 
     Raises DescriptionError, with the line, if the file is invalid or has elements that are not
     supported.
@@ -205,7 +205,7 @@ def _is_left_out(holder: XmlElement, e: XmlElement) -> bool:
 
 
 def _spec(root: XmlElement) -> tuple[Any, list[int]]:
-    """Build MuJoCo's MjSpec from the XML elements, and a list that maps its lines to the file.
+    """Build MuJoCo's MjSpec from XML elements, and a list that maps lines of its text to the file.
 
     The list has, for each line of the text that MuJoCo reads, the line of the original file.
     """

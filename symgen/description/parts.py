@@ -120,7 +120,7 @@ class Frame:
 
 
 def rows(texts: Mapping[int, str] | str, declared: Declared) -> Mapping[int, Row]:
-    """Convert the texts of a joint element, such as {6: q5 + q6}, to coefficients of q.
+    """Convert the entry `along` of an element, such as {6: q5 + q6}, to coefficients of q.
 
     The text "all" gives a row for each actuated joint, in which this joint has the coefficient 1.
     """
@@ -132,7 +132,7 @@ def rows(texts: Mapping[int, str] | str, declared: Declared) -> Mapping[int, Row
 def reduced(
     reduce: Callable[[Expression, tuple[int, ...]], Any], texts: Any, declared: Declared
 ) -> dict[int, Any]:
-    """Convert the texts of a joint element, such as {6: q6**2}, to rows or quadratic forms.
+    """Convert texts of an element, such as {6: q6**2}, to linear or quadratic forms in q.
 
     The function `reduce` makes the row or the form from an expression. A joint number, or a list of
     joint numbers, means a row for each joint with its coefficient 1.
@@ -202,14 +202,14 @@ class Loop:
 
 
 def _of_motors(value: list[float] | float | None, declared: Declared) -> tuple[float, ...]:
-    """Expand a number to one value per actuated joint; a list stays as it is, and None means 0."""
+    """Expand a drive setting to one value per actuated joint; a list stays, and None means 0."""
     if isinstance(value, list):
         return tuple(value)
     return tuple(value or 0.0 for f in declared.frames if f.mu)
 
 
 def _of_motors_if_given(value: Any, declared: Declared) -> tuple[float, ...] | None:
-    """Expand a number to one value per actuated joint; None stays None.
+    """Expand a drive setting to one value per actuated joint; None stays None.
 
     Measured currents are refused if no torque constant is given.
     """
@@ -217,7 +217,7 @@ def _of_motors_if_given(value: Any, declared: Declared) -> tuple[float, ...] | N
 
 
 def _rows(value: list[Any], _: Declared) -> tuple[tuple[float, ...], ...]:
-    """Convert a list of rows to a matrix; a list of numbers becomes the diagonal of the matrix."""
+    """Convert the gear ratios of a file to a matrix; a list of numbers becomes its diagonal."""
     if any(isinstance(x, list) for x in value):
         return tuple(map(tuple, value))
     return tuple(

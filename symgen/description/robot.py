@@ -306,7 +306,7 @@ class Robot:
 
     @cached_property
     def parameters(self) -> tuple[str, ...]:
-        """Names of the standard parameters: link by link, then of further elements.
+        """Names of the standard parameters, link by link, then of springs and other elements.
 
         For each link, the order is that of eq. (4): XX .. ZZ, MX, MY, MZ, M, then Ia, FV, FS and
         OFFSET, as far as the robot has them. Further elements are in the order of the file.
@@ -328,10 +328,7 @@ class Robot:
 
     @cached_property
     def channels(self) -> dict[str, tuple[str, ...]]:
-        """For each channel, such as a temperature: names of the parameters whose laws contain it.
-
-        A channel is a quantity that varies with time.
-        """
+        """For each channel (function of time, as temperature): parameters whose laws contain it."""
         read = [(c, parameter(e.family, j)) for e in self.elements for j in e.keys
                 for c in e.channels(j)]  # fmt: skip
         return {c: tuple(name for own, name in read if own == c) for c, _ in read}
@@ -364,9 +361,9 @@ class Robot:
 
 
 def one_joint_parameters(robot: Robot, families: Collection[str]) -> set[str]:
-    """Find the parameters of `families` that can be stored as one number per joint.
+    """Find the parameters of the element families `families` that act on one joint alone.
 
-    Such a parameter acts on one joint alone, and equally in both directions of motion.
+    They can be stored as one number per joint. Parameters of one direction of motion are left out.
     """
     return {
         parameter(e.family, j)

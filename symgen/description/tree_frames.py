@@ -35,7 +35,7 @@ STEEP = 0.02
 
 @dataclass
 class Body:
-    """A body, that is links joined by fixed joints, while its frame j is chosen.
+    """A rigid body (links on fixed joints): its links with their poses in frame j, and its joints.
 
     Attributes
     ----------
@@ -128,7 +128,7 @@ def _body(tree: Tree, link: str, pose: Array) -> Body:
 
 
 def _add(table: Table, ant: int, joint: Joint, parent: Array) -> int:
-    """Append the frame of `joint` on body `ant`, and return the number of the new frame.
+    """Append the frame of `joint`, mounted on body `ant`, to the frame table; return its number.
 
     `parent` is the pose of the parent link of the joint in frame `ant`.
     """
@@ -196,7 +196,7 @@ def _normal(axis: Array, point: Array) -> tuple[float, float, float, float]:
 
 
 def _numbered(row: Sequence[float]) -> tuple[float, ...]:
-    """Round a row of numbers, in turn an angle and a length, as the frame table stores them.
+    """Round a row of alternating angles and lengths as the frame table stores them.
 
     Angles that are multiples of pi/12 are exact; other numbers get DIGITS decimals.
     """
@@ -215,7 +215,7 @@ def _angle(x: float) -> tuple[float, Expression]:
 def _row(
     table: Table, ant: int, sigma: int, before: Sequence[float], theta: float = 0.0, r: float = 0.0
 ) -> tuple[Array, int]:
-    """Append a frame; return its pose in the antecedent frame at q = 0, and its number.
+    """Append a frame to the table; return its pose in its antecedent at q = 0, and its number.
 
     The pose has the shape (4, 4).
     """
@@ -241,7 +241,7 @@ def _row(
 
 
 def _length(table: Table, name: str, x: float) -> Expression:
-    """Return length `x` as 0 or as plus or minus a constant; equal lengths share one constant."""
+    """Express length x as 0 or as a named constant with a sign; equal lengths share a constant."""
     if abs(x) <= SAME:
         return ZERO
     equal = next(

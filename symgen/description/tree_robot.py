@@ -234,7 +234,7 @@ def _keys(table: Table, family: str, actuated: list[int]) -> list[int]:
 def _limits(
     table: Table, actuated: list[int]
 ) -> dict[str, tuple[float, ...] | tuple[tuple[float, float], ...]]:
-    """Collect the kinds of limits (position, speed, torque) that all actuated joints have.
+    """Collect limits of position, speed and torque, each kind only if all actuated joints have it.
 
     A note lists the kinds that are left out.
     """
@@ -309,7 +309,7 @@ def inertial_of(ten: Sequence[float] | Array) -> Inertial:
 
 
 def ten_of(inertial: Inertial, X: Array) -> Array:
-    """Convert mass, centre and tensor of a link to XX XY XZ YY YZ ZZ MX MY MZ M, shape (10,).
+    """Convert mass, centre of mass and inertia tensor to XX XY .. ZZ MX MY MZ M, shape (10,).
 
     The result is given in the frame of the body, in which the link has the pose X, shape (4, 4).
     """

@@ -114,7 +114,7 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
 
 
 def _left_out(root: XmlElement) -> Iterator[str]:
-    """Yield the tag of each XML element in the robot, its links and joints that is not read."""
+    """Yield the tags of XML elements in the robot, its links and joints that are not read."""
     for e in (root, *root):
         yield from (child.tag for child in e if e.tag in READ and child.tag not in READ[e.tag])
 

@@ -61,7 +61,7 @@ def values_of_csv(content: bytes, file: str) -> dict[str, float]:
 
 
 def with_values(robot: Robot, values: Mapping[str, float]) -> Robot:
-    """Return a copy of `robot` in which `values` replace or extend its standard parameters."""
+    """Return a copy of `robot` with its parameter values replaced or extended by `values`."""
     return replace(robot, values={**robot.values, **values})
 
 

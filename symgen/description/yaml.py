@@ -167,7 +167,7 @@ def _scalar(node: ScalarNode, line: int) -> Any:
 
 
 def tables_of(robot: Robot) -> dict[str, Any]:
-    """Return the tables of the robot file for `robot`, by key; expressions are not yet text."""
+    """Return the data of a robot file for `robot`, by key, with Expression objects, not texts."""
     drives = robot.drives
     return {
         "symgen": SCHEMA,

@@ -68,7 +68,7 @@ Call = Callable[[Sequence[str], Sequence[str]], list[str]]
 def blocks_of(
     spec: ModuleSpec, language: Language, component: Callable[[str, int], str] = "{}[{}]".format
 ) -> dict[str, Block]:
-    """Write every function of a robot as source text that is complete without the others.
+    """Write each function of a robot as complete source text, without code shared by functions.
 
     `component` gives the text of entry k of a state or of X, such as `q[0]`.
     """

@@ -50,7 +50,7 @@ class CStates:
         return f"s->{state}" if self.closed else state
 
     def load(self, state: str) -> str:
-        """Return two C arguments that locate a state: distance between samples, and start address.
+        """Return the C arguments that locate a state: distance between samples, and start address.
 
         The distance, in numbers, is from one sample to the next. The address is the address of the
         first sample of a tile, a group of samples computed together.

@@ -16,7 +16,7 @@ from symgen.regroup.regrouping import Regrouping
 
 @dataclass(frozen=True)
 class Emitter:
-    """Code generator of one kind of file (target): its language, and its writing function."""
+    """Code generator for one kind of file, such as C: its language and its writing function."""
 
     language: Language
     render: Callable[..., str]

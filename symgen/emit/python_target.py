@@ -220,7 +220,7 @@ def _filled_at_once(
 
 
 def _passed_constants(robot: Robot, names: Sequence[str]) -> str:
-    """Write constants as arguments: one tuple, and a second for constants that vary with time."""
+    """Write constants as arguments of a call: a tuple, and a second if some vary with time."""
     timed = [c for c in names if c in robot.channels]
     rest = tuple_of([c for c in names if c not in timed])
     return f"{rest}, {tuple_of(timed)}" if timed else rest
@@ -261,7 +261,7 @@ def _constant_entries(f: Function, result: str) -> list[str]:
 
 
 def _loop_tables(spec: ModuleSpec, slides: bool) -> Iterator[str]:
-    """Yield source lines with the data that close loops: start position, assembly mode, units.
+    """Yield source lines with data to close kinematic loops: start position, assembly mode, units.
 
     A unit is a typical motion of an independent joint: 1 rad, or the longest length of the robot
     file if the joint is prismatic. Units are written only if `slides` is true.

@@ -260,7 +260,7 @@ def _request(regrouping: Regrouping, only: Callable[[str], bool] = lambda own: T
 
 
 def shape_of(model: Model, d: Derivation, parameters: tuple[str, ...]) -> tuple[int, ...]:
-    """Return the shape of the result of a model for one sample."""
+    """Return the shape of the result of a model, such as the regressor, for one sample."""
     shape = tuple(len(labels(d, axis, parameters)) for axis in model.axes)
     return shape[::-1] if model.by_columns else shape
 

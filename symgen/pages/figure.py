@@ -69,7 +69,7 @@ def joint_ranges(robot: Robot, closure: Closure, size: float) -> list[dict[str, 
 
 
 def passive_text(robot: Robot, closure: Closure) -> dict[int, str]:
-    """Say in words how the position of each passive joint is found, for instance from the loop."""
+    """Describe how each passive joint position is found: declared, or from the kinematic loop."""
     words = {True: "declared", False: "found from the loop"}
     return {
         j: "solved from the loop" if j in closure.tied else words[j in robot.constraints]

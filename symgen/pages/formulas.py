@@ -44,7 +44,7 @@ def printed(regrouping: Regrouping, form: str, only: str | None = None) -> str:
 
 
 def _page(regrouping: Regrouping, formulas: list[str]) -> list[str]:
-    """Arrange the text of `symgen show`: counts, formulas, and two lists of further parameters.
+    """Compose the text of `symgen show`: counts, formulas, parameters without regrouping or effect.
 
     The formulas are aligned as in eq. (27). The lists are base parameters without regrouping, and
     standard parameters without effect. Joint names and relations of passive joints are included if

@@ -140,7 +140,10 @@ def _frame_rows(robot: Robot) -> dict[str, Any]:
 
 
 def _relation(closure: Closure, j: int) -> MathML:
-    """Write the formula of a passive joint; only its name if Newton's method computes the joint."""
+    """Write the formula of a passive joint position, or its symbol if no formula exists.
+
+    Without a formula, Newton's method computes the position.
+    """
     shown = expressions.symbol(f"q{j}")
     if j not in closure.tied:
         shown = expressions.equation(shown, expressions.expression(closure.formula(j)))

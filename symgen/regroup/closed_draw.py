@@ -172,9 +172,9 @@ class ClosedDraw(Draw):
             return np.stack([whole, *self._points[u]])
 
         def tip(y: Array) -> tuple[Point, Array]:
-            """Compute (cos v, sin v) that closes the loop, and the determinant of the equations.
+            """Compute cos and sin of hinge v that close the loop, and the equations' determinant.
 
-            The point need not lie on the unit circle.
+            The point (cos, sin) need not lie on the unit circle.
             """
             r, *A = (R % p * y[: len(R), None, None] % p).sum(axis=0) % p
             c, s = self._solved(np.stack(A, axis=1), -r % p)

@@ -49,7 +49,10 @@ def float_relations(robot: Robot, names: Sequence[str]) -> tuple[tuple[str, ...]
 
 
 def numeric_coefficients(robot: Robot, name: str, support: Sequence[str]) -> list[Expression]:
-    """Express a regressor column by others by least squares: D_name = sum_k beta_k D_support,k."""
+    """Express regressor column `name` by the columns `support`, by least squares.
+
+    Return beta in D_name = sum_k beta_k D_support,k.
+    """
     W = float_regressor(robot, (*support, name))
     size = np.linalg.norm(W[:, :-1], axis=0)
     beta = np.linalg.lstsq(W[:, :-1] / size, W[:, -1], rcond=None)[0] / size

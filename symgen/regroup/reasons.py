@@ -58,7 +58,7 @@ class Absorption:
 
 @dataclass(frozen=True)
 class BaseDifference:
-    """Effect of an edit of a robot on its base parameters.
+    """Effect of changes in a robot file on the base parameters of the robot.
 
     Attributes
     ----------

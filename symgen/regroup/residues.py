@@ -73,6 +73,6 @@ def states_for(robot: Robot, names: Sequence[str], spare: int = 4) -> int:
 
 @lru_cache(maxsize=8)
 def _acting(robot: Robot) -> dict[str, Array]:
-    """Find, with random states, the joints on whose torques each standard parameter acts."""
+    """Find, with random states, the joints whose torques depend on each standard parameter."""
     W = sample(Draw(robot, 5, 2), robot.parameters).reshape(len(robot.joints), 2, -1)
     return dict(zip(robot.parameters, (W != 0).any(axis=1).T, strict=True))

@@ -140,7 +140,10 @@ def link_relations(f: Frame) -> dict[str, dict[tuple[str, int], Expression]]:
 
 
 def _steiner(p: Vector, u: Vector, symmetric: int) -> list[list[Expression]]:
-    """Compute the matrix (p.u) E - p u', or 2 (p.u) E - p u' - u p' if `symmetric`."""
+    """Compute the matrix (p.u) E - p u' of the parallel-axis rule, from vectors p and u.
+
+    If `symmetric`, it is 2 (p.u) E - p u' - u p'. E is the identity.
+    """
     trace = (p[0] * u[0] + p[1] * u[1] + p[2] * u[2]) * (1 + symmetric)
     return [
         [

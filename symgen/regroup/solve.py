@@ -163,7 +163,7 @@ class Pool:
         return total
 
     def vector(self, name: str, k: int, P: Products, Q: Products) -> dict[int, int] | None:
-        """Find, modulo p, a fraction beta = P/Q in which P and Q are sums of the given products.
+        """Find a coefficient beta = P/Q modulo p, in which P and Q are sums of the given products.
 
         Return {index in [*Q, *P]: residue} of the first relation with a denominator (a product of
         Q), or None. There can be several relations, since cos(a) and cos(3 a) are related.
@@ -204,7 +204,7 @@ class Dependence:
 
 
 class Recognition:
-    """Search for the exact expressions of coefficients that are known modulo primes.
+    """Search for exact expressions of regrouping coefficients, from their values modulo primes.
 
     `free` names what counts as a variable besides the constants, see `Pool`.
     """

@@ -145,7 +145,7 @@ class WorkFolder:
             self.take_robot(source, content_of(Path(source)))
 
     def edit_robot(self, text: str, *, draft: bool) -> None:
-        """Save an edited table: as a draft if it describes no robot, else as the robot file.
+        """Save an edited robot table: as the robot file if it is valid, else as a draft.
 
         Drafts do not enter the history.
         """
@@ -216,7 +216,7 @@ class WorkFolder:
         return values | {"record": [values["record"]]} if single else values
 
     def checked_study(self, given: Any) -> str:
-        """Check a study, given as text or as values, and return its text.
+        """Check the settings of a study, given as text or as values, and return them as text.
 
         InputError if it is no valid study, or if it names a file of another folder that study.yaml
         did not name before.
@@ -232,7 +232,7 @@ class WorkFolder:
         return text
 
     def results(self) -> list[Path]:
-        """List the folders of complete results, in the order of their names."""
+        """List the results folders of all complete runs, in the order of their names."""
         return sorted(path for path in (self.path / "runs").iterdir() if result_of(path))
 
     def run(self, name: str) -> Path:

@@ -31,7 +31,7 @@ WAITING, RUNNING, DONE, FAILED, CANCELLED = "waiting", "running", "done", "faile
 
 @dataclass
 class Job:
-    """One command in the queue.
+    """One `symgen` command in the queue of the studio.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Job:
 
     @property
     def open(self) -> bool:
-        """Whether the command waits or runs."""
+        """Whether the command is unfinished: it waits in the queue, or it runs."""
         return self.state in (WAITING, RUNNING)
 
     @property
@@ -85,7 +85,7 @@ class Job:
 
     @property
     def counted(self) -> list[str]:
-        """Number of finished steps and of all steps in the progress bar; empty without bar."""
+        """Numbers of finished steps and of all steps, from the progress bar; empty without bar."""
         return re.findall(r"\d+(?=/\d)|(?<=\d/)\d+", "".join(self.said[-1:]))[:2]
 
     @property

@@ -186,7 +186,7 @@ class Pages:
         return bool(json_of(self.folder.path / "check.json").get("of") == now)
 
     async def _view(self, request: Request) -> Response:
-        """Answer with computed data on robot, record or run, as a part of a page or as JSON."""
+        """Answer a request with data computed from the robot, record or run, as HTML or JSON."""
         name, asked = request.path_params["name"], dict(request.query_params)
         if name == "formulas" and self.folder.read(DRAFT):  # those of the last robot stay
             return PlainTextResponse("", headers={"hx-reswap": "none"})
@@ -293,7 +293,7 @@ class Pages:
         return "certificate"
 
     async def _study(self, form: dict[str, str]) -> str:
-        """Replace the study file by a text, or by values in JSON."""
+        """Replace the content of study.yaml by the text, or the values in JSON, of a web form."""
         if form.get("digest", "") != self.folder.study_digest:
             raise InputError("another page has changed the study; reload this page")
         text = form.get("text", "").replace("\r\n", "\n")

@@ -52,7 +52,7 @@ class Server:
         self.views: dict[Any, dict[str, Any]] = {}
 
     def changed(self) -> None:
-        """Notify every open page of a change."""
+        """Notify every open page that the work folder or the command queue has changed."""
         self.version += 1
         self.news.set()
         self.news = asyncio.Event()
@@ -97,6 +97,6 @@ class Server:
 
 
 def page(name: str, status: int = 200, **context: Any) -> Response:
-    """Render a template as an HTML answer; all names in it are escaped."""
+    """Render an HTML template as the answer to a request; inserted texts are escaped."""
     text = PAGE_TEMPLATES.get_template(f"{name}.html.jinja").render(step=name, **context)
     return HTMLResponse(text, status)

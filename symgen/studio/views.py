@@ -269,9 +269,9 @@ def findings(robot_file: str, study_file: str) -> dict[str, Any]:
 
 
 def check() -> None:
-    """Write the findings of ROBOT and STUDY to FILE: the command `check ROBOT STUDY FILE`.
+    """Check a robot and a study named on the command line, and write the findings to a file.
 
-    If there is an error, print one line and exit with code 2.
+    The arguments are ROBOT STUDY FILE. If there is an error, print one line and exit with code 2.
     """
     robot_file, study_file, target = sys.argv[1:4]
     value = findings(robot_file, study_file)

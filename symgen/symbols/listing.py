@@ -72,7 +72,7 @@ class Listing:
     def steps(
         self, domain: Domain, symbol: Callable[[str], Any]
     ) -> tuple[dict[str, Any], list[Any]]:
-        """Compute the equations as objects of another kind than text, such as SymPy expressions.
+        """Convert the equations to objects other than texts, such as SymPy expressions.
 
         Returns the value of each intermediate variable by name, and the list of the outputs. Each
         value is in terms of the symbols of the inputs and of earlier variables.

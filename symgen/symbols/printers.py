@@ -1,4 +1,4 @@
-"""Printers of SymPy expressions as text, LaTeX and MathML, with the symbols of the literature.
+"""Printers of SymPy expressions as text, and as LaTeX and MathML with subscripts and dots.
 
 Terms and factors are printed in the order in which they were made. A minus sign or a fraction is
 printed before its product, and decimals are printed as decimals. The name of a symbol is printed
@@ -116,7 +116,7 @@ def text(x: Tree) -> str:
 
 
 class Latex(Ordered, LatexPrinter):  # type: ignore[misc]
-    """Printer that writes an expression in LaTeX, with the subscripts of the literature."""
+    """Printer that writes an expression in LaTeX, with subscripts: ZZ1R is ZZ with subscript 1R."""
 
     times, visible = r"\,", r" \cdot "
 
@@ -161,7 +161,7 @@ class MathML(str):
 
 
 class Presentation(MathMLPresentationPrinter):  # type: ignore[misc]
-    """Printer that writes an expression in MathML, with the subscripts of the literature.
+    """Printer that writes an expression in MathML, with subscripts: ZZ1R is ZZ with subscript 1R.
 
     Every name is escaped, so no name can insert markup into a page.
     """

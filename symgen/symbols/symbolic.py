@@ -97,9 +97,7 @@ class SymbolicRobot:
                 f"{', '.join(name for name, m in SYMBOLIC.items() if m.of_frames)})"
             )
         if rows is not None and name != "determinant":
-            raise SymgenError(
-                f"only the model `determinant` has `rows`; leave them out for {name}"
-            )
+            raise SymgenError(f"only the model `determinant` has `rows`; leave them out for {name}")
         of = robot.frames[-1].j if of is None else of
         for j in (of, frame):
             if j != 0 and j not in {f.j for f in robot.frames}:
@@ -122,7 +120,7 @@ class SymbolicRobot:
     def equations(
         self, name: str, *, of: int | None = None, frame: int = 0
     ) -> tuple[list[tuple[Any, Any]], Any]:
-        """Return the recursive equations of a model, and its result in terms of their variables.
+        """Return the recursive equations of a model, and its result in the variables they define.
 
         As from `sympy.cse`, an equation is a pair (symbol, expression). The symbols have the names
         of SYMORO.

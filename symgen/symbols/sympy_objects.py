@@ -41,7 +41,7 @@ def of_model(model: SymbolicModel) -> Any:
 
 
 def of_listing(model: SymbolicModel) -> tuple[list[tuple[Any, Any]], Any]:
-    """Return the recursive equations of a model in SymPy, and the result in their variables.
+    """Return a model in SymPy: recursive equations, and the result in the variables they define.
 
     As from `sympy.cse`, an equation is a pair (symbol, expression).
     """

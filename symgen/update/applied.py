@@ -210,7 +210,7 @@ def _percent(c: Change) -> str:
 
 
 def _by_place(lines: Sequence[str]) -> str:
-    """Join the lines `link: number` into one text in which the numbers are grouped by link."""
+    """Group texts such as `link 2: mass` by link, and join the groups into one text."""
     places: dict[str, list[str]] = {}
     for line in lines:
         place, _, what = line.partition(": ")

@@ -114,7 +114,7 @@ class Numbers:
     masses: Array
 
     def head(self, count: int) -> Numbers:
-        """Return the same unknowns restricted to the first `count` numbers."""
+        """Return the optimisation problem restricted to its first `count` unknowns."""
         p = self.physical
         kept = tuple(c for c in p.conditions if max(c.numbers) < count)
         part = replace(p, standard=p.standard[:count], K=p.K[:, :count], conditions=kept)
@@ -123,14 +123,14 @@ class Numbers:
         return Numbers(part, links, *(x[:count] for x in of_numbers))
 
     def chi(self, u: Array) -> Array:
-        """Compute standard parameters, shape (p,), from the masses, centres, tensors ... in u."""
+        """Compute standard parameters, shape (p,), from the unknowns u (masses, centres ...)."""
         chi = u.copy()
         for link, at in self.links:
             chi[at] = link.place.ten(u[at])
         return chi
 
     def slope(self, u: Array) -> Array:
-        """Compute the derivatives (p, p) of the standard parameters chi with respect to u.
+        """Compute the derivatives (p, p) of the standard parameters with respect to the unknowns u.
 
         u are masses, centres, tensors and joint parameters. Central differences are exact, because
         chi is of second order in every number.
@@ -224,7 +224,7 @@ def _of_file(
     values: Mapping[str, float],
     absent: Collection[str],
 ) -> tuple[Numbers, dict[str, int], list[int]]:
-    """Collect the unknowns from the file; those that the optimisation changes first come first.
+    """Collect the unknowns from the file, in the order in which the optimisation changes them.
 
     Return the unknowns, the index of each element, and for each attempt how many numbers may
     change. The first attempt has the first link of each body, and the elements. The second adds

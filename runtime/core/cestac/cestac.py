@@ -190,7 +190,7 @@ def cestac(
 
 
 def _refuse(reference: Estimate) -> None:
-    """Raise InputError if the method finds no estimate from the record as measured.
+    """Raise InputError if the method finds no estimate from the record without rounding.
 
     Estimates from rounded records are compared with this estimate.
     """
@@ -202,7 +202,7 @@ def _refuse(reference: Estimate) -> None:
 
 
 def levels_of(settings: CestacSettings) -> tuple[Level, ...]:
-    """List the levels of a study; a level is one position step Delta with one torque step Phi.
+    """List the levels of a study: each level is a position step Delta with a torque step Phi.
 
     The order is: each Delta alone, each Phi alone, each Phi with the first Delta. If the encoder of
     a simulated loop is studied: a level without steps, then each Delta.
@@ -219,7 +219,7 @@ def levels_of(settings: CestacSettings) -> tuple[Level, ...]:
 
 
 def key_blocks(keys: Sequence[Key], runs: int, levels: int, common: bool) -> list[tuple[Key, ...]]:
-    """Group the runs of a study, given as (level, run) numbers, into tasks for worker processes.
+    """Group the runs of a study of encoder resolution into tasks for worker processes.
 
     A task holds successive runs of one level, or of all levels if these share their random numbers.
     It has at most LIMIT.TASK_RUNS runs, or one run of every level if there are more levels than
@@ -246,7 +246,7 @@ def _all_runs(
     progress: Progress | None,
     checkpoint: Checkpoint | None,
 ) -> Runs:
-    """Compute the runs that are not yet on disk; return all runs, sorted by level and run number.
+    """Compute the runs of a study that are not yet on disk; return all its runs, sorted.
 
     identity : function that returns the data that identify this study on disk.
     """
@@ -271,7 +271,7 @@ def _all_runs(
 
 
 def _measured(record: PreparedRecord) -> Iterator[memoryview]:
-    """Yield the bytes of the positions, torques and missing-sample flags of a record.
+    """Yield the bytes of the positions, torques and missing-sample flags of a record, for a hash.
 
     A hash of these bytes identifies the record.
     """
@@ -282,7 +282,7 @@ def _measured(record: PreparedRecord) -> Iterator[memoryview]:
 def _identity(
     task: Task, described: Mapping[str, Any], provenance: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return the data that determine every bit of every run, as JSON values that identify a study.
+    """Return all data on which the results of the runs depend, as JSON values, to identify a study.
 
     The number of runs is left out, so that a finished study can continue with more runs.
     """

@@ -89,7 +89,7 @@ class PreparedRecord:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """The data that all runs of a study of the encoder resolution share.
+    """Data that all runs of a study of the encoder resolution use: records, model, settings, steps.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class Task:
 
     @property
     def columns(self) -> Columns:
-        """New object that computes the columns of the observation matrix W for several runs."""
+        """Evaluator of the columns of the observation matrix W, shared by several runs."""
         return Columns(self.model, self.names)
 
 
@@ -220,7 +220,7 @@ def study_columns(
     columns: Sequence[str] | None,
     loop: Loop | None = None,
 ) -> tuple[str, ...]:
-    """Choose the parameters that every run fits: all base parameters, or the essential ones.
+    """Choose the parameters that each run estimates: all base parameters, or the essential ones.
 
     Names of settings.cestac.columns come first. The other essential columns are fitted too, because
     without them their torques would change the named parameters.
@@ -258,7 +258,7 @@ def _measured(problem: Problem, records: Sequence[Prepared]) -> Observation:
 
 
 def stream_keys(draw: tuple[int, ...], k: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Return the keys that seed two random streams of record k: for positions, and for torques.
+    """Return the keys of the two random streams of record k: for its positions and torques.
 
     They are (*draw, 2 k) and (*draw, 2 k + 1); the positions of record 0 have the key `draw`
     itself.
@@ -300,7 +300,7 @@ def perturbed_torque(
 
 
 def torque_rows(task: Task, record: PreparedRecord, level: Level, key: Sequence[int]) -> Array:
-    """Compute the torques Y of one record in one run, shape (n, K), before rows are selected.
+    """Compute the torques Y of one record in one run, shape (n, K), before rows are left out.
 
     The torques are as measured, or rounded in steps of Phi if the level has a torque step.
     """
@@ -334,7 +334,7 @@ def perturbed(columns: Columns, task: Task, level: Level, draw: tuple[int, ...])
 
 
 def measured_rows(task: Task, records: Sequence[Prepared]) -> Observation:
-    """Build the system Y = W X + rho of the measured records, as the identification uses it.
+    """Build the system Y = W X + rho of the records without rounding, as reference of the study.
 
     It is the system of a run without steps if a loop is simulated, or if a record that should be
     read as counts is read by the low-pass.
@@ -377,7 +377,7 @@ def run_states(task: Task, record: PreparedRecord, q: Array, level: Level) -> St
 
 
 def _moved(task: Task, record: PreparedRecord, q: Array) -> Record:
-    """Make a record with the positions q of one run, to compute its states from encoder counts."""
+    """Make a Record with the positions q of one run, from which encoder counts give its states."""
     origin = Origin(drives=task.drives)
     t = np.arange(len(q)) / record.rate
     return Record(t, q, record.tau, rate=record.rate, missing=record.missing, origin=origin)

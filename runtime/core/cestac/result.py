@@ -74,7 +74,7 @@ Verdict = Literal["unbiased", "doubtful", "biased"]
 
 @dataclass(frozen=True, eq=False)
 class LevelResult:
-    """The results at one level of a study, that is for one pair of position and torque steps.
+    """Results for one pair (level) of position and torque steps: means, errors and verdict.
 
     Arrays are in the order of the names.
 
@@ -190,7 +190,7 @@ class Cestac(Result, Part):
 
     @property
     def enough(self) -> Level | None:
-        """Coarsest encoder step up to which all steps leave the estimate practically unbiased.
+        """Coarsest encoder step such that this step and all finer ones leave the estimate unbiased.
 
         None if the finest step is not practically unbiased.
         """
@@ -200,7 +200,7 @@ class Cestac(Result, Part):
 
     @property
     def finer_for_values(self) -> str:
-        """Sentence on a parameter that needs a finer encoder step than the residual does, or ""."""
+        """Sentence on a parameter that needs a finer encoder step than the residual; "" if none."""
         apart = (
             level
             for level in self.levels
@@ -222,7 +222,7 @@ class Cestac(Result, Part):
 
     @property
     def message(self) -> str:
-        """Sentence with the verdict for every rounding step and the parameter that changes most."""
+        """Sentence with the verdict for each rounding step and the parameter that changes most."""
         if not self.levels:
             return "Nothing was perturbed."
         by_verdict: dict[str, list[str]] = {}
@@ -239,12 +239,12 @@ class Cestac(Result, Part):
 
     @property
     def estimator(self) -> str:
-        """Short name of the estimation method in tables: LS for least squares with any weights."""
+        """Short name of the estimation method in tables; LS for least squares, weighted or not."""
         return "LS" if self.reference.method in LINEAR else self.reference.method.upper()
 
     @property
     def lists_runs(self) -> bool:
-        """Whether the JSON text lists every run; a large study gives only the number of runs."""
+        """Whether cestac.json lists every run; for a large study it has only their number."""
         return bool(sum(len(level.runs) for level in self.levels) <= LIMIT.RUNS_LISTED)
 
     def brief(self) -> str:
@@ -269,7 +269,7 @@ class Cestac(Result, Part):
         return [self.mean_table(), self.error_table(), self.residual_table()]
 
     def figures(self) -> tuple[Figure, ...]:
-        """Return the figure of the error %e against the encoder step Delta.
+        """Return the figure of the parameter errors %e against the encoder step Delta.
 
         There is no figure without a level of the encoder alone.
         """
@@ -280,7 +280,7 @@ class Cestac(Result, Part):
         return {}
 
     def files(self) -> dict[str, str]:
-        """Return the texts of the files cestac.json and cestac.csv, by file name."""
+        """Return the contents of the files cestac.json and cestac.csv, by file name."""
         return {"cestac.json": self.to_json(), "cestac.csv": cestac_csv(self)}
 
     def arrays(self) -> dict[str, dict[str, Array]]:
@@ -358,7 +358,7 @@ class Cestac(Result, Part):
         )
 
     def summary(self) -> dict[str, Any]:
-        """Return the content of the JSON text as a mapping."""
+        """Return the content of cestac.json as a mapping."""
         return {
             "schema": SCHEMA,
             "names": self.names,
@@ -374,7 +374,7 @@ class Cestac(Result, Part):
         }
 
     def _level_summary(self, level: LevelResult) -> dict[str, Any]:
-        """Return the results at one rounding step for JSON, without the runs if there are many.
+        """Return the results for one rounding step, for cestac.json; many runs are left out.
 
         The number of runs is always given.
         """
@@ -488,12 +488,12 @@ def texts(words: Iterable[str]) -> Array:
 
 
 def names_judged(settings: CestacSettings) -> dict[str, tuple[str, ...]]:
-    """Return the parameters that the settings name for the verdict, as an entry of provenance."""
+    """Return the parameter names that study.cestac lists for the verdict, for the provenance."""
     return {} if isinstance(settings.columns, str) else {JUDGED: settings.columns}
 
 
 def deciding_names(reference: Estimate) -> tuple[str, ...]:
-    """Find the judged parameters that decide the verdict: %sigma (11) is at most LIMIT.DECIDING."""
+    """Find the parameters that decide the verdict: their %sigma (11) is at most LIMIT.DECIDING."""
     asked = reference.provenance.get(JUDGED, reference.names)
     return tuple(
         name
@@ -585,7 +585,7 @@ def runs_needed(spread: float) -> int:
 
 
 def _verdict(errors: Mapping[str, float]) -> tuple[Verdict, dict[str, float]]:
-    """Return the verdict, and the errors that decided it: a mapping by name, largest first.
+    """Return the verdict at one rounding step, and the errors that decided it, largest first.
 
     If all errors are negligible, only the largest is returned.
     """
@@ -598,7 +598,7 @@ def _verdict(errors: Mapping[str, float]) -> tuple[Verdict, dict[str, float]]:
 
 
 def _verdict_of_error(error: float) -> Verdict:
-    """Return the verdict of one error, in %: unbiased, doubtful or biased."""
+    """Return the verdict for an error, in %, of a parameter or of the residual norm."""
     return (
         "unbiased" if error < LIMIT.NEGLIGIBLE else "biased" if error > LIMIT.BIASED else "doubtful"
     )
@@ -642,5 +642,5 @@ def _message(
 
 
 def _relative_change(norm: float, of: float) -> float:
-    """Compute the relative change of a residual norm against the norm `of`, %, eq. (22)."""
+    """Compute the change of a residual norm relative to the residual norm `of`, %, eq. (22)."""
     return 100 * abs(1 - norm / of) if of > 0 else float("inf" if norm > 0 else 0.0)

@@ -1,4 +1,4 @@
-"""Random rounding of a measurement as a coarser sensor would make it, eqs. (15) and (28).
+"""Random rounding of a measurement as by a coarser sensor, eqs. (15) and (28) of the chapter.
 
     two-point   x + Delta or x - Delta, probability 1/2 each           variance Delta^2
             eq. (15)
@@ -94,7 +94,7 @@ def counted(x: Array, step: float, phase: float, uneven: float, rng: np.random.G
 
 
 def noise(shape: tuple[int, ...], mode: Mode, rng: np.random.Generator) -> Array:
-    """Draw random numbers xi, shape (N, n); Delta xi is then added to the measurement."""
+    """Draw random numbers xi, shape (N, n); a rounding law adds Delta xi to the measurement."""
     if mode == "two-point":
         return signs(shape, rng)
     return rng.standard_normal(shape) if mode == "gaussian" else rng.uniform(-1.0, 1.0, shape)
@@ -115,7 +115,7 @@ def bits(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
 
 
 def packed_bits(size: int, rng: np.random.Generator) -> Array:
-    """Draw at least `size` random bits, eight in each byte of the returned array.
+    """Draw at least `size` random bits, packed eight to a byte.
 
     High bits are first; there is one byte more than needed.
     """

@@ -25,7 +25,7 @@ USABLE = ("ok", "weak-instruments")  # Status of an estimate that counts as a ru
 
 
 def run_block(task: Task, keys: Sequence[tuple[int, int]]) -> Runs:
-    """Compute several runs one after the other, each given by its level number and run number."""
+    """Compute several runs of a study one after the other, given as (level, run) numbers."""
     columns = task.columns
     return Runs.of([one_run(columns, task, key) for key in keys], len(task.names))
 
@@ -49,7 +49,7 @@ def one_run(columns: Columns, task: Task, key: tuple[int, int]) -> Run:
 
 
 def _estimated(task: Task, observation: Observation) -> Array:
-    """Estimate X, shape (b,), by the method of the task; nan if the method finds no estimate."""
+    """Estimate X, shape (b,), from the system of one run; nan if the method finds no estimate."""
     if task.estimate.method in LINEAR:
         return linear_system(observation, task.estimate).solve().X
     try:

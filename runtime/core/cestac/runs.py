@@ -34,7 +34,7 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Runs(Sequence[Run]):
-    """R runs of a study, stored as arrays for files and for transfer between processes.
+    """Runs of a study, R in number, as arrays for files and for transfer between processes.
 
     Attributes
     ----------
@@ -60,7 +60,9 @@ class Runs(Sequence[Run]):
 
     @classmethod
     def joined(cls, parts: Sequence[Runs], b: int) -> Runs:
-        """Join several groups of runs, sorted by level and number; a repeated run is kept once."""
+        """Join several groups of runs, sorted by rounding step and run number, without repeated
+        runs.
+        """
         parts = [cls.of((), b), *parts]
         fields = [
             np.concatenate([getattr(part, name) for part in parts])
@@ -75,7 +77,7 @@ class Runs(Sequence[Run]):
 
     @property
     def keys(self) -> set[tuple[int, int]]:
-        """Pairs (level number, run number) of all runs."""
+        """Pairs (number of the rounding step, number of the run) of all runs."""
         return set(zip(self.level.tolist(), self.run.tolist(), strict=True))
 
     def __len__(self) -> int:
@@ -92,7 +94,7 @@ class Runs(Sequence[Run]):
 
 @dataclass(frozen=True)
 class Level:
-    """One level of a study: the steps by which positions and torques are rounded; 0: not rounded.
+    """One pair of rounding steps (level) of a study: for positions and for torques; 0: not rounded.
 
     Attributes
     ----------
@@ -107,7 +109,7 @@ class Level:
 
     @property
     def label(self) -> str:
-        """Name of the level in tables: `2*pi/10000` for a position, `Phi 0.01` for a torque."""
+        """Text for a pair of rounding steps: `2*pi/10000` (position), `Phi 0.01` (torque)."""
         parts = []
         if self.delta:
             counts = 2 * np.pi / self.delta

@@ -24,7 +24,7 @@ Array = np.ndarray
 
 
 class RecordEncoder(Protocol):
-    """Encoder that measured one record.
+    """Encoder that measured one record: its step, and positions that agree with its counts.
 
     step : ndarray, shape (n,), rad or m.   read : whether the counts of the record have been read.
     """
@@ -36,14 +36,14 @@ class RecordEncoder(Protocol):
     def read(self) -> bool: ...
 
     def positions(self, q: Array, delta: float, rng: np.random.Generator) -> Array:
-        """Return the joint positions, shape (N, n), that are then rounded to steps of `delta`.
+        """Return the joint positions, shape (N, n), before they are rounded to steps of `delta`.
 
         They are the measured q, or a random motion that agrees with the recorded counts.
         """
 
 
 class LoopRecord(Protocol):
-    """One record of a simulated closed loop: its prepared data, its selected rows and its torque.
+    """One record of a simulated control loop: prepared data, selected rows and torques.
 
     torque : ndarray, shape (n, K), before the selection of rows.
     """
@@ -59,7 +59,7 @@ class LoopRecord(Protocol):
 
 
 class Loop(Protocol):
-    """Closed loop of robot and controller that a study simulates again in each run.
+    """Control loop of robot and controller that a study of encoders simulates again in each run.
 
     estimate : settings of the estimate without those of the loop.
     described : description for JSON.   notes : sentences for the user.
@@ -78,23 +78,23 @@ class Loop(Protocol):
     def notes(self) -> tuple[str, ...]: ...
 
     def measured(self) -> Observation:
-        """Build the system Y = W X + rho of the measured records."""
+        """Build the system Y = W X + rho of the measured records of the control loop."""
 
     def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
-        """Attach this loop to `observation`, with rounded positions in the records of the loop."""
+        """Add this control loop to `observation`, with the rounded positions in its records."""
 
     def rows(self, level: Level, draw: tuple[int, ...]) -> Observation:
-        """Simulate a record with encoder steps level.delta, and build its system Y = W X + rho."""
+        """Simulate the loop with encoder steps level.delta, and build its system Y = W X + rho."""
 
 
 class Checkpoint(Protocol):
     """Store on disk for the runs of a study, so that an interrupted study can continue."""
 
     def resume(self, identity: Mapping[str, Any], b: int) -> Runs:
-        """Return the stored runs, b parameters each, of an earlier study with the same identity."""
+        """Return the runs that an earlier study with the same identity stored on disk."""
 
     def add(self, runs: Runs) -> None:
-        """Add new runs to the store."""
+        """Add new runs of a study to the store on disk."""
 
     def flush(self) -> None:
         """Write all added runs to disk."""

@@ -1,4 +1,4 @@
-"""Uncertainty of X for correlated residuals, by leaving out or redrawing blocks of time.
+"""Uncertainty of the parameters X for correlated residuals: jackknife and block bootstrap.
 
 Filtered residuals are correlated over time, and the joints of one instant with each other; eq. (10)
 accounts for neither. Time is cut into K blocks, longer than the memory of the residuals, and only
@@ -72,7 +72,7 @@ def deletions(blocks: Iterable[Array], X: Array, T: Array, into: Array) -> Array
 
 
 def _without_its_own(G: Array, g: Array, into: Array, size: Array) -> Array:
-    """Compute the change of X without one block, in directions that other blocks determine.
+    """Compute how X changes without one block, in combinations that other blocks determine.
 
     It is into (1 - G)^-1 g on these directions, and nan for a parameter that depends on another
     direction.

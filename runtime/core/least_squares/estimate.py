@@ -47,7 +47,7 @@ Status = Literal[
 
 @dataclass(frozen=True)
 class JointFit:
-    """Quality of the fit of one joint: residual norm, relative error and scale of its rows.
+    """Quality of the fit of one joint: residual norm, relative error and weight of its rows.
 
     Attributes
     ----------
@@ -172,7 +172,7 @@ class Estimate:
 
     @property
     def relative_sigma(self) -> Vector:
-        """%sigma of eq. (11), shape (b,), in %; inf for a parameter estimated as exactly zero."""
+        """Relative standard deviation 100 sigma / |X| of each parameter, %; inf if X is zero."""
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             return np.asarray(100 * self.sigma / np.abs(self.X))
 

@@ -1,9 +1,9 @@
-"""Estimates from the QR factor of Y = W X + rho: eqs. (7)-(11), rank, and residuals by joint.
+"""Linear least-squares estimates from the QR factor of Y = W X + rho: X, rank and statistics.
 
-All numbers are computed from triangular factors. A System is the rows as a method weighs them.
-Ordinary least squares leaves them as they are; weighted least squares divides the rows of joint j
-by s_j. Removing columns from a System costs little, on which `runtime.core.essential` relies;
-weights do not change when columns are removed.
+All numbers, eqs. (7)-(11) of the chapter, are computed from triangular factors. A System is the
+rows as a method weighs them. Ordinary least squares leaves them as they are; weighted least squares
+divides the rows of joint j by s_j. Removing columns from a System costs little, on which
+`runtime.core.essential` relies; weights do not change when columns are removed.
 """
 
 from __future__ import annotations
@@ -91,11 +91,11 @@ class System:
         return self.raw.names
 
     def select(self, names: Sequence[str]) -> System:
-        """Return the system with the columns `names` only."""
+        """Return the system reduced to the parameters `names`, each a column of W."""
         return self._changed(lambda factor: factor.select(names))
 
     def drop(self, name: str) -> System:
-        """Return the system without one column, computed from its triangular factor."""
+        """Return the system without the column of parameter `name`, from its triangular factor."""
         return self._changed(lambda factor: factor.drop(name))
 
     def _changed(self, change: Callable[[Factor], Factor]) -> System:
@@ -116,7 +116,7 @@ class System:
 
     @property
     def block(self) -> float:
-        """Length of the blocks of time from which standard deviations are corrected, s."""
+        """Length, s, of the time blocks from which corrected standard deviations are computed."""
         return self.options.block or self.observation.residual_block
 
     def block_rows(self) -> Iterator[Array]:
@@ -129,7 +129,7 @@ class System:
 def ordinary(
     observation: Observation, settings: EstimateSettings, options: LinearOptions
 ) -> System:
-    """Make the system of ordinary least squares, eq. (7), with rows in N m and without weights.
+    """Make the system of ordinary least squares: all rows Y = W X + rho with equal weight.
 
     X = argmin ||Y - W X||,    C = sigma_rho^2 (W'W)^-1,    sigma_rho^2 = ||Y - W X||^2 / (r - b)
 
@@ -294,6 +294,6 @@ def _undetermined(system: System, fit: Solution) -> list[int]:
 
 
 def percent(error: Array | float, of: Array | float) -> float:
-    """Compute 100 ||error|| / ||of||, %; nan if `of` is zero."""
+    """Compute the relative error 100 ||error|| / ||of||, %; nan if the reference `of` is zero."""
     norm = float(np.linalg.norm(of))
     return 100 * float(np.linalg.norm(error)) / norm if norm > 0 else float("nan")

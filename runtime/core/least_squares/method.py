@@ -29,7 +29,7 @@ WEIGHTINGS = ("none", "joint", "iterated", "covariance")
 
 @dataclass(frozen=True, eq=False)
 class Beginning:
-    """Input of an estimation method: rows, settings, and a least-squares solution as start.
+    """Input of an estimation method: rows, settings, and a least-squares solution to start from.
 
     Attributes
     ----------
@@ -155,10 +155,10 @@ def linear_system(observation: Observation, settings: EstimateSettings) -> Syste
 
 
 def linear_companion(settings: EstimateSettings) -> EstimateSettings:
-    """Return the settings of least squares with the same weights; linear methods stay as they are.
+    """Replace a nonlinear method in the settings by linear least squares with the same weights.
 
-    The columns stay the same too. Essential parameters and weak directions of a method that is not
-    linear are those of its companion.
+    A linear method stays as it is. Weights and columns stay the same. Essential parameters and weak
+    directions of a method that is not linear are those of its companion.
     """
     if settings.method in LINEAR:
         return settings
@@ -174,7 +174,7 @@ def linear_estimate(
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Estimate:
-    """Estimate X of Y = W X + rho by one linear system; SettingsError for another method.
+    """Estimate X of Y = W X + rho by linear least squares; SettingsError unless ols or wls.
 
     Parameters
     ----------

@@ -52,12 +52,12 @@ class Solution:
     groups: tuple[tuple[str, ...], ...]
 
     def variances(self) -> Array:
-        """Return the diagonal of (W'W)^-1, shape (b,)."""
+        """Return the diagonal of (W'W)^-1, shape (b,); variances of X are proportional to it."""
         return np.asarray(np.einsum("ij,ij->i", self.T, self.T))
 
 
 def unit_columns(R11: Array) -> tuple[Array, Array]:
-    """Scale the columns of R_11 to norm 1; return the scaled matrix and the norms.
+    """Scale the columns of the QR factor R_11 of W to norm 1; return the result and the norms.
 
     A zero column stays zero, with norm 1.
     """
@@ -67,7 +67,7 @@ def unit_columns(R11: Array) -> tuple[Array, Array]:
 
 
 def rank_tolerance(factor: Factor) -> float:
-    """Compute the smallest ratio s_i/s_1 of singular values that counts as rank, by default.
+    """Compute the default tolerance for the rank: the smallest ratio s_i/s_1 of singular values.
 
     It is the number of rows times the unit round-off.
     """
@@ -75,7 +75,7 @@ def rank_tolerance(factor: Factor) -> float:
 
 
 def solve(factor: Factor, tolerance: float | None = None) -> Solution:
-    """Solve the least squares of eq. (7) from the factor R, even if W is rank-deficient.
+    """Compute the least-squares solution X from the QR factor of [W Y], for any rank of W.
 
     tolerance : smallest s_i / s_1 (unit columns) that counts as rank; default
     `rank_tolerance(factor)`.
@@ -112,7 +112,7 @@ def null_groups(V2t: Array, names: Sequence[str]) -> tuple[tuple[str, ...], ...]
 
 
 def joint_scatter(factor: Factor, tolerance: float | None = None) -> Array:
-    """Compute the standard deviation s_j of the residuals of each joint, shape (n,).
+    """Compute the residual standard deviation s_j of each joint, fitted alone, shape (n,).
 
         s_j^2 = ||Y_j - W_j X_j||^2 / (N_j - b_j)
 

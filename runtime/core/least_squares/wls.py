@@ -60,7 +60,7 @@ def by_weights(
 
 
 def common_scales(raw: Factor, X: np.ndarray, rank: int) -> np.ndarray:
-    """Compute the standard deviation s_j of the residuals of each joint for a common X, shape (n,).
+    """Compute the residual standard deviation s_j of each joint, from one common X, shape (n,).
 
     Each joint loses its share b N_j/r of the degrees of freedom.
     """

@@ -30,7 +30,7 @@ Array = np.ndarray
 
 
 def triangularise(A: Array) -> Array:
-    """Compute the upper triangular R, shape (n, n), with R'R = A'A, from a matrix A, shape (m, n).
+    """Compute the upper triangular factor R of A = Q R, so that R'R = A'A; A has the shape (m, n).
 
     m < n is allowed.
     """
@@ -43,7 +43,7 @@ def triangularise(A: Array) -> Array:
 
 @dataclass(frozen=True)
 class JointFactor:
-    """Triangular factor R_j of the rows [W_j Y_j] of one joint, for the columns that act on it.
+    """Triangular factor R_j of the rows [W_j Y_j] of one joint; zero columns of W_j are left out.
 
     R'R is the Gram matrix of [W_j[:, columns] Y_j].
 
@@ -64,7 +64,7 @@ class JointFactor:
         return block
 
     def residual_norm(self, X: Array) -> float:
-        """Compute the residual norm ||Y_j - W_j X|| of this joint for X, shape (b,)."""
+        """Compute the norm ||Y_j - W_j X|| of the residuals of this joint for parameters X."""
         return float(np.linalg.norm(self.R[:, :-1] @ X[self.columns] - self.R[:, -1]))
 
     @property
@@ -88,7 +88,7 @@ class Factor:
 
     @classmethod
     def of(cls, names: Sequence[str], joints: Sequence[JointFactor]) -> Factor:
-        """Combine the factors of all joints into the triangular factor of all rows [W Y]."""
+        """Combine the triangular factors of all joints into the triangular factor of [W Y]."""
         b = len(names)
         R = (
             triangularise(np.vstack([joint.spread(b) for joint in joints]))
@@ -118,7 +118,7 @@ class Factor:
         return float(abs(self.R[-1, -1]))
 
     def weighted(self, weights: Sequence[float] | Array) -> Factor:
-        """Return the triangular factor of [W Y] with the rows of joint j times weights[j]."""
+        """Return the triangular factor of [W Y] with the rows of joint j scaled by weights[j]."""
         return Factor.of(
             self.names,
             [replace(joint, R=joint.R * w) for joint, w in zip(self.joints, weights, strict=True)],
@@ -155,7 +155,7 @@ class Factor:
 
 
 def selected(joint: JointFactor, kept: Sequence[int]) -> JointFactor:
-    """Reduce the triangular factor of one joint to the columns that are kept.
+    """Reduce the triangular factor R_j of one joint to the columns that are kept.
 
     kept : numbers of columns of the Factor, in their new order.
     """
@@ -191,7 +191,7 @@ def factor(W: Array, Y: Array, rows: Sequence[int], names: Sequence[str]) -> Fac
 def joint_factors(
     W: Array, Y: Array, rows: Sequence[int], parts: Array
 ) -> list[tuple[JointFactor, ...]]:
-    """Compute the triangular factor of every joint, separately for each block of rows.
+    """Compute the triangular factor of [W_j Y_j] of every joint, separately for each block of rows.
 
     A block is, for instance, an interval of time.
 

@@ -36,7 +36,7 @@ filter, at the rate of eq. (13).
 
 @dataclass(frozen=True, eq=False)
 class LoopRows:
-    """The closed loop that produced the records, and which of its rows a system Y = W X + rho uses.
+    """Control loop whose simulation gives the rows of a system Y = W X + rho, and their numbers.
 
     loop : `runtime.loop.closed_loop`. rows : shape (r,).
     """
@@ -122,11 +122,11 @@ class Observation:
 
     @property
     def span(self) -> tuple[float, float]:
-        """Time of the first and of the last row, s."""
+        """Times of the first and of the last row, s."""
         return float(self.t.min()), float(self.t.max())
 
     def joint(self, j: int) -> slice:
-        """Return the slice of the rows of joint j, counted from 0."""
+        """Return the slice of the rows of W and Y that belong to joint j, counted from 0."""
         start = sum(self.rows[:j])
         return slice(start, start + self.rows[j])
 
@@ -156,7 +156,7 @@ class Observation:
         return replace(self, W=np.asfortranarray(self.W[:, kept]), names=tuple(names))
 
     def equal_parts(self, count: int) -> Array:
-        """Divide the time span into `count` equal parts and return the part number of each row.
+        """Divide the time span into `count` equal intervals; number the interval of each row.
 
         Shape (r,); numbers start from 0.
         """
@@ -242,7 +242,7 @@ class Observation:
     def block_rows(
         self, names: Sequence[str], weights: Array, length: float, whitener: Array | None = None
     ) -> Iterator[Array]:
-        """Yield the weighted rows [W Y] of every block of time, shape (rows, b + 1).
+        """Yield the weighted rows of [W Y], shape (rows, b + 1), block of time by block of time.
 
         For a long record, factors from `block_factors` replace the rows: their Gram matrix is the
         same.
@@ -279,7 +279,7 @@ class Observation:
 
 
 def split_rows(A: Array, blocks: Array) -> Iterator[Array]:
-    """Yield the rows of a matrix A, shape (r, c), that belong to each block of time.
+    """Yield, for one block of time after another, the rows of A, shape (r, c), in that block.
 
     blocks : number of the block of each row, shape (r,).
     """
@@ -287,7 +287,7 @@ def split_rows(A: Array, blocks: Array) -> Iterator[Array]:
 
 
 def rows_by_block(blocks: Array) -> list[Array]:
-    """List the row numbers that belong to each block of time.
+    """List the row numbers that belong to each block of time, one array per block.
 
     blocks : number of the block of each row, shape (r,).
     """
@@ -361,7 +361,7 @@ def same_settings(settings: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
 
 
 def all_files(hashes: Sequence[Mapping[str, str]]) -> dict[str, str]:
-    """Merge the SHA-256 hashes of the files of all records, by file name.
+    """Merge the mappings from file name to SHA-256 hash of all records into one mapping.
 
     If a later record has another file with the same name, the number of that record is added to the
     name.

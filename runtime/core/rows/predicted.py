@@ -24,7 +24,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """Scales of the rows and columns of the weighted observation matrix W_w.
+    """Weights of the rows (1/s_j) and of the columns (|X_i|) of the observation matrix W.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Weights:
     size: Array
 
     def matrix(self, observation: Observation) -> Array:
-        """Compute the weighted observation matrix W_w, shape (r, c)."""
+        """Compute the weighted observation matrix W_w = diag(1/s_j) W diag(|X_i|), shape (r, c)."""
         return np.asarray(
             observation.columns(self.names).W / self.s[observation.joints][:, None] * self.size
         )
@@ -84,7 +84,7 @@ class Weights:
 
 
 def kept_correlation(signals: Signals, rate: float) -> Array:
-    """Compute the correlation of decimated torque noise at distances of 0, 1, 2 ... rows.
+    """Compute the correlation of decimated torque noise between rows that are 0, 1, 2 ... apart.
 
     The noise is white before the decimation, at the sampling rate `rate`, Hz.
     """

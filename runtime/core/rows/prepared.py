@@ -37,7 +37,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A record with its filtered states, torques and rows; each is computed at first use.
+    """A record with its filtered states, torques Y and selected rows, each computed at first use.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Prepared:
 
     @property
     def drives(self) -> Drives | None:
-        """Drives of the robot, with the coupling that was used when the record was read.
+        """Drives (gear ratios, torque constants) of the robot, as used when the record was read.
 
         None: the drives of the model.
         """
@@ -88,7 +88,7 @@ class Prepared:
         return decimated_torque(self.record.torque, self.selection)
 
     def certain(self, model: GeneratedModel) -> Selection:
-        """Return the selected rows, without those of unknown state or unsure friction direction."""
+        """Return the selected rows without those of unknown state or unsure friction direction."""
         return certain(model, self.states, self.selection)
 
     def observation(
@@ -117,7 +117,7 @@ class Prepared:
         return other
 
     def take_states(self, other: Prepared) -> None:
-        """Reuse the filtered states of another Prepared if positions and filters are the same."""
+        """Copy the filtered states of another Prepared if positions and filters are the same."""
         same = self.record.q is other.record.q and self.record.missing is other.record.missing
         same &= self.record.channels.get("qd") is other.record.channels.get("qd")
         same &= self.reader is other.reader and self.study.signals == other.study.signals
@@ -125,12 +125,12 @@ class Prepared:
             vars(self)["states"] = replace(other.states, channels=self.channels)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the fields to send to another process, without computed results."""
+        """Return the fields that are sent to another process; computed results are left out."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
 
 def common_drives(model: GeneratedModel, records: Sequence[Prepared]) -> Drives | None:
-    """Return the drives of the records, or those of the model if there are no records.
+    """Return the drives that all records have, or the drives of the model if there is no record.
 
     InputError if the records were read with different couplings.
     """
@@ -221,7 +221,7 @@ def certain(
     states: States,
     selection: Selection,
 ) -> Selection:
-    """Remove rows of unknown state, or with uncertain direction of dry friction, from a selection.
+    """Remove rows of unknown state, or of uncertain friction direction, from a selection of rows.
 
     Missing positions make a state unknown ("missing"); a direction is uncertain ("direction") near
     zero speed. Without known errors of the velocities, the selection does not change.
@@ -240,7 +240,7 @@ def certain(
 def stacked(
     model: GeneratedModel, records: Sequence[Prepared], columns: Sequence[str] | None = None
 ) -> Observation:
-    """Build the system Y = W X + rho of several records as one.
+    """Build one system Y = W X + rho from the rows of several records.
 
     columns : names of the columns; default: all.
     """

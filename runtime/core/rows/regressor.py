@@ -29,7 +29,7 @@ PROBES = 64  # random states that tell signals apart
 
 @dataclass(frozen=True, eq=False)
 class Entries:
-    """Table of the nonzero entries of the regressor; entries equal up to sign are computed once.
+    """Table of the nonzero entries of the regressor, which marks entries that are equal up to sign.
 
     Model store[k[m], j[m]] = sign[m] * signal[which[m]]. Signal s first occurs at entry source[s].
 
@@ -75,7 +75,7 @@ class Columns:
 
     @cached_property
     def tape(self) -> Tape | None:
-        """Recorded operations for the regressor entries; None if the model must be called."""
+        """Recorded operations for the regressor entries; None if recording is not possible."""
         n = len(self.model.JOINTS)
         return recorded(self.model, [divmod(int(place), n) for place in self.entries.place])
 
@@ -100,7 +100,7 @@ class Columns:
         return store
 
     def signals(self, states: States, plan: Plan | None) -> Iterator[tuple[slice, Array]]:
-        """Yield the decimated distinct entries of W, one slice of instants after the other.
+        """Yield the decimated distinct entries of W for one slice of instants after the other.
 
         Their shape is (S, instants). Arrays are valid until the next ones are requested.
 
@@ -116,7 +116,7 @@ class Columns:
             yield slice(t0, t1), self._evaluated(states[t0:t1])
 
     def _evaluated(self, states: States) -> Array:
-        """Compute the distinct entries of the regressor, shape (S, B), at states of shape (B, n).
+        """Compute the distinct entries of the regressor, shape (S, B), at B given states.
 
         The array is valid until the next call.
         """

@@ -46,7 +46,7 @@ Chosen on simulated records (docs/theory/counts.md).
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """The samples of a record that are evaluated, and the decimated rows that are used.
+    """Time window of a record, and the decimated rows in it that are used.
 
     It is the same in every run of a study.
 
@@ -73,14 +73,14 @@ class Selection:
 
     @property
     def plan(self) -> Plan | None:
-        """Matrices (Plan) that decimate the time window; None if every sample is kept."""
+        """Matrices (a Plan) that decimate signals in the time window; None without decimation."""
         window, settings = self.samples, self.signals.decimate
         return decimation_plan(window.stop - window.start, self.factor, settings, int(self.kept[0]))
 
 
 @dataclass(frozen=True)
 class Instants:
-    """Window of a record, and the instants (samples) of the window that decimation keeps.
+    """Time window of a record, and the samples of the window that decimation keeps.
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ EXCERPT = 2**16
 
 
 def excerpt(record: Record, rows: Rows) -> slice:
-    """Return the slice of the first samples in the time window, from which settings are chosen.
+    """Return the slice of the first samples in the time window, which determine "auto" settings.
 
     It has EXCERPT samples at most.
     """
@@ -165,7 +165,7 @@ def instants_of(t: Array, rate: float, signals: Signals, rows: Rows, file: str) 
 def select_rows(
     record: Record, qd: Array, signals: Signals, rows: Rows, *, keep: Array | None = None
 ) -> Selection:
-    """Select the rows of a record by time window, decimation, distance from the ends, and speed.
+    """Select the rows of a record by time window, decimation, distance from its ends, and speed.
 
     The mask `keep` of samples (and joints), if given, excludes further rows.
 

@@ -30,7 +30,7 @@ SHAPES = {
 
 @dataclass(frozen=True, eq=False)
 class Switch:
-    """One friction column of W that switches with the sign of a speed s = G qd.
+    """One column of W, dry or one-sided viscous friction, that switches with the sign of a speed.
 
     It acts on joint j as G_j f(s), f(s) = linear s + jump sign(s) + kink |s| + constant.
 
@@ -45,7 +45,7 @@ class Switch:
 
     @property
     def joints(self) -> tuple[int, ...]:
-        """Numbers, from 0, of the joints on which the column acts."""
+        """Numbers, from 0, of the joints on which this friction column acts."""
         return tuple(int(j) for j in np.flatnonzero(self.G))
 
 

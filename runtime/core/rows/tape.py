@@ -30,7 +30,7 @@ POWERS = {2: np.square, 0.5: np.sqrt, -1: np.reciprocal}
 
 
 class NotRecordedError(Exception):
-    """Error: an emitted module does more than arithmetic on signals, so it cannot be recorded."""
+    """Error: an emitted module does more than arithmetic, so its regressor cannot be recorded."""
 
 
 @dataclass(eq=False)
@@ -82,7 +82,9 @@ class Row:
 
 
 class Functions:
-    """Replacement for NumPy: functions of symbolic signals are recorded, of numbers computed."""
+    """Replacement for NumPy that records every function of symbolic signals instead of computing
+    it.
+    """
 
     def __getattr__(self, name: str) -> Any:
         function = getattr(np, name)
@@ -115,7 +117,7 @@ class Tape:
         self._rooms: dict[int, tuple[Array, list[Any], list[Any]]] = {}
 
     def evaluate(self, q: Array, qd: Array, qdd: Array, out: Array) -> Array:
-        """Compute selected entries of D, shape (S, B), at states of shape (B, n), into `out`."""
+        """Compute the entries of D, shape (S, B), at B given states into the array `out`."""
         B = len(q)
         if B not in self._rooms:
             self._rooms[B] = self._bound(B)
@@ -129,7 +131,7 @@ class Tape:
         return out
 
     def _bound(self, B: int) -> tuple[Array, list[Any], list[Any]]:
-        """Allocate arrays (rows) of B samples for the states and for the results of the operations.
+        """Allocate arrays of B samples for the states and for the results of all operations.
 
         Returns the rows of the states, the operations with their rows, and the rows of the entries.
         A row that no later operation uses is used again.
@@ -181,7 +183,7 @@ def _operations(values: Sequence[Any]) -> list[Row]:
 
 
 def recorded(model: GeneratedModel, places: Sequence[tuple[int, int]]) -> Tape | None:
-    """Record how an emitted module computes the entries (k, j) of its regressor D.
+    """Record the operations by which an emitted module computes given entries of its regressor D.
 
     Returns None if the module does anything else than operations on rows, or depends on measured
     functions of time.

@@ -1,4 +1,4 @@
-"""Automatic choice of the cut-off of the low-pass, setting `signals.lowpass.cutoff: auto`.
+"""Automatic choice of the low-pass cut-off frequency (`signals.lowpass.cutoff: auto`).
 
 Of every joint, with S the spectrum of the acceleration and N that of the noise of the positions as
 seen in it, G the gain of the low-pass on the acceleration,
@@ -39,7 +39,7 @@ def cutoff(
     signals: Signals,
     crossing: float | tuple[float, ...] = np.inf,
 ) -> tuple[float, str]:
-    """Choose the cut-off of the low-pass for records that are fitted together.
+    """Choose the cut-off frequency of the low-pass filter for records that are fitted together.
 
     Returns the cut-off, Hz, rounded to two digits, and the reason in words.
 
@@ -132,12 +132,12 @@ def spectra(q: Array, rate: float, median: int = 1) -> tuple[Array, Array, Array
 
 
 def white_noise(x: Array, rate: float, median: int = 1) -> Array:
-    """Estimate the variance of the white noise in each column of x, shape (n,)."""
+    """Estimate the variance of the white noise in each column of signals x, shape (N, n)."""
     return _spectrum(x, rate, median)[3]
 
 
 def _spectrum(x: Array, rate: float, median: int) -> tuple[Array, Array, Array, Array]:
-    """Compute the spectrum of the second differences of x, and the white noise in x.
+    """Compute power spectra of second differences of signals x, shape (N, n), and their noise.
 
     Returns four arrays: the frequencies, shape (m,), Hz; the power of the second differences, shape
     (m, n); their power for white noise of variance 1, shape (m, 1); the variance of the white noise

@@ -177,7 +177,7 @@ def decimate(u: Array, plan: Plan) -> Array:
 def decimated_parts(
     read: Callable[[int, int], Array], S: int, whole: Plan, most: int = PART
 ) -> Iterator[tuple[slice, Array]]:
-    """Yield the values of S decimated signals, one slice [a, b) of kept samples after the other.
+    """Yield S decimated signals in parts: each part is a slice [a, b) of samples, and its values.
 
     The values have shape (S, b - a), b - a being at most `most`.
 
@@ -196,7 +196,7 @@ def decimated_parts(
 
 
 def decimated_pieces(read: Callable[[int, int], Array], S: int, plan: Plan) -> Array:
-    """Decimate S signals, which are read once, piece by piece, to shape (S, K).
+    """Decimate S signals to shape (S, K); the samples are read only once, piece by piece.
 
     read(t0, t1) gives the samples [t0, t1) of every signal, shape (S, t1 - t0); the array may be
     reused.
@@ -231,12 +231,12 @@ def decimated_pieces(read: Callable[[int, int], Array], S: int, plan: Plan) -> A
 
 
 def _later(read: Callable[[int, int], Array], begin: int, t0: int, t1: int) -> Array:
-    """Read the samples [begin + t0, begin + t1) by the function `read`."""
+    """Read samples t0 to t1 - 1 of the signals, where t0 and t1 count from sample `begin`."""
     return read(begin + t0, begin + t1)
 
 
 def recursion(a: Array, x: Array, drive: Array) -> None:
-    """Compute the recursion x_(b+1) = a x_b + drive_b in place, from the given x_0.
+    """Compute the filter state x_(b+1) = a x_b + drive_b of each block in place, from x_0.
 
     x : shape (B + 1, S, 2 m). drive : shape (B, S, 2 m).
     """
@@ -257,19 +257,19 @@ def copy_overlap(u: Array, t0: int, window: Array, start: int) -> None:
 
 
 def _forward(op: Operator, length: int) -> tuple[Array, Array]:
-    """Return the forward filter over `length` samples as two matrices that give its output f.
+    """Return two matrices that give the forward filter's output f from its input and state.
 
-    One is applied to the samples, shape (length, length), the other to x at the first sample, shape
-    (length, 2 m).
+    One is applied to `length` samples, shape (length, length), the other to the state x at the
+    first sample, shape (length, 2 m).
     """
     return np.tril(toeplitz(op.impulse(length))), _output(op, op.lam[:, None] ** np.arange(length))
 
 
 def _backward(op: Operator, length: int, kept: int) -> tuple[Array, Array]:
-    """Return the backward filter as two matrices that are applied to f, the forward output.
+    """Return two matrices that give the backward filter's state and output from its input f.
 
-    One gives f_0 + lambda w_0, complex, shape (m, length), the other y at the first `kept`
-    instants, shape (kept, length).
+    f is the output of the forward filter. One matrix gives f_0 + lambda w_0, complex, shape
+    (m, length), the other y at the first `kept` instants, shape (kept, length).
     """
     h = op.impulse(length)
     later = np.arange(length) - op.factor * np.arange(kept)[:, None]
@@ -293,7 +293,7 @@ def _start(op: Operator, phase: int, pad: int) -> Array:
 
 
 def _end(op: Operator, left: int, kept: int, pad: int) -> tuple[Array, Array]:
-    """Return two matrices that decimate the end of a record, after the last whole block.
+    """Return two matrices that decimate the last samples of a record, after the last whole block.
 
     They give v before the last `kept` instants, and y at these instants. One matrix is applied to
     the last samples, shape (T, 2 m + kept), the other to x at the first of the `left` samples.
@@ -319,9 +319,10 @@ def _end(op: Operator, left: int, kept: int, pad: int) -> tuple[Array, Array]:
 
 
 def _output(op: Operator, factors: Array) -> Array:
-    """Return the matrix, shape (k, 2 m), that gives 2 Re c'(factors x) from the pairs Re, Im of x.
+    """Return the matrix, shape (k, 2 m), that computes filter outputs from the filter state x.
 
-    Factors complex, shape (m, k).
+    The outputs are 2 Re c'(factors x). The state x is given as pairs Re, Im; `factors` is complex,
+    shape (m, k).
     """
     C = 2 * op.c[:, None] * factors
     return np.asarray(np.stack([C.real, -C.imag], axis=1).reshape(-1, C.shape[1]).T)
@@ -333,7 +334,7 @@ def _pairs(C: Array) -> Array:
 
 
 def _transposed(*rows: Array) -> Array:
-    """Stack matrices and transpose the result, to multiply signals from the right.
+    """Stack matrices and transpose the stack, for products with signals that are rows.
 
     The result is contiguous in memory.
     """

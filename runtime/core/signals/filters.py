@@ -28,10 +28,11 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class SpeedErrors:
-    """Standard deviations of the velocities; errors of different encoders are independent.
+    """Standard deviations of encoder velocities, and their conversion to joint velocities.
 
     deviation : ndarray, shape (N, encoders), standard deviation of each encoder velocity, per s;
-        infinite if counts are missing and the state is unknown.
+        infinite if counts are missing and the state is unknown. Errors of different encoders are
+        independent.
     root : ndarray, shape (n, encoders), joint velocity per encoder velocity.
     """
 
@@ -42,7 +43,7 @@ class SpeedErrors:
         return SpeedErrors(self.deviation[samples], self.root)
 
     def along(self, G: Array) -> Array:
-        """Compute the standard deviation of the velocity s = G qd, shape (N,); G has shape (n,)."""
+        """Compute the standard deviation of a combination G qd of joint velocities, shape (N,)."""
         finite = np.where(self.known[:, None], self.deviation, 0.0)
         return np.where(self.known, np.sqrt(finite**2 @ (G @ self.root) ** 2), np.inf)
 
@@ -102,9 +103,10 @@ def filtered_states(q: Array, rate: float, signals: Signals, v: Array | None = N
 
 
 def blended(qd: Array, v: Array, rate: float, crossing: float | tuple[float, ...]) -> Array:
-    """Combine differentiated positions qd with recorded velocities v: v + L (qd - v), shape (N, n).
+    """Combine differentiated positions qd at low with recorded velocities v at high frequencies.
 
-    L is the zero-phase first-order low-pass at `crossing`, Hz (`runtime.speeds`).
+    The result v + L (qd - v), shape (N, n), uses the zero-phase first-order low-pass L at
+    `crossing`, Hz (`runtime.speeds`).
     """
     mixed = qd.copy()
     for j, f in enumerate(np.broadcast_to(crossing, qd.shape[1:]).tolist()):
@@ -186,9 +188,10 @@ CLOCK = 1e-6
 
 
 def decimation_factor(signals: Signals, rate: float) -> int:
-    """Compute the decimation factor n_d = 0.8 ws/(2 wf), eq. (13); 1 without decimation.
+    """Return the decimation factor: as set, or n_d = 0.8 ws/(2 wf), eq. (13) of the chapter.
 
-    It is rounded down to keep the band up to wf.
+    n_d is rounded down to keep the band up to the cut-off wf; ws is the sampling frequency. The
+    factor is 1 without decimation.
     """
     if signals.decimate is None:
         return 1

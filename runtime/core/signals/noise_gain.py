@@ -62,9 +62,9 @@ class Bandwidth:
 
 
 def bandwidth(signals: Signals, rate: float) -> Bandwidth:
-    """Compute the effect of the filters of `signals` on white position noise, at `rate`, Hz.
+    """Compute how the filters in the settings `signals` change white position noise.
 
-    SettingsError for a median filter, which is not linear.
+    rate : sampling rate, Hz. SettingsError for a median filter, which is not linear.
     """
     if signals.median != 1:
         raise SettingsError(

@@ -19,7 +19,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class SpeedAgreement:
-    """Recorded velocities compared with differences of the positions, by joint, shape (n,).
+    """Comparison of recorded velocities with differentiated positions, for each joint, shape (n,).
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class SpeedAgreement:
 
     @property
     def agrees(self) -> Array:
-        """Whether the recorded velocity of each joint is usable, bool, shape (n,)."""
+        """Whether the recorded velocity of each joint fits the positions, bool, shape (n,)."""
         return np.asarray(self.share <= LIMIT.SPEED_DISAGREES)
 
 
