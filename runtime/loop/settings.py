@@ -136,7 +136,7 @@ class Encoder(Settings):
 
 
 class Torque(Settings):
-    """Settings of the joint torques: limit, resolution, disturbance on the arm, noise of the record.
+    """Settings of the joint torques, N m or N: limit, resolution, disturbance, noise of the record.
 
     Attributes
     ----------

@@ -146,7 +146,7 @@ def test_equation_13():
     assert decimation_factor(Signals(), 100.5) == 1
     assert decimation_factor(Signals(decimate=Decimate(factor=7)), 5000.0) == 7
     assert decimation_factor(Signals(decimate=None), 5000.0) == 1
-    with pytest.raises(InputError, match="signals.lowpass is not set"):
+    with pytest.raises(InputError, match=r"signals\.lowpass is not set"):
         decimation_factor(Signals(lowpass=None), 5000.0)
 
 
