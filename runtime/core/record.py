@@ -307,7 +307,7 @@ def _marks(missing: Any, file: str) -> Array:
         return np.array(missing)
     except Exception as e:  # ragged
         raise InputError(
-            "missing has rows of different lengths; expected bool values in the shape of q",
+            "the array `missing` has rows of different lengths; expected bool values in the shape of q",
             file=file,
         ) from e
 

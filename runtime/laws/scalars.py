@@ -179,7 +179,7 @@ def fitted_scalars(problem: Problem) -> Problem:
     estimate = problem.settings.estimate
     if problem.method.observe is not None:
         raise InputError(
-            f"{estimate.method} cannot fit the constants of a law, because it simulates the loop with the constants of the robot file; fit these constants by ols, then fix their values in the robot file: fit: {{vs: 0.08}}"
+            f"{estimate.method} cannot fit the constants of a law, because it simulates the loop with the constants of the robot file; fit these constants by ols, then write the values found into the robot file, as in fit: {{vs: 0.08}}"
         )
     at("scalars of laws")
     columns = None if estimate.columns == "all" else tuple(estimate.columns)

@@ -208,7 +208,8 @@ def _require_shapes(
         width = signal.values.shape[1] + absent.get(key, 0)
         if width != n:
             raise InputError(
-                f"{width} {title} {', '.join(signal.names)}; expected {n}", file=first.file
+                f"{width} {title} ({', '.join(signal.names)}); expected {n}, one per joint",
+                file=first.file,
             )
     for signal in signals.values():
         if len(signal.values) != N:

@@ -30,14 +30,18 @@ def apply(
     robot: Annotated[
         str | None,
         typer.Option(
-            help="Robot file that was identified, if MODEL was converted to it. Give the same --exact, --lock and --chain as for that conversion."
+            help="If you converted MODEL and identified the converted robot file: that file. Give the same --exact, --lock and --chain as for the conversion."
         ),
     ] = None,
     exact: options.Exact = False,
     lock: options.Lock = None,
     chain: options.Chain = None,
     diff: Annotated[
-        bool, typer.Option("--diff", help="Print the lines that change instead of the table.")
+        bool,
+        typer.Option(
+            "--diff",
+            help="Print the changed lines of the file (a diff) instead of the table of values.",
+        ),
     ] = False,
     json: options.Json = False,
     force: options.Force = False,

@@ -27,7 +27,9 @@ def cestac(
             help="Resolution of the torques of the motors, N m or N, such as 0.02; repeat for several."
         ),
     ] = None,
-    runs: Annotated[int | None, typer.Option(help="Runs per step, at least 2.")] = None,
+    runs: Annotated[
+        int | None, typer.Option(help="Number of runs for each encoder or torque step, at least 2.")
+    ] = None,
     rounding: options.Rounding = None,
     uneven: options.Uneven = None,
     method: options.Method = None,
@@ -45,7 +47,7 @@ def cestac(
         bool,
         typer.Option(
             "--verbose",
-            help="Also print means, residuals, verdicts of each step, and what was assumed.",
+            help="Also print the means, residuals and verdicts for each encoder step, and the assumptions.",
         ),
     ] = False,
     json: options.Json = False,

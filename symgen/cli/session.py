@@ -269,8 +269,8 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
     for record in records[1:]:
         if Path(record).suffix.lower() in (".yaml", ".yml") or not is_measured(Path(record)):
             raise InputError(
-                "expected a measured file after the first RECORD, with the same columns, units and "
-                "side as the first",
+                "not a measured file; every RECORD after the first must be one, with the same columns, "
+                "units and side (joint or motor) as the first",
                 file=record,
             )
         like = study.record[-1]

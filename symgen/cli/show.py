@@ -69,7 +69,9 @@ def show(
     ] = "text",
     at_values: options.AtValues = False,
     exact: options.Exact = False,
-    only: Annotated[str | None, typer.Option(help="One base parameter, e.g. XX2R.")] = None,
+    only: Annotated[
+        str | None, typer.Option(help="Print only the formula of this base parameter, e.g. XX2R.")
+    ] = None,
     recursive: Annotated[
         bool,
         typer.Option(

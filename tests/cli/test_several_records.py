@@ -145,9 +145,9 @@ def test_cestac_takes_several(folder):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("one.yaml", "also.yaml"), "expected a measured file after the first record"),
+        (("one.yaml", "also.yaml"), "every record after the first must be one"),
         (("one.yaml", "nothing.csv"), "no such file"),
-        (("a.csv", "planar"), "expected a measured file after the first record"),
+        (("a.csv", "planar"), "every record after the first must be one"),
     ],
 )
 def test_refused(folder, arguments, said):
