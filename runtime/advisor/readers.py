@@ -101,7 +101,7 @@ def curves(
         return float(np.abs(mean_change(known[label][k])[0, decisive]).max(initial=0.0))
 
     def read(k: float, labels: Iterable[str], nodes: int = 0) -> list[str]:
-        """Compute the changes of X at encoder step number k, for several groups of encoders.
+        """Compute how much the estimate X changes if groups of encoders have the k-th step size.
 
         They are computed at the first phases of the encoder, or at `nodes` more phases. Return the
         labels of the choices for which this is possible.

@@ -177,7 +177,7 @@ def kernels(band: Bandwidth, N: int, factor: int) -> Kernels:
 
 
 def _summed_variance(coefficients: Array, near: Array, known: Kernels) -> float:
-    """Compute the variance of a column that switches sign, summed over all its instants.
+    """Compute the variance, summed over the samples, that wrong signs cause in a friction column.
 
     It is the sum of c_n(t) c_n(t') rho^n r over all orders n and instants t, t', by Parseval's
     theorem.

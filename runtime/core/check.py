@@ -115,7 +115,7 @@ def first_names(names: Sequence[str]) -> str:
 
 
 def state_of(value: float, good: float, usable: float) -> State:
-    """Judge a number that should be small: good up to `good`, doubtful up to `usable`, or "no"."""
+    """Judge a value that should be small: "good" up to `good`, "doubtful" up to `usable`, or "no"."""
     if value <= good:
         return "good"
     return "doubtful" if value <= usable else "no"

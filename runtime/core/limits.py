@@ -19,7 +19,7 @@ ENTRIES: dict[str, dict[str, Any]] = {
 
 
 class LimitValues:
-    """Values of all limits as attributes, for instance LIMIT.DECISIVE."""
+    """Numerical thresholds of all verdicts and checks, as attributes, for instance LIMIT.DECISIVE."""
 
     def __init__(self) -> None:
         self.__dict__.update({name: limit["value"] for name, limit in ENTRIES.items()})

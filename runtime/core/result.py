@@ -195,7 +195,7 @@ class Identification:
 
     @property
     def model_estimate(self) -> Estimate:
-        """Estimate of the parameters in the final model; `model_columns` names their set.
+        """Estimate of the parameters in the final model: essential, physical ("feasible") or all.
 
         It is `estimate` if the method is not linear.
         """

@@ -258,7 +258,7 @@ class Boxes:
         return boxes, boxes.posterior(read.errors, read.c, read.density, read.tau, nu)
 
     def _tilted(self, m: Array, v: Array, e2: Array) -> tuple[Array, Array, Array]:
-        """Update the normal distribution (site) that replaces the bounds of each sample.
+        """Compute anew, for each sample, the normal distribution (site) that approximates its bounds.
 
         The other samples give the position m and its variance v. Returns the logarithm of the mass
         of the tilted law, and the precision and precision times mean of the new site.

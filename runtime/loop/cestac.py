@@ -86,7 +86,7 @@ class Loop:
 
     @property
     def options(self) -> Mapping[str, Any]:
-        """Options of the closed loop that the study sets: `around` and `reference`.
+        """The options `around` and `reference` of the control loop, if the study sets them.
 
         around : s, rows near slow rows are left out. reference : how the reference is known.
         """
@@ -108,7 +108,7 @@ class Loop:
 
     @cached_property
     def closed(self) -> ClosedLoop:
-        """Closed loop of the measured records, or of a simulated record if `place` is loop.
+        """Control loop of the measured records; of a simulated record if the setting `place` is "loop".
 
         The simulated record is made with the encoder of the study.
         """

@@ -140,7 +140,7 @@ class Case:
 
     @cached_property
     def few(self) -> str:
-        """Remark that samples are too few to search for study errors; empty if they suffice.
+        """Remark that there are too few samples to search for errors of the study; empty if enough.
 
         Too few samples do not prevent the check of the robot file's values, because gravity needs
         no motion.

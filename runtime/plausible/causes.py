@@ -221,7 +221,7 @@ class Robot:
 
     @property
     def frames(self) -> list[int]:
-        """Numbers of the frames whose entries in the table of frames can be changed.
+        """Numbers of the frames whose geometry may be altered to test for an error in the robot file.
 
         Frames of constrained joints are not among them.
         """
@@ -657,7 +657,7 @@ def exchanged_ratios(robot: Robot, item: Item) -> Maps:
 
 
 def gravity(item: Item) -> Maps:
-    """Make the correction that sets the gravity vector in frame 0 to `g` of an item, m/s^2."""
+    """Make the correction that sets gravity in frame 0 to the vector item["g"], m/s^2."""
     return {"constants": dict(zip(GRAVITY, map(float, item["g"]), strict=True))}
 
 

@@ -153,9 +153,9 @@ def excited(observation: Observation, signals: Signals, rate: float) -> Answer |
 
 
 def unexcited_shares(observation: Observation, signals: Signals, rate: float) -> dict[str, float]:
-    """Predict the standard deviation of each parameter, % of the largest value the torques allow.
+    """Predict how uncertain each parameter is, in % of the largest value that it can have.
 
-    It is share_i of the module docstring, by parameter name. Raises LinAlgError if W is
+    A parameter has this value if it alone produces all measured torques. The result is share_i of the module docstring, by parameter name. Raises LinAlgError if W is
     rank-deficient, and InputError if a torque is zero throughout.
     """
     s = np.array(

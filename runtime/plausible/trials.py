@@ -242,9 +242,10 @@ class Baseline:
         return score
 
     def beyond(self, V: Array) -> float:
-        """Compute, for m sets of torques V, the largest relative part that no parameters explain.
+        """Compute the largest share of torques V that no parameter values can explain.
 
-        This part is outside the span of W.
+        For each of the m sets of torques, it is the norm of the part outside the span of W, over the
+        norm of the set.
 
         V : m sets of torques on the side of the files, shape (K, n, m).
         """
@@ -309,7 +310,7 @@ class Baseline:
         return np.asarray((moved - plain) / LIMIT.DIFFERENCE_STEP)
 
     def first_step(self, J: Array) -> tuple[Array, Array] | None:
-        """Estimate unknown numbers, such as the error of a joint's zero, to first order.
+        """Estimate small errors, such as that of a joint's zero, by one linearised step from the residuals.
 
         The parameters of the model are free.
 

@@ -339,7 +339,7 @@ def same_elements(table: Any, constants: Mapping[str, float], witness: Witness) 
 
 
 def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str, float]:
-    """Compile a C file, run its functions, and return the error of each function.
+    """Compile a C file, run its functions, and return the largest numerical error of each function.
 
     Functions of several samples and functions of one state are both run.
     """

@@ -327,10 +327,10 @@ class Draw:
     # --- laws ---
 
     def forward(self, node: Node, rate: Fp) -> Fp:
-        """Return random values b modulo p for the direction of a velocity: its sign is 2b - 1.
+        """Return random residues b that stand for "the velocity is positive": its sign is 2b - 1.
 
-        b is 1 for a forward motion and 0 for a backward motion. Proportional velocities share one
-        b.
+        In the robot b is 1 or 0; a formula that holds for random b holds for both. Proportional
+        velocities have the same b.
         """
         if not isinstance(node.value, Velocity):
             return self._opaque(SIGN, [rate])

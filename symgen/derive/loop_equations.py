@@ -145,7 +145,7 @@ class LoopSystem:
 
     @property
     def units(self) -> tuple[float, ...]:
-        """Unit of motion per independent joint: 1 rad; for a prismatic joint the longest length."""
+        """Scale of motion of each independent joint: 1 rad, or the longest link length if prismatic."""
         frames = map(self.robot.frame, self.closure.independent)
         return tuple(1.0 if f.sigma == REVOLUTE else self.robot.longest for f in frames)
 

@@ -297,7 +297,9 @@ def _offset(
 
 
 def _beside(robot: Robot, row: Mapping[int, Expression]) -> Expression:
-    """Return sum n_i c_i for a row {i: n_i}; frame i adds the constant c_i (theta or r) to q_i."""
+    """Return the constant part of the relation sum n_i (q_i + c_i), c_i the fixed theta or r of frame i.
+
+    row : the integers n_i by frame i."""
     frames = {i: robot.frame(i) for i in row}
     terms = ((f.theta0 if f.sigma == REVOLUTE else f.r0) * row[i] for i, f in frames.items())
     return sum(terms, ZERO)

@@ -266,7 +266,7 @@ def _require_independent(tree: Tree, name: str) -> None:
 
 
 def _hold(tree: Tree, positions: Mapping[str, float]) -> Tree:
-    """Fix the joints in `positions` at these values, and joints that follow only fixed joints."""
+    """Fix the joints in `positions` at these values, and each joint that mimics fixed joints only."""
     exact = {name: Expression.number(repr(x)) for name, x in positions.items()}
     relations = {
         name: e.substitute(exact) for name, e in tree.relations.items() if name not in positions

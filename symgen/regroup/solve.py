@@ -153,7 +153,7 @@ class Pool:
         self.values.clear()
 
     def value(self, m: tuple[Expression, ...]) -> Array:
-        """Compute a product of expressions at all random geometries, modulo p."""
+        """Compute a product of expressions modulo p, for each randomly drawn set of lengths and angles."""
         total = np.ones(self.count, dtype=np.int64)
         for e in m:
             if e not in self.values:

@@ -493,7 +493,7 @@ def names_judged(settings: CestacSettings) -> dict[str, tuple[str, ...]]:
 
 
 def deciding_names(reference: Estimate) -> tuple[str, ...]:
-    """Find the parameters that decide the verdict: their %sigma (11) is at most LIMIT.DECIDING."""
+    """Find the parameters that decide the verdict: %sigma, eq. (11), is at most LIMIT.DECIDING."""
     asked = reference.provenance.get(JUDGED, reference.names)
     return tuple(
         name

@@ -34,7 +34,7 @@ from runtime.core.study import EstimateSettings
 def weighted(
     observation: Observation, settings: EstimateSettings, options: LinearOptions
 ) -> System:
-    """Weight the rows as `settings.weights` specifies; "none" means "joint" here.
+    """Weight the rows as `settings.weights` says; WLS must weight, so "none" means one weight a joint.
 
     The name of the method, wls, promises weights. s_j is computed from joint j alone, or from the
     common least squares if joint j has too few rows. It is never zero.
