@@ -127,8 +127,12 @@ def limits_of(model: GeneratedModel, given: Mapping[str, Any]) -> MotionLimits:
             np.broadcast_to(np.asarray(known.get(name, np.inf), dtype=float), (n,))
         )
         if not np.all(largest[name] > 0):
+            motor = "; a joint with tau 0 has no motor and cannot be moved: lock it" * (
+                name == "tau"
+            )
             raise SettingsError(
-                f"{name}: {largest[name].tolist()}; expected more than 0", path=("limits", name)
+                f"{name}: {largest[name].tolist()}; expected more than 0{motor}",
+                path=("limits", name),
             )
     ranges = [
         (-float(x), float(x)) if np.ndim(x) == 0 else tuple(map(float, x)) for x in known["q"]
