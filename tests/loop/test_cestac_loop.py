@@ -96,7 +96,7 @@ def test_didim_does_not_see_recorded_positions_and_says_so(arm, study, record, s
     )
     i = found.names.index("ZZ1R")
     assert found.levels[0].e[i] < 0.1 < cestac(model, record, study).levels[0].e[i]
-    assert "reads of the recorded positions the first alone" in found.notes[0]
+    assert "uses only the first recorded position" in found.notes[0]
     assert found.estimator == "DIDIM" and "DIDIM" in found.mean_table().to_text()
 
 

@@ -76,7 +76,7 @@ def test_columns(tmp_path):
         ),
         (
             {"q": ["wrist.position"]},
-            "message 1 of /joint_states: no joint wrist; it has shoulder, elbow",
+            "message 1 of /joint_states: no joint wrist among the joints shoulder, elbow",
         ),
     ):
         with pytest.raises(InputError) as e:

@@ -239,7 +239,7 @@ LAUGHS = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
         ("x: " + "1" * 2_000_000, "at most 500000"),
         ("!!python/object/apply:os.system [true]", "tags"),
         ("rosbag2_bagfile_information: 1", "no mapping rosbag2_bagfile_information"),
-        ("rosbag2_bagfile_information: {relative_file_paths: 5}", "names no file"),
+        ("rosbag2_bagfile_information: {relative_file_paths: 5}", "lists no file"),
         (
             (
                 "rosbag2_bagfile_information: {relative_file_paths: [x], compression_mode: file, "
