@@ -210,7 +210,7 @@ def require(model: GeneratedModel, *functions: str) -> None:
         )
     if missing == ["casadi"]:
         raise ModelError(
-            "no casadi(): the loops of this robot are closed by iteration, which CasADi cannot express, or another version of symgen emitted the model; in this case generate the module again",
+            "no casadi(): the loops of this robot are closed by iteration, which CasADi cannot express, or another version of symgen generated the model; in this case generate the module again",
             file=model.NAME,
         )
     if missing:

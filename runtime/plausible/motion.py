@@ -166,7 +166,7 @@ def unexcited_shares(observation: Observation, signals: Signals, rate: float) ->
         ]
     )
     if not s.all():
-        raise InputError("all torques are zero; a record needs measured torques")
+        raise InputError("the torque of a joint is zero throughout; leave this joint out")
     columns = np.linalg.norm(observation.W / s[observation.joints][:, None], axis=0)
     if not columns.all():
         raise np.linalg.LinAlgError("a column is zero")

@@ -67,7 +67,7 @@ def column_names(
     by_wrench = given.wrench and not given.tau and "tau1" not in last.names
     if settings.by_law and settings.controller is None:
         raise InputError(
-            "record.columns has q_ref but no tau; set record.columns.tau, or record.controller: {kp: ..., kd: ...} to compute the torque from this law",
+            "record.columns has q_ref but no tau; set record.columns.tau, or controller: {kp: ..., kd: ...} to compute the torque from this law",
             file=last.file,
         )
     if not by_wrench and not settings.by_law:

@@ -146,7 +146,7 @@ def known_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str,
     return {**({"columns": columns} if columns else {}), **({"units": units} if units else {})}
 
 
-def speak_of_current(names: Sequence[str]) -> bool:
+def may_be_currents(names: Sequence[str]) -> bool:
     """Whether a column name has a word for current or effort, whose unit depends on the driver."""
     words = {*CURRENTS, "effort", "efforts"}
     meanings = map(_quantity, names)

@@ -150,7 +150,7 @@ def preview(path: str, request: Mapping[str, Any]) -> dict[str, Any]:
     """
     from runtime.core.clock import time_stamps
     from runtime.reading.formats import read_table
-    from runtime.reading.likely_columns import known_columns, speak_of_current
+    from runtime.reading.likely_columns import known_columns, may_be_currents
     from runtime.reading.units import time_unit
 
     topic, mark = request["topic"], request.get("decimal", "") or "."
@@ -176,7 +176,7 @@ def preview(path: str, request: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "names": names,
         "known": known | ({"decimal": mark} if mark != "." else {}),
-        "currents": speak_of_current(request.get("tau", "").split(",")),
+        "currents": may_be_currents(request.get("tau", "").split(",")),
         "rows": N,
         "stamps": "" if t is None else time_stamps(t).to_text(),
         "first": [[f"{x[k]:.6g}" for x in values] for k in range(min(N, FIRST_ROWS))],

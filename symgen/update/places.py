@@ -270,7 +270,7 @@ class Places:
         ignored = next(own, None)
         if self.from_geoms and ignored is not None:
             raise DescriptionError(
-                "inertiafromgeom is true so this <inertial> has no effect; remove one of the two",
+                "inertiafromgeom is true, so this <inertial> has no effect; remove one of the two",
                 line=ignored.line,
             )
         for e in self.from_geoms:

@@ -122,8 +122,7 @@ def cestac(
     if study.signals.reader == "counts" and settings.delta and settings.rounding != "phase":
         raise SettingsError(
             (
-                f"{settings.rounding} does not work with signals.reader: counts, because this rounding of "
-                "each sample independently destroys the changes of the count that the reader needs; use "
+                f"{settings.rounding} does not work with signals.reader: counts, because this rounding treats each sample independently, which destroys the changes of the count that the reader needs; use "
                 "rounding: phase"
             ),
             path=("cestac", "rounding"),
