@@ -277,9 +277,9 @@ class Demonstration:
         """Sentences on the fit, its prediction error, and the effect of each encoder step."""
         result, names = self.result, self.result.essential.names
         words = {
-            "unbiased": "leave them as they are",
-            "doubtful": "make them doubtful",
-            "biased": "bias them",
+            "unbiased": "do not bias the parameters",
+            "doubtful": "make the parameters doubtful",
+            "biased": "bias the parameters",
         }
         levels = {
             verdict: [
@@ -297,7 +297,7 @@ class Demonstration:
             f"{len(result.estimate.names)} parameters leave "
             f"{result.essential.estimate.relative_error:.1f} % of the torques of "
             f"{result.model.NAME} unexplained, {result.prediction_error:.1f} % on a half of the "
-            "record that the fit has not seen. As to the torques (residual of least squares), "
+            "record that the fit has not seen. Judged by the residual of least squares, "
             f"{steps}.{self.resolution.finer_for_values}"
         )
 

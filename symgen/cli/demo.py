@@ -16,7 +16,7 @@ def demo(
         bool,
         typer.Option(
             "--quick",
-            help="Shorter demo: two runs per encoder step, no rounding of torques, and no prediction of the coarsest encoder.",
+            help="Shorter demo: two runs per encoder step, no further steps, and no rounding of torques.",
         ),
     ] = False,
 ) -> None:

@@ -20,7 +20,7 @@ RobotFile = Annotated[
 RobotOrModule = Annotated[
     str,
     typer.Argument(
-        help="Packaged robot, robot file (.yaml, .par, .urdf) or generated module (.py)."
+        help="Packaged robot, robot file (.yaml, .par, .urdf, .xml, .mjcf) or generated module (.py)."
     ),
 ]
 Records = Annotated[

@@ -215,9 +215,9 @@ class Cestac(Result, Part):
             return ""
         name = max(errors, key=errors.__getitem__)
         return (
-            f" Single values ask for a finer one: at {level.level.label} {name} changes by "
-            f"{errors[name]:.0f} % and the residual grows by "
-            f"{level.increase:.1f} % of the torques, which hardly tell {name}."
+            f" Single values need a finer step: at {level.level.label}, {name} changes by "
+            f"{errors[name]:.0f} %, but the residual grows by only "
+            f"{level.increase:.1f} % of the torques, because they depend little on {name}."
         )
 
     @property
