@@ -5,9 +5,9 @@ torque errors of motions within the range of the robot.
 
     D       regressor in states of a reference motion: sines of every joint over a part of the range
             and at a part of the speed of the robot file, or of the record if the file has no limits
-    C       covariance of least squares with joints weighted by their residuals, multiplied to
-            include slow residuals: by the median of corrected over stated standard deviations,
-            squared, and by a factor for correlations longer than a block
+    C       covariance S C_10 S of least squares with joints weighted by their residuals: C_10 of
+            eq. (10), and S the diagonal matrix of corrected over stated standard deviations, times
+            a factor for correlations longer than a block
     V       the same, if the fit uses the values of the robot file, known to LIMIT.VALUES_KNOWN:
             (K'C^-1 K + S^-1)^-1 over the standard parameters, X = K chi, S diagonal; the estimate
             of the standard parameters is then chi_V
@@ -177,15 +177,16 @@ def expected_error(
     X = np.array(
         [dict(zip(fit.names, fit.X, strict=True)).get(name, 0.0) for name in least_squares.names]
     )
-    wider = max(1.0, float(np.median(least_squares.sigma_corrected / least_squares.sigma))) ** 2
-    wider *= unseen_by_blocks(observation, least_squares)
-    V = wider * least_squares.covariance
+    ratio = least_squares.sigma_corrected / least_squares.sigma
+    wider = np.fmax(ratio, 1.0) * np.sqrt(unseen_by_blocks(observation, least_squares))
+    V = np.outer(wider, wider) * least_squares.covariance
     near = least_squares.X
     if dict(fit.details.get("options", {})).get("prior", "none") != "none":
         physical = physical_model(model)
         K, rows = physical.rows(least_squares.names), system.weighted
-        variance = wider * (1.0 if system.known_variance else least_squares.sigma_rho**2)
-        near, V = with_values(physical, K, rows.R11 / variance**0.5, rows.r12 / variance**0.5)
+        size = wider * (1.0 if system.known_variance else least_squares.sigma_rho)
+        R = rows.R11 / size
+        near, V = with_values(physical, K, R, R @ least_squares.X)
         D, still, X = D @ K, still @ K, np.linalg.lstsq(K, X, rcond=None)[0]
     A = D.reshape(-1, len(X))
     size = np.linalg.norm(A @ X)

@@ -28,7 +28,7 @@ from typing import Literal
 import numpy as np
 
 from runtime.core.least_squares import wls
-from runtime.core.least_squares.block_covariance import block_covariance
+from runtime.core.least_squares.block_covariance import corrected_deviations
 from runtime.core.least_squares.linear import LinearOptions, labels_of
 from runtime.core.least_squares.method import Beginning, Fitted
 from runtime.core.least_squares.solution import solve
@@ -163,8 +163,10 @@ def _fit_of_last_pass(start: Beginning, W: Array, fit: Robust) -> Fitted:
     A = np.column_stack(
         [W * rows[:, None] * bend, (observation.Y - W @ fit.X) * rows * fit.w / bend]
     )
-    blocks = split_rows(A, observation.blocks(options.block))
-    C_b = block_covariance(blocks, np.zeros(b), fit.T / bend)
+    blocks, bands = (
+        split_rows(A, groups) for groups in (observation.blocks(options.block), observation.bands())
+    )
+    corrected = corrected_deviations(blocks, bands, np.zeros(b), fit.T / bend)
     shares = {
         label: float(np.mean(fit.w[observation.joint(j)] < LIMIT.DOWN_WEIGHTED))
         for j, label in enumerate(labels_of(start.model, observation.n))
@@ -174,7 +176,7 @@ def _fit_of_last_pass(start: Beginning, W: Array, fit: Robust) -> Fitted:
         system,
         replace(system.solve(), X=fit.X),
         C,
-        np.sqrt(np.diag(C_b)),
+        corrected,
         message=_note_of_shares(shares),
         details={"loss": loss, "tuning": tuning, "scales": fit.S, "down_weighted": shares},
     )

@@ -53,7 +53,7 @@ class BlockBootstrap:
     sigma : ndarray, shape (b,), SI
         Eq. (10).
     corrected : ndarray, shape (b,), SI
-        Jackknife over blocks of time.
+        Jackknife over blocks of time, or over bands of speed.
     drawn : ndarray, shape (b,), SI
         Bootstrap: blocks of time drawn again with replacement.
     blocks : int

@@ -264,6 +264,7 @@ def _alone(
             observation.t[rows],
             observation.record[rows],
             observation.rate,
+            speed=None if observation.speed is None else observation.speed[rows],
         )
         factored = ordinary(of_joint, EstimateSettings(), LinearOptions())
         fit = assemble(factored, factored.solve())

@@ -87,8 +87,8 @@ def every_section(result: Identification) -> Section:
         sortable=True,
     )
     text = (
-        "± 95 % is 1.96 corrected standard deviations. It is a 95 % interval if the model is right "
-        "and residuals further apart than two blocks of time are uncorrelated. parameters.csv "
+        "± 95 % is 1.96 corrected standard deviations. They allow for residuals that are correlated "
+        "in time, and for friction that the model does not contain. parameters.csv "
         "also has σ of eq. (10), which assumes that all residuals are independent.",
         *(
             [

@@ -14,6 +14,16 @@ reduced them: sigma is 0.8 of the scatter with 60 parameters and 50 blocks. (1 -
 place (CR2) is exact for independent residuals and too small for correlated ones, for which blocks
 are used.
 
+Friction that the model lacks errs alike in every block of time, since each has the same strokes.
+So the rows of every joint are divided a second time, into bands of its speed |qd_j| with equally
+many rows. The jackknife over these bands leaves out slow or fast motion; few and unequal bands
+make it larger than (10) for independent residuals too, by diag(C_0)/diag(T T'):
+
+    C_v = (K - 1)/K  sum_k u_k u_k',        C_0 = (K - 1)/K  sum_k T G_k (1 - G_k)^-1 T',
+            v = diag(C_v) diag(T T')/diag(C_0)
+
+The corrected variance is diag(C_b), or v where v is larger by LIMIT.BANDS_SHOW.
+
 References: Bell and McCaffrey (2002) for (1 - G_k); MacKinnon, Nielsen and Webb (2023), CV3, for
 the jackknife; Kunsch (1989) for drawn blocks.
 """
@@ -44,6 +54,46 @@ def block_covariance(blocks: Iterable[Array], X: Array, T: Array) -> Array:
     """
     U = deletions(blocks, X, T, T)
     return np.asarray(U.T @ U) if len(U) > 1 else np.full((len(T), len(T)), np.nan)
+
+
+def corrected_deviations(
+    blocks: Iterable[Array], bands: Iterable[Array], X: Array, T: Array
+) -> Array:
+    """Compute standard deviations of X that allow for slow noise and for friction not in the model.
+
+    Shape (b,): from the jackknife over blocks of time, or over bands of speed where this one is
+    clearly larger. nan where only one block determines a parameter.
+
+    Parameters
+    ----------
+    blocks, bands : iterable of ndarray, shape (rows, b + 1)
+        Rows [W Y] of every block of time, and of every band of speed, weighted as for the fit.
+    X, T
+        As for `block_covariance`.
+    """
+    by_time, by_speed = np.diag(block_covariance(blocks, X, T)), band_variances(bands, X, T)
+    larger = by_speed > LIMIT.BANDS_SHOW * by_time
+    return np.asarray(np.sqrt(np.where(larger, by_speed, by_time)))
+
+
+def band_variances(bands: Iterable[Array], X: Array, T: Array) -> Array:
+    """Compute the variances of X from the jackknife over bands of speed, shape (b,).
+
+    They are v = diag(C_v) diag(T T')/diag(C_0). The parameters are those of `block_covariance`; nan
+    for fewer than two bands.
+    """
+    squares, independent, count = np.zeros(len(T)), np.zeros(len(T)), 0
+    for count, rows in enumerate(bands, start=1):
+        P = rows[:, :-1] @ T
+        share, V = np.linalg.eigh(P.T @ P)
+        others = (1 - share).clip(LIMIT.BLOCK_ALONE)
+        directions = T @ V
+        u = directions @ (V.T @ (P.T @ (rows[:, -1] - rows[:, :-1] @ X)) / others)
+        squares += u**2
+        independent += directions**2 @ (share / others)
+    size = np.sum(T**2, axis=1)
+    known = (independent > 0) & (count > 1)
+    return np.where(known, squares * size / np.where(known, independent, 1.0), np.nan)
 
 
 def deletions(blocks: Iterable[Array], X: Array, T: Array, into: Array) -> Array:

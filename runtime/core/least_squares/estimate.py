@@ -8,8 +8,8 @@ minimal encoder resolution):
     %sigma   (11)    = 100 sigma / |X|
 
 Eq. (10) supposes independent residuals; filtered ones are not. `sigma_corrected` is given too: it
-assumes that blocks of time are independent, not samples
-(`runtime.core.least_squares.block_covariance`). A number that the record does not determine is nan
+assumes that blocks of time are independent, not samples, and includes errors of the friction model
+that depend on the speed (`runtime.core.least_squares.block_covariance`). A number that the record does not determine is nan
 in memory and null in JSON.
 """
 
@@ -98,7 +98,7 @@ class Estimate:
     covariance : ndarray, shape (b, b), SI
         Covariance of X, eq. (10).
     sigma_corrected : ndarray, shape (b,), SI
-        Standard deviations without the assumption of independent residuals.
+        Standard deviations that allow for slow residuals and for errors of the friction model.
     sigma_rho : float, N m or N
         Eq. (9) of the system that was solved; with weights near 1 and without unit.
     cond : float

@@ -17,7 +17,7 @@ import numpy as np
 import scipy
 
 from runtime.core.errors import SettingsError
-from runtime.core.least_squares.block_covariance import block_covariance
+from runtime.core.least_squares.block_covariance import corrected_deviations
 from runtime.core.least_squares.estimate import Estimate, JointFit, Status
 from runtime.core.least_squares.solution import Solution, solve
 from runtime.core.model import GeneratedModel, joint_labels
@@ -125,6 +125,10 @@ class System:
             self.names, 1 / np.array(self.scales), self.block, self.whitener
         )
 
+    def band_rows(self) -> Iterator[Array]:
+        """Yield the weighted rows [W Y] of every band of speed, shape (rows, b + 1)."""
+        return self.observation.band_rows(self.names, 1 / np.array(self.scales), self.whitener)
+
 
 def ordinary(
     observation: Observation, settings: EstimateSettings, options: LinearOptions
@@ -171,7 +175,7 @@ def assemble(
     sigma_rho, C = standard_deviations(system, fit)
     corrected = np.full(len(names), np.nan)  # as without redundancy
     if system.raw.rows > len(names):
-        corrected = np.sqrt(np.diag(block_covariance(system.block_rows(), fit.X, fit.T)))
+        corrected = corrected_deviations(system.block_rows(), system.band_rows(), fit.X, fit.T)
     corrected[_undetermined(system, fit)] = np.nan
     norms, measured = system.norms(fit.X)
     share = 1 - fit.rank / system.raw.rows

@@ -28,6 +28,8 @@ BLOCKS = 50
 """Blocks of residuals that the record is cut into by default: their number alone makes sigma
 uncertain by 1/sqrt(2*50) = 10 %.
 """
+BANDS = 6
+"""Bands of speed, with equally many rows of each joint, that show errors of the friction model."""
 SHORTEST = 5
 """Shortest default block of residuals, rows of one joint: 2/cutoff, the memory of the low-pass
 filter, at the rate of eq. (13).
@@ -78,6 +80,8 @@ class Observation:
         Sentences of the reader of counts about the encoders.
     rates : tuple of float, Hz
         Rows per second of each record; empty for an observation of one record.
+    speed : ndarray, shape (r,), rad/s or m/s, or None
+        Speed |qd_j| of the joint of each row; None if it is unknown.
     """
 
     W: Array
@@ -93,6 +97,7 @@ class Observation:
     closed_loop: LoopRows | None = None
     findings: tuple[str, ...] = ()
     rates: tuple[float, ...] = ()
+    speed: Array | None = None
 
     def __post_init__(self) -> None:
         r = sum(self.rows)
@@ -184,6 +189,7 @@ class Observation:
             record=self.record[mask],
             rows=rows,
             closed_loop=loop,
+            speed=None if self.speed is None else self.speed[mask],
         )
 
     def between(self, t0: float | None, t1: float | None) -> Observation:
@@ -239,6 +245,43 @@ class Observation:
             np.unique(record * (interval.max() + 1) + interval, return_inverse=True)[1]
         )
 
+    def bands(self) -> Array:
+        """Divide the rows of each joint into BANDS bands of its speed; number the band of each row.
+
+        Shape (r,), numbers from 0. The bands of a joint have equally many rows. If the speed is
+        unknown or zero, all rows of the joint are in one band.
+        """
+        band = np.zeros(len(self.Y), dtype=np.intp)
+        for j in range(self.n):
+            own = self.joint(j)
+            if self.speed is not None and self.speed[own].any():
+                order = np.argsort(self.speed[own], kind="stable")
+                band[own][order] = np.arange(len(order)) * BANDS // max(len(order), 1)
+        return band
+
+    def band_rows(
+        self, names: Sequence[str], weights: Array, whitener: Array | None = None
+    ) -> Iterator[Array]:
+        """Yield the weighted rows of [W Y], shape (rows, b + 1), one band of speed after another.
+
+        The parameters are those of `block_rows`.
+        """
+        return self._weighted_rows(names, weights, self.bands(), whitener)
+
+    def _weighted_rows(
+        self, names: Sequence[str], weights: Array, groups: Array, whitener: Array | None
+    ) -> Iterator[Array]:
+        """Yield the weighted rows of [W Y] of one group after another; groups: shape (r,)."""
+        kept = column_numbers(names, self.names)
+        if whitener is not None:
+            A = np.column_stack([self.W[:, kept], self.Y])
+            yield from split_rows(whitened(A, whitener), groups)
+            return
+        row_weights = np.repeat(weights, self.rows)
+        for rows in rows_by_block(groups):
+            A = np.column_stack([self.W[rows][:, kept], self.Y[rows]])
+            yield A * row_weights[rows, None]
+
     def block_rows(
         self, names: Sequence[str], weights: Array, length: float, whitener: Array | None = None
     ) -> Iterator[Array]:
@@ -258,16 +301,10 @@ class Observation:
         whitener : ndarray, shape (n, n), optional
             Multiplies the n rows of one instant, in place of the weights.
         """
-        kept = column_numbers(names, self.names)
-        if whitener is not None:
-            A = np.column_stack([self.W[:, kept], self.Y])
-            yield from split_rows(whitened(A, whitener), self.blocks(length))
-        elif self.block_factors is None or length != self.residual_block:
-            row_weights = np.repeat(weights, self.rows)
-            for rows in rows_by_block(self.blocks(length)):
-                A = np.column_stack([self.W[rows][:, kept], self.Y[rows]])
-                yield A * row_weights[rows, None]
+        if whitener is not None or self.block_factors is None or length != self.residual_block:
+            yield from self._weighted_rows(names, weights, self.blocks(length), whitener)
         else:
+            kept = column_numbers(names, self.names)
             for joints in self.block_factors:
                 yield np.vstack(
                     [
@@ -331,6 +368,7 @@ def stack(observations: Sequence[Observation]) -> Observation:
         replace(o, record=o.record + k) for o, k in zip(observations, offsets, strict=False)
     ]
     order = [(o, o.joint(j)) for j in range(first.n) for o in numbered]
+    speeds = [o.speed[rows] for o, rows in order if o.speed is not None]
     W = np.empty((sum(sum(o.rows) for o in observations), len(first.names)), order="F")
     np.concatenate([o.W[rows] for o, rows in order], out=W)
     return Observation(
@@ -352,6 +390,7 @@ def stack(observations: Sequence[Observation]) -> Observation:
         files=all_files([o.files for o in observations]),
         findings=tuple(dict.fromkeys(text for o in observations for text in o.findings)),
         rates=tuple(rate for o in observations for rate in (o.rates or (o.rate,))),
+        speed=np.concatenate(speeds) if len(speeds) == len(order) else None,
     )
 
 

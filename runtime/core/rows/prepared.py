@@ -213,6 +213,7 @@ def observation_of(
         settings=selection.settings,
         files=dict(files or {}),
         findings=states.findings,
+        speed=np.abs(window.qd[selection.kept][inside].T).ravel()[mask],
     )
 
 
