@@ -79,21 +79,20 @@ def corrected_deviations(
 def band_variances(bands: Iterable[Array], X: Array, T: Array) -> Array:
     """Compute the variances of X from the jackknife over bands of speed, shape (b,).
 
-    They are v = diag(C_v) diag(T T')/diag(C_0). The parameters are those of `block_covariance`; nan
-    for fewer than two bands.
+    They are v = diag(C_v) diag(T T')/diag(C_0), and about zero for one band. The parameters are
+    those of `block_covariance`.
     """
-    squares, independent, count = np.zeros(len(T)), np.zeros(len(T)), 0
-    for count, rows in enumerate(bands, start=1):
+    squares, independent = np.zeros(len(T)), np.zeros(len(T))
+    for rows in bands:
         P = rows[:, :-1] @ T
         share, V = np.linalg.eigh(P.T @ P)
-        others = (1 - share).clip(LIMIT.BLOCK_ALONE)
+        others = (1 - share).clip(LIMIT.BLOCK_ALONE)  # what the other bands know
         directions = T @ V
         u = directions @ (V.T @ (P.T @ (rows[:, -1] - rows[:, :-1] @ X)) / others)
         squares += u**2
         independent += directions**2 @ (share / others)
-    size = np.sum(T**2, axis=1)
-    known = (independent > 0) & (count > 1)
-    return np.where(known, squares * size / np.where(known, independent, 1.0), np.nan)
+    scale = np.sum(T**2, axis=1) / np.where(independent > 0, independent, 1.0)
+    return np.asarray(squares * scale)
 
 
 def deletions(blocks: Iterable[Array], X: Array, T: Array, into: Array) -> Array:
