@@ -1,62 +1,66 @@
-// Two lines over time and their difference below, as SVG: drag, wheel or keys choose the span of time, buttons show or hide a line.
+// Figures of lines over time as SVG, panels one below the other: drag, wheel or keys choose the span of time, buttons show or hide a line, one cursor marks an instant in all figures.
 
 "use strict";
 
 // the name space of SVG, which is written as an address: whoever looks for addresses in a report finds none
-const SVG = Object.assign(document.createElement("template"), { innerHTML: "<svg></svg>" }).content.firstChild.namespaceURI;
+const SPACE = Object.assign(document.createElement("template"), { innerHTML: "<svg></svg>" }).content.firstChild.namespaceURI;
+const [LEFT, RIGHT, TOP, GAP, BELOW] = [60, 10, 10, 24, 42];
 
-function svgNode(tag, attributes, parent, text) {
-  const node = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
-  if (text !== undefined) node.textContent = text;
-  if (parent) parent.append(node);
-  return node;
+function svgNode(tag, attributes, ...inside) {
+  const made = document.createElementNS(SPACE, tag);
+  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+  made.append(...inside);
+  return made;
 }
 
-function htmlNode(tag, properties, parent) {
-  const node = Object.assign(document.createElement(tag), properties);
-  if (parent) parent.append(node);
-  return node;
+function node(tag, properties, ...inside) {
+  const made = Object.assign(document.createElement(tag), properties);
+  made.append(...inside);
+  return made;
 }
 
-/** Numbers of little-endian float32 in base64. */
-function floats(text) {
-  const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-  const view = new DataView(bytes.buffer);
-  return Float32Array.from({ length: bytes.length / 4 }, (_, k) => view.getFloat32(4 * k, true));
+const minus = (text) => (Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−"));
+
+/** Round numbers between two, with their labels: steps of 1, 2 or 5 times a power of ten, about `count` of them and at least two. */
+function ticks(low, high, count) {
+  const raw = (high - low) / count, power = 10 ** Math.floor(Math.log10(raw));
+  const step = power * [1, 2, 5, 10].find((factor) => factor * power >= raw * 0.999);
+  const found = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push(k * step);
+  if (found.length < 2) return ticks(low, high, 2 * count);
+  const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+  return found.map((value) => [value, minus(value.toFixed(digits))]);
 }
 
+/** Panels of one joint: predicted over measured torque, and their difference. */
+function torques(measured, predicted, unit, source = "measured") {
+  const error = measured.map((x, k) => x - predicted[k]);
+  const lines = [{ name: source, kind: "measured", values: measured }, { name: "predicted", kind: "predicted", values: predicted }];
+  return [{ title: "torque", unit, lines }, { title: "error", unit, lines: [{ name: "error", kind: "error", values: error }] }];
+}
+
+const titled = (title, unit) => (unit ? `${title}, ${unit}` : title);
+
+/** A figure: panels {title, unit, lines {name, kind, values}} over the instants t, or over the quantity `over` {title, unit, values} at these instants. */
 class Chart {
-  constructor(figure, data, group) {
-    this.group = group;
-    this.t = floats(data.t).map((x) => x + data.start);
-    this.first = floats(data.first);
-    this.second = floats(data.second);
-    this.error = this.first.map((x, k) => x - this.second[k]);
-    this.labels = { first: data.labels[0], second: data.labels[1], error: "error" };
-    this.unit = data.unit;
+  constructor(group, figure, { label, t, over, panels }) {
+    Object.assign(this, { group, t, over, panels, across: over ? over.values : t });
+    this.plot = node("div", { className: "plot", tabIndex: 0, role: "application", ariaLabel: `${label}. Arrow keys move in time, plus and minus zoom, 0 shows all.` });
+    this.readout = node("div", { className: "readout" });
     figure.classList.add("live");
-    this.plot = htmlNode("div", { className: "plot", tabIndex: 0, role: "application" });
-    this.plot.setAttribute("aria-label", `${figure.dataset.label}. Arrow keys move in time, plus and minus zoom, 0 shows all.`);
-    this.readout = htmlNode("div", { className: "readout" });
-    figure.prepend(this.plot, this.readout);
+    figure.append(this.plot, ...(over ? [] : [this.readout])); // the values are those of the figure over time
+    if (!over) this.follow();
     this.listen();
     new ResizeObserver(() => this.draw()).observe(this.plot);
   }
 
-  get shown() { return ["first", "second", "error"].filter((name) => !this.group.hidden.has(name)); }
-
-  /** Smallest and largest of the lines in the span, with a margin. */
-  extent(names) {
-    const [a, b] = this.group.span;
+  /** Smallest and largest of some values at the instants kept, with a margin. */
+  extent(rows) {
     let low = Infinity, high = -Infinity;
-    for (const name of names)
-      for (let k = 0; k < this.t.length; k++) {
-        const y = this[name][k];
-        if (this.t[k] >= a && this.t[k] <= b && y === y) {
-          if (y < low) low = y;
-          if (y > high) high = y;
-        }
+    for (const values of rows)
+      for (const k of this.kept) {
+        if (values[k] < low) low = values[k];
+        if (values[k] > high) high = values[k];
       }
     if (low > high) return [-1, 1];
     const margin = 0.06 * (high - low) || 1;
@@ -64,63 +68,64 @@ class Chart {
   }
 
   draw() {
-    const width = this.plot.clientWidth;
+    const width = this.plot.clientWidth, [a, b] = this.group.span, t = this.t;
     if (!width) return;
-    const upper = { top: 10, height: 170 }, lower = { top: 204, height: 84 };
-    const names = this.shown, [a, b] = this.group.span;
-    this.left = 52;
-    this.width = Math.max(40, width - this.left - 10);
-    const root = svgNode("svg", { viewBox: `0 0 ${width} 330`, height: 330, "aria-hidden": "true" });
-    svgNode("rect", { x: this.left, y: 0, width: this.width, height: 300 }, svgNode("clipPath", { id: `clip${this.group.charts.indexOf(this)}` }, root));
-    for (const [value, label] of ticks(a, b, Math.max(2, this.width / 60))) {
-      const x = this.x(value);
-      for (const panel of [upper, lower]) svgNode("line", { class: "grid", x1: x, x2: x, y1: panel.top, y2: panel.top + panel.height }, root);
-      svgNode("text", { x, y: 304, "text-anchor": "middle" }, root, label);
+    this.kept = [...t.keys()].filter((k) => t[k] === t[k] && (t[k] < a ? t[k + 1] >= a : t[k] <= b || t[k - 1] <= b)); // one more on either side
+    this.width = Math.max(40, width - LEFT - RIGHT);
+    this.span = this.over ? this.extent([this.across]) : [a, b];
+    this.drawn = [];
+    const root = svgNode("g", { transform: `translate(${LEFT} 0)` }), places = ticks(...this.span, Math.max(2, this.width / 60));
+    let top = TOP;
+    for (const [k, panel] of this.panels.entries()) {
+      this.panel(root, panel, top, k ? 84 : 170, places);
+      top += (k ? 84 : 170) + GAP;
     }
-    svgNode("text", { x: this.left + this.width / 2, y: 322, "text-anchor": "middle" }, root, "time, s");
-    this.panel(root, upper, names.filter((name) => name !== "error"), `torque, ${this.unit}`);
-    this.panel(root, lower, names.filter((name) => name === "error"), `error, ${this.unit}`);
-    this.plot.replaceChildren(root);
+    this.bottom = top - GAP;
+    for (const [value, label] of places) root.append(svgNode("text", { x: this.x(value), y: this.bottom + 16, "text-anchor": "middle" }, label));
+    const title = this.over ? titled(this.over.title, this.over.unit) : this.group.unit ? `time, ${this.group.unit}` : "sample";
+    this.marks = svgNode("svg", { width: this.width, height: this.bottom });
+    root.append(svgNode("text", { x: this.width / 2, y: this.bottom + 34, "text-anchor": "middle" }, title), this.marks);
+    const height = this.bottom + BELOW;
+    this.plot.replaceChildren(svgNode("svg", { viewBox: `0 0 ${width} ${height}`, height, "aria-hidden": "true" }, root));
+    this.mark();
   }
 
-  panel(root, { top, height }, names, title) {
-    const [low, high] = this.extent(names), y = (value) => top + height * (high - value) / (high - low);
+  panel(root, panel, top, height, places) {
+    const lines = panel.lines.filter(({ name }) => !this.group.hidden.has(name)), [low, high] = this.extent(lines.map(({ values }) => values));
+    const y = (value) => height * (high - value) / (high - low), inside = svgNode("svg", { y: top, width: this.width, height });
+    for (const [value] of places) inside.append(svgNode("line", { class: "grid", x1: this.x(value), x2: this.x(value), y2: height }));
     for (const [value, label] of ticks(low, high, height / 34)) {
-      svgNode("line", { class: Math.abs(value) < 1e-12 ? "zero" : "grid", x1: this.left, x2: this.left + this.width, y1: y(value), y2: y(value) }, root);
-      svgNode("text", { x: this.left - 6, y: y(value) + 4, "text-anchor": "end" }, root, label);
+      inside.append(svgNode("line", { class: Math.abs(value) < 1e-12 ? "zero" : "grid", x2: this.width, y1: y(value), y2: y(value) }));
+      root.append(svgNode("text", { x: -6, y: top + y(value) + 4, "text-anchor": "end" }, label));
     }
-    svgNode("text", { x: 13, y: top + height / 2, "text-anchor": "middle", transform: `rotate(-90 13 ${top + height / 2})` }, root, title);
-    const clip = `url(#clip${this.group.charts.indexOf(this)})`;
-    for (const name of names) svgNode("path", { class: `line ${name}`, d: this.path(this[name], y), "clip-path": clip }, root);
+    for (const { kind, values } of lines) inside.append(svgNode("path", { class: `line ${kind}`, d: this.path(values, y) }));
+    const middle = top + height / 2;
+    root.append(inside, svgNode("text", { "text-anchor": "middle", transform: `translate(-48 ${middle}) rotate(-90)` }, titled(panel.title, panel.unit)));
+    this.drawn.push({ lines, unit: panel.unit, digits: Math.max(0, Math.min(12, 4 - Math.floor(Math.log10(high - low)))), y: (value) => top + y(value) });
   }
 
-  /** The part of a line in the span with one point on either side of it. */
+  /** A line through the instants kept; it breaks where an instant or a value is missing. */
   path(values, y) {
-    const [a, b] = this.group.span, t = this.t, parts = [];
-    let pen = "M";
-    for (let k = 0; k < t.length; k++) {
-      if (t[k] !== t[k] || (t[k] < a && !(t[k + 1] >= a)) || (t[k] > b && !(t[k - 1] <= b))) {
-        pen = "M";
-        continue;
-      }
-      parts.push(`${pen}${this.x(t[k]).toFixed(1)} ${y(values[k]).toFixed(1)}`);
-      pen = "L";
+    let text = "", last = NaN;
+    for (const k of this.kept) {
+      const place = `${this.x(this.across[k]).toFixed(1)} ${y(values[k]).toFixed(1)}`;
+      if (place.includes("NaN")) continue;
+      text += (last === k - 1 ? "L" : "M") + place;
+      last = k;
     }
-    return parts.join("");
+    return text;
   }
 
-  x(time) {
-    const [a, b] = this.group.span;
-    return this.left + this.width * (time - a) / (b - a);
-  }
+  x(value) { return this.width * (value - this.span[0]) / (this.span[1] - this.span[0]); }
 
   /** Time under a pointer, s. */
   time(event) {
     const [a, b] = this.group.span, x = event.clientX - this.plot.getBoundingClientRect().left - this.plot.clientLeft;
-    return a + (b - a) * Math.max(0, Math.min(1, (x - this.left) / this.width));
+    return a + (b - a) * Math.max(0, Math.min(1, (x - LEFT) / this.width));
   }
 
-  listen() {
+  /** The pointer moves the cursor, and chooses a span of time by a drag. */
+  follow() {
     let start = null;
     this.plot.addEventListener("pointerdown", (event) => {
       if (event.button) return;
@@ -130,83 +135,85 @@ class Chart {
     });
     this.plot.addEventListener("pointermove", (event) => {
       const now = this.time(event);
-      this.tell(now);
-      if (start !== null) this.overlay("rect", { class: "chosen", x: Math.min(this.x(start), this.x(now)), width: Math.abs(this.x(now) - this.x(start)), y: 10, height: 278 });
+      this.group.moved(now);
+      if (start !== null) this.marks.append(svgNode("rect", { class: "chosen", x: Math.min(this.x(start), this.x(now)), width: Math.abs(this.x(now) - this.x(start)), y: TOP, height: this.bottom - TOP }));
     });
     this.plot.addEventListener("pointerup", (event) => {
       const end = this.time(event), from = start;
       start = null;
-      this.overlay();
+      this.mark();
       if (from !== null && Math.abs(this.x(end) - this.x(from)) > 8) this.group.show(Math.min(from, end), Math.max(from, end));
     });
-    for (const end of ["pointercancel", "pointerleave"]) this.plot.addEventListener(end, () => {
-      if (end === "pointercancel") start = null;
-      this.overlay();
-      this.readout.textContent = "";
-    });
+    this.plot.addEventListener("pointercancel", () => { start = null; this.mark(); });
+  }
+
+  listen() {
     this.plot.addEventListener("dblclick", () => this.group.whole());
     this.plot.addEventListener("wheel", (event) => {
       if (document.activeElement !== this.plot && !event.ctrlKey) return;
       event.preventDefault();
-      this.group.zoom(event.deltaY < 0 ? 0.8 : 1.25, this.time(event));
+      this.group.zoom(event.deltaY < 0 ? 0.8 : 1.25, this.over ? undefined : this.time(event));
     }, { passive: false });
     this.plot.addEventListener("keydown", (event) => {
       if (!event.ctrlKey && !event.altKey && !event.metaKey && this.group.key(event.key)) event.preventDefault();
     });
   }
 
-  /** Values at the instant nearest to `time`, and a line there. */
-  tell(time) {
-    let best = 0;
-    for (let k = 1; k < this.t.length; k++) if (Math.abs(this.t[k] - time) < Math.abs(this.t[best] - time) || this.t[best] !== this.t[best]) best = k;
-    const values = this.shown.map((name) => `${this.labels[name]} ${minus(this[name][best].toPrecision(4))}`);
-    this.readout.textContent = `${this.t[best].toFixed(3)} s: ${values.join(", ")} ${this.unit}`;
-    this.overlay("line", { class: "cursor", x1: this.x(this.t[best]), x2: this.x(this.t[best]), y1: 10, y2: 288 });
+  /** Mark the instant next to a time, and write the values there. */
+  at(time) {
+    let least = Infinity;
+    this.t.forEach((t, k) => { if (Math.abs(t - time) < least) [least, this.k] = [Math.abs(t - time), k]; });
+    this.mark();
   }
 
-  overlay(tag, attributes) {
-    const root = this.plot.firstChild;
-    for (const node of root.querySelectorAll(".chosen, .cursor")) node.remove();
-    if (tag) svgNode(tag, attributes, root);
+  mark() {
+    if (this.k === undefined || !this.marks) return;
+    const k = this.k, x = this.x(this.across[k]), { unit } = this.group, known = (value) => value === value, said = [];
+    this.marks.replaceChildren(...(known(x) ? [svgNode("line", { class: "cursor", x1: x, x2: x, y1: TOP, y2: this.bottom })] : []));
+    for (const { lines, unit, digits, y } of this.drawn.filter(({ lines }) => lines.length)) {
+      for (const { values } of lines) if (known(x + values[k])) this.marks.append(svgNode("circle", { class: "cursor", r: 3, cx: x, cy: y(values[k]) }));
+      const numbers = lines.map(({ name, values }) => `${name} ${known(values[k]) ? minus(values[k].toFixed(digits)) : "–"}`);
+      said.push(`${numbers.join(", ")} ${unit}`.trim());
+    }
+    this.readout.textContent = `${unit ? `${this.t[k].toFixed(3)} ${unit}` : `sample ${this.t[k]}`}: ${said.join("; ")}`;
   }
 }
 
-/** The figures of one section: they show the same span of time and the same lines. */
+/** The figures of one box: they show the same span of time, the same instant and the same lines. A chart without a figure gets one. `moved` is called when the pointer moves the cursor. */
 class Group {
-  constructor(box, data) {
-    this.hidden = new Set();
-    this.charts = [];
-    const figures = [...box.querySelectorAll("figure[data-series]")];
-    this.tools(box, data[figures[0].dataset.series]);
-    for (const figure of figures) this.charts.push(new Chart(figure, data[figure.dataset.series], this));
+  constructor(box, charts, { unit = "s", moved = (time) => this.at(time) } = {}) {
+    Object.assign(this, { unit, moved, hidden: new Set() });
+    this.tools(box, charts);
+    this.charts = charts.map((chart) => new Chart(this, chart.figure ?? box.appendChild(node("figure", {}, node("figcaption", { textContent: chart.label }))), chart));
     let low = Infinity, high = -Infinity;
-    for (const chart of this.charts) for (const t of chart.t) if (t === t) [low, high] = [Math.min(low, t), Math.max(high, t)];
-    this.all = low < high ? [low, high] : [low - 0.5, low + 0.5];
+    for (const { t } of this.charts) for (const x of t) if (x === x) [low, high] = [Math.min(low, x), Math.max(high, x)];
+    this.all = low < high ? [low, high] : low === high ? [low - 0.5, low + 0.5] : [0, 1];
     this.whole();
   }
 
-  tools(box, data) {
-    const bar = htmlNode("div", { className: "tools", role: "toolbar" });
-    bar.setAttribute("aria-label", "Span of time and lines of the figures");
+  tools(box, charts) {
+    const bar = node("div", { className: "tools", role: "toolbar", ariaLabel: "Span of time and lines of the figures" });
     for (const [key, label, name] of [["+", "+", "Zoom in"], ["-", "−", "Zoom out"], ["ArrowLeft", "◀", "Earlier"], ["ArrowRight", "▶", "Later"], ["0", "all", "Show the whole time"]]) {
-      const button = htmlNode("button", { type: "button", textContent: label, title: name }, bar);
-      button.setAttribute("aria-label", name);
+      const button = node("button", { type: "button", textContent: label, title: name, ariaLabel: name });
       button.addEventListener("click", () => this.key(key));
+      bar.append(button);
     }
-    for (const [name, label] of [["first", data.labels[0]], ["second", data.labels[1]], ["error", "error"]]) {
-      const button = htmlNode("button", { type: "button" }, bar);
-      button.setAttribute("aria-pressed", "true");
-      svgNode("line", { class: `line ${name}`, x1: 0, x2: 30, y1: 5, y2: 5 }, svgNode("svg", { viewBox: "0 0 30 10", "aria-hidden": "true" }, button));
-      button.append(label);
+    const kinds = new Map(charts.flatMap(({ panels }) => panels.flatMap(({ lines }) => lines.map(({ name, kind }) => [name, kind]))));
+    for (const [name, kind] of kinds) {
+      const sample = svgNode("svg", { viewBox: "0 0 30 10", "aria-hidden": "true" }, svgNode("line", { class: `line ${kind}`, x2: 30, y1: 5, y2: 5 }));
+      const button = node("button", { type: "button", ariaPressed: "true" }, sample, name);
       button.addEventListener("click", () => {
         if (!this.hidden.delete(name)) this.hidden.add(name);
-        button.setAttribute("aria-pressed", String(!this.hidden.has(name)));
+        button.ariaPressed = String(!this.hidden.has(name));
         this.draw();
       });
+      bar.append(button);
     }
-    htmlNode("span", { className: "hint", textContent: "Drag over a figure: zoom. Click, then wheel or + − ← → 0. All figures move together." }, bar);
+    bar.append(node("span", { className: "hint", textContent: "Drag over a figure: zoom. Click, then wheel or + − ← → 0. All figures move together." }));
     box.before(bar);
   }
+
+  at(time) { for (const chart of this.charts) chart.at(time); }
 
   draw() {
     cancelAnimationFrame(this.asked);

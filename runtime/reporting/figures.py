@@ -41,8 +41,8 @@ STYLE: Any = {
     "path.simplify": True,
 }
 DPI = 150
-MEASURED: Any = {"color": BLACK, "linewidth": 1.5}
-PREDICTED: Any = {"color": ORANGE, "linewidth": 1.0, "linestyle": (0, (4, 1))}
+MEASURED: Any = {"color": GREY, "linewidth": 2.4}
+PREDICTED: Any = {"color": BLACK, "linewidth": 0.8}
 ERROR: Any = {"color": BLUE, "linewidth": 0.7, "label": "error"}
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -154,9 +154,9 @@ def _torques(upper: Axes, lower: Axes, joint: JointComparison, source: str) -> N
     Lines break where rows were left out or another record starts.
     """
     thinned = series(joint, "", "")
-    upper.plot(thinned.t, thinned.first, label=source, **MEASURED)
-    upper.plot(thinned.t, thinned.second, label="predicted", **PREDICTED)
-    lower.plot(thinned.t, thinned.first - thinned.second, **ERROR)
+    upper.plot(thinned.t, thinned.measured, label=source, **MEASURED)
+    upper.plot(thinned.t, thinned.predicted, label="predicted", **PREDICTED)
+    lower.plot(thinned.t, thinned.measured - thinned.predicted, **ERROR)
 
 
 def _title(joint: JointComparison) -> str:

@@ -1,8 +1,20 @@
 // Figures come to life, tables are sorted, what is folded opens for print.
 
+/** Numbers of little-endian float32 in base64. */
+function floats(text) {
+  const view = new DataView(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
+  return Array.from({ length: view.byteLength / 4 }, (_, k) => view.getFloat32(4 * k, true));
+}
+
 (function () {
   const data = JSON.parse(document.getElementById("data").textContent);
-  for (const box of document.querySelectorAll(".figures")) if (box.querySelector("figure[data-series]")) new Group(box, data);
+  for (const box of document.querySelectorAll(".figures")) {
+    const charts = [...box.querySelectorAll("figure[data-series]")].map((figure) => {
+      const { start, t, measured, predicted, unit, source } = data[figure.dataset.series];
+      return { figure, label: figure.dataset.label, t: floats(t).map((x) => x + start), panels: torques(floats(measured), floats(predicted), unit, source) };
+    });
+    if (charts.length) new Group(box, charts);
+  }
 
   /** What a cell is sorted by: the number it begins with, else its text; empty cells and - come last. */
   function worth(cell) {
@@ -19,8 +31,7 @@
   for (const table of document.querySelectorAll("table.sortable")) {
     const body = table.tBodies[0], heads = [...table.tHead.rows[0].cells], first = [...body.rows];
     heads.forEach((head, column) => {
-      const button = htmlNode("button", { type: "button", title: "Sort by this column" });
-      button.append(...head.childNodes);
+      const button = node("button", { type: "button", title: "Sort by this column" }, ...head.childNodes);
       head.append(button);
       button.addEventListener("click", () => {
         const next = { ascending: "descending", descending: "" }[head.getAttribute("aria-sort") ?? ""] ?? "ascending";

@@ -27,7 +27,7 @@ from runtime.core.table import Table
 from runtime.reporting.series import Series
 
 State = Literal["good", "doubtful", "no", "open", ""]
-SCRIPTS = ("ticks.js", "chart.js", "page.js")
+SCRIPTS, STYLES = ("chart.js", "page.js"), ("chart.css", "page.css")
 SIGNS = {"good": "✓", "doubtful": "!", "no": "✕", "open": "–"}
 WORDS = {"good": "good", "doubtful": "doubtful", "no": "no", "open": "not judged"}
 
@@ -173,7 +173,8 @@ def render(page: Page) -> str:
     scripted = bool(images) or any(
         table.sortable for section in page.sections for table in section.tables
     )
-    style, script = _resource("page.css"), "\n".join(map(_resource, SCRIPTS)) if scripted else ""
+    style = "\n".join(map(_resource, STYLES))
+    script = "\n".join(map(_resource, SCRIPTS)) if scripted else ""
     allowed = f"script-src '{_hash(script)}'; " if scripted else ""
     return _template().render(
         page=page,

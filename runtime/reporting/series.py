@@ -20,36 +20,36 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Two lines over time, such as measured and predicted torque, and their labels.
+    """Measured and predicted torque of one joint over time.
 
     Attributes
     ----------
     t : ndarray, shape (N,), s
-    first, second : ndarray, shape (N,), unit
+    measured, predicted : ndarray, shape (N,), unit
         Values of the lines; nan breaks a line.
-    labels : (str, str)
-        Names of the lines.
     unit : str
+    source : str
+        "measured" or "simulated": the name of the first line.
     total : int
         Number of instants before thinning.
     """
 
     t: Array
-    first: Array
-    second: Array
-    labels: tuple[str, str]
+    measured: Array
+    predicted: Array
     unit: str
+    source: str
     total: int
 
     @property
     def data(self) -> Mapping[str, Any]:
         """Samples of the two lines as JSON values; times start at zero, and nan breaks a line."""
         start = float(np.nanmin(self.t)) if len(self.t) else 0.0
-        arrays = {"t": self.t - start, "first": self.first, "second": self.second}
+        arrays = {"t": self.t - start, "measured": self.measured, "predicted": self.predicted}
         return {
             "start": start,
-            "labels": self.labels,
             "unit": self.unit,
+            "source": self.source,
             **{name: _base64(x) for name, x in arrays.items()},
         }
 
@@ -61,11 +61,11 @@ def series(
     kept = extremes(np.array([joint.measured, joint.predicted, joint.error]), most)
     piece = np.searchsorted(gaps(joint.t), kept, side="right")
     holes = np.flatnonzero(np.diff(piece)) + 1
-    t, first, second = (
+    t, measured, predicted = (
         np.insert(np.asarray(x, dtype=float)[kept], holes, np.nan)
         for x in (joint.t, joint.measured, joint.predicted)
     )
-    return Series(t, first, second, (source, "predicted"), unit, len(joint.t))
+    return Series(t, measured, predicted, unit, source, len(joint.t))
 
 
 def extremes(values: Array, most: int) -> Array:

@@ -53,12 +53,13 @@ def application(server: Server, port: int, end: Callable[[], None]) -> Guard:
         for name, place in {"static": "studio/static", "pages": "pages"}.items()
     ]
 
-    async def ticks(request: Request) -> Response:
-        return FileResponse(str(files("runtime").joinpath("reporting/ticks.js")))
+    async def chart(request: Request) -> Response:
+        name = Path(request.url.path).name
+        return FileResponse(str(files("runtime").joinpath("reporting", name)))
 
     inner = [
         Route("/events", events),
-        Route("/ticks.js", ticks),
+        *(Route(f"/{name}", chart) for name in ("chart.js", "chart.css")),
         *mounts,
         *Pages(server).routes(),
     ]

@@ -21,14 +21,15 @@ import numpy as np
 import runtime
 import symgen
 from runtime.core.errors import InputError
+from runtime.core.limits import LIMIT
 from runtime.reporting.result_files import write_all
+from runtime.reporting.series import extremes
 from symgen.derive.doubts import doubts
 from symgen.derive.loops import close
 from symgen.description.files import write_robot
 from symgen.errors import SymgenError
 from symgen.pages.figure import figure
 
-INSTANTS_DRAWN = 800  # instants of a plot
 FIRST_ROWS = 5  # first ones that are shown
 NAMES_LISTED = 200  # columns that are listed
 
@@ -171,7 +172,7 @@ def preview(path: str, request: Mapping[str, Any]) -> dict[str, Any]:
     N, t = len(values[0]) if values else 0, columns.get(request.get("t", ""))
     if t is not None:
         t = t * time_unit(request.get("unit") or "s")
-    kept = np.unique(np.linspace(0, max(N - 1, 0), min(N, INSTANTS_DRAWN)).astype(int))
+    kept = extremes(np.nan_to_num(np.reshape(values, (len(values), N))), LIMIT.INSTANTS_SHOWN)
     known = known_columns(opened.names, request["joints"])
     return {
         "names": names,
@@ -203,11 +204,12 @@ def series(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     problem = runtime.problem(loaded, record, study)
     own = problem.prepared[0]
     selection, K = own.selection, len(own.selection.kept)
-    shown = np.unique(np.linspace(0, K - 1, min(K, INSTANTS_DRAWN)).astype(int))
     torques = np.full((2, len(loaded.JOINTS), K), np.nan)
     for j, joint in enumerate(direct_comparison(own.observation(problem.model), fit)):
         rows = np.searchsorted(selection.t, joint.t).clip(max=K - 1)
         torques[:, j, rows] = joint.measured, joint.predicted
+    lines = np.concatenate([*torques, torques[0] - torques[1]])
+    shown = extremes(np.nan_to_num(lines), LIMIT.INSTANTS_SHOWN)
     return {
         "records": list(named),
         "t": _plain(selection.t[shown]),

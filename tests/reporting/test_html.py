@@ -32,7 +32,7 @@ def page(text, *, live=True):
         text,
         sortable=live,
     )
-    image = Image(text, b"<svg/>", text, Series(t, t, t, (text, text), text, 3) if live else None)
+    image = Image(text, b"<svg/>", text, Series(t, t, t, text, text, 3) if live else None)
     section = Section(
         text,
         (text,),
@@ -73,7 +73,7 @@ def test_nothing_is_fetched():
     html = render(page("text"))
     addresses = re.findall(r'(?:src|href|action|srcset)="([^"]*)"', html)
     assert addresses and all(a.startswith("data:image/svg+xml;base64,") for a in addresses)
-    assert not re.search(r"url\((?!#)|@import", html.replace("url(#clip$", ""))
+    assert not re.search(r"url\(|@import", html)
 
 
 def test_policy_allows_this_script_and_this_style_alone():

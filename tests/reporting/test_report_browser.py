@@ -145,7 +145,7 @@ def test_axes_tell_a_scale_and_texts_stay_in_their_cells(shown):
     leaves its cell.
     """
     labels = (
-        "[...document.querySelectorAll('.plot svg')].map((s) => "
+        "[...document.querySelectorAll('.plot > svg')].map((s) => "
         "[...s.querySelectorAll('text[text-anchor=end]')].map((n) => Number(n.getAttribute('y'))))"
     )
     for places in shown.run(labels):
@@ -244,7 +244,7 @@ def test_lines_are_the_torques(shown, folder):
     fit = json.loads((folder / "report" / "estimate.json").read_text())["essential"]["per_joint"]
     norms = shown.run(
         "JSON.parse(document.getElementById('data').textContent).map((d) => { const a = "
-        "floats(d.first), b = floats(d.second);"
+        "floats(d.measured), b = floats(d.predicted);"
         " return Math.sqrt(a.reduce((sum, x, k) => sum + (x - b[k] || 0) ** 2, 0)); })"
     )
     assert norms == pytest.approx([joint["residual_norm"] for joint in fit], rel=1e-5)
@@ -292,7 +292,7 @@ def test_pointer_zooms_all_figures_and_legend_hides_lines(shown):
     shown.run(FRAME)
     assert shown.run(
         "[...new Set([...document.querySelectorAll('.plot .line')].map((n) => n.classList[1]))]"
-    ) == ["first", "second"]
+    ) == ["measured", "predicted"]
     assert shown.run("document.querySelectorAll('.tools [aria-pressed=false]').length") == 1
     assert shown.complaints == []
 

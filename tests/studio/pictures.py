@@ -17,10 +17,10 @@ from test_browser import URDF, choose, go, proved, record, until  # noqa: E402
 DOCS = Path(__file__).parents[2] / "docs" / "guide"
 READY = {
     "robot": "document.querySelectorAll('.formulas li').length > 0",
-    "record": "document.querySelectorAll('#preview svg').length === 2",
+    "record": "document.querySelectorAll('#preview .plot > svg').length === 2",
     "check": "document.querySelectorAll('.checks li').length > 10",
     "solve": "document.querySelectorAll('#compared tbody tr').length > 0",
-    "results?run=02-feasible": "document.querySelectorAll('.plots svg').length === 4",
+    "results?run=02-feasible": "document.querySelectorAll('.plot > svg').length === 4",
     "results?run=03-cestac": "document.querySelector('figure img')?.naturalWidth > 300",
 }
 

@@ -210,7 +210,7 @@ def test_from_urdf_and_csv_to_verdict_report_and_applied_urdf(
     choose(page, "#robot-file", tmp_path / "lever.urdf")
     go(page, studio.address + "record")
     choose(page, "#record-file", record(tmp_path / "run.csv"))
-    until(page, "document.querySelectorAll('#preview svg').length === 2")
+    until(page, "document.querySelectorAll('#preview .plot > svg').length === 2")
     assert page.run("document.querySelector('[name=\"units.q\"]').value") == "deg"
     page.click("#questions button.main")  # the side is asked for: nothing is written
     assert page.run("document.activeElement.name") == "side"
@@ -232,7 +232,7 @@ def test_from_urdf_and_csv_to_verdict_report_and_applied_urdf(
     until(page, "document.querySelector('#jobs')?.dataset.runs.split(' ').length === 2")
     go(page, studio.address + "results", 390)
     assert page.run("document.documentElement.scrollWidth") <= 390
-    until(page, "document.querySelectorAll('.plots svg').length === 4")
+    until(page, "document.querySelectorAll('.plot > svg').length === 4")
     assert page.run("document.querySelector('.answer').textContent").startswith("Yes")
     page.click("form[hx-post='do/apply'] button")
     assert "mass value" in until(page, "document.querySelector('.diff')?.textContent")
@@ -325,7 +325,7 @@ def test_resolution_replay_a_restart_and_a_table_beside_the_urdf(
     assert answer == (result["enough"] or "None of the steps tried")
 
     go(page, studio.address + "results?run=01-ols")
-    until(page, "document.querySelectorAll('.plots svg').length === 4")
+    until(page, "document.querySelectorAll('.plot > svg').length === 4")
     ends = page.run("document.querySelector('#cursor').max")
     page.run("document.querySelector('#part').focus()")
     page.press("ArrowDown")

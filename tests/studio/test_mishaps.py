@@ -179,7 +179,7 @@ def test_columns_of_a_log_are_one_family_each(
     studio = running(str(tmp_path / "lever.urdf"))
     go(page, studio.address + "record")
     choose(page, "#record-file", tmp_path / "rtde.csv")
-    until(page, "document.querySelectorAll('#preview svg').length === 2", 20)
+    until(page, "document.querySelectorAll('#preview .plot > svg').length === 2", 20)
     assert page.run(FIELD.format("columns.t")) == "timestamp"
     assert page.run(FIELD.format("columns.q")) == "actual_q_0 [°], actual_q_1 [°]"
     assert page.run(FIELD.format("columns.tau")) == "actual_current_0 [A], actual_current_1 [A]"
@@ -238,7 +238,7 @@ def test_decimal_commas(page: Browser, running: Callable[..., Any], tmp_path: Pa
     studio = running(str(tmp_path / "lever.urdf"))
     go(page, studio.address + "record")
     choose(page, "#record-file", tmp_path / "excel.csv")
-    plots = "document.querySelectorAll('#preview svg').length === 2"
+    plots = "document.querySelectorAll('#preview .plot > svg').length === 2"
     until(page, plots, 20)
     assert page.run(FIELD.format("decimal")) == ","
     assert "step 0.005 s" in page.run("document.querySelector('#preview').textContent")
@@ -317,7 +317,7 @@ def test_play_runs_in_time_however_far_apart_the_instants_are(
     studio = running(*lever(tmp_path))
     solved(studio, "ols")
     go(page, studio.address + "results")
-    until(page, "document.querySelectorAll('.plots svg').length === 4", 20)
+    until(page, "document.querySelectorAll('.plot > svg').length === 4", 20)
     page.run(THINNED)
     page.run("new Promise((done) => setTimeout(done, 1000))")
     cursor = "Number(document.querySelector('#cursor').value)"

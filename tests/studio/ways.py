@@ -81,7 +81,7 @@ def measured(way: Way, folder: Path) -> None:
     way.file("#robot-file", folder / "lever.urdf")
     way.follow("header a[href='record']")
     way.file("#record-file", record(folder / "run.csv"))
-    way.wait("document.querySelectorAll('#preview svg').length === 2")
+    way.wait("document.querySelectorAll('#preview .plot > svg').length === 2")
     way.option("[name=side]", "joint")
     way.click("#questions button.main")
     way.wait("document.querySelector('#study-text')?.value.includes('side: joint')")

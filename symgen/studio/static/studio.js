@@ -1,5 +1,6 @@
 // Uploads, the drawing with its sliders, copy buttons, news of the server. htmx does the rest.
 "use strict";
+const one = (selector, of = document) => of.querySelector(selector), all = (selector, of = document) => [...of.querySelectorAll(selector)];
 (function () {
   const plain = (x, digits) => { const text = x.toFixed(digits); return Number(text) === 0 ? (0).toFixed(digits) : text.replace("-", "−"); };
   const say = (text, kind = "no") => one("#message").replaceChildren(node("p", { textContent: text, className: kind }));
@@ -102,52 +103,47 @@
     });
     for (const end of ["pointerup", "pointercancel"]) view.addEventListener(end, () => { grip = null; });
   }
-  // --- replay: one cursor for the drawing and all plots ---
+  // --- replay: one cursor for the drawing and the figures of all joints ---
   function replay(place) {
-    const [cursor, joint, part, play] = ["#cursor", "#joint", "#part", "#play"].map((id) => one(id));
-    let data = null, plots = null, timer = null;
-    const options = (select, names, k) => select.replaceChildren(...names.map((name, i) => new Option(name, name, i === k, i === k)));
+    const [cursor, part, play] = ["#cursor", "#part", "#play"].map((id) => one(id));
+    let data = null, group = null, timer = null;
     const at = (t) => {
-      const k = nearest(data.t, t);
+      group.at(t);
+      const { k } = group.charts[0];
       cursor.value = t;
       one("#now").textContent = `${plain(data.t[k], 2)} s`;
-      plots.at(data.t[k]);
       if (!arm.robot) return;
       arm.robot.joints.forEach((own, i) => { arm.q[own.j] = data.q[i]?.[k] ?? 0; });
       arm.q = closeLoops(arm.robot, arm.q) || arm.q;
       redraw();
     };
-    const show = () => {
-      const i = joint.selectedIndex, pair = { measured: data.measured[i], predicted: data.predicted[i] };
-      const error = data.measured[i].map((x, k) => (x === null ? null : x - data.predicted[i][k])), unit = slides(arm.robot.joints[i].j) ? ["N", "m"] : ["N m", "rad"];
-      plots = new Plots(place, data.t, [
-        { title: `torque of joint ${data.joints[i]}, ${unit[0]}`, lines: pair },
-        { title: `residual, measured − predicted, ${unit[0]}`, lines: { residual: error } },
-        { title: `position of joint ${data.joints[i]}, ${unit[1]}`, lines: { q: data.q[i] } },
-        { title: `torque, ${unit[0]}, over position, ${unit[1]}`, lines: pair, over: data.q[i] },
-      ], at);
-      at(Number(cursor.value));
+    const charts = (joint, i) => {
+      const { t, q, measured, predicted } = data, [torque, unit] = slides(arm.robot.joints[i].j) ? ["N", "m"] : ["N m", "rad"];
+      const panels = torques(measured[i], predicted[i], torque), position = { title: "position", unit };
+      const moving = { ...position, lines: [{ name: "position", kind: "c0", values: q[i] }] };
+      return [{ label: `Joint ${joint}`, t, panels: [...panels, moving] }, { label: `Joint ${joint}, over its position`, t, over: { ...position, values: q[i] }, panels }];
     };
     const load = async () => { // the record that is chosen, "" for the first
-      const answer = await fetch(`${place.dataset.series}&record=${encodeURIComponent(part.value)}`), value = answer.ok ? await answer.json() : { error: await answer.text() };
+      const answer = await fetch(`${place.dataset.series}&record=${encodeURIComponent(part.value)}`), text = await answer.text(), value = answer.ok ? JSON.parse(text, (_, x) => x ?? NaN) : { error: text };
       if (value.error) return say(value.error);
       data = value;
-      options(part, data.records, Math.max(part.selectedIndex, 0));
-      options(joint, data.joints, Math.max(joint.selectedIndex, 0));
+      const chosen = Math.max(part.selectedIndex, 0), box = node("div", { className: "figures" });
+      part.replaceChildren(...data.records.map((name, k) => new Option(name, name, k === chosen, k === chosen)));
       Object.assign(cursor, { min: data.t[0], max: data.t.at(-1), value: data.t[0] });
-      show();
+      place.replaceChildren(box);
+      group = new Group(box, data.joints.flatMap(charts), { moved: at });
+      at(data.t[0]);
     };
     part.addEventListener("change", load);
-    joint.addEventListener("change", show);
     cursor.addEventListener("input", () => data && at(Number(cursor.value)));
     play.addEventListener("click", () => {
       if (timer || !data) { clearInterval(timer); timer = null; play.textContent = "Play"; return; }
       play.textContent = "Stop";
       let last = performance.now();
       timer = setInterval(() => {
-        const now = performance.now(), t = Number(cursor.value) + (now - last) / 1000;
+        const now = performance.now(), t = Number(cursor.value) + (now - last) / 1000, [start, end] = group.span;
         last = now;
-        at(t > data.t.at(-1) ? data.t[0] : t);
+        at(t < start || t > end ? start : t);
       }, 50);
     });
     load();

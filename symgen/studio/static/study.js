@@ -97,10 +97,11 @@
     const first = node("div", { className: "scroll", tabIndex: 0 }, node("table", {}, node("caption", { textContent: "First rows" }), cells("th", Object.keys(value.lines)), ...value.first.map((row) => cells("td", row))));
     first.setAttribute("role", "region");
     first.setAttribute("aria-label", "First rows");
-    const plots = node("div", { className: "plots" });
-    place.replaceChildren(node("p", { textContent: value.stamps || `${value.rows} samples` }), node("p", { className: "note", textContent: `Columns: ${value.names.join(", ")}` }), first, plots);
-    const lines = (list) => Object.fromEntries(list.filter((name) => value.lines[name]).map((name) => [name, value.lines[name]]));
-    new Plots(plots, value.t, q.length + tau.length ? [{ title: "q, as in the file", lines: lines(q) }, { title: "tau, as in the file", lines: lines(tau) }] : [{ title: "as in the file", lines: value.lines }]);
+    const figures = node("div", { className: "figures" });
+    place.replaceChildren(node("p", { textContent: value.stamps || `${value.rows} samples` }), node("p", { className: "note", textContent: `Columns: ${value.names.join(", ")}` }), first, figures);
+    const chart = (title, list, unit = "") => ({ label: `${title}, as in the file`, t: value.t, panels: [{ title, unit: unit.replace("*", " "), lines: list.filter((name) => value.lines[name]).map((name, i) => ({ name, kind: `c${i % 8}`, values: value.lines[name].map((x) => x ?? NaN) })) }] });
+    const charts = (q.length + tau.length ? [chart("q", q, text("units.q")), chart("tau", tau, text("units.tau"))] : [chart("columns", Object.keys(value.lines))]).filter(({ panels: [{ lines }] }) => lines.length);
+    if (charts.length) new Group(figures, charts, { unit: t.length ? "s" : "" });
   }
   // --- remedies as one change of the study: {"record.units.q": "deg"}; what is of record.scale multiplies ---
   const multiplies = (key) => key.startsWith("record.scale.");
