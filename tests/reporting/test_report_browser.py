@@ -121,8 +121,7 @@ def test_structure(browser, folder, verb):
     assert browser.run("[...document.images].every((n) => n.complete && n.naturalWidth > 0)")
     assert (
         browser.run(
-            "[...document.querySelectorAll('svg')].filter((n) => n.getAttribute('aria-hidden') !== "
-            "'true').length"
+            "[...document.querySelectorAll('svg')].filter((n) => !n.closest('[aria-hidden=true]')).length"
         )
         == 0
     )
