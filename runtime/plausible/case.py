@@ -175,6 +175,22 @@ class Case:
         return q, "law" if any(record.origin.by_law for record in self.records) else tau
 
     @cached_property
+    def column_units(self) -> dict[str, tuple[str, ...]]:
+        """Units of the columns q and tau in the files, one for each joint; {} if records differ."""
+        settings: Any = self.study
+        given = {(one.units.q, one.units.tau) for one in settings.record} or {("rad", "N*m")}
+        if len(given) > 1:
+            return {}
+        q, tau = (
+            (unit,) * self.samples.n if isinstance(unit, str) else unit for unit in given.pop()
+        )
+        axes = zip(self.units, q, strict=True)
+        metres = (
+            "m" if (axis, unit) == ("m", "rad") else unit for axis, unit in axes
+        )  # both are 1
+        return {"q": tuple(metres), "tau": tau}
+
+    @cached_property
     def baseline(self) -> Baseline | None:
         """Reference fit, with the study (settings) as given; None if nothing can be fitted."""
         return None if self.silent else self._baseline(values=True)

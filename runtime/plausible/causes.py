@@ -160,6 +160,8 @@ class Robot:
         Sides of positions and torques in the files: motor or joint.
     samples : Samples, optional
         Samples that show which joints have known torques, and how large the torques are.
+    column_units : mapping of str to tuple of str, optional
+        Units of the columns q and tau in the files, one for each joint; default: not known.
     friction : ndarray, shape (n,), N m or N, optional
         Friction at low speed that the model lacks, to first order; None if it is certain in no
         joint.
@@ -172,6 +174,7 @@ class Robot:
         sides: Sequence[str] = ("joint", "joint"),
         samples: Samples | None = None,
         friction: Array | None = None,
+        column_units: Mapping[str, tuple[str, ...]] | None = None,
     ) -> None:
         self.n = n = len(model.JOINTS)
         self.labels, self.units = joint_labels(model), joint_units(model)
@@ -179,6 +182,7 @@ class Robot:
         self.links = getattr(model, "LINKS", ())
         self.free = {} if variants is None else dict(variants.CONSTANTS)
         self.sides, self.samples, self.friction = sides, samples, friction
+        self.column_units = column_units or {}
         drives = drives_of(model)
         self.drives = drives
         self.R = np.eye(n) if drives is None else drives.ratio
@@ -346,13 +350,18 @@ def orders(robot: Robot) -> Iterator[Item]:
 
 
 def torque_units(robot: Robot) -> Iterator[Item]:
-    """Yield each unit in which torques may have been recorded, with its value in N m.
+    """Yield each unit in which all torques may have been recorded, with its value in N m.
 
     Nothing is yielded if a joint is prismatic, or if the law of a controller gives the torques.
     """
     measured = robot.sides[1] != "law"
     for unit, factor in TORQUE_UNITS.items() if measured and robot.turning.all() else ():
-        yield {"unit": unit, "factor": factor}
+        yield {"unit": unit, "factor": factor, "read": ("N*m", "Nm"), "chosen": robot.turning}
+
+
+def torque_unit_of_joints(robot: Robot) -> Iterator[Item]:
+    """Yield each unit in which the torque of one joint may have been recorded."""
+    yield from of_each_joint(robot, torque_units(robot))
 
 
 def position_units(robot: Robot) -> Iterator[Item]:
@@ -360,24 +369,27 @@ def position_units(robot: Robot) -> Iterator[Item]:
 
     It concerns all revolute joints or all prismatic joints.
     """
-    for unit, factor, turning, mistake in (
-        ("deg", DEGREE, True, "degrees are read as rad"),
-        ("rad", 1 / DEGREE, True, "rad are read as degrees"),
-        ("rev", 2 * np.pi, True, "turns are read as rad"),
-        ("mm", 1e-3, False, "mm are read as m"),
-        ("m", 1e3, False, "m are read as mm"),
+    for unit, factor, turning, read, mistake in (
+        ("deg", DEGREE, True, ("rad",), "degrees are read as rad"),
+        ("rad", 1 / DEGREE, True, ("deg", "°"), "rad are read as degrees"),
+        ("rev", 2 * np.pi, True, ("rad",), "turns are read as rad"),
+        ("mm", 1e-3, False, ("m",), "mm are read as m"),
+        ("m", 1e3, False, ("mm",), "m are read as mm"),
     ):
         chosen = robot.turning == turning
         if chosen.any():
-            yield {"unit": unit, "factor": factor, "chosen": chosen, "mistake": mistake}
+            item = {"unit": unit, "factor": factor, "read": read, "mistake": mistake}
+            yield {**item, "chosen": chosen}
 
 
 def position_unit_of_joints(robot: Robot) -> Iterator[Item]:
-    """Yield each possible mistake in the unit of one joint position, such as degrees read as rad.
+    """Yield each possible mistake in the unit of one joint position, such as degrees read as rad."""
+    yield from of_each_joint(robot, position_units(robot))
 
-    Only if the robot has several joints of this kind (revolute or prismatic).
-    """
-    for item in position_units(robot):
+
+def of_each_joint(robot: Robot, items: Iterator[Item]) -> Iterator[Item]:
+    """Yield an error of several joints for each of these joints alone; nothing if it has only one."""
+    for item in items:
         for j in np.flatnonzero(item["chosen"]) if item["chosen"].sum() > 1 else ():
             yield {**item, "chosen": np.arange(robot.n) == j, "joint": robot.labels[j]}
 
@@ -615,6 +627,45 @@ def turned(*quantities: str) -> Callable[[Robot, Item], Mapping[str, Any]]:
     return change
 
 
+def in_unit(key: str) -> Callable[[Robot, Item], Mapping[str, Any]]:
+    """Make a function that writes another unit of some columns as a setting of the study.
+
+    key : q or tau.
+    """
+
+    def change(robot: Robot, item: Item) -> Mapping[str, Any]:
+        units = robot.column_units.get(key, ())
+        return changed_unit(key, units, item["chosen"], item["read"], item["unit"])
+
+    return change
+
+
+def changed_unit(
+    key: str, units: Sequence[str], chosen: Array, read: Sequence[str], unit: str
+) -> Mapping[str, Any]:
+    """Write the unit of some columns as a setting of the study: one unit, or one for each joint.
+
+    Parameters
+    ----------
+    key : str
+        Key in record.units: q or tau.
+    units : sequence of str
+        Present unit of each joint; empty if it is not known.
+    chosen : ndarray of bool, shape (n,)
+        The joints whose unit changes.
+    read : sequence of str
+        Names of the unit in which their columns are read by mistake. If the study gives them
+        another unit, the setting is left out.
+    unit : str
+        Unit to set.
+    """
+    given = {own for own, changes in zip(units, chosen, strict=False) if changes}
+    if not given or not given <= {*read}:
+        return {}
+    new = [unit if changes else own for own, changes in zip(units, chosen, strict=True)]
+    return {f"record.units.{key}": new if len({*new}) > 1 else unit}
+
+
 def transmitted(robot: Robot, *, positions: bool, torques: bool, to_joints: bool) -> Maps:
     """Make the correction that converts positions, torques or both from motor to joint or back."""
     inverse = np.linalg.inv(robot.R)
@@ -662,7 +713,7 @@ def gravity(item: Item) -> Maps:
 
 
 def chosen(item: Item) -> Array:
-    """Make the diagonal matrix that converts the unit of some joint positions.
+    """Make the diagonal matrix that converts the unit of some positions or torques.
 
     Its elements are the unit-conversion factor for these joints, and 1 for the others.
     """
@@ -748,24 +799,34 @@ CAUSES = (
         torque_units,
         "torques: {unit} are read as N*m",
         "set record.units.tau: {unit}",
-        lambda robot, item: {"T": item["factor"] * np.eye(robot.n)},
+        lambda robot, item: {"T": chosen(item)},
         "a common factor of all torques",
-        change=lambda robot, item: {"record.units.tau": item["unit"]},
+        change=in_unit("tau"),
+    ),
+    Row(
+        "unit",
+        torque_unit_of_joints,
+        "torque of joint {joint}: {unit} are read as N*m",
+        "set the unit of joint {joint} in record.units.tau: {unit}",
+        lambda robot, item: robot.torques(chosen(item)),
+        "a factor of the torque of joint {joint}",
+        change=in_unit("tau"),
     ),
     Row(
         "unit",
         position_units,
         "positions: {mistake}",
         "set record.units.q: {unit}",
-        lambda robot, item: {"P": chosen(item)},
-        change=lambda robot, item: {"record.units.q": item["unit"]} if item["chosen"].all() else {},
+        lambda robot, item: robot.positions(chosen(item)),
+        change=in_unit("q"),
     ),
     Row(
         "unit",
         position_unit_of_joints,
         "position of joint {joint}: {mistake}",
         "set the unit of joint {joint} in record.units.q: {unit}",
-        lambda robot, item: {"P": chosen(item)},
+        lambda robot, item: robot.positions(chosen(item)),
+        change=in_unit("q"),
     ),
     Row(
         "rate",

@@ -228,7 +228,7 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
     trials: list[Trial] = []
     if variants is not None or worst_of(checks) is not None:
         at("what would explain the record better")
-        trials = try_causes(case.baseline, case.sides)
+        trials = try_causes(case.baseline, case.sides, case.column_units)
         if case.robot_values is not None and case.robot_values.heavy:
             trials = [t for t in trials if t.cause.kind != "rate"]
         if variants is not None and "free_alpha" not in " ".join(variants.CONSTANTS):

@@ -17,6 +17,7 @@ from runtime.core.record import Record
 from runtime.physical.inertia import INERTIAL, PhysicalModel
 from runtime.physical.signs import frame_origins
 from runtime.plausible.case import Case
+from runtime.plausible.causes import changed_unit
 from runtime.plausible.trials import reach
 
 Array = np.ndarray
@@ -102,12 +103,14 @@ def positions(case: Case) -> Answer:
         and float(np.median(turns)) * np.pi / 180 < 2 * np.pi
         and float(turns.max()) > 2 * LIMIT.LARGEST_ANGLE[0]
     ):
+        which = "" if turning.all() else " of revolute joints"
         remedy = (
-            "degrees read as rad? set record.units.q: deg; or motor side read as joint side "
+            f"degrees read as rad? set record.units.q: deg{which}; or motor side read as joint side "
             "(record.side)"
         )
-        all_turn = {"record.units.q": "deg"} if turning.all() else {}
-        return Answer("no", text, remedy, limit, all_turn)
+        units = case.column_units.get("q", ())
+        change = changed_unit("q", units, turning, ("rad",), "deg")
+        return Answer("no", text, remedy, limit, change)
     return Answer("no" if far.any() else "doubtful", text, limit=limit)
 
 

@@ -19,7 +19,7 @@ with rows divided by their sigma. Then fits of a physical robot search the best 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
@@ -424,15 +424,18 @@ def reach(model: GeneratedModel, q: Array) -> float:
     return float(np.clip(np.nanmax(distance), 0.1, 1e6)) if np.isfinite(distance).any() else 1.0
 
 
-def try_causes(baseline: Baseline, sides: Sequence[str] = ("joint", "joint")) -> list[Trial]:
+def try_causes(
+    baseline: Baseline,
+    sides: Sequence[str] = ("joint", "joint"),
+    column_units: Mapping[str, tuple[str, ...]] | None = None,
+) -> list[Trial]:
     """Try every possible error of the study (cause), and return the fits, the best first.
 
     A wrong sampling rate, coupling, scale of a position or constant torque must gain
     LIMIT.RATE_GAIN more than the others, because it gives the parameters more freedom.
     """
-    robot = Robot(
-        baseline.model, baseline.variants, sides, baseline.samples, slow_friction(baseline)
-    )
+    model, variants, samples = baseline.model, baseline.variants, baseline.samples
+    robot = Robot(model, variants, sides, samples, slow_friction(baseline), column_units)
     trials = [*_of_causes(baseline, causes(robot)), *_of_numbers(baseline, robot)]
     priced = [
         replace(trial, gain=trial.gain - LIMIT.RATE_GAIN)

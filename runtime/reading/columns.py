@@ -255,15 +255,17 @@ def conversion(
     positions = _scale(settings.scale.q, first, n, "scale.q") * units_of_positions
     turns = angles if settings.unwrap else None
     scale = _scale(settings.scale.tau, last, n, "scale.tau")
+    if "motor" in settings.sides and drives is None:
+        key = "side" if settings.side == "motor" else "torque_side"
+        raise InputError(
+            f"record.{key} is motor but the robot file has no drives; give drives (ratio, torque_constant) in the robot file, or use a record of the joint side",
+            file=first.file,
+        )
     units, constant = _torque_constant(settings, drives, n)
     factors = units if constant is None else units * constant
     if "motor" not in settings.sides:
         return Conversion(positions, scale * factors, None, None, drives, constant, turns)
-    if drives is None:
-        raise InputError(
-            "side is motor but the robot has no drives; give drives in the robot file, or use a record of the joint side",
-            file=first.file,
-        )
+    assert drives is not None
     motors = replace(drives, torque_constant=factors, coupling=settings.coupling)
     side_of_positions, side_of_torques = settings.sides
     at_motors = side_of_torques == "motor"
@@ -365,8 +367,9 @@ def _torque_constant(
             )
         constant = drives.torque_constant
     else:
+        by_drives = "for currents of the motors set record.torque_side: motor, to use the gears and torque constants of the robot file; else "
         raise InputError(
-            f"tau is in {', '.join(dict.fromkeys(names))} but there is no torque constant; for currents of the motors set record.torque_side: motor, to use the gears and torque constants of the robot file; else set record.torque_constant (N*m/A) of every joint, including the gear; 1 is no constant of a motor",
+            f"tau is in {', '.join(dict.fromkeys(names))} but there is no torque constant; {by_drives if drives is not None else ''}set record.torque_constant (N*m/A) of every joint, including the gear; 1 is no constant of a motor",
             remedy={"torque_side": "motor"} if drives is not None and drives.declared else None,
         )
     return factors, np.where(commands, constant, 1.0)

@@ -44,8 +44,8 @@ RUN_COMMANDS = {  # what each writes, its verb and options
 MOST_FIELDS = 100  # of a form
 Handler = Callable[[Any], Awaitable[Any]]
 ESTIMATORS = {
-    "ols": "least squares, as the chapter",
-    "wls": "weighted by joint",
+    "ols": "ordinary least squares",
+    "wls": "least squares, weighted by joint",
     "irls": "weighted, outliers count less",
     "iv": "instrumental variables, needs the controller",
     "didim": "simulated closed loop, torques; needs the controller",

@@ -22,6 +22,7 @@ import runtime
 import symgen
 from runtime.core.errors import InputError
 from runtime.core.limits import LIMIT
+from runtime.core.model import joint_labels
 from runtime.reporting.result_files import write_all
 from runtime.reporting.series import extremes
 from symgen.derive.doubts import doubts
@@ -64,6 +65,8 @@ def robot(path: str, draft: str) -> dict[str, Any]:
         symgen.parse_robot(draft.encode(), "robot.yaml") if draft else symgen.load_robot(path)
     )
     drawn = figure(described, close(described))
+    for joint in drawn["joints"]:
+        joint["label"] = described.labels.get(joint["j"], "")
     degrees = [
         {name: f"{np.degrees(frame[name]):.6g}°" for name in ("gamma", "alpha", "theta")}
         for frame in drawn["frames"]
@@ -213,7 +216,7 @@ def series(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     return {
         "records": list(named),
         "t": _plain(selection.t[shown]),
-        "joints": [str(j) for j in loaded.JOINTS],
+        "joints": joint_labels(loaded),
         "q": list(map(_plain, own.states.q[selection.samples.start + selection.kept[shown]].T)),
         "measured": list(map(_plain, torques[0][:, shown])),
         "predicted": list(map(_plain, torques[1][:, shown])),

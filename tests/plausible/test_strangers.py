@@ -173,6 +173,26 @@ def test_other_units_of_all_torques_are_named(unit) -> None:
     assert named[0].cause.says == f"torques: {unit} are read as N*m"
 
 
+def test_another_unit_of_some_columns_is_a_setting_of_the_study() -> None:
+    """One unit, or one for each joint; no setting if the study says another unit than is read."""
+    model = symgen.model("scara")
+    units = {"q": ("rad", "rad", "rad", "m"), "tau": ("N*m", "N*m", "N*m", "N")}
+    found = {c.says: c.change for c in causes(Robot(model, column_units=units)) if c.kind == "unit"}
+    assert found["positions: degrees are read as rad"] == {
+        "record.units.q": ["deg", "deg", "deg", "m"]
+    }
+    assert found["positions: mm are read as m"] == {"record.units.q": ["rad", "rad", "rad", "mm"]}
+    assert found["positions: rad are read as degrees"] == {}
+    assert {c.change == {} for c in causes(Robot(model)) if c.kind == "unit"} == {True}
+    units = {"q": ("°", "rad"), "tau": ("N*m", "N*mm")}
+    model = symgen.model("planar_2r")
+    found = {c.says: c.change for c in causes(Robot(model, column_units=units)) if c.kind == "unit"}
+    assert found["position of joint 1: rad are read as degrees"] == {"record.units.q": "rad"}
+    assert found["position of joint 2: degrees are read as rad"] == {"record.units.q": ["°", "deg"]}
+    assert found["torque of joint 1: N*mm are read as N*m"] == {"record.units.tau": "N*mm"}
+    assert found["torque of joint 2: N*mm are read as N*m"] == {}
+
+
 def test_few_samples_beside_the_bound_are_doubtful_and_two_levels_alone_are_not() -> None:
     model = symgen.model("planar_2r")
     t, q, tau = motion(model)

@@ -362,6 +362,36 @@ def test_a_flipped_sign_is_turned_by_one_click(
     )
 
 
+def test_units_that_differ_by_joint_are_set_by_one_click_each(
+    page: Browser, running: Callable[..., Any], tmp_path: Path
+) -> None:
+    """The elbow alone is in rad and N mm; each click sets the unit of this joint, and helps."""
+    settings = lever(tmp_path)
+    header = (tmp_path / "run.csv").read_text().partition("\n")[0]
+    table = np.loadtxt(tmp_path / "run.csv", delimiter=",", skiprows=1) * [
+        1,
+        1,
+        np.pi / 180,
+        1,
+        1e3,
+    ]
+    np.savetxt(tmp_path / "run.csv", table, delimiter=",", comments="", header=header, fmt="%.8g")
+    studio = running(*settings)
+    go(page, studio.address + "check")
+    page.click("#findings button.main")
+    clicked = []
+    for _ in range(2):
+        until(page, "document.querySelector('[data-change] button')", 60)
+        clicked.append(page.run("document.querySelector('[data-change] button').textContent"))
+        page.click("[data-change] button")
+        gone = "!document.querySelector('#findings .busy') && !document.querySelector('#findings')"
+        until(page, f"{gone}?.textContent.includes('have changed')", 60)
+    assert sorted(clicked) == ["Set record.units.q: deg, rad", "Set record.units.tau: N*m, N*mm"]
+    until(page, "!document.querySelector('[data-change] button')", 60)
+    units = {"q": ["deg", "rad"], "tau": ["N*m", "N*mm"]}
+    assert WorkFolder(studio.work).study()["record"][0]["units"] == units
+
+
 def test_two_pages_do_not_overwrite_their_studies(
     page: Browser, running: Callable[..., Any], tmp_path: Path
 ) -> None:

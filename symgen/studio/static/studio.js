@@ -55,14 +55,14 @@ const one = (selector, of = document) => of.querySelector(selector), all = (sele
   function sliders(place) {
     if (!place) return;
     const focused = document.activeElement?.id;
-    place.replaceChildren(...arm.robot.joints.map(({ j, low, high }) => {
+    place.replaceChildren(...arm.robot.joints.map(({ j, low, high, label }) => {
       const input = node("input", { type: "range", id: `s-${j}`, min: low, max: high, step: "any", value: arm.q[j] });
       input.addEventListener("input", () => {
         const result = moved(arm.robot, arm.q, j, Number(input.value), slides(j) ? arm.drawing.size / 50 : 0.05);
         arm.q = result.q;
         redraw();
       });
-      return node("div", { className: "joint" }, node("label", { textContent: `q${j}`, htmlFor: `s-${j}` }), input, node("output", { id: `at-${j}`, htmlFor: `s-${j}` }));
+      return node("div", { className: "joint" }, node("label", { textContent: `q${j} ${label}`, htmlFor: `s-${j}` }), input, node("output", { id: `at-${j}`, htmlFor: `s-${j}` }));
     }));
     document.getElementById(focused)?.focus();
   }

@@ -29,7 +29,13 @@
     ask();
   }
 
-  const ask = () => {
+  const ask = () => { // what this record needs, and what is filled in
+    const text = (name) => one(`#questions [name='${name}']`).value;
+    const needed = { rate: !text("columns.t"), torque_constant: /^(m?A|V)$/.test(text("units.tau")), counts_per_revolution: text("units.q") === "counts" };
+    for (const [name, open] of Object.entries(needed)) {
+      const field = one(`#questions [name='${name}']`);
+      for (const part of [one(`label[for='${field.id}']`), field.parentElement]) part.hidden = !open && !field.value;
+    }
     for (const name of [...LISTS, "units.q", "units.tau", "side"]) {
       const field = one(`#questions [name='${name}']`);
       one(`label[for='${field.id}'] .ask`).hidden = Boolean(field.value);
@@ -50,6 +56,7 @@
       if (inner) record[key] = { ...record[key], [inner]: value };
       else record[key] = value;
       if (inner && value === undefined) delete record[key][inner];
+      if (inner && !Object.keys(record[key]).length) delete record[key];
     }
     const validation = page.validation ? { validate: { ...values.validate, record: [{ ...record, files: [page.validation] }] } } : {};
     return { symgen: 1, ...values, record: [record, ...(values.record || []).slice(1)], ...validation };
@@ -152,12 +159,17 @@
       }
   }
   // --- values side by side ---
-  const short = (x, digits) => String(Number(x.toPrecision(digits))).replace("-", "−");
+  const minus = (text) => (Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−"));
+  /** A value and its deviation, which has two digits and ends at the same place. */
+  function measured(x, sigma) {
+    const places = sigma > 0 ? 1 - Math.floor(Math.log10(sigma)) : 5;
+    return places < 0 || places > 12 ? `${minus(x.toPrecision(3))} ± ${sigma.toPrecision(2)}` : `${minus(x.toFixed(places))} ± ${sigma.toFixed(places)}`;
+  }
 
   async function compare() {
     const place = one("#compared");
     if (!place) return;
-    const names = all("#jobs [name='side']:checked").map((box) => box.value).slice(-6), key = names.join(" ");
+    const names = place.dataset.run ? [place.dataset.run] : all("#jobs [name='side']:checked").map((box) => box.value).slice(-6), key = names.join(" ");
     if (key === shown) return;
     shown = key;
     const fits = await Promise.all(names.map(async (name) => (await fetch(`runs/${name}/estimate.json`)).json()));
@@ -168,15 +180,16 @@
       const own = column[name], first = columns[0][name];
       if (!own) return node("td", { textContent: "–" });
       const far = first && column !== columns[0] ? (own[0] - first[0]) / Math.hypot(own[1] || 0, first[1] || 0) : null;
-      const text = `${short(own[0], 5)} ± ${short(own[1] || 0, 2)}`, known = far !== null && Number.isFinite(far);
-      return node("td", { className: known && Math.abs(far) > 3 ? "far" : "", textContent: known ? `${text} (${far > 0 ? "+" : "−"}${Math.abs(far).toFixed(1)})` : text });
+      const text = measured(own[0], own[1] || 0), known = far !== null && Number.isFinite(far);
+      return node("td", { className: known && Math.abs(far) > 3 ? "far" : "", textContent: known ? `${text} (${far > 0.05 ? "+" : ""}${minus(far.toFixed(1))})` : text });
     };
     const head = node("tr", {}, ...["parameter", "unit", ...names].map((text) => node("th", { scope: "col", textContent: text })));
     const rows = Object.keys(units).map((name) => node("tr", {}, node("th", { scope: "row", textContent: name }), node("td", { textContent: units[name].replace("**2", "²").replaceAll("*", " ") }), ...columns.map((column) => cell(name, column))));
     const table = node("div", { className: "scroll tall", tabIndex: 0 }, node("table", {}, node("thead", {}, head), node("tbody", {}, ...rows)));
     table.setAttribute("role", "region");
     table.setAttribute("aria-label", "Values of the runs");
-    place.replaceChildren(node("p", { className: "note", textContent: `Differences from ${names[0]} in deviations, (X − X₁)/√(σ² + σ₁²); above 3 they are marked.` }), table);
+    const note = names.length > 1 ? `± σ, the standard deviation. In brackets, the difference from ${names[0]} in deviations, (X − X₁)/√(σ² + σ₁²); above 3 it is marked.` : "± σ, the standard deviation.";
+    place.replaceChildren(node("p", { className: "note", textContent: note }), table);
   }
 
   document.addEventListener("htmx:afterSettle", (event) => {
