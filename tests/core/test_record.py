@@ -578,6 +578,11 @@ def test_motor_side_needs_drives(tmp_path):
     )
     with pytest.raises(InputError, match="has no drives"):
         read_record(settings(files="a.csv", side="motor"), folder=tmp_path)
+    currents = settings(files="a.csv", torque_side="motor", units={"tau": "A"})
+    with pytest.raises(InputError, match=r"record\.torque_side is motor but the robot file has no"):
+        read_record(currents, folder=tmp_path)  # it asked to set what was set already
+    with pytest.raises(InputError, match=r"no torque constant; set record\.torque_constant"):
+        read_record(settings(files="a.csv", units={"tau": "A"}), folder=tmp_path)
 
 
 def test_records_of_a_model(tmp_path):

@@ -208,6 +208,7 @@ def test_from_urdf_and_csv_to_verdict_report_and_applied_urdf(
     studio = running()
     go(page, studio.address + "robot")
     choose(page, "#robot-file", tmp_path / "lever.urdf")
+    assert until(page, "document.querySelector('label[for=s-2]')?.textContent") == "q2 elbow"
     go(page, studio.address + "record")
     choose(page, "#record-file", record(tmp_path / "run.csv"))
     until(page, "document.querySelectorAll('#preview .plot > svg').length === 2")
@@ -220,6 +221,7 @@ def test_from_urdf_and_csv_to_verdict_report_and_applied_urdf(
     )
     page.click("#questions button.main")
     until(page, "document.querySelector('#study-text')?.value.includes('side: joint')")
+    assert "scale" not in (studio.work / "study.yaml").read_text()  # nothing was said of it
     go(page, studio.address + "check")
     page.click("#findings button.main")
     until(page, "document.querySelectorAll('.checks li').length > 10", 60)
@@ -234,6 +236,12 @@ def test_from_urdf_and_csv_to_verdict_report_and_applied_urdf(
     assert page.run("document.documentElement.scrollWidth") <= 390
     until(page, "document.querySelectorAll('.plot > svg').length === 4")
     assert page.run("document.querySelector('.answer').textContent").startswith("Yes")
+    values = "[...document.querySelectorAll('#compared td:last-child')].map((n) => n.textContent)"
+    for text in until(page, f"{values}.length === 13 && {values}"):  # digits by the deviation
+        value, sigma = text.replace("−", "-").split(" ± ")
+        assert len(value.partition(".")[2]) == len(sigma.partition(".")[2]), text
+        assert len(sigma.replace(".", "").lstrip("0")) == 2, text
+    assert "shoulder" in page.run("document.querySelector('#joint').textContent")
     page.click("form[hx-post='do/apply'] button")
     assert "mass value" in until(page, "document.querySelector('.diff')?.textContent")
     applied = symgen.load_robot(studio.work / "applied-02-feasible.urdf").values

@@ -188,6 +188,13 @@ def test_columns_of_a_log_are_one_family_each(
         "[...document.querySelectorAll('#preview th')].map((node) => node.textContent)"
     )
     assert len(shown) == 5 and not [name for name in shown if "target" in name]
+    shown = "document.querySelector('[name={}]').checkVisibility()"
+    asks = [page.run(shown.format(name)) for name in ("torque_constant", "rate")]
+    assert asks == [True, False]  # A needs one; the rate is that of the time column
+    pick(page, "columns.t", "")
+    pick(page, "units.tau", "N*m")
+    asks = [page.run(shown.format(name)) for name in ("torque_constant", "rate")]
+    assert asks == [False, True]
 
 
 def test_solve_waits_for_a_check(
@@ -347,9 +354,8 @@ def test_a_flipped_sign_is_turned_by_one_click(
     remedies = (
         "[...document.querySelectorAll('[data-change] button')].map((node) => node.textContent)"
     )
-    assert "Multiply record.scale.tau by 1, -1" in until(
-        page, f"{remedies}.length && {remedies}", 5
-    )
+    shown = until(page, f"{remedies}.length && {remedies}", 5)
+    assert shown == ["Multiply record.scale.tau by 1, -1"]  # each remedy once
     page.click("[data-change] button")
     wait_for(
         lambda: WorkFolder(studio.work).study()["record"][0].get("scale", {}).get("tau") == [1, -1],
@@ -410,6 +416,16 @@ def test_two_pages_do_not_overwrite_their_studies(
     page.run("document.querySelector('#study-text').value += '# mine'")
     page.run("document.querySelector('#study-text').form.requestSubmit()")
     wait_for(lambda: file.read_text().endswith("# mine"), 10)
+
+
+def test_a_server_that_has_ended_is_told_at_once(
+    page: Browser, running: Callable[..., Any]
+) -> None:
+    studio = running("planar_2r")
+    go(page, studio.address + "robot")
+    until(page, "!!document.querySelector('#cells')", 20)
+    studio.end()
+    until(page, f"{MESSAGE}.includes('server has ended')", 20)
 
 
 def test_quick_clicks_add_as_many_frames(page: Browser, running: Callable[..., Any]) -> None:

@@ -244,7 +244,8 @@ const one = (selector, of = document) => of.querySelector(selector), all = (sele
   document.addEventListener("htmx:afterSettle", (event) => {
     if (event.target.id === "table" || one("#table")?.contains(event.target)) read();
   });
-  document.addEventListener("htmx:sendError", () => say("The server has ended; what was saved is in the work folder. Start symgen studio again."));
+  const ended = () => say("The server has ended; what was saved is in the work folder. Start symgen studio again.", "no ended");
+  document.addEventListener("htmx:sendError", ended);
   document.addEventListener("htmx:beforeRequest", ({ target }) => target.matches("[hx-trigger]") || one("#message").replaceChildren()); // parts that load by themselves clear nothing
 
   document.addEventListener("click", async (event) => {
@@ -263,6 +264,8 @@ const one = (selector, of = document) => of.querySelector(selector), all = (sele
   // --- news of the server ---
   let shownRobot = one("#figure")?.dataset.digest || "", version = Number(one("#values").dataset.version), timer = null;
   const news = new EventSource("events");
+  news.addEventListener("error", ended);
+  news.addEventListener("open", () => one("#message .ended")?.remove()); // it was the network
   news.addEventListener("message", (event) => {
     const state = JSON.parse(event.data);
     if (state.version !== version) htmx.trigger(document.body, "changed");

@@ -162,8 +162,9 @@
   const minus = (text) => (Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−"));
   /** A value and its deviation, which has two digits and ends at the same place. */
   function measured(x, sigma) {
-    const places = sigma > 0 ? 1 - Math.floor(Math.log10(sigma)) : 5;
-    return places < 0 || places > 12 ? `${minus(x.toPrecision(3))} ± ${sigma.toPrecision(2)}` : `${minus(x.toFixed(places))} ± ${sigma.toFixed(places)}`;
+    if (!(sigma > 0)) return minus(String(Number(x.toPrecision(5))));
+    const places = Math.min(Math.max(1 - Math.floor(Math.log10(Number(sigma.toPrecision(2)))), 0), 12);
+    return `${minus(x.toFixed(places))} ± ${sigma.toFixed(places)}`;
   }
 
   async function compare() {
