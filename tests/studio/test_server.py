@@ -13,6 +13,7 @@ import warnings
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ import pytest
 from bag_files import joint_states, write_bag
 
 import symgen
-from symgen.studio import guard, server, serving, table
+from symgen.studio import guard, server, serving, table, views
 from symgen.studio.child import ViewProcess
 from symgen.studio.folder import WorkFolder
 from symgen.studio.jobs import Job, Jobs
@@ -514,8 +515,6 @@ def test_the_server_ends_some_time_after_its_last_page(
 
 def test_a_check_that_is_refused_ends_with_2(tmp_path, monkeypatch, capsys):
     """Code 1 counts as a result: a failed Check said nothing."""
-    from symgen.studio import views
-
     (tmp_path / "arm.yaml").write_text("symgen: 1\nname: [\n")
     (tmp_path / "study.yaml").write_text("symgen: 1\n")
     monkeypatch.setattr(
@@ -580,14 +579,27 @@ def test_a_studio_that_ends_closes_the_pipes_of_its_run(tmp_path: Path) -> None:
     assert [str(warning.message) for warning in leaked] == []
 
 
-def test_pages_do_not_wait_for_formulas(studio: Any) -> None:
-    """Those of a long chain take seconds; an edit of the table meanwhile is read in a blink."""
+def chain(n: int) -> str:
+    """The file of an open chain of n revolute joints."""
     rows = [
         f"  {j}: {{ant: {j - 1}, sigma: 0, alpha: {('0', 'pi/2', '-pi/2')[j % 3]}, d: 0.{j}, theta: q{j}, r: 0.2}}"
-        for j in range(1, 19)
+        for j in range(1, n + 1)
     ]
-    chain = "symgen: 1\nname: chain\ngravity: [0, 0, 9.81]\nframes:\n" + "\n".join(rows) + "\n"
-    studio.upload("robot", "chain.yaml", chain.encode())
+    return "symgen: 1\nname: chain\ngravity: [0, 0, 9.81]\nframes:\n" + "\n".join(rows) + "\n"
+
+
+@pytest.mark.campaign
+def test_formulas_of_thirty_joints_take_seconds(tmp_path: Path) -> None:
+    """Of processor time, which a busy machine does not lengthen; they took minutes."""
+    (tmp_path / "chain.yaml").write_text(chain(30))
+    start = process_time()
+    shown = views.formulas(str(tmp_path / "chain.yaml"), "")
+    assert len(shown["base"]) > 200 and process_time() - start < server.VIEW_PATIENCE / 2
+
+
+def test_pages_do_not_wait_for_formulas(studio: Any) -> None:
+    """Those of a long chain take seconds; an edit of the table meanwhile is read in a blink."""
+    studio.upload("robot", "chain.yaml", chain(18).encode())
     studio.server.deriving = ViewProcess()
     try:
         studio.server.deriving.start()
