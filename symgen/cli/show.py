@@ -131,7 +131,7 @@ def show(
     with reported_errors():
         described = described_robot(robot, at_values, exact)
         if model is not None:
-            typer.echo(model_text(described, model, kind, asked))
+            typer.echo(model_text(described, model, kind, asked, at_values))
         else:
             regrouping = regrouping_of(described, decimals=at_values)
             if html:
@@ -165,16 +165,19 @@ def page_file(regrouping: Regrouping, output: Path | None) -> Path:
     return write_all(path.parent, {path.name: robot_page(regrouping)})[0]
 
 
-def model_text(robot: Robot, model: str, kind: str, asked: Mapping[str, Any]) -> str:
+def model_text(
+    robot: Robot, model: str, kind: str, asked: Mapping[str, Any], decimals: bool = False
+) -> str:
     """Return a symbolic model of a robot, such as its inertia matrix, as text in one of FORMATS.
 
     asked : options of --model that the user gave.
+    decimals : whether to write coefficients without symbols as decimal numbers.
     """
     from symgen.symbols.symbolic import symbolic
 
     given = dict(asked)
     of_robot = {name: given.pop(name) for name in ("parameters", "passive") if name in given}
-    models = symbolic(robot, values=_values(given.pop("value", ())), **of_robot)
+    models = symbolic(robot, values=_values(given.pop("value", ())), decimals=decimals, **of_robot)
     if "rows" in given:
         given["rows"] = _numbers(given["rows"])
     return models.show(model, format=kind, **given)

@@ -30,6 +30,7 @@ from symgen.description.robot import Robot
 from symgen.errors import SymgenError
 from symgen.regroup.formula import Formula
 from symgen.regroup.regrouping import Regrouping, regroup
+from symgen.symbols.expressions import in_decimals
 
 PARAMETERS = ("base", "standard")
 PASSIVE = ("functions", "symbols")
@@ -58,6 +59,8 @@ class Source:
         Values that replace symbols, by symbol.
     kind : str
         Kind of the parameters, base or standard.
+    decimals : bool
+        Whether functions of numbers alone, such as sin(1.571), are written as decimals.
     """
 
     robot: Robot
@@ -67,6 +70,7 @@ class Source:
     formulas: Mapping[str, Formula]
     given: Mapping[str, Expression]
     kind: str
+    decimals: bool = False
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -118,6 +122,7 @@ def source_of(
     values: Mapping[str, Any] | None = None,
     passive: str | None = None,
     regrouping: Regrouping | None = None,
+    decimals: bool = False,
 ) -> Source:
     """Collect the inputs (parameters, given values, ...) of the symbolic models of a robot.
 
@@ -128,6 +133,8 @@ def source_of(
     formulas: dict[str, Formula]
     if parameters == "base":
         regrouping = regrouping or regroup(robot)
+        if decimals:
+            regrouping = in_decimals(regrouping)
         own = {b.own: b.name for b in regrouping.base}
         formulas = {b.name: b.formula for b in regrouping.base}
     else:
@@ -156,7 +163,7 @@ def source_of(
             )
         if passive == "symbols":
             closure = open_tree(robot)
-    return Source(robot, closure, relations, own, formulas, given, parameters)
+    return Source(robot, closure, relations, own, formulas, given, parameters, decimals)
 
 
 def _one_of(what: str, given: str, known: Iterable[str]) -> None:

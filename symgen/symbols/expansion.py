@@ -12,6 +12,7 @@ both, and ints are far faster than the rationals QQ.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from decimal import Context, Decimal
 from fractions import Fraction
 from functools import cache
 from itertools import combinations
@@ -25,7 +26,7 @@ from sympy.polys.rings import PolyRing
 from symgen.derive.graph import Angle, Node, Scalar, reachable
 from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.numbers import numbered, numbers_of
-from symgen.description.expression import FUNCTIONS, Expression, call
+from symgen.description.expression import FUNCTIONS, PI, Expression, call
 from symgen.errors import SymgenError
 from symgen.symbols import expressions
 from symgen.symbols.expressions import Tree
@@ -34,6 +35,7 @@ from symgen.symbols.identities import Coefficient, Identities, forward, number
 
 Polynomial = Any  # of the ring of the parameters
 CONSTANT, SLIDE, TURN, RATE, DIRECTION = 1, 2, 3, 4, 5  # ranks: the order of factors in a product
+GUARDED, NOISE = 50, Fraction(1, 10**30)  # digits of a decimal inside; what rounding leaves of 1
 
 
 class TooManyTermsError(SymgenError):
@@ -53,6 +55,9 @@ class Expansion:
         Values of the graph whose polynomials are needed.
     limit : int
         Largest number of terms of a polynomial. TooManyTermsError is raised beyond.
+    decimals : bool
+        Whether functions of numbers alone, such as sin(1.571), become decimals. A printed number
+        then has at most DIGITS digits.
     """
 
     def __init__(
@@ -61,8 +66,10 @@ class Expansion:
         parameters: Sequence[str],
         outputs: Sequence[Scalar | int],
         limit: int,
+        *,
+        decimals: bool = False,
     ) -> None:
-        self.algebra, self.limit = algebra, limit
+        self.algebra, self.limit, self.decimals = algebra, limit, decimals
         self.names = self._names({*parameters, *algebra.robot.constants})
         ranks: dict[Any, tuple[int | Fraction, ...]] = {
             x: (TURN, *(j for j, _ in turn), *(n for _, n in turn), k)
@@ -83,7 +90,7 @@ class Expansion:
             for kept in ((RATE, DIRECTION), (CONSTANT, SLIDE, TURN), (CONSTANT,))
         )
         self.shown = shown
-        decimals = bool(numbers_of(numbered(algebra.robot)))
+        decimals = decimals or bool(numbers_of(numbered(algebra.robot)))
         self.factors = Factors(self.K, shown, (rates, others, constants), decimals=decimals)
         self.identities = Identities(
             self.K,
@@ -126,6 +133,8 @@ class Expansion:
             case "sym":
                 stem, own = name.rstrip("0123456789_"), name in self.algebra.robot.constants
                 is_rate = stem in ("QP", "QDP", "G") and not own
+                if name == "pi" and self.decimals:
+                    return
                 yield (
                     expressions.symbol(name),
                     SLIDE if stem == "q" else RATE if is_rate else CONSTANT,
@@ -144,17 +153,18 @@ class Expansion:
 
         Zero if the angle depends on joint positions.
         """
-        if node.op == "sqrt":
-            root: Expression = node.value
-            return root
-        turn, rest = node.value
-        return Expression() if turn else call(node.op, rest)
+        value: Expression = node.value if node.op == "sqrt" else Expression()
+        if node.op != "sqrt" and not node.value.turn:
+            value = call(node.op, node.value.offset)
+        return expressions.rounded(value, GUARDED) if self.decimals else value
 
     def _node(self, node: Node) -> Polynomial:
         x = [self.of(s) for s in node.operands]
         match node.op:
             case "sym":
                 name = str(node.value)
+                if name == "pi" and self.decimals:
+                    return self._constants(expressions.rounded(PI, GUARDED))
                 return self.parameters.get(name) or self._lifted(
                     self.generator[expressions.symbol(name)]
                 )
@@ -169,18 +179,9 @@ class Expansion:
                 C, S = self.identities.pairs[angle]
                 return self._lifted(C if node.op == "cos" else sign * S)
             case "cos" | "sin" | "sqrt" if node.value is not None:
-                return self._lifted(
-                    sum(
-                        prod(
-                            (
-                                self.generator[expressions.power(a, 1 if n > 0 else -1)] ** abs(n)
-                                for a, n in m
-                            ),
-                            start=self.K.one.mul_ground(number(c)),
-                        )
-                        for m, c in self._constant(node).terms.items()
-                    )
-                )
+                return self._constants(self._constant(node))
+            case "inv" if self.decimals and (c := self._number(x[0])):
+                return self._lifted(self.K.one.mul_ground(number(shortened(1 / c, GUARDED))))
         inside, made = self.written(x[0]), self.generator[node.op, node.index]
         k = self.K.gens.index(made)
         if node.op == "inv":
@@ -196,6 +197,25 @@ class Expansion:
     def _lifted(self, c: Coefficient) -> Polynomial:
         return self.ring.ground_new(c)
 
+    def _constants(self, e: Expression) -> Polynomial:
+        return self._lifted(
+            sum(
+                prod(
+                    (
+                        self.generator[expressions.power(a, 1 if n > 0 else -1)] ** abs(n)
+                        for a, n in m
+                    ),
+                    start=self.K.one.mul_ground(number(c)),
+                )
+                for m, c in e.terms.items()
+            )
+        )
+
+    def _number(self, a: Polynomial) -> Fraction:
+        """Return the value of a polynomial that is a number, else 0."""
+        c = a.get(self.ring.zero_monom, {}) if len(a) == 1 else {}
+        return Fraction(c.get(self.K.zero_monom, 0)) if len(c) == 1 else Fraction(0)
+
     # --- arithmetic ---
 
     def of(self, x: Scalar | int) -> Polynomial:
@@ -206,7 +226,10 @@ class Expansion:
     def mul(self, a: Polynomial, b: Polynomial) -> Polynomial:
         if (terms := length(a) * length(b)) > 100 * self.limit:
             raise TooManyTermsError(f"more than {self.limit} terms")
-        return self.checked(self._each(a * b, self.identities.reduced)) if terms else self.ring(0)
+        if not terms:
+            return self.ring(0)
+        made = self._each(a * b, self.identities.reduced)
+        return self.checked(self._shortened(made, GUARDED) if self.decimals else made)
 
     def checked(self, a: Polynomial) -> Polynomial:
         if length(a) > self.limit:
@@ -215,6 +238,17 @@ class Expansion:
 
     def _each(self, a: Polynomial, of: Any) -> Polynomial:
         return self.ring.from_dict({m: of(c) for m, c in a.items()})
+
+    def _shortened(self, a: Polynomial, digits: int) -> Polynomial:
+        """Round the numbers of a polynomial to so many digits; without those that are rounding errors."""
+        largest = max((abs(n) for c in a.values() for n in c.values()), default=0)
+        kept = {
+            m: c.new(
+                {k: number(shortened(n, digits)) for k, n in c.items() if abs(n) > NOISE * largest}
+            )
+            for m, c in a.items()
+        }
+        return self.ring.from_dict({m: c for m, c in kept.items() if c})
 
     def halved(self, a: Polynomial) -> Polynomial:
         return self._each(a, lambda c: c.new({m: number(Fraction(n) / 2) for m, n in c.items()}))
@@ -250,6 +284,8 @@ class Expansion:
 
         Parameters that have the same coefficient, up to the sign, share one bracket.
         """
+        if self.decimals:
+            a = self._shortened(a, expressions.DIGITS)
         shared: dict[Coefficient, list[Tree]] = {}
         signs: dict[Coefficient, int] = {}
         for monomial in sorted(a, key=lambda m: (any(m), [-n for n in m])):
@@ -263,6 +299,12 @@ class Expansion:
         return expressions.total(
             x for c, members in shared.items() for x in self.factors.terms(signs[c] * c, members)
         )
+
+
+def shortened(c: Fraction | int, digits: int) -> Fraction:
+    """Round a fraction to a decimal of so many digits."""
+    decimal = Context(prec=digits).divide(Decimal(c.numerator), Decimal(c.denominator))
+    return Fraction(decimal)
 
 
 def length(a: Polynomial) -> int:

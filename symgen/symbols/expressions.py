@@ -162,16 +162,19 @@ def in_decimals(regrouping: Regrouping) -> Regrouping:
     The decimals have DIGITS digits. Coefficients that contain symbols are not changed.
     """
 
-    def rounded(c: Expression) -> Expression:
-        digits = sympy.N(evaluated(expression(c), {}), DIGITS)
-        return c if c.symbols else Expression.number(str(digits))
-
     base = (
         replace(b, combination={name: rounded(c) for name, c in b.combination.items()})
         for b in regrouping.base
     )
     steps = ((source, target, rounded(c)) for source, target, c in regrouping.steps)
     return replace(regrouping, base=tuple(base), steps=tuple(steps))
+
+
+def rounded(c: Expression, digits: int = DIGITS) -> Expression:
+    """Convert an expression without symbols to a decimal number; others are not changed."""
+    if c.symbols:
+        return c
+    return Expression.number(str(sympy.N(evaluated(expression(c), {}), digits)))
 
 
 def size(x: Tree) -> int:

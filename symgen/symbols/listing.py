@@ -8,13 +8,16 @@ only equation that uses it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from symgen.derive.graph import SYM, Domain, Scalar, interpret
 from symgen.derive.graph_algebra import GraphAlgebra
+from symgen.description.expression import Expression
+from symgen.description.grammar import parse
 from symgen.description.naming import Namespace
 from symgen.emit.printers import PLAIN, Text
+from symgen.symbols.expressions import rounded
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,8 @@ class Listing:
         Indices of each entry in the model.
     parameters : iterable of str
         Names of the parameters, which no intermediate variable may have.
+    decimals : bool
+        Whether constants are written as decimals, such as SA2 = 0.999 in place of sin(1.571).
     """
 
     def __init__(
@@ -47,7 +52,10 @@ class Listing:
         outputs: Mapping[str, Scalar | int],
         places: Sequence[tuple[int, ...]],
         parameters: Iterable[str],
+        *,
+        decimals: bool = False,
     ) -> None:
+        self.decimals = decimals
         self.graph, self.outputs, self.places = algebra.graph, dict(outputs), list(places)
         values = list(self.outputs.values())
         names = Namespace((*algebra.robot.constants, *parameters))
@@ -62,6 +70,8 @@ class Listing:
             for section in self.text.sections
             for line in section.lines
         ]
+        if self.decimals:
+            steps = _in_decimals(steps)
         results = [
             Equation("Result", label, str(x) if isinstance(x, int) else self.text.expression(x))
             for label, x in self.outputs.items()
@@ -90,3 +100,17 @@ class Listing:
                 steps[name] = made
                 value[node.index] = sign * symbol(name)
         return steps, interpret([*self.outputs.values()], domain, value)
+
+
+def _in_decimals(equations: Sequence[Equation]) -> list[Equation]:
+    """Replace the right-hand sides of constants that depend on numbers alone by decimals."""
+    values: dict[str, Expression] = {}
+    result = []
+    for equation in equations:
+        if equation.section == "Constants":
+            value = parse(equation.expression, None).substitute(values)
+            if not value.symbols:
+                values[equation.name] = value = rounded(value)
+                equation = replace(equation, expression=str(value))
+        result.append(equation)
+    return result

@@ -27,6 +27,7 @@ def symbolic(
     values: Mapping[str, Any] | None = None,
     passive: str | None = None,
     limit: int = LARGEST,
+    decimals: bool = False,
 ) -> SymbolicRobot:
     """Prepare the models of a robot as exact SymPy objects.
 
@@ -50,6 +51,9 @@ def symbolic(
         Largest number of terms of a closed form before it is factored. A longer closed form is
         refused; a recursion has no limit.
 
+    decimals : bool
+        Whether functions of numbers alone, such as sin(1.571), are written as decimals.
+
     Returns
     -------
     SymbolicRobot
@@ -62,7 +66,9 @@ def symbolic(
         have no linear relation.
     """
     described = robot if isinstance(robot, Robot) else load_robot(robot)
-    return SymbolicRobot(source_of(described, parameters, values, passive), limit)
+    return SymbolicRobot(
+        source_of(described, parameters, values, passive, decimals=decimals), limit
+    )
 
 
 @dataclass(frozen=True)

@@ -169,7 +169,9 @@ class SymbolicModel:
 
     def _expansion(self, algebra: GraphAlgebra, *outputs: Mapping[Any, Scalar | int]) -> Expansion:
         values = [x for entries in outputs for x in entries.values()]
-        return Expansion(algebra, self.source.parameters, values, self.limit)
+        return Expansion(
+            algebra, self.source.parameters, values, self.limit, decimals=self.source.decimals
+        )
 
     def _collected(
         self,
@@ -291,4 +293,10 @@ class SymbolicModel:
         by_place = {entry.place: entry.value for entry in values.entries}
         outputs = {place: by_place[place] for place in self.places if place in by_place}
         labelled = {self.label(place): x for place, x in outputs.items()}
-        return Listing(values.algebra, labelled, list(outputs), self.source.parameters)
+        return Listing(
+            values.algebra,
+            labelled,
+            list(outputs),
+            self.source.parameters,
+            decimals=self.source.decimals,
+        )

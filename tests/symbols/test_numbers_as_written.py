@@ -6,6 +6,7 @@ import re
 
 import pytest
 import sympy
+from printed_back import error_of
 
 import symgen
 from symgen.description.grammar import parse
@@ -83,3 +84,21 @@ def test_pasted_sympy_with_any_constant(name: str, form: str) -> None:
     made = space["A"].subs(values)
     theirs = models.inertia_matrix().subs(given)
     assert name in free and abs((made - theirs).evalf(20)).norm() < 1e-12
+
+
+@pytest.mark.parametrize("form", ["closed", "recursive"])
+@pytest.mark.parametrize("format", ["text", "json"])
+@pytest.mark.parametrize("model", ["inertia_matrix", "bias", "gravity", "pose", "base_parameters"])
+def test_decimals_in_place_of_functions_of_numbers(model: str, form: str, format: str) -> None:
+    """sin(1.571)**2 YY2 becomes one number times YY2, and the torques are those of the witness."""
+    if form == "recursive" and model == "base_parameters":
+        return
+    text = NUM.replace(b"alpha: pi/2", b"alpha: 1.571").replace(b"0, d: 0.25", b"0.3, d: 0.25")
+    base = symgen.regrouping(symgen.parse_robot(text, "num.yaml"))
+    exact, decimal = symgen.symbolic(base.robot), symgen.symbolic(base.robot, decimals=True)
+    shown = decimal.show(model, form=form, format=format)
+    number_inside = re.compile(r"(sin|cos|sqrt)\(\d")
+    assert number_inside.search(exact.show(model, form=form, format=format))
+    assert not number_inside.search(shown)
+    assert max(len(digits) for digits in re.findall(r"\.0*([1-9]\d*)", shown)) == 15
+    assert error_of(shown, decimal, base, model) < 1e-13
