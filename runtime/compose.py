@@ -26,6 +26,7 @@ from runtime.core import estimation
 from runtime.core import identify as identification
 from runtime.core.arrays import kind_of, require_kind
 from runtime.core.automatic import automatic_cutoff
+from runtime.core.commands import model_of_records
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.essential import Essential
 from runtime.core.gone import gone
@@ -222,7 +223,7 @@ def state_problem(
             name: method if method.observe is None else replace(method, observe=observe)
             for name, method in METHODS.items()
         }
-    return Problem(
+    stated = Problem(
         model,
         list_records(records),
         list_records(unseen),
@@ -230,6 +231,7 @@ def state_problem(
         READERS[study.signals.reader].states,
         methods,
     )
+    return replace(stated, model=model_of_records(model, [*stated.records, *stated.unseen]))
 
 
 def problem(

@@ -346,6 +346,7 @@ def joint_units(model: GeneratedModel) -> tuple[str, ...]:
     acts on it, since a force depends on masses and first moments only. Units of user-defined
     columns are not used.
     """
+    model = getattr(model, "of_torques", model)  # of a CommandModel: UNITS in N m
     units, elements = getattr(model, "UNITS", {}), getattr(model, "ELEMENTS", {})
     result = []
     for row, joint in enumerate(model.JOINTS):
@@ -361,6 +362,12 @@ def joint_units(model: GeneratedModel) -> tuple[str, ...]:
         )
         result.append("m" if slides else "rad")
     return tuple(result)
+
+
+def joint_torque_units(model: GeneratedModel) -> tuple[str, ...]:
+    """Return the unit of each joint torque: N m, N, or A or V of a CommandModel."""
+    command = getattr(model, "TORQUE_UNIT", "")
+    return tuple(command or {"rad": "N m", "m": "N"}[unit] for unit in joint_units(model))
 
 
 def _check_names(model: GeneratedModel, label: str) -> None:

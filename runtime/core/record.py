@@ -52,6 +52,8 @@ class Origin:
     torque_constant : ndarray, shape (n,), N m/A or N m/V, or None
         Constants that converted currents or voltages to torques; None: torques were measured, or
         the constants are those of the robot file.
+    command : str
+        A or V, if the torque was recorded in this unit and stays in it; else "".
     joints : tuple of str
         Names of the joints in results; empty: the numbers of the joints, from 1.
     whole : str
@@ -67,6 +69,7 @@ class Origin:
     jitter: float = JITTER
     drives: Drives | None = None
     torque_constant: Array | None = None
+    command: str = ""
     joints: tuple[str, ...] = ()
     whole: str = ""
     simulated: bool = False

@@ -230,10 +230,12 @@ class Identification:
 
     @property
     def torque_unit(self) -> str:
-        """Unit of the torques: "N" if all joints are prismatic, else "N m".
+        """Unit of the torques: A or V of a CommandModel, "N" if all joints are prismatic, else "N m".
 
         The joints are judged by the units of the parameters.
         """
+        if command := getattr(self.model, "TORQUE_UNIT", ""):
+            return str(command)
         units = set(dict(getattr(self.model, "UNITS", {})).values())
         return "N" if "N" in units and "N*m" not in units else "N m"
 

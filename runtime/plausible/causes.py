@@ -24,7 +24,13 @@ from typing import Any
 import numpy as np
 
 from runtime.core.limits import LIMIT
-from runtime.core.model import GeneratedModel, drives_of, joint_labels, joint_units
+from runtime.core.model import (
+    GeneratedModel,
+    drives_of,
+    joint_labels,
+    joint_torque_units,
+    joint_units,
+)
 from runtime.plausible.samples import Samples
 
 Array = np.ndarray
@@ -179,6 +185,7 @@ class Robot:
         self.n = n = len(model.JOINTS)
         self.labels, self.units = joint_labels(model), joint_units(model)
         self.turning = np.array([unit == "rad" for unit in self.units])
+        self.torque_units = joint_torque_units(model)
         self.links = getattr(model, "LINKS", ())
         self.free = {} if variants is None else dict(variants.CONSTANTS)
         self.sides, self.samples, self.friction = sides, samples, friction
@@ -352,10 +359,10 @@ def orders(robot: Robot) -> Iterator[Item]:
 def torque_units(robot: Robot) -> Iterator[Item]:
     """Yield each unit in which all torques may have been recorded, with its value in N m.
 
-    Nothing is yielded if a joint is prismatic, or if the law of a controller gives the torques.
+    Nothing is yielded unless all torques are in N m, or if the law of a controller gives them.
     """
-    measured = robot.sides[1] != "law"
-    for unit, factor in TORQUE_UNITS.items() if measured and robot.turning.all() else ():
+    measured = robot.sides[1] != "law" and {*robot.torque_units} == {"N m"}
+    for unit, factor in TORQUE_UNITS.items() if measured else ():
         yield {"unit": unit, "factor": factor, "read": ("N*m", "Nm"), "chosen": robot.turning}
 
 
@@ -1054,7 +1061,7 @@ def size_of_torque(robot: Robot, j: int) -> float:
 def offset_words(robot: Robot, item: Item, xi: float) -> Item:
     """Write the fitted constant torque of a joint: xi times its root mean square torque."""
     j = item["j"]
-    return {"offset": f"{xi * size_of_torque(robot, j):.3g} {'N m' if robot.turning[j] else 'N'}"}
+    return {"offset": f"{xi * size_of_torque(robot, j):.3g} {robot.torque_units[j]}"}
 
 
 def angle_words(robot: Robot, item: Item, xi: float) -> Item:

@@ -20,7 +20,7 @@ from runtime.core.check import Answer, Question
 from runtime.core.errors import instant
 from runtime.core.limits import LIMIT
 from runtime.core.missing import held_samples
-from runtime.core.model import drives_of
+from runtime.core.model import drives_of, joint_torque_units
 from runtime.core.signals.filters import median_filtered
 from runtime.plausible.bodies import least_squares
 from runtime.plausible.case import Case
@@ -224,7 +224,7 @@ def cut_torques(case: Case) -> Answer | None:
     return Answer(
         "no" if clipped[j] else "good",
         f"{text}; fitted to the others, the model goes beyond it by {missing[j]:.2g} "
-        f"{'N m' if case.turning[j] else 'N'} on average, {beyond[j]:.1f} times the residual "
+        f"{joint_torque_units(case.model)[j]} on average, {beyond[j]:.1f} times the residual "
         "elsewhere",
     )
 

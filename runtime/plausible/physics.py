@@ -12,7 +12,7 @@ import numpy as np
 
 from runtime.core.check import Answer, Question, State
 from runtime.core.limits import LIMIT
-from runtime.core.model import elements_of
+from runtime.core.model import elements_of, joint_torque_units
 from runtime.plausible.case import Case
 from runtime.plausible.delay import Delay
 from runtime.plausible.trials import Trial, reach
@@ -110,9 +110,10 @@ def measured(case: Case) -> Answer | None:
 def size(case: Case) -> Answer | None:
     """Check whether the mass that explains the torques suits the reach of the robot.
 
-    None if either is unknown, or if a joint is prismatic.
+    None if either is unknown, or if a torque is not in N m.
     """
-    if case.alone is None or not case.alone.physical.links or not case.turning.all():
+    in_newton = {*joint_torque_units(case.model)} == {"N m"}
+    if case.alone is None or not case.alone.physical.links or not in_newton:
         return None
     length, physical = reach(case.model, case.samples.q), case.alone.physical
     if length > LIMIT.FARTHEST_REACH or length <= 0.1:

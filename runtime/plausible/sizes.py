@@ -13,6 +13,7 @@ import numpy as np
 
 from runtime.core.check import Answer, Question, State
 from runtime.core.limits import LIMIT
+from runtime.core.model import joint_torque_units
 from runtime.core.record import Record
 from runtime.physical.inertia import INERTIAL, PhysicalModel
 from runtime.physical.signs import frame_origins
@@ -179,10 +180,7 @@ def torques(case: Case) -> Answer:
     limits = np.where(limits > 0, limits, np.inf)  # a joint without a motor reaches none
     largest = np.abs(case.samples.tau).max(axis=0)
     if (out := largest > 1.5 * limits).any():
-        units = np.where(case.turning, "N m", "N").tolist()
-        text = (
-            f"{case.reaching(largest, units, out)}, {(largest / limits).max():.3g} times the limits"
-        )
+        text = f"{case.reaching(largest, joint_torque_units(case.model), out)}, {(largest / limits).max():.3g} times the limits"
         return Answer("no", text)
     share = 100 * float((largest / limits).max())
     if share < 1:

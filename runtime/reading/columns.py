@@ -190,6 +190,8 @@ class Conversion:
         Drives of the robot, with the coupling of the settings of the record.
     constant : ndarray, shape (n,), N m/A or N m/V, or None
         Torque constants, of commands that are currents or voltages.
+    command : str
+        A or V, if the commands stay in this unit; else "".
     turns : ndarray of bool, shape (n,)
         Which columns of positions are angles that jump back after a full turn.
     """
@@ -201,6 +203,7 @@ class Conversion:
     drives: Drives | None
     constant: Array | None = None
     turns: Array | None = None
+    command: str = ""
 
     def position(self, q: Array) -> Array:
         """Convert positions q of the file, shape (N, n), to joint positions, rad or m."""
@@ -262,9 +265,10 @@ def conversion(
             file=first.file,
         )
     units, constant = _torque_constant(settings, drives, n)
+    command = _command(settings, n) if settings.torque_constant == "none" else ""
     factors = units if constant is None else units * constant
     if "motor" not in settings.sides:
-        return Conversion(positions, scale * factors, None, None, drives, constant, turns)
+        return Conversion(positions, scale * factors, None, None, drives, constant, turns, command)
     assert drives is not None
     motors = replace(drives, torque_constant=factors, coupling=settings.coupling)
     side_of_positions, side_of_torques = settings.sides
@@ -277,6 +281,7 @@ def conversion(
         drives=drives.decoupled(settings.coupling),
         constant=constant,
         turns=turns,
+        command=command,
     )
 
 
@@ -344,6 +349,16 @@ def _position_units(settings: RecordSettings, n: int) -> tuple[Array, Array]:
     return factors, np.array([kind != "length" for kind, _ in units])
 
 
+def _command(settings: RecordSettings, n: int) -> str:
+    """Return the unit A or V of all torque columns; InputError if they have several units."""
+    units = {torque_unit(name)[0] for name in _units(settings.units.tau, n, "units.tau")}
+    if len(units) > 1 or settings.columns.tau_known:
+        raise InputError(
+            "record.torque_constant: none is for torque columns that are all currents or all voltages, without tau_known; set the constants (N*m/A), 1 for columns in N*m"
+        )
+    return {"current": "A", "voltage": "V"}[units.pop()]
+
+
 def _torque_constant(
     settings: RecordSettings, drives: Drives | None, n: int
 ) -> tuple[Array, Array | None]:
@@ -358,18 +373,21 @@ def _torque_constant(
     commands = [kind in COMMANDS for kind, _ in units]
     if not any(commands):
         return factors, None
-    if settings.torque_constant is not None:
+    unknown = "If the constants are unknown, set record.torque_constant: none; the values are then per A or V"
+    if settings.torque_constant == "none":
+        constant = np.ones(n)
+    elif settings.torque_constant is not None:
         constant = _per_joint(settings.torque_constant, n, "torque_constant")
     elif drives is not None and settings.sides[1] == "motor":
         if not drives.declared:
             raise InputError(
-                f"tau is in {', '.join(dict.fromkeys(names))} but the robot file has no drives.torque_constant (N*m/A); set this constant in the robot file or as record.torque_constant, from the data sheet of the motors. With 1 the torque unit is A, and values are per A"
+                f"tau is in {', '.join(dict.fromkeys(names))} but the robot file has no drives.torque_constant (N*m/A); set this constant in the robot file or as record.torque_constant, from the data sheet of the motors. {unknown}"
             )
         constant = drives.torque_constant
     else:
         by_drives = "for currents of the motors set record.torque_side: motor, to use the gears and torque constants of the robot file; else "
         raise InputError(
-            f"tau is in {', '.join(dict.fromkeys(names))} but there is no torque constant; {by_drives if drives is not None else ''}set record.torque_constant (N*m/A) of every joint, including the gear; 1 is no constant of a motor",
+            f"tau is in {', '.join(dict.fromkeys(names))} but there is no torque constant; {by_drives if drives is not None else ''}set record.torque_constant (N*m/A) of every joint, including the gear. {unknown}",
             remedy={"torque_side": "motor"} if drives is not None and drives.declared else None,
         )
     return factors, np.where(commands, constant, 1.0)

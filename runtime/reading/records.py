@@ -108,6 +108,7 @@ def _pieces(
         jitter=settings.jitter,
         drives=side.drives,
         torque_constant=side.constant,
+        command=side.command,
         joints=() if model is None else joint_labels(model),
         whole="" if len(stretches) == 1 else label.name,
         simulated=settings.simulated,

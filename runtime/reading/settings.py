@@ -237,9 +237,10 @@ class RecordSettings(Settings):
         Factors on the columns.
     counts_per_revolution : float or tuple of float or None
         Counts in one turn of the encoder, on the side of q; needed if the unit of q is counts.
-    torque_constant : float or tuple of float or None, N*m/A or N*m/V
+    torque_constant : float or tuple of float or "none" or None, N*m/A or N*m/V
         For tau in A, mA, V; default: that of the robot's drives. On the side of tau: of the motor,
-        or with the gear in it for the joint.
+        or with the gear in it for the joint. "none": the constants are unknown; the model is fitted
+        in A or V, and all values are in this unit.
     coupling : str
         Use the off-diagonal part of R for both, for position or torque alone, or for none.
     jitter : float, sampling periods
@@ -277,7 +278,7 @@ class RecordSettings(Settings):
     units: Units = field(default_factory=Units)
     scale: Scale = field(default_factory=Scale)
     counts_per_revolution: PerJoint[Real] | None = None
-    torque_constant: PerJoint[Real] | None = None
+    torque_constant: PerJoint[Real] | Literal["none"] | None = None
     coupling: Literal["both", "position", "torque", "none"] = "both"
     jitter: Annotated[Positive, Field(lt=0.5)] = 0.1
     dataset: Text | None = None

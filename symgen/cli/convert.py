@@ -96,10 +96,12 @@ def convert(
 
             robot = with_values(robot, values_of_csv(read_bytes(values), str(values)))
         if estimate is not None:
+            from runtime.core.commands import require_torques
             from runtime.documents.estimates import load_whole_estimate
 
-            standard = load_whole_estimate(estimate).details.get("standard")
-            robot = with_estimate(robot, standard, str(estimate))
+            fit = load_whole_estimate(estimate)
+            require_torques(fit)
+            robot = with_estimate(robot, fit.details.get("standard"), str(estimate))
         comments = [f"Converted from {robot.file}.", *([robot.angles] if exact else []), *read]
         text, written = write_robot(robot, output.name, comments=comments)
         write_all(output.parent, {output.name: text})

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from runtime.core.commands import require_torques
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.model import load_model
 from runtime.documents.estimates import load_whole_estimate
@@ -78,6 +79,7 @@ def apply(
     )
     require_same_frames(text, described, of)
     result = _estimate(estimate)
+    require_torques(result)
     _require_same_joints(result, described, of)
     physical = physical_model(load_model(emitted(described)))
     names, X, lost = _determined_names(result, physical, of)

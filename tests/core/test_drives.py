@@ -1,12 +1,15 @@
 """Drives: one matrix for both directions, power conserved, coupling left out on request."""
 
+import re
+
 import numpy as np
 import pytest
 
 import runtime
 import symgen
+from runtime.core.commands import require_torques
 from runtime.core.drives import Drives
-from runtime.core.errors import InputError
+from runtime.core.errors import InputError, SettingsError
 from runtime.study import study_from_mapping
 
 RATIO = np.array([[32.0, 0, 0], [0, -48, 0], [0, 32, 45]])
@@ -116,3 +119,57 @@ def test_currents_ask_for_a_torque_constant_that_is_declared(tmp_path):
         else:
             tau = runtime.read_record(record, model, folder=tmp_path).tau
             np.testing.assert_allclose(tau[:, 0], 100 * np.cos(t), rtol=1e-6)
+
+
+def in_amperes(folder, **record):
+    """Study of a pendulum with FV 2 A s/rad, recorded with a current."""
+    (folder / "one.yaml").write_text(
+        "symgen: 1\nname: one\ngravity: [g, 0, 0]\nconstants: {g: 9.81}\nframes:\n"
+        "  1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}\n"
+        "elements: {FV: {kind: viscous, along: all}}\nvalues: {ZZ1: 1, MX1: 5}\n"
+        "limits: {q: [[-3, 3]], qd: [10], tau: [0.1]}\n"
+    )
+    t = np.arange(4000) / 400
+    q = np.sin(3 * t) + 0.7 * np.sin(7 * t)
+    qd = 3 * np.cos(3 * t) + 4.9 * np.cos(7 * t)
+    qdd = -9 * np.sin(3 * t) - 34.3 * np.sin(7 * t)
+    tau = 0.3 * qdd + 0.1 * 9.81 * np.sin(q) + 2 * qd
+    tau += 0.01 * np.random.default_rng(1).standard_normal(tau.shape)
+    table = np.column_stack([t, q, tau])
+    np.savetxt(folder / "run.csv", table, delimiter=",", header="t,q1,tau1", comments="")
+    settings = {"files": "run.csv", "units": {"tau": "A"}, "torque_constant": "none", **record}
+    return study_from_mapping({"record": settings})
+
+
+@pytest.mark.parametrize(("given", "unit"), [("A", "A"), ("V", "V")])
+def test_a_fit_in_amperes_is_printed_in_amperes(tmp_path, given, unit):
+    """Values of the robot file and its limits are in N m, so nothing is compared with them."""
+    study = in_amperes(tmp_path, units={"tau": given})
+    model = symgen.model(tmp_path / "one.yaml")
+    record = runtime.read_record(study.record[0], model, folder=tmp_path)
+    result = runtime.identify(model, record, study)
+    assert result.estimate.units == {
+        "ZZ1": f"{unit}*s**2/rad",
+        "MX1": f"{unit}*s**2/m",
+        "MY1": f"{unit}*s**2/m",
+        "FV1": f"{unit}*s/rad",
+    }
+    assert result.estimate.X[-1] == pytest.approx(2, rel=1e-2)
+    text = str(result)
+    assert f"{unit}*s/rad" in text and "N*m" not in text and "N m" not in text and "kg" not in text
+    runtime.report(result, tmp_path / "out")
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert not re.search(r"\d N m\b|torque, N m|limits.tau at", page)
+    with pytest.raises(InputError, match=rf"the estimate is in {unit} .*record.torque_constant"):
+        require_torques(result.estimate)
+
+
+def test_records_in_amperes_go_with_records_in_amperes(tmp_path):
+    study = in_amperes(tmp_path)
+    model = symgen.model(tmp_path / "one.yaml")
+    amperes = runtime.read_record(study.record[0], model, folder=tmp_path)
+    torques = runtime.read_record(tmp_path / "run.csv", model)
+    with pytest.raises(InputError, match="some records are in A, others in N m"):
+        runtime.identify(model, [amperes, torques], study)
+    with pytest.raises(SettingsError, match=r"units.tau is N\*m"):
+        in_amperes(tmp_path, units={"tau": "N*m"})
