@@ -47,9 +47,12 @@ def certify(
     target = {t.file.format(robot.name): name for name, t in reversed(TARGETS.items())}
     with limited(f"the certificate of {robot.name}"):
         certificate = certify_formulas(regrouping)
-    files = generate_files(robot, regrouping=regrouping) if files is None else files
-    witness = Witness(regrouping, options=options)
-    texts = {file: text_check(file, text, target[file], witness) for file, text in files.items()}
+    with limited(f"the derivation of {robot.name}"):
+        files = generate_files(robot, regrouping=regrouping) if files is None else files
+        witness = Witness(regrouping, options=options)
+        texts = {
+            file: text_check(file, text, target[file], witness) for file, text in files.items()
+        }
     certificate = replace(certificate, texts=texts)
     unsaid = not certificate.valid and not certificate.failures
     if unsaid and nearly_round(robot, WITHIN):
@@ -71,9 +74,10 @@ def certified_files(
     CertificateError is raised, in one sentence, if the certificate does not hold.
     """
     regrouping = regroup(robot)
-    files = generate_files(
-        robot, targets=targets, command=command, regrouping=regrouping, options=options
-    )
+    with limited(f"the derivation of {robot.name}"):
+        files = generate_files(
+            robot, targets=targets, command=command, regrouping=regrouping, options=options
+        )
     return _certified(regrouping, files, options)
 
 

@@ -20,9 +20,12 @@ from fractions import Fraction
 from typing import Any, NamedTuple, Protocol
 
 from symgen.description.expression import Expression
+from symgen.time_limit import require_time
 
 SYM, CONST, ADD, MUL = "sym", "const", "add", "mul"
 COS, SIN, SIGN, POS, SQRT, INV = "cos", "sin", "sign", "pos", "sqrt", "inv"
+
+LOOKS = 256  # nodes made between two looks at the clock
 
 EVEN, ODD = {COS}, {SIN, SIGN, INV, "tanh"}
 
@@ -278,6 +281,8 @@ class Graph:
     ) -> Scalar:
         node = self._node.get(key)
         if node is None:
+            if not len(self.nodes) % LOOKS:
+                require_time()
             node = Node(len(self.nodes), op, operands, value, fixed)
             self._node[key] = node
             self.nodes.append(node)
