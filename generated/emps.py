@@ -51,7 +51,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: f1c23f1d430c0530534b1c0e111c7de2e126ece3748c956e579e88c830a18839
+sha256 of all but these lines: 15a0f1d957513a70f4283bd4be31c7ae10389c3c93a1a78375f857a5806fcf01
 """
 
 import numpy as np
@@ -109,8 +109,9 @@ def _real(x, name):
         array = np.asarray(x)
     except Exception as error:
         raise ValueError(f"{name}: {type(x).__name__} with rows of several lengths") from error
-    if array.dtype.kind not in "iuf" or np.ma.is_masked(x):
-        kind = "a masked array" if np.ma.is_masked(x) else f"{type(x).__name__} of {array.dtype}"
+    masked = array is not x and np.ma.is_masked(x)
+    if array.dtype.kind not in "iuf" or masked:
+        kind = "a masked array" if masked else f"{type(x).__name__} of {array.dtype}"
         raise ValueError(f"{name}: {kind}; expected real numbers")
     return array.astype(float, copy=False)
 

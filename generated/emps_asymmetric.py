@@ -52,7 +52,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: ff1f278737d3340fb1fdacefcaf1a5ac1776ae2253e48a4fad2d2d4bf3af525e
+sha256 of all but these lines: 24349d5c473eaf51b5ec2a3c28c94afc4242474af569597403a8c3397b806cdc
 """
 
 import numpy as np
@@ -109,8 +109,9 @@ def _real(x, name):
         array = np.asarray(x)
     except Exception as error:
         raise ValueError(f"{name}: {type(x).__name__} with rows of several lengths") from error
-    if array.dtype.kind not in "iuf" or np.ma.is_masked(x):
-        kind = "a masked array" if np.ma.is_masked(x) else f"{type(x).__name__} of {array.dtype}"
+    masked = array is not x and np.ma.is_masked(x)
+    if array.dtype.kind not in "iuf" or masked:
+        kind = "a masked array" if masked else f"{type(x).__name__} of {array.dtype}"
         raise ValueError(f"{name}: {kind}; expected real numbers")
     return array.astype(float, copy=False)
 

@@ -76,7 +76,7 @@ with probability below 8e-15; base_parameters, regressor, observation_matrix, in
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints, elements
 at random states, parameters and random constants agree with Lagrange's equations and products of
 frames to 1e-09, on NumPy's arrays.
-sha256 of all but these lines: 39e0e8193bae9ab493a1aaeadd2187a0f8317a6b44f8fb14e03e9892c86c01c6
+sha256 of all but these lines: c70f14d76c6a23302e8d23a63ea9d8e9d5940864333be250afb001b21335c446
 """
 
 import numpy as np
@@ -153,8 +153,9 @@ def _real(x, name):
         array = np.asarray(x)
     except Exception as error:
         raise ValueError(f"{name}: {type(x).__name__} with rows of several lengths") from error
-    if array.dtype.kind not in "iuf" or np.ma.is_masked(x):
-        kind = "a masked array" if np.ma.is_masked(x) else f"{type(x).__name__} of {array.dtype}"
+    masked = array is not x and np.ma.is_masked(x)
+    if array.dtype.kind not in "iuf" or masked:
+        kind = "a masked array" if masked else f"{type(x).__name__} of {array.dtype}"
         raise ValueError(f"{name}: {kind}; expected real numbers")
     return array.astype(float, copy=False)
 

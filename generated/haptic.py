@@ -89,7 +89,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: a7d9458a26d6c7908f64de25a467aafd2a9738d28d784ed94e541ad6d32e159b
+sha256 of all but these lines: 70e28dcb0291a73d7d570b89c4e8613ef2c6b431fcc08cbaf04543aae694a9ee
 """
 
 import numpy as np
@@ -179,8 +179,9 @@ def _real(x, name):
         array = np.asarray(x)
     except Exception as error:
         raise ValueError(f"{name}: {type(x).__name__} with rows of several lengths") from error
-    if array.dtype.kind not in "iuf" or np.ma.is_masked(x):
-        kind = "a masked array" if np.ma.is_masked(x) else f"{type(x).__name__} of {array.dtype}"
+    masked = array is not x and np.ma.is_masked(x)
+    if array.dtype.kind not in "iuf" or masked:
+        kind = "a masked array" if masked else f"{type(x).__name__} of {array.dtype}"
         raise ValueError(f"{name}: {kind}; expected real numbers")
     return array.astype(float, copy=False)
 

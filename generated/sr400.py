@@ -88,7 +88,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: a450fc8c65ecd9c2f64a3af166eacc8e5dbf5bdeec83158009ad5313c7782c02
+sha256 of all but these lines: df79a2b39b34cc6b761fef09e63a334abb59cdbd83aabcd55e9c6fddf93cb530
 """
 
 import numpy as np
@@ -190,8 +190,9 @@ def _real(x, name):
         array = np.asarray(x)
     except Exception as error:
         raise ValueError(f"{name}: {type(x).__name__} with rows of several lengths") from error
-    if array.dtype.kind not in "iuf" or np.ma.is_masked(x):
-        kind = "a masked array" if np.ma.is_masked(x) else f"{type(x).__name__} of {array.dtype}"
+    masked = array is not x and np.ma.is_masked(x)
+    if array.dtype.kind not in "iuf" or masked:
+        kind = "a masked array" if masked else f"{type(x).__name__} of {array.dtype}"
         raise ValueError(f"{name}: {kind}; expected real numbers")
     return array.astype(float, copy=False)
 

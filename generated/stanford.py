@@ -78,7 +78,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: b2dd65d37f621720d4dc16c0d14c2774651c3c2f15c67c10609da83b15325f0a
+sha256 of all but these lines: cc90397ea2645d70bde2453676f33c682400e4c342828c95a1b41ef7dc71fcfa
 """
 
 import numpy as np
@@ -168,8 +168,9 @@ def _real(x, name):
         array = np.asarray(x)
     except Exception as error:
         raise ValueError(f"{name}: {type(x).__name__} with rows of several lengths") from error
-    if array.dtype.kind not in "iuf" or np.ma.is_masked(x):
-        kind = "a masked array" if np.ma.is_masked(x) else f"{type(x).__name__} of {array.dtype}"
+    masked = array is not x and np.ma.is_masked(x)
+    if array.dtype.kind not in "iuf" or masked:
+        kind = "a masked array" if masked else f"{type(x).__name__} of {array.dtype}"
         raise ValueError(f"{name}: {kind}; expected real numbers")
     return array.astype(float, copy=False)
 

@@ -82,7 +82,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 201544cc856fb7869f3b252add364be3183d1f00f28c4958abedcbbdc628971a
+sha256 of all but these lines: c393d657d3a4274658c065d915ccf21b555c047bd79aa596d9f92edff6e9371a
 """
 
 import numpy as np
@@ -173,8 +173,9 @@ def _real(x, name):
         array = np.asarray(x)
     except Exception as error:
         raise ValueError(f"{name}: {type(x).__name__} with rows of several lengths") from error
-    if array.dtype.kind not in "iuf" or np.ma.is_masked(x):
-        kind = "a masked array" if np.ma.is_masked(x) else f"{type(x).__name__} of {array.dtype}"
+    masked = array is not x and np.ma.is_masked(x)
+    if array.dtype.kind not in "iuf" or masked:
+        kind = "a masked array" if masked else f"{type(x).__name__} of {array.dtype}"
         raise ValueError(f"{name}: {kind}; expected real numbers")
     return array.astype(float, copy=False)
 

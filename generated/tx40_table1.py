@@ -80,7 +80,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 3ec3c88f2ad9e34ac0077625dadba758be250f9867b503eb2840f9730e9ade6a
+sha256 of all but these lines: 348a26802c1d55ba876827c8f07db265020820f736f09d59fccfb9029cdd21ef
 """
 
 import numpy as np
@@ -171,8 +171,9 @@ def _real(x, name):
         array = np.asarray(x)
     except Exception as error:
         raise ValueError(f"{name}: {type(x).__name__} with rows of several lengths") from error
-    if array.dtype.kind not in "iuf" or np.ma.is_masked(x):
-        kind = "a masked array" if np.ma.is_masked(x) else f"{type(x).__name__} of {array.dtype}"
+    masked = array is not x and np.ma.is_masked(x)
+    if array.dtype.kind not in "iuf" or masked:
+        kind = "a masked array" if masked else f"{type(x).__name__} of {array.dtype}"
         raise ValueError(f"{name}: {kind}; expected real numbers")
     return array.astype(float, copy=False)
 

@@ -477,9 +477,9 @@ def numeric_rank(W: Array, *, tolerance: float = 1e-9, proved: int = 0) -> tuple
     singular value exceeds the next by a factor of SEEN.
     """
     norms = np.linalg.norm(W, axis=0)
-    acts = (
-        norms > 1e-12 * np.median(norms[norms > 0]) if norms.any() else norms > 0
-    )  # below: rounding of a column without effect
+    acts = norms > 0
+    if acts.any():  # below: rounding of a column without effect
+        acts = norms > 1e-12 * np.sort(norms[acts])[acts.sum() // 2]
     s = np.linalg.svd(W[:, acts] / norms[acts], compute_uv=False)
     rank = int(np.sum(s > tolerance * s[0]))
     if rank < proved < s.size and s[proved - 1] > SEEN * s[proved]:

@@ -130,6 +130,7 @@ def symgen(
 def main() -> None:
     """Run the `symgen` command line."""
     gc.set_threshold(ALLOCATIONS, 50, 100)
+    os.environ["PYDANTIC_DISABLE_PLUGINS"] = "1"  # reads the metadata of every package
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # cleans up as Ctrl-C does
     _open_streams()
     try:

@@ -338,7 +338,7 @@ class Draw:
         lead = row[0][1]
         inverse = power(self.residues(self.constant(lead)), self.p - 2, self.p)
         key = tuple(
-            (i, tuple(np.unique(self.residues(self.constant(g)) * inverse % self.p)))
+            (i, tuple(sorted({*(self.residues(self.constant(g)) * inverse % self.p).tolist()})))
             for i, g in row
         )
         b = self._fp(self._state(("direction", key)))

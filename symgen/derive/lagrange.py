@@ -626,4 +626,4 @@ def in_one_mode(robot: Robot) -> Robot:
             robot, loops=tuple(replace(loop, start=dict(closure.start)) for loop in robot.loops)
         )
     declared = {j: closure.formula(j) for j in robot.passive}
-    return replace(robot, constraints=declared)
+    return replace(robot, constraints=declared) if declared else robot

@@ -31,7 +31,7 @@ from symgen.description.grammar import parse
 from symgen.errors import DescriptionError, ExpressionError, SymgenError
 
 Path = tuple[str | int, ...]  # keys that lead to a field of a robot file
-CONFIG = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
+CONFIG = ConfigDict(extra="forbid", arbitrary_types_allowed=True, defer_build=True)
 
 
 def dotted(path: Path) -> str:

@@ -139,7 +139,10 @@ def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
 
 
 def _warn(regrouping: Regrouping) -> None:
-    """Warn of each link whose inertia no rigid body can have, and name its base parameters."""
+    """Warn of each link whose inertia no rigid body can have, and name its base parameters.
+
+    The warning names this line, wherever `regroup` was called: Python shows a warning once per line.
+    """
     for j, wrong in regrouping.robot.impossible:
         moments = {parameter(p, j) for p in INERTIAL[:6]}
         names = [b.name for b in regrouping.base if moments & b.combination.keys()]
@@ -147,7 +150,7 @@ def _warn(regrouping: Regrouping) -> None:
             f"{wrong}; this inertia enters {', '.join(names) or 'no base parameter'}. Give the "
             "moments about the centre of mass in kg m^2, from CAD or of a box, or identify the moments",
             InertiaWarning,
-            stacklevel=3,
+            stacklevel=1,
         )
 
 

@@ -64,10 +64,8 @@ def states_for(robot: Robot, names: Sequence[str], spare: int = 4) -> int:
     """
     acting = _acting(robot)
     acts = np.stack([acting[name] for name in names])
-    sets = np.unique(
-        np.vstack([acts[acts.any(axis=1)], np.ones((1, len(robot.joints)), dtype=bool)]), axis=0
-    )
-    needed = max(np.count_nonzero((acts <= S).all(axis=1)) / np.count_nonzero(S) for S in sets)
+    sets = {tuple(row) for row in acts.tolist() if any(row)} | {(True,) * len(robot.joints)}
+    needed = max(np.count_nonzero((acts <= S).all(axis=1)) / sum(S) for S in sets)
     return int(np.ceil(needed + (6 + spare) / len(robot.joints))) + spare
 
 

@@ -1,5 +1,7 @@
 """Inertias that no body can have: the note names the base parameters that they enter."""
 
+import warnings
+
 import pytest
 
 from symgen.description.angles import InertiaWarning
@@ -40,6 +42,15 @@ def test_the_note_names_the_base_parameters(link, parameters):
     (note,) = notes
     assert str(note.message).startswith(f"link '{link}' (line ")
     assert f"; this inertia enters {parameters}. " in str(note.message)
+
+
+def test_the_note_comes_once():
+    robot, _ = read_tree(arm("upper"), "arm.urdf")
+    with warnings.catch_warnings(record=True) as notes:
+        warnings.simplefilter("default")
+        regroup(robot)
+        regroup(robot)
+    assert [note.category for note in notes] == [InertiaWarning]
 
 
 def test_a_robot_of_bodies_that_exist_has_no_note(recwarn):
