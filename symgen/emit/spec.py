@@ -11,8 +11,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
-from symgen.derive.derivation import Derivation, derive
+from symgen.derive.derivation import Derivation, derive, derived
 from symgen.derive.graph import ADD, COS, MUL, SIN, SYM, Node, Scalar, Symbol, reachable
+from symgen.derive.loops import close
 from symgen.derive.model import Entry, Model, Place, Request, Values, labels, rewriting
 from symgen.derive.models import MODELS
 from symgen.derive.regressor import element_names, inertial_names
@@ -248,9 +249,12 @@ def function(
     """Make the data of one function of the emitted code, such as the regressor.
 
     Only base parameters named after a standard parameter for which `only` is true take part.
-    `graph` is an expression graph that several models share; it needs all parameters.
+    `graph` is an expression graph that several models share; it needs all parameters. A model on
+    request adds nodes to its derivation, so it has one of its own: its operations do not depend on
+    what was asked before.
     """
-    d, model, request = derive(regrouping.robot), MODELS[name], _request(regrouping, only)
+    robot, model, request = regrouping.robot, MODELS[name], _request(regrouping, only)
+    d = derived(robot, close) if model.option else derive(robot)
     shape = shape_of(model, d, tuple(request.parameters.values()))
     return Function(model, model.values(d, request, graph), shape)
 

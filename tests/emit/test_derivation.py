@@ -17,11 +17,11 @@ from symgen.cli.main import app
 from symgen.derive.derivation import derive
 from symgen.derive.loop_equations import loop_system
 from symgen.derive.loops import close
-from symgen.derive.models import MODELS
+from symgen.derive.models import MODELS, ON_REQUEST
 from symgen.derive.newton_euler import Motion
 from symgen.description import Robot, load_robot, packaged_robots
 from symgen.emit.generate import generate_files
-from symgen.emit.spec import module_spec, spec_of
+from symgen.emit.spec import function, module_spec, spec_of
 from symgen.pages.page import robot_page
 from symgen.regroup.regrouping import _regrouped, regroup
 from symgen.regroup.residues import _acting
@@ -120,13 +120,25 @@ def test_later_models_change_no_emitted_byte() -> None:
         ]
 
 
-@pytest.mark.parametrize("function", ["inverse_dynamics", "inertia_matrix", "bias", "gravity"])
-def test_parameters_of_another_length_are_refused(function: str) -> None:
+def test_a_function_on_request_does_not_depend_on_what_was_asked_before() -> None:
+    regrouping, alone = regroup(load_robot("tx40")), {}
+    for name in ON_REQUEST:
+        derive.cache_clear()
+        alone[name] = function(regrouping, name).nodes
+    derive.cache_clear()
+    symgen.symbolic("tx40").model("jacobian").listing  # noqa: B018
+    for name in reversed(ON_REQUEST):
+        after = function(regrouping, name).nodes
+        assert [(n.op, n.name) for n in after] == [(n.op, n.name) for n in alone[name]], name
+
+
+@pytest.mark.parametrize("of", ["inverse_dynamics", "inertia_matrix", "bias", "gravity"])
+def test_parameters_of_another_length_are_refused(of: str) -> None:
     module = symgen.model("tx40")
     q = np.zeros((3, 6))
-    arguments = [q] * (len(MODELS[function].arguments) - 1)
+    arguments = [q] * (len(MODELS[of].arguments) - 1)
     with pytest.raises(ValueError, match=r"X of shape \(86,\); expected \(60,\)"):
-        getattr(module, function)(*arguments, np.ones(86))
+        getattr(module, of)(*arguments, np.ones(86))
 
 
 def test_torques_that_only_broadcast_are_refused() -> None:
