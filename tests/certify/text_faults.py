@@ -47,6 +47,7 @@ SAME = (  # changed lines that change no value, and why
     ),
     (r"N = len\(states\[[12]\]\)", "states are of one shape, which `_states` checks before"),
     (r"ready = -True", "what is not zero is true"),
+    (r"masked = -array", "a plain array is asked for a mask too, and has none"),
     (
         r"range\(0, N, \d+\)|     if N <= |every = int|part = slice\(t, t \+ \d+\)",
         "samples at a time",
