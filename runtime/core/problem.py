@@ -125,7 +125,7 @@ class Problem:
     def provenance(self) -> dict[str, Any]:
         """Names and time stamps of the records, and data from the preparation steps, for JSON."""
         automatic = " ".join(note.text for note in self.notes if note.kind == SIGNALS)
-        entries = {**origin(self.records), **({"lowpass": automatic} if automatic else {})}
+        entries = {**origin(self.records), **({SIGNALS: automatic} if automatic else {})}
         for note in self.notes:
             entries |= note.data
         return entries

@@ -29,7 +29,7 @@ from runtime.core.parameter_sets import (
     whole_set,
 )
 from runtime.core.part import Part, printed
-from runtime.core.problem import Problem
+from runtime.core.problem import SIGNALS, Problem
 from runtime.core.provenance import record_names
 from runtime.core.record import UNNAMED, Record
 from runtime.core.rows.observation import Observation
@@ -246,7 +246,7 @@ class Identification:
         return record_errors(self.observation, self.model_estimate, names) if len(names) > 1 else ()
 
     @cached_property
-    def time_stamps(self) -> tuple[str, ...]:
+    def remarks(self) -> tuple[str, ...]:
         """Sentences on the records: time stamps, subtracted torques, low-pass filter, findings.
 
         Findings are sentences of the readers and the steps.
@@ -260,7 +260,7 @@ class Identification:
         return (
             *(f"Time stamps of {name}: {text}." for name, text in texts),
             *known,
-            *filter(None, [self.estimate.provenance.get("lowpass")]),
+            *filter(None, [self.estimate.provenance.get(SIGNALS)]),
             *self.observation.findings,
         )
 
@@ -466,7 +466,7 @@ class Identification:
         tables: tuple[Any, ...] = (fit, self.essential, *self.validation)
         parts = [
             *(table.to_table() for table in tables),
-            "\n".join([*records, *self.time_stamps]),
+            "\n".join([*records, *self.remarks]),
             "\n".join(trade),
             "\n".join([head, *weak]),
             self.ranking,

@@ -84,9 +84,8 @@ class ExcitationSettings(Settings):
         Seed of the random starts.
     """
 
-    parts: Annotated[Many[AnyFamily], Field(min_length=1)] = (
-        Fourier(),
-        PointToPoint(points=7, travel=1.0, blend=0.25),
+    parts: Annotated[Many[AnyFamily], Field(min_length=1)] = field(
+        default_factory=lambda: (Fourier(), PointToPoint(points=7, travel=1.0, blend=0.25))
     )
     poses: Annotated[Whole, Field(ge=1, le=10_000)] | None = None
     criterion: Literal["auto", "record", "cond", "logdet", "sigma"] = "auto"

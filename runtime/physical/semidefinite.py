@@ -250,10 +250,13 @@ class Program:
     def solve(self) -> Optimum:
         """Solve the program with the tightest tolerances that Clarabel reaches (TOLERANCES)."""
         cones, A, b = zip(*self.constraints, strict=True)
-        count, status = len(self.linear), ""
+        status = ""
         Q = np.diag(self.diagonal)
         Q[: self.m, : self.m] += self.squares
-        whole = np.vstack([np.pad(part, ((0, 0), (0, count - part.shape[1]))) for part in A])
+        ends = np.cumsum([len(part) for part in b])
+        whole = np.zeros((ends[-1], len(self.linear)))
+        for rows, part in zip(np.split(whole, ends), A, strict=False):
+            rows[:, : part.shape[1]] = part
         for gap, feasible in TOLERANCES:
             settings = _clarabel().DefaultSettings()
             settings.verbose = False
@@ -274,7 +277,7 @@ class Program:
             status = STATUS.get(str(solution.status), f"Clarabel: {solution.status}")
             if status in SOLVED:
                 x, z = np.array(solution.x), np.array(solution.z)
-                multipliers = np.split(z, np.cumsum([len(part) for part in b]))
+                multipliers = np.split(z, ends)
                 duals = {
                     c.name: trace(of_c)
                     for c, of_c in zip(self.conditions, multipliers, strict=False)

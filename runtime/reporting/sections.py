@@ -29,7 +29,7 @@ def detail_sections(result: Identification) -> list[Section]:
         trail_section(result),
         validation_section(result),
         joint_section(result),
-        *([record_section(result)] if result.record_errors or result.time_stamps else []),
+        *([record_section(result)] if result.record_errors or result.remarks else []),
         *([motion_section(result)] if result.motion_table().rows else []),
         residual_section(result, result.torque_unit),
         correlation_section(result),
@@ -173,7 +173,7 @@ def record_section(result: Identification) -> Section:
         for one in result.record_errors
     ]
     tables = [Table("Relative error by record and joint, %", header, rows)] if rows else []
-    return Section("Records", result.time_stamps, tables=tables)
+    return Section("Records", result.remarks, tables=tables)
 
 
 def motion_section(result: Identification) -> Section:

@@ -35,7 +35,8 @@ def compare(
         import runtime
         from runtime.core.documents import json_text
 
-        model = session.model_of(robot, trust=trust, exact=exact)
+        described = session.robot_of(robot, exact=exact)
+        model = session.model_of(described, trust=trust)
         short = len({Path(one).stem for one in study}) == len(study)
         candidates = {
             Path(one).stem if short else one: session.study_of_arguments([one]) for one in study
@@ -44,7 +45,7 @@ def compare(
         ranking = runtime.compare(
             model,
             candidates if len(candidates) > 1 else alone,
-            variants=session.variants_of(robot, exact=exact),
+            variants=session.variants_of(described),
         )
         if results is not None:
             runtime.report(ranking, results)

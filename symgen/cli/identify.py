@@ -64,8 +64,9 @@ def identify(
         from runtime.core.provenance import processor
         from runtime.reading.records import read_records
 
-        model = session.model_of(robot, trust=trust, exact=exact, records=record)
+        described = session.robot_of(robot, exact=exact)
         study = session.study_of_arguments(record)
+        model = session.model_of(described, trust=trust, study=study)
         study = study if suggest is None else session.suggested_study(study, model, suggest)
         records = read_records(study.record, model, missing=study.signals.admits_missing)
         result = runtime.identify(
@@ -74,7 +75,7 @@ def identify(
             study,
             physical=physical,
             friction=friction,
-            variants=session.variants_of(robot, exact=exact) if plausible else None,
+            variants=session.variants_of(described) if plausible else None,
             plausible=plausible,
             provenance={"processor": processor()},
         )
@@ -83,7 +84,7 @@ def identify(
         if json:
             text = result.to_json()
         else:
-            said = session.assumptions_of(robot, records, study, exact=exact)
+            said = session.assumptions_of(described, records, study)
             found = result.to_text() if verbose else result.brief(len(said))
             text = "\n".join([found, *(f"assume: {line}" for line in said)])
         session.show(text, results, json=json, verdict=result.checklist)

@@ -38,8 +38,9 @@ def report(
         from runtime.core.documents import json_text
         from runtime.reading.records import read_records
 
-        model = session.model_of(robot, trust=trust, exact=exact, records=record)
+        described = session.robot_of(robot, exact=exact)
         study = session.changed(session.study_of_arguments(record), cestac={"side": side})
+        model = session.model_of(described, trust=trust, study=study)
         asked = session.changed(study, cestac={"delta": encoder}).cestac.delta
         records = read_records(study.record, model, missing=study.signals.admits_missing)
         result = assess(
@@ -47,7 +48,7 @@ def report(
             records,
             study,
             encoder=asked if encoder else (),
-            variants=session.variants_of(robot, exact=exact),
+            variants=session.variants_of(described),
             progress=session.say,
         )
         runtime.report(result, results)

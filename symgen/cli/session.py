@@ -77,7 +77,7 @@ def _noted_angles() -> Iterator[None]:
 
     with warnings.catch_warnings():
         show = warnings.showwarning
-        told: set[str] = set()  # a verb may read its robot twice
+        told: set[str] = set()  # a verb may regroup its robot twice
 
         def note(message: Warning | str, category: type[Warning], *place: Any) -> None:
             if not issubclass(category, RobotFileWarning):
@@ -163,33 +163,37 @@ def end(*, good: bool) -> None:
         raise typer.Exit(NEGATIVE)
 
 
+def robot_of(source: str, *, exact: bool = False) -> Robot | Path:
+    """Load the argument ROBOT of a command: a robot, or the path of a generated module.
+
+    exact : as for `load_robot`.
+    """
+    from runtime.reading.formats import is_measured
+
+    path = Path(source)
+    if path.suffix == ".py":
+        return path
+    if path.is_file() and is_measured(path):
+        fail(f"{source} is a measured file; the robot comes first, then the record")
+    return described_robot(source, exact=exact)
+
+
 def model_of(
-    robot: str,
-    *,
-    trust: bool = False,
-    exact: bool = False,
-    records: Sequence[str] = (),
+    robot: Robot | Path, *, trust: bool = False, study: Study | None = None
 ) -> GeneratedModel:
-    """Load the model for the argument ROBOT of a command: a name, a robot file or a module.
+    """Load the model of a robot (see `robot_of`), or a generated module.
 
     trust : whether to run a module that was not emitted on this machine.
-    exact : as for `load_robot`.
-    records : RECORD arguments; if they name wrenches, the model has the columns of force sensors.
+    study : if its records name wrenches, the model has the columns of force sensors.
     """
     import symgen
     from runtime.core.model import load_model
-    from runtime.reading.formats import is_measured
 
-    path = Path(robot)
-    if path.suffix != ".py" and path.is_file() and is_measured(path):
-        fail(f"{robot} is a measured file; the robot comes first, then the record")
-    if path.suffix == ".py":
-        model = load_model(path, trust=trust)
-    else:
-        named = study_of_arguments(records, recorded=False).record if records else ()
-        options = ("base_wrench_regressor",) * any(one.columns.wrench for one in named)
-        model = load_model(symgen.model(described_robot(robot, exact=exact), options=options))
-    return model
+    if isinstance(robot, Path):
+        return load_model(robot, trust=trust)
+    records = () if study is None else study.record
+    options = ("base_wrench_regressor",) * any(record.columns.wrench for record in records)
+    return load_model(symgen.model(robot, options=options))
 
 
 def described_robot(source: str, at_values: bool = False, exact: bool = False) -> Robot:
@@ -207,41 +211,34 @@ def described_robot(source: str, at_values: bool = False, exact: bool = False) -
     return with_values(robot) if at_values else robot
 
 
-def variants_of(robot: str, *, exact: bool = False) -> GeneratedModel | None:
-    """Load the model for the argument ROBOT as a module in which the frame table can be changed.
+def variants_of(robot: Robot | Path) -> GeneratedModel | None:
+    """Load the model of a robot as a module in which the frame table can be changed.
 
     None for a generated module, which has no robot file.
     """
     import symgen
     from runtime.core.model import load_model
 
-    return (
-        None
-        if Path(robot).suffix == ".py"
-        else load_model(symgen.variants(symgen.load_robot(robot, exact=exact)))
-    )
+    return None if isinstance(robot, Path) else load_model(symgen.variants(robot))
 
 
-def assumptions_of(robot: str, records: Any, study: Study, *, exact: bool = False) -> list[str]:
+def assumptions_of(robot: Robot | Path, records: Any, study: Study) -> list[str]:
     """Write a sentence on each parameter that the robot file assumes to be zero.
 
     It says whether the records contradict the assumption.
     """
-    from dataclasses import replace
-
+    if isinstance(robot, Path) or not robot.assume:
+        return []
     import runtime
     import symgen
     from runtime.assumptions import assumptions_asked
     from runtime.core.model import load_model
 
-    described = None if Path(robot).suffix == ".py" else symgen.load_robot(robot, exact=exact)
-    if described is None or not described.assume:
-        return []
-    free = load_model(symgen.model(replace(described, assume=frozenset())))
+    free = load_model(symgen.model(replace(robot, assume=frozenset())))
     fit = runtime.estimate(free, records, study)
     if fit.status != "ok":
         return ["the record does not determine the model without the assumptions"]
-    return [a.text for a in assumptions_asked(free, fit, sorted(described.assume))]
+    return [a.text for a in assumptions_asked(free, fit, sorted(robot.assume))]
 
 
 def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Study:

@@ -40,7 +40,7 @@ def simulate(
         import runtime
         from runtime.core.documents import json_text
 
-        model = session.model_of(robot, trust=trust, exact=exact)
+        model = session.model_of(session.robot_of(robot, exact=exact), trust=trust)
         settings = session.study_of_arguments([study], recorded=False)
         if settings.controller is None:
             session.fail(

@@ -80,7 +80,7 @@ def test_results_say_what_auto_became(records):
     result = runtime.identify(model, records)
     hertz = result.study.signals.lowpass.cutoff
     assert result.estimate.settings["signals"]["lowpass"]["cutoff"] == hertz
-    assert result.estimate.provenance["lowpass"] in result.time_stamps
+    assert result.estimate.provenance["signals"] in result.remarks
     measured = runtime.observe(model, records)
     assert measured.settings["signals"]["lowpass"]["cutoff"] == hertz
     study = runtime.Study(cestac={"delta": [1e-4], "runs": 2})

@@ -135,7 +135,7 @@ def test_a_record_is_filtered_once_for_all_checks(model, monkeypatch):
     study = replace(STUDY, signals=Signals(median=1, lowpass=lowpass))
     result = assess(model, measured(model, 0), study)
     assert all(result.part(name) for name in ("plausibility", "friction", "advice"))
-    assert result.part("resolution") is not None and str(result) and result.time_stamps is not None
+    assert result.part("resolution") is not None and str(result) and result.remarks is not None
     assert passes.count((1, lowpass)) == 1, passes
 
 
@@ -320,7 +320,7 @@ def test_a_number_in_the_name_of_a_record_is_kept(model):
     for piece in ("gap (1 of 2)", "gap (2 of 2)"):
         stamps.append(replace(first, name=piece, origin=Origin(time="regular", whole="gap")))
     result = runtime.identify(model, stamps)
-    assert [text.split(":")[0] for text in result.time_stamps] == [
+    assert [text.split(":")[0] for text in result.remarks] == [
         "Time stamps of run (1 of 2)",
         "Time stamps of gap",
         "Low-pass at 11 Hz (cutoff",

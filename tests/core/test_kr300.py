@@ -182,7 +182,7 @@ def test_one_call_finds_the_best_treatment(robot):
         and best.prediction_error < 4
         and best.ranking.startswith("Predicts B best: feasible (58)")
     )
-    assert "known torques subtracted: up to" in "".join(best.time_stamps)
+    assert "known torques subtracted: up to" in "".join(best.remarks)
     agreement = best.part("homogeneity")
     assert not agreement.agree and agreement.disagreements[0].record == "B"
     with pytest.raises(InputError, match="no validation record"):

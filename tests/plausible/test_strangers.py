@@ -488,7 +488,7 @@ def test_a_cut_off_that_is_given_is_left_alone() -> None:
     given = runtime.Study(signals={"lowpass": {"cutoff": 20}})
     record = runtime.Record(*motion(model, 10.0), name="run")
     result = runtime.identify(model, record, given, plausible=True)
-    assert "lowpass" not in result.estimate.provenance
+    assert "signals" not in result.estimate.provenance
 
 
 def test_a_yes_is_followed_by_what_to_do_with_the_values() -> None:
