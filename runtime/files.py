@@ -185,7 +185,7 @@ def _(result: Excitation, folder: Path, study: Study) -> Files:
 
 @files_of.register
 def _(result: StaticPoses, folder: Path, study: Study) -> Files:
-    """Make a table of static poses whose column t numbers the poses, and their page.
+    """Make a table of static poses (column t has the number of the pose), and the page on these poses.
 
     With columns of measured torques added, the table is a record.
     """

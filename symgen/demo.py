@@ -336,7 +336,7 @@ def sections(demo: Demonstration) -> list[Section]:
 
 
 def differences(demo: Demonstration) -> dict[str, float]:
-    """Compute, in per cent, how far our essential parameters differ from Table 2 of the chapter."""
+    """Compute, in per cent, how far the essential parameters differ from Table 2 of the chapter."""
     fit = demo.result.essential.estimate
     return {n: percent(fit[n], value) for n, value in TABLE_2.items() if n in fit.names}
 

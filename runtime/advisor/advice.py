@@ -197,7 +197,7 @@ class Advice(Result, Part):
     title = "Resolution advice"
 
     def text(self) -> str:
-        """Write the verdict, parameter changes at the requested encoder steps, and assumptions."""
+        """Write the verdict, the change of each parameter at the requested encoder steps, and assumptions."""
         return "\n".join([self.verdict, *self.asked_lines(), *self.assumptions])
 
     def figures(self) -> tuple[Figure, ...]:

@@ -1,4 +1,4 @@
-"""Predict how coarse a real encoder may be if it is read as positions, and if it is read as counts.
+"""Predict the coarsest encoder that an identification allows, from filtered positions and from counts.
 
 The change of the estimate is computed along steps of law phase, for both readers
 (`runtime.advisor.coarse_encoders`). White noise does not describe a sawtooth that is locked to the

@@ -47,7 +47,7 @@ ORDER: tuple[SetName, ...] = ("essential", "feasible", "all")
 def least_squares_sets(
     settings: EstimateSettings, reduced: Essential
 ) -> tuple[dict[SetName, Estimate], dict[SetName, EstimateSettings]]:
-    """Return two estimates, of the essential and of all parameters, and settings to repeat each.
+    """Return an estimate of the essential parameters and one of all, each with the settings of its fit.
 
     The method of estimation is linear.
     """

@@ -337,7 +337,7 @@ def require_finite(
     hint: str = "",
     largest: float = FINITE,
 ) -> Array:
-    """Return x, shape (N, k), if all its numbers are finite and at most `largest`; else InputError.
+    """Return x, shape (N, k); InputError if a number of x is not finite or larger than `largest`.
 
     row : function from a sample number to its place. hint : another remedy for nan.
     """

@@ -350,7 +350,7 @@ class Gaps:
 
 
 def stretches(N: int) -> list[tuple[int, int, int, int]]:
-    """Split N samples into stretches [first, stop), each with the overlapping range [begin, end).
+    """Split N samples into stretches [first, stop), each with a wider range [begin, end) around it.
 
     The samples [begin, end) are processed in order to find the motion in [first, stop).
     """

@@ -197,7 +197,9 @@ class Factor:
             L, info = dpbtrf(np.vstack([A[:1] * (1 + share), A[1:]]), lower=1)
             if not info:
                 return cls(L)
-        raise np.linalg.LinAlgError(f"the precision of coefficient {info} is not positive")
+        raise np.linalg.LinAlgError(
+            f"the precision matrix of the spline is not positive definite (coefficient {info})"
+        )
 
     @property
     def log_determinant(self) -> float:

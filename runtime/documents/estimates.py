@@ -66,7 +66,7 @@ class EssentialDocument:
 
 @dataclass(frozen=True, eq=False)
 class SetDocument:
-    """One of the nested parameter sets (essential, feasible, all) with its values and errors.
+    """One set of estimated parameters (essential, feasible or all), with its values and errors.
 
     See `runtime.core.parameter_sets`.
 

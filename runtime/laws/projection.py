@@ -164,7 +164,7 @@ class Projection:
         return np.asarray(B @ (B.T @ S) - S)
 
     def polished(self, u: Array) -> tuple[Array, float]:
-        """Find the local minimum of the sum of squared residuals near the coordinates u.
+        """Find the local minimum of the sum of squared residuals near the nonlinear constants u.
 
         Returns the coordinates of the minimum and the sum of squares there.
         """

@@ -182,7 +182,7 @@ class Loop:
         return self.simulated(level, draw).measured()
 
     def simulated(self, level: Level, draw: tuple[int, ...]) -> ClosedLoop:
-        """Simulate a record with the encoder step of `level`, and return its closed loop.
+        """Return the control loop that simulates a record with the encoder step of `level`.
 
         If the step level.delta is 0, the encoder is that of the study. draw : numbers of the run;
         the last sets its seed.

@@ -235,8 +235,8 @@ class Simulator:
         if steps > LIMIT.MOST_SUBSTEPS:
             raise SettingsError(
                 (
-                    f"{steps} integration steps per tick, for a pole at {fastest:.3g} 1/s; at most "
-                    f"{LIMIT.MOST_SUBSTEPS}: raise the rate or pole_step, or lower the gains"
+                    f"a pole at {fastest:.3g} 1/s needs {steps} integration steps per tick of the controller; at most "
+                    f"{LIMIT.MOST_SUBSTEPS} are allowed: raise the rate or pole_step, or lower the gains"
                 ),
                 path=("controller", "rate"),
             )

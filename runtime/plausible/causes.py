@@ -154,7 +154,7 @@ def unchanged_study(n: int, **changed: Any) -> Cause:
 
 
 class Robot:
-    """Joints, drives and table of frames of a robot, from which its possible errors are listed.
+    """Joints, drives and table of frames of a robot, to list the errors that its file may have.
 
     Parameters
     ----------

@@ -196,7 +196,7 @@ class Baseline:
     def fit(
         self, grams: Grams, how: Callable[..., Fit] = physical_fit, sigma: Array | None = None
     ) -> Fit:
-        """Fit the standard parameters of a physical robot by `how`: physical_fit or quick_fit.
+        """Fit standard parameters that a physical robot can have, by `how`: physical_fit or quick_fit.
 
         sigma : residuals of the joints that give the first weights; default: those of least
             squares.

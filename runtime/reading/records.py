@@ -262,7 +262,7 @@ def _joint_side(
 
 
 def _columns_of_joints(names: Sequence[str]) -> tuple[str, ...]:
-    """Return column names without the mark NONE, which replaces the column of some joints."""
+    """Return the column names without the mark NONE of joints that have no column."""
     return tuple(name for name in names if name != NONE)
 
 

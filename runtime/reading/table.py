@@ -161,7 +161,7 @@ class Table:
         return float(x.reshape(()))
 
     def _by_samples(self, name: str) -> Array:
-        """Return the array called `name` as columns of N samples, shape (N, k); else InputError."""
+        """Return the array `name`, shape (N, k); InputError if it does not have N samples."""
         x = self.columns[name]
         problem = ""
         if x.ndim > 2:

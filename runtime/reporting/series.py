@@ -43,7 +43,7 @@ class Series:
 
     @property
     def data(self) -> Mapping[str, Any]:
-        """Samples of the two lines as JSON values; times start at zero, and nan breaks a line."""
+        """Samples of the two curves of a figure as JSON values; times start at zero, nan breaks a curve."""
         start = float(np.nanmin(self.t)) if len(self.t) else 0.0
         arrays = {"t": self.t - start, "measured": self.measured, "predicted": self.predicted}
         return {

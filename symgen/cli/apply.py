@@ -30,7 +30,7 @@ def apply(
     robot: Annotated[
         str | None,
         typer.Option(
-            help="If you converted MODEL and identified the converted robot file: that file. Give the same --exact, --lock and --chain as for the conversion."
+            help="Robot file that you converted from MODEL and identified; not needed if you identified MODEL itself. Give the same --exact, --lock and --chain as for the conversion."
         ),
     ] = None,
     exact: options.Exact = False,

@@ -60,7 +60,7 @@ def convert(
         Path | None,
         typer.Option(
             help=(
-                "Result of `symgen identify` with physical parameters (estimate.json) to write into OUT."
+                "File estimate.json of `symgen identify` with physical parameters; these parameters are written into OUT."
             )
         ),
     ] = None,

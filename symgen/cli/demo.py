@@ -16,7 +16,7 @@ def demo(
         bool,
         typer.Option(
             "--quick",
-            help="Shorter demo: two runs per encoder step, no further steps, and no rounding of torques.",
+            help="Shorter demo: fewer encoder steps, two runs for each step, and no rounding of torques.",
         ),
     ] = False,
 ) -> None:

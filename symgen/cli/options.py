@@ -98,8 +98,8 @@ Method = Annotated[
 Reader = Annotated[
     Text,
     typer.Option(
-        help="How velocities are computed: lowpass filters the positions; counts estimates the motion from "
-        "encoder counts and needs --rounding phase."
+        help="How velocities are computed: `lowpass`, by filtering the positions; `counts`, by estimating the motion from "
+        "encoder counts (needs --rounding phase)."
     ),
 ]
 Place = Annotated[

@@ -293,7 +293,7 @@ class Draw:
         for j, n in angle.turn:
             if (whole := n * self.parts[j]).denominator > 1:
                 raise ArithmeticError(
-                    f"an angle contains {n} times q{j}, a joint that only the loop equations determine"
+                    f"an angle contains {n} times q{j}; only whole multiples of a joint that the loop equations determine are allowed"
                 )
             point = self._turned(point, self._multiple(self._joint(j), int(whole)))
         return point

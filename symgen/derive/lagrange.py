@@ -537,8 +537,7 @@ class Sample:
 
 
 def _leverage(robot: Robot, constants: Mapping[str, float]) -> Array:
-    """Return, for each actuated joint, its largest coefficient in friction and other elements that
-    act on several joints.
+    """Return the largest coefficient of each actuated joint in friction that acts on several joints.
 
     For instance 101.25 for q5 in friction along q4 + 101.25 q5; 1 if there is no such element.
     Shape (n,).

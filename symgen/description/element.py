@@ -183,7 +183,7 @@ class Element:
         return sorted(name.removeprefix(CHANNEL) for name in names if name.startswith(CHANNEL))
 
     def law(self, j: int) -> Expression:
-        """Return the torque law for frame j, along the coordinate s = G q, for a unit parameter.
+        """Return the torque of this element in frame j, along s = G q, if its parameter is 1.
 
         It is zero if the law is an energy.
         """

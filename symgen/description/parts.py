@@ -168,7 +168,7 @@ def assumed(table: Mapping[str, str], declared: Declared) -> frozenset[str]:
             names.add(key)
         else:
             raise DescriptionError(
-                f"{key}: {text}; expected 0, since only zero changes the regrouping; write another known "
+                f"{key}: {text}; expected 0 (only a zero changes the regrouping); write another known "
                 "value under `values`, which method feasible uses as a prior",
                 path=(key,),
             )

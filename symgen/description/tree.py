@@ -197,7 +197,7 @@ WHOLE_TREE = TreePart()
 
 
 def part_of(tree: Tree, part: TreePart) -> Tree:
-    """Return the tree in which the joints in `part.lock` and outside `part.chain` are held fixed.
+    """Return the tree with the joints in `part.lock`, and all joints outside `part.chain`, held fixed.
 
     Notes of the tree name the held joints.
 
@@ -292,7 +292,7 @@ def _motion(joint: Joint, q: float) -> Array:
     T = np.eye(4)
     if joint.kind == FREE_TYPE and q:
         raise DescriptionError(
-            f"free joint {joint.name!a:.60} can only be locked at its pose in the file; lock this joint at 0",
+            f"free joint {joint.name!a:.60} can only be locked at its pose in the file, which is position 0: lock this joint at 0",
             line=joint.line,
         )
     if joint.kind == "prismatic":

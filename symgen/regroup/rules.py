@@ -76,7 +76,7 @@ class Transfer:
                 self._move(parameter(name, frame.j), acting)
 
     def _reached(self, name: str, j: int) -> Combination:
-        """Express the regressor column of an inertial parameter at frame j by columns of links.
+        """Express the regressor column of an inertial parameter in frame j by columns of link parameters.
 
         A frame that is fixed to a link but is no link itself is replaced by that link. Parameters
         of the base have no columns.

@@ -1,4 +1,4 @@
-"""State that all requests of the studio share: work folder, command queue and view processes.
+"""Shared state of all requests of the studio: work folder, command queue and view processes.
 
 It needs pip install symgen[studio].
 """
@@ -32,7 +32,7 @@ PAGE_TEMPLATES = Environment(
 
 
 class Server:
-    """State that all requests of the studio share: work folder, command queue and computed data.
+    """Shared state of all requests of the studio: work folder, command queue and computed data.
 
     Parameters
     ----------

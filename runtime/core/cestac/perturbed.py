@@ -312,7 +312,7 @@ def torque_rows(task: Task, record: PreparedRecord, level: Level, key: Sequence[
 
 
 def perturbed(columns: Columns, task: Task, level: Level, draw: tuple[int, ...]) -> Observation:
-    """Build the system Y = W X + rho of one run from rounded measurements.
+    """Build the system Y = W X + rho of one CESTAC run, from measurements rounded at random.
 
     Without steps, it is the system of the measurements.
 

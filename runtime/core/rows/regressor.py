@@ -75,7 +75,7 @@ class Columns:
 
     @cached_property
     def tape(self) -> Tape | None:
-        """Recorded operations for the regressor entries; None if recording is not possible."""
+        """Operations that compute the regressor entries, to be repeated; None if they are unknown."""
         n = len(self.model.JOINTS)
         return recorded(self.model, [divmod(int(place), n) for place in self.entries.place])
 
