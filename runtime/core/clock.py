@@ -24,6 +24,7 @@ GAP = 3.0  # periods; a longer step is a gap
 DIGITS = 1e-6  # relative error of stamps as they are written: three periods are no more than that
 LISTED = 3  # places named, of those of one kind
 JITTER = 0.1  # sampling periods that stamps may be off the uniform grid where nothing is said
+SHOWN = 5e-5  # periods; a smaller jitter is not printed
 RATE_TOLERANCE = 1e-3
 """Between a stated rate and that of the stamps, beyond what the jitter of the two ends makes."""
 BRIDGED = 0.02  # s
@@ -206,14 +207,15 @@ class TimeStamps:
     def to_text(self, row: Callable[[int], str] = lambda i: f"sample {i + 1}") -> str:
         """Describe the regularity of the time stamps in one sentence.
 
+        A jitter below 0.005 % is left out.
+
         row : function from a sample number to its place in the file.
         """
-        parts = [
-            (
-                f"{self.samples} samples, median step {self.period:.6g} s, jitter up to "
-                f"{100 * self.jitter:.2g} % ({100 * self.jitter_rms:.2g} % rms)"
+        parts = [f"{self.samples} samples, median step {self.period:.6g} s"]
+        if self.jitter >= SHOWN:
+            parts[0] += (
+                f", jitter up to {100 * self.jitter:.2g} % ({100 * self.jitter_rms:.2g} % rms)"
             )
-        ]
         for found, kind in (
             (self.gaps, "gap"),
             (self.resets, "step back"),

@@ -3,7 +3,7 @@
     robot.urdf, .xml, .par    the user's own file
     robot.yaml                the table of frames, after an edit; it then is the robot
     robot.draft.yaml          an edit that does not describe a robot yet
-    record.csv, validation.csv, ...    measured files
+    record/run.csv, validation/other.csv    measured files, with the names that they came with
     study.yaml                meaning of the record, and settings of its evaluation
     proof.json, check.json    the certificate and the findings
     study-NN-name.yaml, runs/NN-name/    settings and results of one command
@@ -16,6 +16,7 @@ In a history, the newest folder has the largest number NNNN.
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import warnings
 from hashlib import sha256
@@ -28,7 +29,7 @@ from runtime.core.settings import to_mapping
 from runtime.documents.yaml_text import yaml_text, yaml_values
 from runtime.reading.bags import stored_files
 from runtime.reading.datasets import DATASETS
-from runtime.reading.formats import BAG, endings, is_measured
+from runtime.reading.formats import endings, is_measured
 from runtime.reporting.result_files import write_all
 from runtime.study import located, study_from_text, study_of, study_text
 from symgen.description import packaged_robots
@@ -155,29 +156,27 @@ class WorkFolder:
         if not draft:
             (self.path / DRAFT).unlink(missing_ok=True)
 
-    def measured(self, kind: str) -> Path | None:
-        """Return the file of the record or of the validation record; None if there is none.
+    def measured(self, kind: str) -> str:
+        """Return the name of the measured file, such as record/run.csv; "" if there is none.
 
         kind : "record" or "validation".
         """
-        return next((p for p in sorted(self.path.glob(f"{kind}.*")) if is_measured(p)), None)
+        return next((f"{kind}/{path.name}" for path in (self.path / kind).glob("*")), "")
 
     def take_measured(self, kind: str, name: str, part: Path) -> None:
-        """Use an uploaded file as the record or the validation record.
+        """Use an uploaded file, or the folder of a bag, as the record or the validation record.
 
-        A new record starts a new study.
+        It replaces the one before. A new record starts a new study.
 
         name : original name of the file.
         part : the uploaded file.
         """
-        ending = "".join(s for s in map(str.lower, Path(name).suffixes) if s in (*endings(), ".gz"))
-        if not name.lower().endswith(ending) or ending.removesuffix(".gz") not in endings():
-            raise InputError(
-                f"{name[:80]}: expected a measured file: {', '.join(endings())}, or .gz"
-            )
-        if (old := self.measured(kind)) is not None:
-            remove(old)
-        part.replace(self.path / f"{kind}{ending}")
+        name = measured_name(name)
+        if not (part.is_dir() or name.lower().removesuffix(".gz").endswith(endings())):
+            raise InputError(f"{name}: expected a measured file: {', '.join(endings())}, or .gz")
+        remove(self.path / kind)
+        (self.path / kind).mkdir()
+        part.replace(self.path / kind / name)
         if kind == "record":
             self.keep("study")
             (self.path / "study.yaml").unlink(missing_ok=True)
@@ -194,7 +193,7 @@ class WorkFolder:
         elif path.is_dir():
             bag = {file.name for file in stored_files(path)} | {"metadata.yaml"}
             shutil.copytree(path, part, ignore=lambda _, names: {*names} - bag)
-            self.take_measured("record", f"bag{BAG}", part)
+            self.take_measured("record", path.resolve().name, part)
         else:
             shutil.copyfile(path, part)
             self.take_measured("record", source, part)
@@ -218,13 +217,14 @@ class WorkFolder:
     def checked_study(self, given: Any) -> str:
         """Check the settings of a study, given as text or as values, and return them as text.
 
-        InputError if it is no valid study, or if it names a file of another folder that study.yaml
-        did not name before.
+        InputError if it is no valid study, or if it names a file of another folder that is not one
+        of the measured files, and that study.yaml did not name before.
         """
         text = given if isinstance(given, str) else yaml_text(given)
         study = to_mapping(study_from_text(text, file="study.yaml"))
         outside = {file for file in files_named(study) if Path(file).name != file}
-        if alien := sorted(outside - {*files_named(self.study())}):
+        own = {self.measured("record"), self.measured("validation")}
+        if alien := sorted(outside - own - {*files_named(self.study())}):
             raise InputError(
                 f"{', '.join(alien)[:200]}: a study in the studio may only name files of its work "
                 "folder; drop these files on the page, or give them on the command line"
@@ -274,6 +274,14 @@ def robot_file(name: str) -> str:
             f"{name[:80]}: expected a robot file that ends in {', '.join(ROBOT_ENDINGS)}"
         )
     return f"robot{ending}"
+
+
+def measured_name(name: str) -> str:
+    """Return a safe name for a measured file: the end of its own name, without folders.
+
+    Spaces and signs become _; the name does not begin with a dot or a hyphen.
+    """
+    return re.sub(r"[^\w.-]+", "_", re.split(r"[/\\]", name)[-1])[-60:].lstrip(".-")
 
 
 def result_of(run: Path) -> str:

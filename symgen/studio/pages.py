@@ -114,7 +114,6 @@ class Pages:
         """
         folder, version, shown = self.folder, self.server.version, await self.server.robot()
         runs = [folder.about(run) for run in folder.results()]
-        record, validation = folder.measured("record"), folder.measured("validation")
         findings = json_of(folder.path / "check.json")
         own = folder.first(TREES)
         run = next((r for r in runs if r["name"] == asked), runs[-1] if runs else None)
@@ -141,8 +140,8 @@ class Pages:
             models=sorted(SYMBOLIC),
             targets=list(TARGETS),
             proof=self._proof(),
-            record=record.name if record else "",
-            validation=validation.name if validation else "",
+            record=folder.measured("record"),
+            validation=folder.measured("validation"),
             study=folder.read("study.yaml"),
             study_digest=folder.study_digest,
             values=values,
@@ -190,15 +189,16 @@ class Pages:
         name, asked = request.path_params["name"], dict(request.query_params)
         if name == "formulas" and self.folder.read(DRAFT):  # those of the last robot stay
             return PlainTextResponse("", headers={"hx-reswap": "none"})
-        path: Path | None = self.folder.measured("record") if name == "preview" else self._source()
-        if name not in VIEWS or path is None:
+        record = self.folder.measured("record")
+        if name not in VIEWS or (name == "preview" and not record):
             raise InputError("no such view")
+        path = self.folder.path / record if name == "preview" else self._source()
         given: Any = self.server.before if name == "formulas" else asked
         if name == "preview":
             shown = await self.server.robot()
-            (record, *_) = self.folder.study().get("record") or [{}]
+            (settings, *_) = self.folder.study().get("record") or [{}]
             joints = tuple(filter(None, shown.get("labels", ())))
-            given = asked | {"joints": joints, "topic": record.get("topic")}
+            given = asked | {"joints": joints, "topic": settings.get("topic")}
         if name == "series":
             run = str(self.folder.run(asked.get("run", "")))
             given = {"run": run, "record": asked.get("record", "")}
@@ -246,9 +246,9 @@ class Pages:
                 self.folder.take_robot(name, content_of(part))
         finally:
             remove(folder)
-        if kind == "validation" and (taken := self.folder.measured(kind)):  # the page stays
+        if kind == "validation":  # the page stays
             self.server.changed()
-            return PlainTextResponse(taken.name)
+            return PlainTextResponse(self.folder.measured(kind))
         return await self._changed("")
 
     async def _packaged(self, form: dict[str, str]) -> str:

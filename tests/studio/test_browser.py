@@ -454,7 +454,7 @@ def test_the_numbers_are_those_of_the_command_line(studio: Any, tmp_path: Path, 
         studio.upload("record", "A.mat", (kr300.DATA / "A.mat").read_bytes())
         values = kr300.study("A")
         for part in values["record"] if isinstance(values["record"], list) else [values["record"]]:
-            part["files"] = ["record.mat"]
+            part["files"] = ["record/A.mat"]
     values = json.loads(json.dumps(values))
     assert studio.post("study", {"values": json.dumps(values)}).status_code == 200
     assert (
@@ -467,7 +467,8 @@ def test_the_numbers_are_those_of_the_command_line(studio: Any, tmp_path: Path, 
     wait_for(lambda: (run / "estimate.json").is_file() or "failed" in studio.get("jobs").text, 120)
     (tmp_path / "by_hand").mkdir()
     (tmp_path / "by_hand" / "study.yaml").write_text(yaml_text(values))
-    for file in ("robot.yaml", "record.mat"):
+    (tmp_path / "by_hand" / "record").mkdir()
+    for file in ("robot.yaml", "record/A.mat"):
         if (studio.path / file).is_file():
             (tmp_path / "by_hand" / file).write_bytes((studio.path / file).read_bytes())
     subprocess.run(

@@ -267,7 +267,7 @@ def test_decimal_commas(page: Browser, running: Callable[..., Any], tmp_path: Pa
     until(page, "document.querySelector('#study-text')?.value.includes('side: joint')", 10)
     until(page, "!!document.querySelector('#study-text').form['htmx-internal-data']", 10)  # settled
     assert WorkFolder(studio.work).study()["record"][0]["decimal"] == ","
-    text = "record: {files: [record.csv], decimal: ',', columns: {q: [elbow_pos_deg]}}"
+    text = "record: {files: [record/excel.csv], decimal: ',', columns: {q: [elbow_pos_deg]}}"
     page.run(f"document.querySelector('#study-text').value = {json.dumps(text)}")
     page.run("document.querySelector('#study-text').form.requestSubmit()")
     until(page, "document.querySelectorAll('#preview th').length === 4", 10)
@@ -469,7 +469,9 @@ def test_a_validation_record_leaves_the_answers(
     page.run("document.querySelector('details.start').open = true")
     give(page, "#validation-file", tmp_path / "second.csv")
     until(page, "document.querySelector('[data-named] b').textContent === 'second.csv'", 20)
-    assert page.run("document.querySelector('#values').dataset.validation") == "validation.csv"
+    assert (
+        page.run("document.querySelector('#values').dataset.validation") == "validation/second.csv"
+    )
     assert page.run(typed) == "b, a"
 
 

@@ -143,15 +143,41 @@ def test_no_path_leads_out(studio: Any, name: str) -> None:
 
 
 def test_a_file_gets_a_name_of_ours(studio: Any) -> None:
-    assert studio.upload("record", "../../../tmp/evil<script>.CSV", csv()).status_code == 200
     assert studio.upload("robot", "/etc/cron.d/arm.yaml", TEXT.encode()).status_code == 200
-    assert sorted(p.name for p in studio.path.iterdir() if p.is_file()) == [
-        "record.csv",
-        "robot.yaml",
-    ]
+    assert [p.name for p in studio.path.iterdir() if p.is_file()] == ["robot.yaml"]
 
 
-@pytest.mark.parametrize(("kind", "name"), [("robot", "arm.py"), ("robot", "arm"), ("record", "run.exe"), ("record", "run.csv.exe"), ("record", ".gz"), ("record", ""), ("module", "arm.py")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "kept"),
+    [
+        ("run 3.csv", "run_3.csv"),
+        ("a b ä.csv", "a_b_ä.csv"),
+        ("../x.csv", "x.csv"),
+        ("C:\\logs\\x.csv", "x.csv"),
+        ("../../../tmp/evil<script>.CSV", "evil_script_.CSV"),
+        ("..csv.csv", "csv.csv"),
+        ("-o.csv", "o.csv"),
+        ("x\n\0y\u202e.csv.gz", "x_y_.csv.gz"),
+        ("study.csv", "study.csv"),
+        ("robot.csv", "robot.csv"),
+        ("a" * 296 + ".csv", "a" * 56 + ".csv"),
+        ("\U00020000" * 296 + ".csv", "\U00020000" * 56 + ".csv"),
+    ],
+)
+def test_a_measured_file_keeps_its_name(studio: Any, name: str, kept: str) -> None:
+    """As far as it is harmless; the record and its validation may have the same name."""
+    for kind in ("record", "validation"):
+        assert studio.upload(kind, "before.csv", csv()).status_code == 200
+        assert studio.upload(kind, name, csv()).status_code == 200
+    files = sorted(p.relative_to(studio.path).as_posix() for p in studio.path.rglob("*.*"))
+    assert files == [f"record/{kept}", f"validation/{kept}"]
+    page = studio.get("record").text
+    assert f"<h1>Record: {kept}</h1>" in page and f'data-validation="validation/{kept}"' in page
+    study = {"symgen": 1, "record": [{"files": [f"record/{kept}"]}]}
+    assert studio.post("study", {"values": json.dumps(study)}).status_code == 200
+
+
+@pytest.mark.parametrize(("kind", "name"), [("robot", "arm.py"), ("robot", "arm"), ("record", "run.exe"), ("record", "run.csv.exe"), ("record", ".gz"), ("record", ""), ("record", ".x"), ("record", ".csv"), ("record", "a.csv/.."), ("record", "runs"), ("record", "study.yaml"), ("record", "robot.yaml"), ("validation", "x" * 300), ("module", "arm.py")])  # fmt: skip
 def test_another_kind_is_refused(studio: Any, kind: str, name: str) -> None:
     answer = studio.upload(kind, name, b"x")
     assert answer.status_code == 422 and "expected" in answer.text
@@ -196,7 +222,7 @@ def test_a_bomb_ends_in_a_sentence(studio: Any) -> None:
 
 
 def test_a_new_record_is_what_the_page_shows(studio: Any) -> None:
-    """Its file has the name of the one before."""
+    """The file before goes."""
     studio.upload("record", "run.csv", csv())
     assert studio.get("view/preview").json()["names"] == ["t", "q1", "q2", "tau1", "tau2"]
     studio.upload("record", "other.csv", csv().replace(b"tau", b"effort_"))
@@ -218,12 +244,13 @@ def test_a_folder_of_ros_2_is_a_record_of_the_command_line(studio: Any, tmp_path
     (bag / "private.txt").write_text("not of the bag")
     work = WorkFolder(studio.path)
     work.take_record_of(str(bag))
-    place = work.measured("record")
-    assert place is not None and place.is_dir() and not (place / "private.txt").exists()
+    assert work.measured("record") == "record/bag"
+    assert not (studio.path / "record" / "bag" / "private.txt").exists()
     answer = studio.get("view/preview", params={"columns": "a.position,b.effort"}).json()
     assert answer["rows"] == 50 and answer["first"][1] == ["0.01", "0.01"], answer
     studio.upload("record", "run.csv", csv())
-    assert not place.exists() and work.measured("record") == studio.path / "record.csv"
+    assert work.measured("record") == "record/run.csv"
+    assert [p.name for p in (studio.path / "record").iterdir()] == ["run.csv"]
 
 
 def test_what_a_bar_draws_in_a_terminal_is_a_count_on_the_page() -> None:
@@ -242,7 +269,7 @@ def test_the_settings_of_a_run_begin_with_its_command(studio: Any) -> None:
     """Nothing that is asked for can add a line to them."""
     studio.upload("robot", "arm.yaml", TEXT.encode())
     studio.upload("record", "run.csv", csv())
-    values = {"symgen": 1, "record": [{"files": ["record.csv"]}]}
+    values = {"symgen": 1, "record": [{"files": ["record/run.csv"]}]}
     studio.post("study", {"values": json.dumps(values)})
     asked = {
         "kind": "advise",
@@ -344,7 +371,7 @@ def test_names_are_escaped_wherever_they_are_shown(studio: Any) -> None:
     )
     studio.upload("robot", "arm.yaml", text.encode())
     studio.upload("record", f"{EVIL}.csv", csv().replace(b"q1", b"q1<script>alert(1)</script>"))
-    studio.post("study", {"text": f"symgen: 1\nrecord: {{files: [record.csv], name: {title}}}\n"})
+    studio.post("study", {"text": f"symgen: 1\nrecord: {{files: [run.csv], name: {title}}}\n"})
     run = studio.path / "runs" / "01-ols"
     run.mkdir()
     data = {
@@ -370,8 +397,19 @@ def test_names_are_escaped_wherever_they_are_shown(studio: Any) -> None:
     assert "<script>alert" not in bad.text
 
 
-@pytest.mark.parametrize("file", ["/etc/passwd", "../record.csv", "C:\\\\x.csv", "a/b.csv"])
+@pytest.mark.parametrize(
+    "file",
+    [
+        "/etc/passwd",
+        "../record.csv",
+        "C:\\\\x.csv",
+        "a/b.csv",
+        "record/other.csv",
+        "record/../record/run.csv",
+    ],
+)
 def test_a_study_of_the_browser_names_no_file_of_another_folder(studio: Any, file: str) -> None:
+    studio.upload("record", "run.csv", csv())
     for text in (f"record: {{files: ['{file}']}}", f"validate: {{record: [{{files: ['{file}']}}]}}", f"record: {{files: [record.csv], also: [['{file}']]}}"):  # fmt: skip
         answer = studio.post("study", {"text": text})
         if Path(file).name != file:
@@ -398,16 +436,16 @@ def test_a_folder_opens_again(studio: Any) -> None:
     studio.upload("robot", "arm.yaml", TEXT.encode())
     studio.upload("record", "run.csv", csv())
     studio.post(
-        "study", {"values": json.dumps({"symgen": 1, "record": [{"files": ["record.csv"]}]})}
+        "study", {"values": json.dumps({"symgen": 1, "record": [{"files": ["record/run.csv"]}]})}
     )
     (studio.path / "runs" / "01-killed").mkdir()
     (studio.path / "left.part").write_text("x")
     again = WorkFolder(studio.path)
     assert again.robot == studio.path / "robot.yaml" and again.study()["record"][0]["files"] == [
-        "record.csv"
+        "record/run.csv"
     ]
     assert sorted(p.name for p in studio.path.iterdir()) == [
-        "record.csv",
+        "record",
         "robot.yaml",
         "runs",
         "study.yaml",
@@ -545,7 +583,7 @@ def test_what_is_nested_without_end_is_refused(studio: Any) -> None:
 def test_a_run_that_was_cancelled_while_it_waited_leaves_nothing(studio: Any) -> None:
     studio.upload("robot", "arm.yaml", TEXT.encode())
     studio.upload("record", "run.csv", csv())
-    values = json.dumps({"symgen": 1, "record": [{"files": ["record.csv"]}]})
+    values = json.dumps({"symgen": 1, "record": [{"files": ["record/run.csv"]}]})
     studio.post("study", {"values": values})
     asked = {"values": values, "kind": "advise", "anyway": "1"}
     for _ in range(2):
