@@ -272,6 +272,18 @@ def load_whole_estimate(path: Path | str) -> Estimate:
     )
 
 
+def load_used_set(path: Path | str) -> tuple[Estimate, Estimate | SetDocument]:
+    """Read from estimate.json the estimate of all parameters, and the set of those that are used.
+
+    InputError as for `load_estimate`.
+    """
+    fit, text = load_estimate(path), result_text(path)
+    if not json.loads(text).get("sets"):
+        return fit, fit
+    document = from_text(SetsDocument, text, ESTIMATE, str(path))
+    return fit, next((one for one in document.sets if one.name == document.model_columns), fit)
+
+
 class ResultSchema(GenerateJsonSchema):
     """Generator of the JSON Schema of result files, in which null means nan or infinity."""
 

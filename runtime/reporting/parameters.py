@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from itertools import repeat
 from typing import Any, cast
 
 import numpy as np
@@ -20,6 +19,11 @@ from runtime.core.model import GeneratedModel
 from runtime.core.result import Identification
 from runtime.core.table import Table, csv_text, interval
 from runtime.reporting.page import Matrix, Section
+
+FILE_NOTE = (
+    "Robot file: its values through the same formulas; the difference to it is left out where that "
+    "value is smaller than the 95 % interval."
+)
 
 
 def cad_values(model: GeneratedModel) -> dict[str, float]:
@@ -71,12 +75,8 @@ def every_section(result: Identification) -> Section:
     if fit.names != estimate.names:
         columns += _columns("all fitted: ", estimate, estimate.names)
     if cad:
-        given = [cad.get(name, math.nan) for name in estimate.names]
-        differences = map(_difference, repeat(fit), estimate.names, given)
-        columns += [
-            ("robot file", ["" if math.isnan(x) else number(x) for x in given]),
-            ("difference %", list(differences)),
-        ]
+        fitted = {name: (fit[name], _half(fit, name)) for name in fit.names}
+        columns += file_columns(estimate.names, fitted, cad)
     if formulas:
         columns.append(("made of", [_made_of(name, formulas) for name in estimate.names]))
     table = Table(
@@ -90,16 +90,25 @@ def every_section(result: Identification) -> Section:
         "± 95 % is 1.96 corrected standard deviations. They allow for residuals that are correlated "
         "in time, and for friction that the model does not contain. parameters.csv "
         "also has σ of eq. (10), which assumes that all residuals are independent.",
-        *(
-            [
-                "Robot file: its values through the same formulas; the difference to it is left "
-                "out where that value is smaller than the interval."
-            ]
-            if cad
-            else []
-        ),
+        *([FILE_NOTE] if cad else []),
     )
     return Section("All base parameters, and what they are made of", text, tables=[table])
+
+
+def file_columns(
+    names: Sequence[str], fitted: Mapping[str, tuple[float, float]], cad: Mapping[str, float]
+) -> list[tuple[str, list[str]]]:
+    """Make two table columns: values of the robot file, and differences of fitted values from them.
+
+    fitted : value and half the width of its 95 % interval, by name. cad : see `cad_values`.
+    """
+    given = [cad.get(name, math.nan) for name in names]
+    pairs = [fitted.get(name, (math.nan, math.nan)) for name in names]
+    differences = [_difference(*pair, x) for pair, x in zip(pairs, given, strict=True)]
+    return [
+        ("robot file", ["" if math.isnan(x) else number(x) for x in given]),
+        ("difference %", differences),
+    ]
 
 
 def _columns(head: str, fit: Estimate, names: Sequence[str]) -> list[tuple[str, list[str]]]:
@@ -122,15 +131,15 @@ def _half(fit: Estimate, name: str) -> float:
     return 1.96 * float(fit.sigma_corrected[fit.names.index(name)])
 
 
-def _difference(fit: Estimate, name: str, given: float) -> str:
+def _difference(fitted: float, half: float, given: float) -> str:
     """Write the difference of a fitted value from the robot file's value, in % of the robot file's.
 
     The text is empty if the value of the robot file is smaller than half the width of the 95 %
     interval.
     """
-    if name not in fit.names or not abs(given) > (half := _half(fit, name)):
+    if not abs(given) > half:
         return ""
-    value, _ = interval(100 * (fit[name] - given) / abs(given), 100 * half / abs(given))
+    value, _ = interval(100 * (fitted - given) / abs(given), 100 * half / abs(given))
     return value if value.startswith("-") else f"+{value}"
 
 

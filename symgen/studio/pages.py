@@ -35,7 +35,7 @@ PAGE_STEPS = ("robot", "record", "check", "solve", "results")
 PAGE_PARTS = ("table", "certificate", "study", "findings", "jobs", "applied")
 SANDBOX = "sandbox allow-scripts allow-downloads allow-popups"
 SHOWN_FILES = {".html": "text/html", ".png": "image/png", ".svg": "image/svg+xml"}
-VIEWS = ("formulas", "model", "module", "preview", "series")
+VIEWS = ("formulas", "model", "module", "preview", "series", "changes")
 RUN_COMMANDS = {  # what each writes, its verb and options
     "identify": ("estimate.json", "identify"),
     "cestac": ("cestac.json", "cestac"),
@@ -199,11 +199,11 @@ class Pages:
             (settings, *_) = self.folder.study().get("record") or [{}]
             joints = tuple(filter(None, shown.get("labels", ())))
             given = asked | {"joints": joints, "topic": settings.get("topic")}
-        if name == "series":
+        if name in ("series", "changes"):
             run = str(self.folder.run(asked.get("run", "")))
             given = {"run": run, "record": asked.get("record", "")}
         value = await self.server.view(getattr(views, name), str(path), given)
-        if name in ("preview", "series"):
+        if name in ("preview", "series", "changes"):
             return JSONResponse(value)
         return page(name, value=value, asked=asked, file=path.name)
 

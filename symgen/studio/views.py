@@ -223,6 +223,31 @@ def series(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     }
 
 
+@answered
+def changes(path: str, request: Mapping[str, str]) -> dict[str, Any]:
+    """Compare the parameters of a run with the values of the robot file, as its report does.
+
+    The table columns are empty if the robot file has no values, or if it has changed since the run.
+
+    path : robot file.
+    request : `run`, the folder of the run.
+    """
+    from runtime.documents.estimates import load_used_set
+    from runtime.reporting.parameters import FILE_NOTE, cad_values, file_columns
+
+    loaded = runtime.load_model(symgen.model(path))
+    fit, used = load_used_set(Path(request["run"]) / "estimate.json")
+    if fit.provenance.get("robot_sha256") != loaded.SOURCE_SHA256:
+        return {"columns": {}, "note": "The robot file has changed since this run."}
+    if not (cad := cad_values(loaded)):
+        return {"columns": {}, "note": ""}
+    halves = 1.96 * np.asarray(used.sigma_corrected)
+    fitted = dict(zip(used.names, zip(used.X, halves, strict=True), strict=True))
+    columns = file_columns(fit.names, fitted, cad)
+    of = {title: dict(zip(fit.names, cells, strict=True)) for title, cells in columns}
+    return {"columns": of, "note": FILE_NOTE}
+
+
 def _read(path: str, study_file: Path, asked: str | None = None) -> tuple[Any, ...]:
     """Load the model and the study, and read records of the study.
 

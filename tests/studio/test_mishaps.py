@@ -368,6 +368,64 @@ def test_a_flipped_sign_is_turned_by_one_click(
     )
 
 
+def test_a_gain_that_is_a_name_is_not_multiplied(
+    page: Browser, running: Callable[..., Any], tmp_path: Path
+) -> None:
+    """Of a MATLAB file, as gtau of EMPS: one sentence in place of the button; numbers have one."""
+    studio = running(*lever(tmp_path, scale={"tau": "gtau"}))
+    cause = {"cause": "signs", "remedy": "turn", "change": {"record.scale.tau": [1, -1]}}
+    findings = {"checks": [], "named": [{}, cause], "deviations": {}, "rank": 1, "count": 1}
+    (studio.work / "check.json").write_text(json.dumps(findings))
+    shown = "document.querySelector('[data-change*=scale] > :last-child')?.textContent"
+    go(page, studio.address + "check")
+    until(page, "!!document.querySelector('[data-change*=scale]')", 20)
+    assert page.run(shown) == (
+        "record.scale.tau is the name gtau, which this page cannot multiply by 1, -1: "
+        "on Record, write the product as numbers."
+    )
+    assert page.run("!document.querySelector('[data-change] button')")
+    study = WorkFolder(studio.work).study()
+    study["record"][0]["scale"]["tau"] = [2, 3]
+    (studio.work / "study.yaml").write_text(json.dumps(study))
+    go(page, studio.address + "check")
+    page.click("[data-change] button")
+    wait_for(lambda: WorkFolder(studio.work).study()["record"][0]["scale"]["tau"] == [2, -3], 10)
+
+
+def test_results_have_the_values_of_the_robot_file_as_the_report_has(
+    page: Browser, running: Callable[..., Any], tmp_path: Path
+) -> None:
+    """Where the file has changed since, there are none, and the page says so."""
+    studio = running(*lever(tmp_path))
+    solved(studio, "ols")
+    rows = "[...document.querySelectorAll('{} tr')].map((row) => [...row.cells].map((cell) => cell.textContent))"
+    go(page, studio.address + "results")
+    until(page, "document.querySelectorAll('#compared th[scope=col]').length === 5", 30)
+    (head, *shown) = page.run(rows.format("#compared"))
+    assert head[3:] == ["robot file", "difference %"] and "95 %" in page.run("document.querySelector('#compared .note').textContent")  # fmt: skip
+    page.call("Page.navigate", url=studio.address + "runs/01-ols/report.html")
+    script = "[...document.querySelectorAll('table')].find((table) => table.textContent.includes('difference %'))"
+    until(page, f"!!{script}", 20)
+    page.run(f"{script}.id = 'every'")
+    (titles, *written) = page.run(rows.format("#every"))
+    title = [text.split("\n")[0].strip() for text in titles]
+    value, given, change = map(title.index, ("value", "robot file", "difference %"))
+    assert len(shown) == len(written) == 13 and shown[1][4].startswith("+")
+    for ours, theirs in zip(shown, written, strict=True):
+        assert [x.replace("−", "-") for x in ours[3:]] == [theirs[given], theirs[change]]
+        number = ours[2].partition(" ± ")[0].replace("−", "-")
+        assert (number == "–") == (theirs[value] == "")
+        if number != "–":
+            assert float(number) == pytest.approx(float(theirs[value]), rel=0.02, abs=1e-3)
+    robot = studio.work / "robot.urdf"
+    robot.write_text(robot.read_text().replace('value="3.0"', 'value="4.0"'))
+    go(page, studio.address + "results")
+    until(
+        page, "document.querySelector('#compared .note')?.textContent.includes('has changed')", 30
+    )
+    assert page.run("document.querySelectorAll('#compared th[scope=col]').length") == 3
+
+
 def test_units_that_differ_by_joint_are_set_by_one_click_each(
     page: Browser, running: Callable[..., Any], tmp_path: Path
 ) -> None:

@@ -112,12 +112,15 @@
   }
   // --- remedies as one change of the study: {"record.units.q": "deg"}; what is of record.scale multiplies ---
   const multiplies = (key) => key.startsWith("record.scale.");
+  const records = (values) => [values.record, values.validate?.record ?? []].flat();
+  /** The name of an array in the file, where a change would multiply a number. */
+  const named = (key) => multiplies(key) && records(study()).flatMap((part) => part.scale?.[key.split(".")[2]] ?? []).find((x) => typeof x === "string");
 
   function changed(values, change) {
     const made = structuredClone(values);
     for (const [path, value] of Object.entries(change)) {
       const [section, ...keys] = path.split("."), last = keys.pop();
-      for (const part of section === "record" ? [made.record, made.validate?.record ?? []].flat() : [(made[section] ??= {})]) {
+      for (const part of section === "record" ? records(made) : [(made[section] ??= {})]) {
         const place = keys.reduce((at, name) => (at[name] ??= {}), part), before = [place[last] ?? 1].flat();
         place[last] = multiplies(path) ? value.map((factor, k) => factor * (before.length > 1 ? before[k] : before[0])) : value;
       }
@@ -128,7 +131,12 @@
   function remedies() {
     for (const place of all("[data-change]")) {
       const change = JSON.parse(place.dataset.change), steps = Object.entries(change);
-      if (!steps.length || one("button", place)) continue;
+      if (!steps.length || one("button, .wrong", place)) continue;
+      const [key, factors] = steps.find(([path]) => named(path)) || [];
+      if (key) {
+        place.append(node("span", { className: "wrong", textContent: `${key} is the name ${named(key)}, which this page cannot multiply by ${listed(factors)}: on Record, write the product as numbers.` }));
+        continue;
+      }
       const text = steps.map(([key, value]) => (multiplies(key) ? `multiply ${key} by ${listed(value)}` : `set ${key}: ${listed(value) || "null"}`)).join(", ");
       const button = node("button", { type: "button", textContent: text[0].toUpperCase() + text.slice(1) });
       button.addEventListener("click", async () => {
@@ -170,12 +178,13 @@
   async function compare() {
     const place = one("#compared");
     if (!place) return;
-    const names = place.dataset.run ? [place.dataset.run] : all("#jobs [name='side']:checked").map((box) => box.value).slice(-6), key = names.join(" ");
+    const only = place.dataset.run, names = only ? [only] : all("#jobs [name='side']:checked").map((box) => box.value).slice(-6), key = names.join(" ");
     if (key === shown) return;
     shown = key;
     const fits = await Promise.all(names.map(async (name) => (await fetch(`runs/${name}/estimate.json`)).json()));
     if (!fits.length) return place.replaceChildren(node("p", { className: "note", textContent: "Nothing to compare yet." }));
-    const columns = fits.map((fit) => Object.fromEntries(fit.names.map((name, k) => [name, [fit.X[k], (fit.sigma_corrected || fit.sigma)[k]]])));
+    const used = fits.map((fit) => (only && fit.sets?.find(({ name }) => name === fit.model_columns)) || fit); // of a run alone, as in its report
+    const columns = used.map((fit) => Object.fromEntries(fit.names.map((name, k) => [name, [fit.X[k], (fit.sigma_corrected || fit.sigma)[k]]])));
     const units = Object.assign({}, ...fits.map((fit) => fit.units));
     const cell = (name, column) => {
       const own = column[name], first = columns[0][name];
@@ -184,13 +193,19 @@
       const text = measured(own[0], own[1] || 0), known = far !== null && Number.isFinite(far);
       return node("td", { className: known && Math.abs(far) > 3 ? "far" : "", textContent: known ? `${text} (${far > 0.05 ? "+" : ""}${minus(far.toFixed(1))})` : text });
     };
-    const head = node("tr", {}, ...["parameter", "unit", ...names].map((text) => node("th", { scope: "col", textContent: text })));
-    const rows = Object.keys(units).map((name) => node("tr", {}, node("th", { scope: "row", textContent: name }), node("td", { textContent: units[name].replace("**2", "²").replaceAll("*", " ") }), ...columns.map((column) => cell(name, column))));
-    const table = node("div", { className: "scroll tall", tabIndex: 0 }, node("table", {}, node("thead", {}, head), node("tbody", {}, ...rows)));
-    table.setAttribute("role", "region");
-    table.setAttribute("aria-label", "Values of the runs");
-    const note = names.length > 1 ? `± σ, the standard deviation. In brackets, the difference from ${names[0]} in deviations, (X − X₁)/√(σ² + σ₁²); above 3 it is marked.` : "± σ, the standard deviation.";
-    place.replaceChildren(node("p", { className: "note", textContent: note }), table);
+    const show = ({ columns: of = {}, note: more = "", error = more }) => { // of: the columns of the robot file
+      const head = node("tr", {}, ...["parameter", "unit", ...names, ...Object.keys(of)].map((text) => node("th", { scope: "col", textContent: text })));
+      const rows = Object.keys(units).map((name) => node("tr", {}, node("th", { scope: "row", textContent: name }), node("td", { textContent: units[name].replace("**2", "²").replaceAll("*", " ") }), ...columns.map((column) => cell(name, column)), ...Object.values(of).map((texts) => node("td", { textContent: minus(texts[name]) }))));
+      const table = node("div", { className: "scroll tall", tabIndex: 0 }, node("table", {}, node("thead", {}, head), node("tbody", {}, ...rows)));
+      table.setAttribute("role", "region");
+      table.setAttribute("aria-label", "Values of the runs");
+      const note = names.length > 1 ? `± σ, the standard deviation. In brackets, the difference from ${names[0]} in deviations, (X − X₁)/√(σ² + σ₁²); above 3 it is marked.` : `± σ, the standard deviation; –: removed, as if zero. ${error}`;
+      place.replaceChildren(node("p", { className: "note", textContent: note }), table);
+    };
+    show({});
+    if (!only) return;
+    const answer = await fetch(`view/changes?run=${only}`);
+    show(answer.ok ? await answer.json() : {});
   }
 
   document.addEventListener("htmx:afterSettle", (event) => {
