@@ -238,7 +238,10 @@ def changes(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     loaded = runtime.load_model(symgen.model(path))
     fit, used = load_used_set(Path(request["run"]) / "estimate.json")
     if fit.provenance.get("robot_sha256") != loaded.SOURCE_SHA256:
-        return {"columns": {}, "note": "The robot file has changed since this run."}
+        return {
+            "columns": {},
+            "note": "The robot file has changed since this run; its values are left out.",
+        }
     if not (cad := cad_values(loaded)):
         return {"columns": {}, "note": ""}
     halves = 1.96 * np.asarray(used.sigma_corrected)
