@@ -241,7 +241,7 @@ def test_from_urdf_and_csv_to_verdict_report_and_applied_urdf(
         value, sigma = text.replace("−", "-").split(" ± ")
         assert len(value.partition(".")[2]) == len(sigma.partition(".")[2]), text
         assert len(sigma.replace(".", "").lstrip("0")) == 2, text
-    assert "shoulder" in page.run("document.querySelector('#joint').textContent")
+    assert "shoulder" in page.run("document.querySelector('[data-series]').innerHTML")
     page.click("form[hx-post='do/apply'] button")
     assert "mass value" in until(page, "document.querySelector('.diff')?.textContent")
     applied = symgen.load_robot(studio.work / "applied-02-feasible.urdf").values
