@@ -12,7 +12,7 @@ from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from starlette.responses import HTMLResponse, Response
 
 from symgen.studio import child, views
@@ -23,7 +23,9 @@ VIEW_PATIENCE = 60.0  # s that a page waits for a view
 REMEMBERED = 30  # views
 DERIVING = (views.formulas, views.model, views.module)  # pages do not wait for these
 PAGE_TEMPLATES = Environment(
-    loader=PackageLoader("symgen.studio", "templates"),
+    loader=ChoiceLoader(
+        [PackageLoader("symgen.studio", "templates"), PackageLoader("symgen.pages", "")]
+    ),
     autoescape=True,
     undefined=StrictUndefined,
     trim_blocks=True,

@@ -16,7 +16,14 @@ from symgen.errors import DescriptionError
 
 TABLE_COLUMNS = ("ant", "sigma", "mu", "gamma", "b", "alpha", "d", "theta", "r")
 UNITS_OF_CELLS = {"gamma": "rad", "alpha": "rad", "theta": "rad", "b": "m", "d": "m", "r": "m"}
-EDITED: dict[str, Any] = {"frames": {}, "constants": {}, "gravity": ["0", "0", "-g"], "loops": []}
+EDITED: dict[str, Any] = {
+    "name": "",
+    "title": "",
+    "frames": {},
+    "constants": {},
+    "gravity": ["0", "0", "-g"],
+    "loops": [],
+}
 SIZED = ("limits", "drives", "values", "labels", "elements", "constraints", "massless")
 """Parts whose size is that of the robot: they go where a frame is added or removed."""
 PLAIN_CELL = re.compile(r"(?!- )[A-Za-z0-9_.+/(-][A-Za-z0-9_.+*/() -]*(?<! )\Z|[0-9]\Z")
@@ -25,14 +32,14 @@ CELL = 200  # characters of a cell
 
 
 def cells_of(text: str) -> dict[str, Any]:
-    """Return frames, constants, gravity and loops of a robot file as texts.
+    """Return name, title, frames, constants, gravity and loops of a robot file as texts.
 
     Values that are not valid for a robot are accepted too.
 
     Returns
     -------
     dict
-        frames : {number: {column: text}}; constants : {name: text}; gravity : list of text; loops :
+        name, title : text; frames : {number: {column: text}}; constants : {name: text}; gravity : list of text; loops :
         list of {cut, twin}.
     """
     values = yaml_values(text, file="robot.yaml")[0]
@@ -69,6 +76,10 @@ def with_cells(text: str, asked: str) -> str:
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise DescriptionError("the page sent no table; reload the page") from error
     new = {
+        **{
+            key: f"{key}: {_quoted(cells[key])}\n" if cells[key] else ""
+            for key in ("name", "title")
+        },
         "gravity": f"gravity: [{gravity}]\n",
         "constants": f"constants: {constants}\n",
         "frames": "\n".join(["frames:", *frames, ""]),
@@ -76,7 +87,10 @@ def with_cells(text: str, asked: str) -> str:
     }
     now = cells_of(text)
     kept = {key for key, cell in cells.items() if cell == now[key]}
-    parts = [new.pop(key, part) if key not in kept else part for key, part in blocks(text)]
+    parts = [
+        new.pop(key) + _comments(part) if key in new and key not in kept else part
+        for key, part in blocks(text)
+    ]
     return "".join([*parts, *(x for key, x in new.items() if key not in kept)])
 
 
@@ -112,6 +126,16 @@ def fitted(text: str) -> tuple[str, list[str]]:
             break
         text = shorter
     return text, left_out
+
+
+def _comments(part: str) -> str:
+    """Keep only the lines after the first of a part that are comments or empty."""
+    lines = part.splitlines(keepends=True)[1:]
+    return "".join(line for line in lines if line.lstrip()[:1] in ("", "#"))
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=not text.isprintable())
 
 
 def _flow(items: Iterable[tuple[str, Any]]) -> str:

@@ -123,14 +123,40 @@ def formulas(path: str, before: str) -> dict[str, Any]:
 
 @answered
 def model(path: str, request: Mapping[str, str]) -> dict[str, Any]:
-    """Write a symbolic model of the robot as text, LaTeX and SymPy."""
-    models = symgen.symbolic(symgen.load_robot(path))
+    """Prepare a symbolic model of the robot typeset, and as text, LaTeX and SymPy.
+
+    A long closed form is typeset as recursion. A model without closed form is its recursion in all
+    forms.
+    """
+    from symgen.symbols.documents import READABLE, notes, printed, shown_model
+
     name, form = request.get("model", "gravity"), request.get("form", "closed")
     frames: dict[str, Any] = {
         key: int(x) for key in ("of", "frame") if (x := request.get(key, "")).isdigit()
     }
-    kinds = ("text", "latex", "sympy")
-    return {"texts": {kind: models.show(name, form=form, format=kind, **frames) for kind in kinds}}
+    asked = symgen.symbolic(symgen.load_robot(path)).model(name, **frames)
+    typeset, why = form, ""
+    if form == "closed":
+        try:
+            if (terms := asked.closed.size) > READABLE:
+                typeset = "recursive"
+                why = (
+                    f"The closed form has {terms} terms. The page shows the recursion; "
+                    "the copies contain the closed form."
+                )
+        except SymgenError as e:
+            if asked.model.cases is None:
+                raise
+            typeset = form = "recursive"
+            text = str(e).partition(";")[0]
+            why = f"{text[0].upper()}{text[1:]}. The page shows and copies the recursion."
+    return {
+        "typeset": shown_model(asked, typeset),
+        "why": why,
+        "about": notes(asked),
+        "form": form,
+        "texts": {kind: printed(asked, form, kind) for kind in ("text", "latex", "sympy")},
+    }
 
 
 @answered

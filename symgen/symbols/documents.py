@@ -518,14 +518,17 @@ def shown_models(regrouping: Regrouping) -> tuple[list[ShownModel], list[str]]:
         for model in sorted(SYMBOLIC.values(), key=lambda model: model.page)
         if model.page
     ]
-    return [*filter(None, map(_shown, models))], passive_notes(models[0])
+    return [*filter(None, map(shown_model, models))], passive_notes(models[0])
 
 
-def _shown(model: SymbolicModel) -> ShownModel | None:
-    """Prepare one model for the HTML page; None if it has no short closed form and no recursion."""
+def shown_model(model: SymbolicModel, form: str = "closed") -> ShownModel | None:
+    """Prepare a model for an HTML page; None if it has no short closed form and no recursion.
+
+    form : recursive, or closed for the closed form where it is short.
+    """
     title = model.model.name.replace("_", " ")
     try:
-        closed = model.closed
+        closed = model.closed if form == "closed" else None
     except SymgenError:
         closed = None
     if closed is None or closed.size > READABLE:
@@ -549,6 +552,9 @@ def _shown(model: SymbolicModel) -> ShownModel | None:
         for place in model.places
         if place in closed.entries
     ]
+    if closed.denominator is not None:
+        below = math(expressions.symbol(model.model.denominator))
+        entries.append((below, math_terms(closed.denominator)))
     angles = [
         math(expressions.equation(expressions.symbol(name), expressions.angle(name[0], e)))
         for name, e in closed.angles.items()

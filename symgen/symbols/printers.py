@@ -214,6 +214,13 @@ class Presentation(MathMLPresentationPrinter):  # type: ignore[misc]
             ]
         return self.row(*parts)
 
+    def _print_Pow(self, x: Tree) -> Any:
+        made = super()._print_Pow(x)
+        if [y.nodeName for y in made.childNodes[:1]] == ["msub"] and made.nodeName == "msup":
+            base, power = made.childNodes
+            return self.element("msubsup", *list(base.childNodes), power)
+        return made
+
     def _print_Symbol(self, x: Tree, **attributes: str) -> Any:
         stem, subscript = letter(x.name)
         if stem in DOTS:

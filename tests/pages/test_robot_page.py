@@ -125,6 +125,7 @@ def test_formula_reads_as_the_text():
     ("-pi/2", "<mrow><mo form=\"prefix\">−</mo><mfrac><mi>π</mi><mn>2</mn></mfrac></mrow>"),
     ("0.225", "<mn>0.225</mn>"),
     ("0", "<mn>0</mn>"),
+    ("D2**2", "<msubsup><mi>D</mi><mn>2</mn><mn>2</mn></msubsup>"),
     ("sqrt(L1)", "<msqrt><msub><mi>L</mi><mn>1</mn></msub></msqrt>"),
 ])  # fmt: skip
 def test_expressions(text, expected):
@@ -146,6 +147,7 @@ def test_names_cannot_bring_in_markup():
             "mrow",
             "msub",
             "msup",
+            "msubsup",
             "mi",
             "mn",
             "mo",

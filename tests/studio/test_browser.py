@@ -201,6 +201,74 @@ def test_a_wrong_alpha_shows_in_the_picture(page: Browser, running: Callable[...
     quiet(page)
 
 
+def test_name_and_title_are_fields_of_the_table(page: Browser, running: Callable[..., Any]) -> None:
+    """A wrong name stands beside its field; undo brings the earlier one back."""
+    studio = running("planar_2r")
+    file = studio.work / "robot.yaml"
+    before = symgen.load_robot(file)
+    go(page, studio.address + "robot")
+    assert until(page, "document.getElementById('r-name')?.value") == before.name
+    page.click("#r-name")
+    type_in(page, "r-name", "2 links")
+    wrong = until(page, "document.getElementById('wrong-name')?.textContent")
+    assert wrong.startswith("name: '2 links' is no identifier")
+    assert page.run("document.body.textContent.split(\"'2 links' is no\").length") == 2  # once
+    assert page.run("document.activeElement.id") == "r-name"
+    assert symgen.load_robot(file).name == before.name
+    type_in(page, "r-name", "two_links")
+    until(page, "!document.getElementById('wrong-name')")
+    page.click("#r-title")
+    type_in(page, "r-title", 'Bras "à" 2: <b>#1</b>')
+    until(page, "document.querySelector('h1').textContent.includes('<b>#1</b>')")
+    robot = symgen.load_robot(file)
+    assert (robot.name, robot.title) == ("two_links", 'Bras "à" 2: <b>#1</b>')
+    assert robot.frames == before.frames
+    assert [p.name for p in sorted((studio.work / "history/robot").iterdir())] == ["0001", "0002"]
+    for _ in range(2):
+        page.run("window.left = true")
+        page.click("#undo")
+        until(page, "!window.left && document.readyState === 'complete'")
+    assert page.run("document.getElementById('r-name').value") == before.name
+    assert symgen.load_robot(file) == before
+    assert page.run(WEAK_CONTRAST) == []
+    quiet(page)
+
+
+COPIED = """navigator.clipboard.writeText = async (text) => { window.copied = text; }"""
+
+
+@pytest.mark.parametrize(
+    ("robot", "model", "typeset"),
+    [("planar_2r", "inertia_matrix", "closed"), ("tx40", "inertia_matrix", "recursive")],
+)
+def test_a_model_is_typeset_and_its_latex_is_copied(
+    page: Browser, running: Callable[..., Any], robot: str, model: str, typeset: str
+) -> None:
+    """A short closed form as such, a long one as recursion; a square is above its subscript."""
+    studio = running(robot)
+    go(page, studio.address + "robot")
+    page.run(COPIED)
+    page.run(
+        f"document.querySelector('form[hx-get=\"view/model\"] [name=model]').value = '{model}'"
+    )
+    page.click("form[hx-get='view/model'] button")
+    until(page, "document.querySelectorAll('#model math').length > 0")
+    assert page.run("document.querySelectorAll('#model .steps').length > 0") == (
+        typeset == "recursive"
+    )
+    until(page, "document.querySelectorAll('.formulas msubsup').length > 0")
+    assert page.run("document.querySelectorAll('msup > msub:first-child').length") == 0
+    page.click("[data-copy='#model-latex']")
+    latex = until(page, "window.copied")
+    assert latex.strip() == symgen.symbolic(robot).show(model, format="latex").strip()
+    assert page.run(WEAK_CONTRAST) == []
+    go(page, studio.address + "robot", 390)
+    page.run("document.querySelector('form[hx-get=\"view/model\"] button').click()")
+    until(page, "document.querySelectorAll('#model math').length > 0")
+    assert page.run("document.documentElement.scrollWidth") <= 390
+    quiet(page)
+
+
 def test_from_urdf_and_csv_to_verdict_report_and_applied_urdf(
     page: Browser, running: Callable[..., Any], tmp_path: Path
 ) -> None:

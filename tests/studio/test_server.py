@@ -635,6 +635,15 @@ def test_formulas_of_thirty_joints_take_seconds(tmp_path: Path) -> None:
     assert len(shown["base"]) > 200 and process_time() - start < server.VIEW_PATIENCE / 2
 
 
+@pytest.mark.campaign
+def test_a_model_of_thirty_joints_is_its_recursion(tmp_path: Path) -> None:
+    (tmp_path / "chain.yaml").write_text(chain(30))
+    start = process_time()
+    shown = views.model(str(tmp_path / "chain.yaml"), {"model": "inverse_dynamics"})
+    assert shown["form"] == "recursive" and "more than 10000 terms." in shown["why"]
+    assert len(shown["typeset"].steps) > 1 and process_time() - start < server.VIEW_PATIENCE / 2
+
+
 def test_pages_do_not_wait_for_formulas(studio: Any) -> None:
     """Those of a long chain take seconds; an edit of the table meanwhile is read in a blink."""
     studio.upload("robot", "chain.yaml", chain(18).encode())

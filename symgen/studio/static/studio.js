@@ -155,7 +155,8 @@ const one = (selector, of = document) => of.querySelector(selector), all = (sele
     const form = one("#cells"), found = { frames: {}, constants: {}, gravity: [], loops: [] }, names = {};
     for (const input of all("[data-cell]", form)) {
       const [part, k, column] = input.dataset.cell.split("."), value = input.value.trim();
-      if (part === "gravity") found.gravity.push(value);
+      if (k === undefined) found[part] = value; // name and title
+      else if (part === "gravity") found.gravity.push(value);
       else if (part === "constants") (names[k] ??= {})[column] = value;
       else if (part === "loops") (found.loops[k] ??= JSON.parse(input.closest("[data-rest]").dataset.rest))[column] = value;
       else {
