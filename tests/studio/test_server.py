@@ -298,6 +298,16 @@ def test_an_edit_changes_its_line_alone(studio: Any) -> None:
     )
 
 
+def test_comments_after_an_edited_part_stay(studio: Any) -> None:
+    studio.post("packaged", {"name": "new"})
+    before = (studio.path / "robot.yaml").read_text()
+    edited(studio, lambda cells: cells.update(name="two", constants={"D2": "0.7", "g": "9.81"}))
+    text = (studio.path / "robot.yaml").read_text()
+    assert 'name: "two"' in text and "D2: 0.7" in text
+    whole = [line for line in before.splitlines() if line.startswith("#")]
+    assert [line for line in text.splitlines() if line.startswith("#")] == whole
+
+
 def test_an_error_stands_beside_its_cell_and_the_last_robot_stays(studio: Any) -> None:
     studio.upload("robot", "arm.yaml", TEXT.encode())
     answer = edited(studio, lambda cells: cells["frames"]["2"].update(alpha="pi/"))
