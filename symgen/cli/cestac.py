@@ -69,7 +69,7 @@ def cestac(
         from runtime.parallel.checkpoint import Checkpoint
         from runtime.reading.records import read_records
 
-        described = session.robot_of(robot, exact=exact)
+        described = session.robot_of(robot, trust=trust, exact=exact)
         study = session.changed(
             session.study_of_arguments(record, recorded=False),
             cestac={
@@ -86,7 +86,7 @@ def cestac(
             estimate={"method": method},
             signals={"reader": reader},
         )
-        model = session.model_of(described, trust=trust, study=study)
+        model = session.model_of(described, study=study)
         if study.cestac.place == "record":
             session.require_record(study, record[0])
         records = read_records(study.record, model, missing=study.signals.admits_missing)

@@ -35,8 +35,8 @@ def compare(
         import runtime
         from runtime.core.documents import json_text
 
-        described = session.robot_of(robot, exact=exact)
-        model = session.model_of(described, trust=trust)
+        described = session.robot_of(robot, trust=trust, exact=exact)
+        model = session.model_of(described)
         short = len({Path(one).stem for one in study}) == len(study)
         candidates = {
             Path(one).stem if short else one: session.study_of_arguments([one]) for one in study

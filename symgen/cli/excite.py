@@ -64,7 +64,7 @@ def excite(
         from runtime.core.documents import json_text
         from runtime.reading.records import read_records
 
-        model = session.model_of(session.robot_of(robot, exact=exact), trust=trust)
+        model = session.model_of(session.robot_of(robot, trust=trust, exact=exact))
         study = session.changed(
             session.study_of_arguments([record], recorded=False) if record else runtime.Study(),
             excitation={

@@ -64,9 +64,9 @@ def identify(
         from runtime.core.provenance import processor
         from runtime.reading.records import read_records
 
-        described = session.robot_of(robot, exact=exact)
+        described = session.robot_of(robot, trust=trust, exact=exact)
         study = session.study_of_arguments(record)
-        model = session.model_of(described, trust=trust, study=study)
+        model = session.model_of(described, study=study)
         study = study if suggest is None else session.suggested_study(study, model, suggest)
         records = read_records(study.record, model, missing=study.signals.admits_missing)
         result = runtime.identify(

@@ -38,9 +38,9 @@ def report(
         from runtime.core.documents import json_text
         from runtime.reading.records import read_records
 
-        described = session.robot_of(robot, exact=exact)
+        described = session.robot_of(robot, trust=trust, exact=exact)
         study = session.changed(session.study_of_arguments(record), cestac={"side": side})
-        model = session.model_of(described, trust=trust, study=study)
+        model = session.model_of(described, study=study)
         asked = session.changed(study, cestac={"delta": encoder}).cestac.delta
         records = read_records(study.record, model, missing=study.signals.admits_missing)
         result = assess(

@@ -163,34 +163,34 @@ def end(*, good: bool) -> None:
         raise typer.Exit(NEGATIVE)
 
 
-def robot_of(source: str, *, exact: bool = False) -> Robot | Path:
-    """Load the argument ROBOT of a command: a robot, or the path of a generated module.
+def robot_of(source: str, *, trust: bool = False, exact: bool = False) -> Robot | GeneratedModel:
+    """Load the argument ROBOT of a command: a robot, or a generated module.
 
+    trust : whether to run a module that was not emitted on this machine.
     exact : as for `load_robot`.
     """
+    from runtime.core.model import load_model
     from runtime.reading.formats import is_measured
 
     path = Path(source)
     if path.suffix == ".py":
-        return path
+        return load_model(path, trust=trust)
     if path.is_file() and is_measured(path):
         fail(f"{source} is a measured file; the robot comes first, then the record")
     return described_robot(source, exact=exact)
 
 
-def model_of(
-    robot: Robot | Path, *, trust: bool = False, study: Study | None = None
-) -> GeneratedModel:
-    """Load the model of a robot (see `robot_of`), or a generated module.
+def model_of(robot: Robot | GeneratedModel, *, study: Study | None = None) -> GeneratedModel:
+    """Return the model of a robot (see `robot_of`); a generated module is its own model.
 
-    trust : whether to run a module that was not emitted on this machine.
     study : if its records name wrenches, the model has the columns of force sensors.
     """
     import symgen
     from runtime.core.model import load_model
+    from symgen.description import Robot
 
-    if isinstance(robot, Path):
-        return load_model(robot, trust=trust)
+    if not isinstance(robot, Robot):
+        return robot
     records = () if study is None else study.record
     options = ("base_wrench_regressor",) * any(record.columns.wrench for record in records)
     return load_model(symgen.model(robot, options=options))
@@ -211,23 +211,26 @@ def described_robot(source: str, at_values: bool = False, exact: bool = False) -
     return with_values(robot) if at_values else robot
 
 
-def variants_of(robot: Robot | Path) -> GeneratedModel | None:
+def variants_of(robot: Robot | GeneratedModel) -> GeneratedModel | None:
     """Load the model of a robot as a module in which the frame table can be changed.
 
     None for a generated module, which has no robot file.
     """
     import symgen
     from runtime.core.model import load_model
+    from symgen.description import Robot
 
-    return None if isinstance(robot, Path) else load_model(symgen.variants(robot))
+    return load_model(symgen.variants(robot)) if isinstance(robot, Robot) else None
 
 
-def assumptions_of(robot: Robot | Path, records: Any, study: Study) -> list[str]:
+def assumptions_of(robot: Robot | GeneratedModel, records: Any, study: Study) -> list[str]:
     """Write a sentence on each parameter that the robot file assumes to be zero.
 
     It says whether the records contradict the assumption.
     """
-    if isinstance(robot, Path) or not robot.assume:
+    from symgen.description import Robot
+
+    if not isinstance(robot, Robot) or not robot.assume:
         return []
     import runtime
     import symgen

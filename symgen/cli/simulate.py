@@ -40,7 +40,7 @@ def simulate(
         import runtime
         from runtime.core.documents import json_text
 
-        model = session.model_of(session.robot_of(robot, exact=exact), trust=trust)
+        model = session.model_of(session.robot_of(robot, trust=trust, exact=exact))
         settings = session.study_of_arguments([study], recorded=False)
         if settings.controller is None:
             session.fail(

@@ -338,7 +338,12 @@ class Draw:
         lead = row[0][1]
         inverse = power(self.residues(self.constant(lead)), self.p - 2, self.p)
         key = tuple(
-            (i, tuple(sorted({*(self.residues(self.constant(g)) * inverse % self.p).tolist()})))
+            (
+                i,
+                tuple(
+                    sorted({*(self.residues(self.constant(g)) * inverse % self.p).ravel().tolist()})
+                ),
+            )
             for i, g in row
         )
         b = self._fp(self._state(("direction", key)))
