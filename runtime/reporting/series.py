@@ -8,12 +8,14 @@ from __future__ import annotations
 from base64 import b64encode
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from runtime.core.limits import LIMIT
-from runtime.core.validation import JointComparison
+
+if TYPE_CHECKING:  # a page of the studio needs no estimator
+    from runtime.core.validation import JointComparison
 
 Array = np.ndarray
 
