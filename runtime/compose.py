@@ -21,12 +21,12 @@ from typing import TYPE_CHECKING, Any
 from runtime import robust as irls
 from runtime.advisor.advice import NoAdvice
 from runtime.agreement import agreement
+from runtime.commands import commands_for_torques
 from runtime.controller.fitted import doubt_of_gains, law_of_controller
 from runtime.core import estimation
 from runtime.core import identify as identification
 from runtime.core.arrays import kind_of, require_kind
 from runtime.core.automatic import automatic_cutoff
-from runtime.core.commands import model_of_records
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.essential import Essential
 from runtime.core.gone import gone
@@ -81,6 +81,7 @@ if TYPE_CHECKING:
     from runtime.treatments import Ranking
 
 STEPS: list[Step] = [
+    commands_for_torques,
     force_sensors,
     torques_of_links,
     torque_median,
@@ -223,7 +224,7 @@ def state_problem(
             name: method if method.observe is None else replace(method, observe=observe)
             for name, method in METHODS.items()
         }
-    stated = Problem(
+    return Problem(
         model,
         list_records(records),
         list_records(unseen),
@@ -231,7 +232,6 @@ def state_problem(
         READERS[study.signals.reader].states,
         methods,
     )
-    return replace(stated, model=model_of_records(model, [*stated.records, *stated.unseen]))
 
 
 def problem(

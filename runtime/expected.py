@@ -184,8 +184,7 @@ def expected_error(
     if dict(fit.details.get("options", {})).get("prior", "none") != "none":
         physical = physical_model(model)
         K, rows = physical.rows(least_squares.names), system.weighted
-        size = wider * (1.0 if system.known_variance else least_squares.sigma_rho)
-        R = rows.R11 / size
+        R = rows.R11 / (wider * (1.0 if system.known_variance else least_squares.sigma_rho))
         near, V = with_values(physical, K, R, R @ least_squares.X)
         D, still, X = D @ K, still @ K, np.linalg.lstsq(K, X, rcond=None)[0]
     A = D.reshape(-1, len(X))

@@ -184,11 +184,9 @@ class Case:
         q, tau = (
             (unit,) * self.samples.n if isinstance(unit, str) else unit for unit in given.pop()
         )
-        axes = zip(self.units, q, strict=True)
-        metres = (
-            "m" if (axis, unit) == ("m", "rad") else unit for axis, unit in axes
-        )  # both are 1
-        return {"q": tuple(metres), "tau": tau}
+        # the default rad of a prismatic joint is read as m
+        q = tuple(axis if unit == "rad" else unit for axis, unit in zip(self.units, q, strict=True))
+        return {"q": q, "tau": tau}
 
     @cached_property
     def baseline(self) -> Baseline | None:

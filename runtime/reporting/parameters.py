@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import repeat
 from typing import Any, cast
 
 import numpy as np
@@ -75,8 +76,7 @@ def every_section(result: Identification) -> Section:
     if fit.names != estimate.names:
         columns += _columns("all fitted: ", estimate, estimate.names)
     if cad:
-        fitted = {name: (fit[name], _half(fit, name)) for name in fit.names}
-        columns += file_columns(estimate.names, fitted, cad)
+        columns += file_columns(estimate.names, fit, cad)
     if formulas:
         columns.append(("made of", [_made_of(name, formulas) for name in estimate.names]))
     table = Table(
@@ -96,18 +96,16 @@ def every_section(result: Identification) -> Section:
 
 
 def file_columns(
-    names: Sequence[str], fitted: Mapping[str, tuple[float, float]], cad: Mapping[str, float]
+    names: Sequence[str], fit: Any, cad: Mapping[str, float]
 ) -> list[tuple[str, list[str]]]:
     """Make two table columns: values of the robot file, and differences of fitted values from them.
 
-    fitted : value and half the width of its 95 % interval, by name. cad : see `cad_values`.
+    fit : estimate or set of parameters with names, X and sigma_corrected. cad : see `cad_values`.
     """
     given = [cad.get(name, math.nan) for name in names]
-    pairs = [fitted.get(name, (math.nan, math.nan)) for name in names]
-    differences = [_difference(*pair, x) for pair, x in zip(pairs, given, strict=True)]
     return [
         ("robot file", ["" if math.isnan(x) else number(x) for x in given]),
-        ("difference %", differences),
+        ("difference %", list(map(_difference, repeat(fit), names, given))),
     ]
 
 
@@ -127,18 +125,19 @@ def _with_interval(fit: Estimate, name: str) -> tuple[str, str]:
     return interval(fit[name], half) if math.isfinite(half) else (number(fit[name]), "-")
 
 
-def _half(fit: Estimate, name: str) -> float:
+def _half(fit: Any, name: str) -> float:
     return 1.96 * float(fit.sigma_corrected[fit.names.index(name)])
 
 
-def _difference(fitted: float, half: float, given: float) -> str:
+def _difference(fit: Any, name: str, given: float) -> str:
     """Write the difference of a fitted value from the robot file's value, in % of the robot file's.
 
     The text is empty if the value of the robot file is smaller than half the width of the 95 %
     interval.
     """
-    if not abs(given) > half:
+    if name not in fit.names or not abs(given) > (half := _half(fit, name)):
         return ""
+    fitted = float(fit.X[fit.names.index(name)])
     value, _ = interval(100 * (fitted - given) / abs(given), 100 * half / abs(given))
     return value if value.startswith("-") else f"+{value}"
 

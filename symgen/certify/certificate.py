@@ -478,7 +478,9 @@ def numeric_rank(W: Array, *, tolerance: float = 1e-9, proved: int = 0) -> tuple
     """
     norms = np.linalg.norm(W, axis=0)
     acts = norms > 0
-    if acts.any():  # below: rounding of a column without effect
+    if (
+        acts.any()
+    ):  # below the median (np.median loads numpy.ma): rounding of a column without effect
         acts = norms > 1e-12 * np.sort(norms[acts])[acts.sum() // 2]
     s = np.linalg.svd(W[:, acts] / norms[acts], compute_uv=False)
     rank = int(np.sum(s > tolerance * s[0]))

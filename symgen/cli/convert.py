@@ -96,7 +96,7 @@ def convert(
 
             robot = with_values(robot, values_of_csv(read_bytes(values), str(values)))
         if estimate is not None:
-            from runtime.core.commands import require_torques
+            from runtime.commands import require_torques
             from runtime.documents.estimates import load_whole_estimate
 
             fit = load_whole_estimate(estimate)

@@ -130,7 +130,9 @@ def symgen(
 def main() -> None:
     """Run the `symgen` command line."""
     gc.set_threshold(ALLOCATIONS, 50, 100)
-    os.environ["PYDANTIC_DISABLE_PLUGINS"] = "1"  # reads the metadata of every package
+    os.environ["PYDANTIC_DISABLE_PLUGINS"] = (
+        "1"  # else pydantic reads the metadata of every package
+    )
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # cleans up as Ctrl-C does
     _open_streams()
     try:

@@ -338,13 +338,9 @@ class Draw:
         lead = row[0][1]
         inverse = power(self.residues(self.constant(lead)), self.p - 2, self.p)
         key = tuple(
-            (
-                i,
-                tuple(
-                    sorted({*(self.residues(self.constant(g)) * inverse % self.p).ravel().tolist()})
-                ),
-            )
+            (i, tuple(sorted({*ratio.ravel().tolist()})))
             for i, g in row
+            for ratio in (self.residues(self.constant(g)) * inverse % self.p,)
         )
         b = self._fp(self._state(("direction", key)))
         return b if lead.value(self.robot.constants) > 0 else 1 - b

@@ -39,8 +39,8 @@ def cells_of(text: str) -> dict[str, Any]:
     Returns
     -------
     dict
-        name, title : text; frames : {number: {column: text}}; constants : {name: text}; gravity : list of text; loops :
-        list of {cut, twin}.
+        name, title : text; frames : {number: {column: text}}; constants : {name: text};
+        gravity : list of text; loops : list of {cut, twin}.
     """
     values = yaml_values(text, file="robot.yaml")[0]
     values = values if isinstance(values, dict) else {}

@@ -270,9 +270,7 @@ def changes(path: str, request: Mapping[str, str]) -> dict[str, Any]:
         }
     if not (cad := cad_values(loaded)):
         return {"columns": {}, "note": ""}
-    halves = 1.96 * np.asarray(used.sigma_corrected)
-    fitted = dict(zip(used.names, zip(used.X, halves, strict=True), strict=True))
-    columns = file_columns(fit.names, fitted, cad)
+    columns = file_columns(fit.names, used, cad)
     of = {title: dict(zip(fit.names, cells, strict=True)) for title, cells in columns}
     return {"columns": of, "note": FILE_NOTE}
 

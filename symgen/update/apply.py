@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.commands import require_torques
+from runtime.commands import require_torques
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.model import load_model
 from runtime.documents.estimates import load_whole_estimate

@@ -7,7 +7,7 @@ import pytest
 
 import runtime
 import symgen
-from runtime.core.commands import require_torques
+from runtime.commands import require_torques
 from runtime.core.drives import Drives
 from runtime.core.errors import InputError, SettingsError
 from runtime.study import study_from_mapping

@@ -9,8 +9,8 @@ minimal encoder resolution):
 
 Eq. (10) supposes independent residuals; filtered ones are not. `sigma_corrected` is given too: it
 assumes that blocks of time are independent, not samples, and includes errors of the friction model
-that depend on the speed (`runtime.core.least_squares.block_covariance`). A number that the record does not determine is nan
-in memory and null in JSON.
+that depend on the speed (`runtime.core.least_squares.block_covariance`). A number that the record
+does not determine is nan in memory and null in JSON.
 """
 
 from __future__ import annotations

@@ -8,13 +8,12 @@ on several joints are meaningful only if these joints have the same torque const
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from typing import Any
 
 from runtime.core.errors import InputError
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.model import GeneratedModel
-from runtime.core.record import Record
+from runtime.core.problem import Problem
 
 INERTIAS = {"kg*m**2": "*s**2/rad", "kg*m": "*s**2/m", "kg": "*s**2/m"}
 """Units of inertias, as the rest behind the unit of the torque."""
@@ -63,15 +62,20 @@ def require_torques(fit: Estimate) -> None:
         )
 
 
-def model_of_records(model: GeneratedModel, records: Sequence[Record]) -> Any:
-    """Return the model, or its CommandModel if the records are in A or V.
+def commands_for_torques(problem: Problem) -> Problem:
+    """Replace the model of a problem by its CommandModel if the records are in A or V.
 
-    Raises InputError if some records are in N m and some are not.
+    This is a step of the preparation of a problem. Raises InputError if some records are in N m and
+    some are not.
     """
+    records = (*problem.records, *problem.unseen)
     units = dict.fromkeys(record.origin.command or "N m" for record in records)
     if len(units) > 1:
         raise InputError(
             f"some records are in {', others in '.join(units)}; set the same record.torque_constant for all records"
         )
     unit = next(iter(units), "N m")
-    return model if unit == "N m" else CommandModel(model, unit)
+    if unit == "N m":
+        return problem
+    model: Any = CommandModel(problem.model, unit)
+    return problem.changed(model=model)
