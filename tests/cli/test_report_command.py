@@ -47,7 +47,7 @@ def record(tmp_path):
 def test_measured_record_of_one_joint(emps_data, tmp_path):
     result = run("emps", "emps", "-o", tmp_path / "out", "--encoder", "1e-6")
     assert result.exit_code == 0, result.output
-    assert result.stdout.startswith("Yes. The model of emps with 4 of 4 parameters leaves")
+    assert result.stdout.startswith("With care. The model of emps with 4 of 4 parameters leaves")
     assert {path.name for path in (tmp_path / "out").iterdir()} >= FILES
     html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     for words in (

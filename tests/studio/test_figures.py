@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,15 @@ def zoomed(page: Browser) -> tuple[list[str], list[str]]:
     page.drag(".plot", 90, 0)
     page.run(FRAME)
     return whole, page.run(DRAWN)
+
+
+def point(page: Browser) -> None:
+    """The pointer on the middle of the first figure, until the cursor has left the first instant."""
+    start, end = page.run(CURSOR), time.monotonic() + 10
+    while page.run(CURSOR) == start:
+        assert time.monotonic() < end
+        page.hover(".plot")
+        page.run(FRAME)
 
 
 @pytest.fixture
@@ -72,7 +82,7 @@ def test_results_show_measured_predicted_and_error_of_every_joint(results: Brows
 
 def test_the_pointer_moves_one_cursor(results: Browser) -> None:
     """Of all figures, the slider and the values; the error is the difference of the torques."""
-    results.hover(".plot")
+    point(results)
     marks = "document.querySelectorAll('.plot line.cursor').length"
     assert results.run(marks) == 4
     found = re.fullmatch(
@@ -86,7 +96,7 @@ def test_the_pointer_moves_one_cursor(results: Browser) -> None:
 
 
 def test_play_repeats_the_span_that_is_shown(results: Browser) -> None:
-    results.hover(".plot")
+    point(results)
     start = results.run(CURSOR)
     zoomed(results)
     end = results.run(CURSOR)
