@@ -294,9 +294,7 @@ class Bodies:
         return bool(self.known_links.any())
 
     def distance(self, chi: Array) -> float:
-        """Compute the penalty, nats, on the distance of parameters chi from the robot file's
-        values.
-        """
+        """Compute the penalty, nats, on the distance of parameters chi from the file's values."""
         return float(0.5 * chi @ self.H @ chi - self.h @ chi + self.constant)
 
     def penalty(self, chi: Array) -> float:

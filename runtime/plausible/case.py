@@ -80,8 +80,7 @@ class Case:
         return list(joint_units(self.model))
 
     def grams(self, mask: Array) -> Grams:
-        """Form the least-squares normal equations of the samples selected by `mask`, bool (K, n).
-        """
+        """Form the least-squares normal equations of the samples in `mask`, bool (K, n)."""
         tau = self.samples.tau
         return Grams.of(self.D, tau - self.samples.tau_known, mask, tau)
 

@@ -239,7 +239,7 @@ class Robot:
 
     @property
     def frames(self) -> list[int]:
-        """Numbers of the frames whose geometry may be altered to test for an error in the robot file.
+        """Numbers of the frames whose geometry may be altered to test the robot file for errors.
 
         Frames of constrained joints are not among them.
         """
@@ -616,19 +616,17 @@ def slow_joints(robot: Robot) -> Iterator[Item]:
 
 
 def in_positions(robot: Robot, item: Item) -> Maps:
-    """Make the correction of the positions from a matrix E that reorders columns or changes signs.
-    """
+    """Make the correction of positions from a matrix E that reorders columns or changes signs."""
     return robot.positions(item["E"])
 
 
 def in_torques(robot: Robot, item: Item) -> Maps:
-    """Make the correction of the torques from a matrix E that reorders columns or changes signs."""
+    """Make the correction of torques from a matrix E that reorders columns or changes signs."""
     return robot.torques(item["E"])
 
 
 def in_both(robot: Robot, item: Item) -> Maps:
-    """Make the correction of positions and torques from E, which reorders columns or changes signs.
-    """
+    """Make the correction of positions and torques from E: other order or signs of columns."""
     return robot.positions(item["E"]) | robot.torques(item["E"])
 
 
