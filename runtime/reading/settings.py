@@ -334,8 +334,7 @@ class RecordSettings(Settings):
 
     @property
     def sides(self) -> tuple[str, str]:
-        """Sides at which positions and torques were measured: "motor", "joint" or "link" for each.
-        """
+        """Sides at which positions and torques were measured, each "motor", "joint" or "link"."""
         return self.side, self.torque_side or self.side
 
 

@@ -19,7 +19,7 @@ def resolution_section(
     curve: Cestac | None = None,
     names: Sequence[str] = (),
 ) -> Section:
-    """Build the section of a study of encoder steps: tables of errors, curve of %e over Delta.
+    """Build the section of a study of encoder steps: tables of errors, and curves over the step.
 
     The table is Table 3 of the chapter, with both definitions of %e(rho).
 
@@ -32,7 +32,7 @@ def resolution_section(
 
 
 def level_numbers(result: Cestac) -> list[Number]:
-    """Write the verdict of each encoder or torque step, with the parameter that changes most.
+    """Write the verdict of each encoder or torque step, and the parameter with the largest error.
 
     Encoder steps are given in counts per turn and bits too. The numbers are for the head of a page.
     """

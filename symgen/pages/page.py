@@ -193,7 +193,7 @@ def printed(text: str) -> str:
 
 
 def _places(parameters: Sequence[Effect]) -> dict[str, list[dict[str, Any]]]:
-    """Group the standard parameters by link or joint, each with its role: alone, regrouped or none.
+    """Group the standard parameters by link or joint, and mark each: alone, regrouped or none.
 
     The mark none means that the parameter has no effect.
     """

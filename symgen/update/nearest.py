@@ -51,7 +51,7 @@ TINY = 1e-15  # SI; an eigenvalue so little below zero is rounding
 
 @dataclass(frozen=True, eq=False)
 class Nearest:
-    """Result of `nearest`: masses, centres, tensors and joint parameters nearest to a file.
+    """Result of `nearest`: masses, centres of mass, inertia tensors and joint parameters.
 
     The numbers u, shape (p,), are mass, centre and tensor of each link, and the parameters of the
     elements on the joints.
@@ -87,7 +87,7 @@ class Nearest:
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """The unknowns of the optimisation in `nearest`: masses, centres, tensors and joint parameters.
+    """Unknowns of the optimisation in `nearest`: masses, centres, tensors and joint parameters.
 
     Each link of the file has ten unknowns; joint parameters are those of the elements on the
     joints.
@@ -145,7 +145,7 @@ class Numbers:
         return T
 
     def seen(self, u: Array) -> Array:
-        """Find the link and joint values on which a base parameter depends; bool, shape (p,)."""
+        """Find the link and joint values that affect any base parameter; bool, shape (p,)."""
         A = self.physical.K @ self.slope(u) * self.size
         share = np.abs(A) > MISSED * np.linalg.norm(A, axis=1, keepdims=True)
         return np.asarray(np.any(share, axis=0))
@@ -159,7 +159,7 @@ def nearest(
     X: Array,
     absent: Collection[str] = (),
 ) -> Nearest:
-    """Find the physically possible robot with base parameters X nearest to the values of the file.
+    """Find the physically possible robot with base parameters X that is nearest to a file's values.
 
     Parameters
     ----------
@@ -291,7 +291,7 @@ def _sizes_of(x: Array) -> Array:
 
 
 def _spare(physical: PhysicalModel, own: Sequence[str], absent: Sequence[str]) -> list[str]:
-    """Find the joint parameters that the file lacks and that other parameters can replace."""
+    """Find the joint parameters that are not in the file and that other parameters can replace."""
     spare: list[str] = []
 
     def rank(names: Sequence[str]) -> int:

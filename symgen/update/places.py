@@ -104,7 +104,7 @@ MJCF = Attributes(
 
 @dataclass(frozen=True, eq=False)
 class LinkPlace:
-    """The XML elements of a link, and the frames in which the file gives mass, centre and tensor.
+    """XML elements of a link, and the frames in which the file gives mass, centre and tensor.
 
     Attributes
     ----------
@@ -362,7 +362,7 @@ def _bodies(e: XmlElement) -> Iterator[XmlElement]:
 
 @dataclass(frozen=True, eq=False)
 class FileLink:
-    """A link of a URDF or MJCF file that has inertia.
+    """A link of a URDF or MJCF file, with its inertial parameters and its XML elements.
 
     Attributes
     ----------

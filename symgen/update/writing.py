@@ -107,7 +107,7 @@ class Writing:
 
     @property
     def placeless(self) -> dict[str, float]:
-        """New values, by name, of changed parameters for which the format has no attribute."""
+        """New values, by name, of changed parameters that the file format cannot store."""
         return {
             name: float(self.nearest.u[k])
             for name, k in self.nearest.elements.items()
