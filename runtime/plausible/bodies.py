@@ -1,4 +1,4 @@
-"""Fit robot parameters to samples of a record: any values, or only those that bodies can have.
+"""Fit robot parameters to samples of a record, with or without conditions on physical values.
 
 Bodies stay near the values that are known. Rows of a joint are weighted by its own residuals, so
 that a wrist counts as much as a shoulder. The score is the negative logarithm of the likelihood
@@ -353,7 +353,7 @@ def physical_fit(grams: Grams, bodies: Bodies, N: float, sigma: Array, rounds: i
 
 
 def quick_fit(grams: Grams, bodies: Bodies, N: float, sigma: Array) -> Fit:
-    """Fit the standard parameters of a physical robot once, with weights from given residuals.
+    """Fit the standard parameters under physical conditions once, weighted by given residuals.
 
     The score is at most a few nats above that of `physical_fit`.
     """

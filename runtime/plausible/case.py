@@ -142,7 +142,8 @@ class Case:
 
     @cached_property
     def few(self) -> str:
-        """Remark that there are too few samples to search for errors of the study; empty if enough.
+        """Remark that too few samples remain to search for errors of the study; "" if there are
+        enough.
 
         Too few samples do not prevent the check of the robot file's values, because gravity needs
         no motion.
@@ -168,7 +169,7 @@ class Case:
 
     @cached_property
     def sides(self) -> tuple[str, str]:
-        """Sides, "joint" or "motor", on which the files give the positions and the torques.
+        """Sides of the drives, "joint" or "motor", at which the files give positions and torques.
 
         The side of the torques is "law" if the control law of a controller computed them.
         """
@@ -200,7 +201,7 @@ class Case:
 
     @cached_property
     def validation(self) -> Baseline | None:
-        """Reference fit `baseline` with the samples and the regressor of the validation records.
+        """Reference fit `baseline`, prepared to predict the torques of the validation records.
 
         None if there are no validation records, or if they cannot be used.
         """

@@ -1,4 +1,4 @@
-"""Two tables of possible errors (causes) of a study, a robot file or a log, each tried alone.
+"""Two tables of possible errors (causes) of a study, robot file or record, each tried alone.
 
 Each row gives the kind of a cause, for which items it is tried (joints, pairs of joints, frames,
 ...), the sentences of the finding and of the remedy, and the change of the samples or of the table
@@ -64,7 +64,7 @@ ENTRY = re.compile(r"free_(alpha|[drb])(\d+)")
 
 @dataclass(frozen=True, eq=False)
 class Cause:
-    """One possible error of a study, a robot file or a log, and the change that corrects it.
+    """One possible error of a study, a robot file or a record, and the change that corrects it.
 
     Attributes
     ----------
@@ -126,7 +126,7 @@ class Cause:
         return np.asarray(samples.tau @ self.T.T - self.subtracted(samples))
 
     def subtracted(self, samples: Samples) -> Array:
-        """Compute the torques that the model lacks, to subtract from the measured torques.
+        """Compute the torques that the model lacks; they are subtracted from the measured torques.
 
         They are s known + rho, shape (K, n).
         """
@@ -150,7 +150,7 @@ def unmodelled_torques(samples: Samples) -> Array:
 
 
 def unchanged_study(n: int, **changed: Any) -> Cause:
-    """Make a `Cause` that leaves a study of n joints unchanged, except for the given fields."""
+    """Make a `Cause` for n joints that corrects nothing, except by the given fields."""
     plain = {"kind": "", "says": "", "remedy": "", "subject": ""}
     return Cause(**plain | {"P": np.eye(n), "p": np.zeros(n), "T": np.eye(n)} | changed)
 
@@ -284,7 +284,7 @@ class Row:
     change: Callable[[Robot, Item], Mapping[str, Any]] = lambda robot, item: {}
 
     def cause(self, robot: Robot, item: Item, *xi: float) -> Cause:
-        """Make the possible error (cause) for one item, for instance for one joint.
+        """Make the `Cause` of this kind of error for one item, for instance for one joint.
 
         Rows of NUMBERS also need xi, the unknown number.
         """
@@ -310,9 +310,7 @@ def study(robot: Robot) -> Iterator[Item]:
 
 
 def several_joints(robot: Robot) -> Iterator[Item]:
-    """Yield one empty mapping, for an error of all joints together; nothing if there is only one
-    joint.
-    """
+    """Yield one empty mapping, for an error of all joints together; nothing for a single joint."""
     yield from [{}] if robot.n > 1 else []
 
 
@@ -452,8 +450,7 @@ def geared(robot: Robot) -> Iterator[Item]:
 
 
 def with_constants(robot: Robot) -> Iterator[Item]:
-    """Yield one empty mapping, for an error of the torque constants; nothing if the drives have
-    none.
+    """Yield one empty mapping, for an error of the torque constants; nothing without them.
 
     The torque constants may be missing, or applied to signals that are torques already.
     """
@@ -461,8 +458,7 @@ def with_constants(robot: Robot) -> Iterator[Item]:
 
 
 def with_offsets(robot: Robot) -> Iterator[Item]:
-    """Yield one empty mapping, for an error of the position offsets; nothing if the drives have
-    none.
+    """Yield one empty mapping, for an error of the position offsets; nothing without them.
 
     The offsets may be missing or wrong.
     """
@@ -626,7 +622,7 @@ def in_torques(robot: Robot, item: Item) -> Maps:
 
 
 def in_both(robot: Robot, item: Item) -> Maps:
-    """Make the correction of positions and torques from E: other order or signs of columns."""
+    """Make the correction of positions and torques from a matrix E (other order or signs)."""
     return robot.positions(item["E"]) | robot.torques(item["E"])
 
 

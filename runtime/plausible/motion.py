@@ -109,7 +109,10 @@ def speed_of_rest(problem: Problem) -> float | tuple[float, ...] | None:
 
 
 def _rounded_up(x: float) -> float:
-    """Round x up to two digits; a smaller threshold would not leave out all rows at rest."""
+    """Round a speed threshold x up to two significant digits.
+
+    A smaller threshold would not leave out all rows at rest.
+    """
     digit = 10.0 ** (np.floor(np.log10(x)) - 1) if x > 0 else 1.0
     return float(f"{np.ceil(x / digit * (1 - 1e-12)) * digit:.2g}")
 

@@ -217,7 +217,7 @@ def usable(record: Record, study: Study, before: int, after: int) -> Array:
 
 
 def _instants(through: Filtered, number: int) -> Samples:
-    """Filter one record and select samples about 0.4/f seconds apart; f is the cut-off frequency.
+    """Select samples of one filtered record, about 0.4/f seconds apart (f: cut-off frequency).
 
     If these are fewer than LIMIT.INSTANTS_LEAST in a long record, twice as many are chosen. A time
     of 2/cutoff is left out at each end.

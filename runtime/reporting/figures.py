@@ -93,8 +93,7 @@ def joint_overlay(joint: JointComparison, unit: str = "N m", source: str = "meas
 def torque_overlay(
     comparison: Sequence[JointComparison], unit: str = "N m", source: str = "measured"
 ) -> Figure:
-    """Draw measured torque, predicted torque and error of each joint: Fig. 4 of the book chapter.
-    """
+    """Draw measured torque, predicted torque and error of each joint, as Fig. 4 of the chapter."""
 
     def draw(ax: Axes, joint: JointComparison) -> None:
         _torques(ax, ax, joint, source)

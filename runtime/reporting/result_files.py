@@ -73,8 +73,7 @@ class Results:
         return [self.folder / name for name in contents]
 
     def recover(self) -> None:
-        """Finish an interrupted write: move complete files to their place, delete incomplete ones.
-        """
+        """Finish an interrupted write: move complete files to their place, delete the others."""
         for unfinished in self.folder.glob(f"{UNFINISHED}*"):
             if unfinished.is_dir() and not unfinished.is_symlink():  # rmtree waits for a pipe
                 shutil.rmtree(unfinished, ignore_errors=True)

@@ -41,7 +41,8 @@ class Writing:
     root: Array
 
     def links(self, edits: XmlEdits) -> list[Change]:
-        """Edit the links in the file; return a Change for each mass, centre and tensor element."""
+        """Edit the links in the file; return a Change for each element of mass, centre and inertia.
+        """
         rows, moved = [], []
         for link in self.text.links:
             x = self.nearest.u[self.nearest.links[link.name]]
