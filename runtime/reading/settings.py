@@ -122,7 +122,8 @@ class Columns(Settings):
 
     @property
     def further(self) -> dict[str, tuple[str, ...]]:
-        """Columns of signals that belong to no joint: channels (temperature ...) and wrenches.
+        """Columns of signals that belong to no joint: channels (temperature ...) and sensor
+        wrenches.
 
         They are listed by name of the channel or wrench.
         """

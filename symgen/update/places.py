@@ -385,8 +385,7 @@ class FileLink:
 
     @property
     def numbers(self) -> Array:
-        """Mass, centre of mass and inertia tensor in the file, shape (10,), as listed in NUMBERS.
-        """
+        """Mass, centre of mass and inertia tensor in the file, shape (10,); order as in NUMBERS."""
         return self.place.numbers(self.ten) if self.place.stated is None else self.place.stated
 
 

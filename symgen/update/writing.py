@@ -41,7 +41,7 @@ class Writing:
     root: Array
 
     def links(self, edits: XmlEdits) -> list[Change]:
-        """Edit the links in the file; return a Change for each element of mass, centre and inertia.
+        """Edit the links in the file; return a Change for each number of mass, centre and inertia.
         """
         rows, moved = [], []
         for link in self.text.links:
