@@ -156,7 +156,7 @@ class Signal:
 def _signals(
     columns: Columns, first: Table, last: Table, other: Table, missing: bool
 ) -> dict[str, Signal]:
-    """Read the requested columns and return them by quantity, for instance "q" or "tau"."""
+    """Read the columns of a record, and return them by quantity, for instance "q" or "tau"."""
     places = {
         "t": (first, () if columns.t is None else (columns.t,)),
         "q": (first, columns.q),

@@ -43,7 +43,7 @@ ADVICE = {
 
 
 class OutputError(InputError):
-    """Results cannot be written; the message says where, why, and what to do."""
+    """Error raised if results cannot be written; the message names the file, reason and remedy."""
 
 
 class Results:

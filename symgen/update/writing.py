@@ -41,8 +41,7 @@ class Writing:
     root: Array
 
     def links(self, edits: XmlEdits) -> list[Change]:
-        """Edit the links in the file; return a Change for each number of mass, centre and inertia.
-        """
+        """Edit the links in the file; return a Change for each mass, centre and inertia number."""
         rows, moved = [], []
         for link in self.text.links:
             x = self.nearest.u[self.nearest.links[link.name]]
