@@ -20,7 +20,8 @@ FIGURES_SHOWN = 8  # of joints, before the table of parameters
 
 
 def detail_sections(result: Identification) -> list[Section]:
-    """Build the folded report sections: fit errors, removed parameters, validation, residuals."""
+    """Build the collapsible report sections: fit errors, removed parameters, validation, residuals.
+    """
     trust = result.uncertainty
     sections = [
         *other_torques_section(result),

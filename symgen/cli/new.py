@@ -14,9 +14,7 @@ from symgen.cli.session import fail, reported_errors
 def new(
     file: Annotated[Path, typer.Argument(help="Robot file to create, e.g. my_arm.yaml.")],
 ) -> None:
-    """Write a robot file in which every section is explained. An existing file is never
-    overwritten.
-    """
+    """Write a robot file with an explanation of every section; never overwrite an existing file."""
     with reported_errors():
         from symgen.description.new import skeleton_for
 

@@ -1,4 +1,4 @@
-"""Find the physically possible robot with given base parameters that is nearest to a file.
+"""Find the physically possible robot with given base parameters, nearest to a file's values.
 
 This is the optimisation of the feasible estimate in `identify`, with the file as prior:
 

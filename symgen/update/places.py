@@ -391,7 +391,7 @@ class FileLink:
 
 @dataclass(frozen=True, eq=False)
 class RobotText:
-    """A parsed URDF or MJCF file: its tree, its frame table, and the XML elements with its numbers.
+    """A parsed URDF or MJCF file: tree of links, frame table, and XML elements with the numbers.
 
     Attributes
     ----------
