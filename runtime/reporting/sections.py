@@ -20,8 +20,7 @@ FIGURES_SHOWN = 8  # of joints, before the table of parameters
 
 
 def detail_sections(result: Identification) -> list[Section]:
-    """Build the collapsible report sections: fit errors, removed parameters, validation, residuals.
-    """
+    """Build the collapsible report sections, such as fit errors, validation and residuals."""
     trust = result.uncertainty
     sections = [
         *other_torques_section(result),
