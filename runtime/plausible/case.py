@@ -169,7 +169,7 @@ class Case:
 
     @cached_property
     def sides(self) -> tuple[str, str]:
-        """Sides of the drives, "joint" or "motor", at which the files give positions and torques.
+        """Sides at which the files give positions and torques: "joint", "motor" or "link" for each.
 
         The side of the torques is "law" if the control law of a controller computed them.
         """

@@ -402,7 +402,7 @@ def position_unit_of_joints(robot: Robot) -> Iterator[Item]:
 
 
 def of_each_joint(robot: Robot, items: Iterator[Item]) -> Iterator[Item]:
-    """Yield an error of several joints again, as an error of each of these joints alone."""
+    """Yield, for an error of several joints, the same error of each of these joints alone."""
     for item in items:
         for j in np.flatnonzero(item["chosen"]) if item["chosen"].sum() > 1 else ():
             yield {**item, "chosen": np.arange(robot.n) == j, "joint": robot.labels[j]}
@@ -531,7 +531,7 @@ def lengths(robot: Robot) -> Iterator[Item]:
 
 
 def odd_lengths(robot: Robot) -> Iterator[Item]:
-    """Yield each unusual d, r or b of the table of frames, with the factors 1000 and 1/1000."""
+    """Yield each very long or very short d, r or b of the frames, with the factors 1000, 1/1000."""
     for item in lengths(robot):
         if not LIMIT.MM_BELOW < abs(item["length"]) < LIMIT.MM_ABOVE:
             for text, factor in LENGTHS.items():
@@ -547,7 +547,7 @@ def exchanged_lengths(robot: Robot) -> Iterator[Item]:
 
 
 def odd_tables(robot: Robot) -> Iterator[Item]:
-    """Yield all lengths of the table of frames, multiplied by 1000 and by 1/1000 (mm read as m).
+    """Yield all lengths of the table of frames times 1000, then times 1/1000 (mm for m, m for mm).
 
     Only if the longest length is too long or too short for an arm.
     """

@@ -100,8 +100,8 @@ def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ..
 
 
 def speed_of_rest(problem: Problem) -> float | tuple[float, ...] | None:
-    """Propose the speed below which the samples of an identification problem are left out as
-    resting.
+    """Propose the speed below which the samples of a joint are left out, for an identification
+    problem.
 
     See `low_speed_of_rest`.
     """

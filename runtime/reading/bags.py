@@ -72,7 +72,7 @@ class JointState:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class JointTable(Table):
-    """Table of the JointState messages of one ROS topic; the method `chosen` fills its columns."""
+    """Table of the JointState messages of a ROS topic; `chosen` reads columns from the messages."""
 
     messages: tuple[JointState, ...]
 

@@ -32,9 +32,10 @@ def resolution_section(
 
 
 def level_numbers(result: Cestac) -> list[Number]:
-    """Write the verdict of each encoder or torque step, and the parameter with the largest error.
+    """Write, for each encoder or torque step, the verdict and the largest error, %.
 
-    Encoder steps are given in counts per turn and bits too. The numbers are for the head of a page.
+    The error is that of a parameter or of the residual. Encoder steps are given in counts per turn
+    and bits too. The numbers are for the head of a page.
     """
     states: dict[str, State] = {"unbiased": "good", "doubtful": "doubtful", "biased": "no"}
     turns = not {*result.reference.units.values()} & {"N*s/m", "kg"}
