@@ -239,7 +239,7 @@ def demonstrate(
 
 
 def recorded_step(record: Record) -> float:
-    """Find the coarsest step of the recorded positions over all joints, rad.
+    """Find the step of the recorded positions of each joint, and return the coarsest one, rad.
 
     The step of a joint is the smallest change between two samples that is not a rounding error.
     """
@@ -322,7 +322,7 @@ class Demonstration:
 
 
 def sections(demo: Demonstration) -> list[Section]:
-    """Build the report sections: comparisons with Tables 2 to 4 and contradictions of the chapter.
+    """Build the report sections: comparisons with the book chapter, and its contradictions.
 
     Contradictions are statements of the chapter that do not agree with each other.
     """
@@ -336,7 +336,7 @@ def sections(demo: Demonstration) -> list[Section]:
 
 
 def differences(demo: Demonstration) -> dict[str, float]:
-    """Compute, in per cent, how far the essential parameters differ from Table 2 of the chapter."""
+    """Compute the differences of the essential parameters from Table 2 of the book chapter, %."""
     fit = demo.result.essential.estimate
     return {n: percent(fit[n], value) for n, value in TABLE_2.items() if n in fit.names}
 
@@ -358,7 +358,7 @@ def _fit_cells(fit: Estimate, name: str) -> tuple[str, str, str]:
 
 
 def _table_2(demo: Demonstration) -> Section:
-    """Build the report section that compares our least squares values with Table 2.
+    """Build the report section that compares our least-squares values with Table 2 of the chapter.
 
     Our values are those of the essential fit and of the fit of all parameters.
     """

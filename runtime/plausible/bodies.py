@@ -1,4 +1,4 @@
-"""Fit robot parameters to samples of a record: any values, or only those that bodies can have.
+"""Fit robot parameters to samples of a record, with or without conditions on physical values.
 
 Bodies stay near the values that are known. Rows of a joint are weighted by its own residuals, so
 that a wrist counts as much as a shoulder. The score is the negative logarithm of the likelihood
@@ -40,7 +40,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Grams:
-    """Normal equations of least squares, separately for the torque of each joint.
+    """Normal equations W_j'W_j X = W_j'Y_j of a least-squares fit, stored for each joint j.
 
     Attributes
     ----------
@@ -58,7 +58,8 @@ class Grams:
 
     @classmethod
     def of(cls, D: Array, Y: Array, mask: Array, tau: Array | None = None) -> Grams:
-        """Form the normal equations from the regressor D, the torques Y and a mask of used rows.
+        """Form the normal equations of each joint from the regressor D and the torques Y of the
+        used rows.
 
         D : shape (K, n, b).
         Y : shape (K, n).
@@ -141,7 +142,7 @@ def fit_of(grams: Grams, X: Array, N: float, penalty: float = 0.0) -> Fit:
 
 
 def solve_scaled(A: Array, g: Array, ridge: float = LIMIT.RIDGE) -> Array:
-    """Solve A x = g for a positive semidefinite A, whose columns are scaled first."""
+    """Solve A x = g for a positive semidefinite A that is first scaled to a unit diagonal."""
     d = np.diag(A)
     D = 1 / np.sqrt(np.where(d > 0, d, 1.0))
     scaled = A * D * D[:, None]
@@ -151,7 +152,8 @@ def solve_scaled(A: Array, g: Array, ridge: float = LIMIT.RIDGE) -> Array:
 
 
 def least_squares(grams: Grams, N: float, bodies: Bodies | None = None) -> Fit:
-    """Fit the parameters by least squares, with each joint's rows divided by its rms residual.
+    """Fit the parameters by weighted least squares: each row is divided by the rms residual of its
+    joint.
 
     If `bodies` is given, the parameters are the standard parameters, and they are drawn towards the
     values of the robot file.
@@ -167,7 +169,8 @@ def least_squares(grams: Grams, N: float, bodies: Bodies | None = None) -> Fit:
 
 
 class Bodies:
-    """Conditions for physical parameters of bodies, and penalties that draw them to known values.
+    """Physical conditions on the standard parameters, and penalties that keep them near known
+    values.
 
     Parameters
     ----------
@@ -276,7 +279,8 @@ class Bodies:
         return self.physical.values.get(names[0], 0.0) if single else 0.0
 
     def _pull(self, numbers: list[int], near: Array, linear: Array, size: float) -> None:
-        """Add a penalty that draws some parameters, given by their indices, towards known values.
+        """Add a penalty on the distance of some parameters, given by their indices, from known
+        values.
 
         It is 1/2 x'near x - linear'x + size/2/tolerance^2, x the parameters.
         """
@@ -286,15 +290,16 @@ class Bodies:
 
     @property
     def near_values(self) -> bool:
-        """Whether the fit is drawn towards values of links that the robot file gives."""
+        """Whether the fit keeps the parameters of any link near the values in the robot file."""
         return bool(self.known_links.any())
 
     def distance(self, chi: Array) -> float:
-        """Compute the penalty if parameters chi differ from the robot file's values, nats."""
+        """Compute the penalty, nats, on the distance of parameters chi from the file's values."""
         return float(0.5 * chi @ self.H @ chi - self.h @ chi + self.constant)
 
     def penalty(self, chi: Array) -> float:
-        """Compute the penalty D of standard parameters chi, nats.
+        """Compute the penalty D, in nats, that is added to the cost of a fit for standard
+        parameters chi.
 
         It is the distance from known values, plus a price for the masses of links without values.
         """
@@ -309,7 +314,8 @@ class Bodies:
         return self.program.minimum(A + self.H, g + self.h - self.heavy - self.price)
 
     def stiffness(self, chi: Array) -> Array:
-        """Compute the second derivatives of the penalty D plus a barrier at the physical bounds.
+        """Compute the Hessian matrix of the penalty D plus a barrier that keeps the parameters
+        physical.
 
         The barrier is logarithmic, has the weight LIMIT.WEAK_PRICE, and bounds the parameters by
         the physical conditions. It makes the matrix large in the directions in which parameters
@@ -331,7 +337,8 @@ class Bodies:
 
 
 def physical_fit(grams: Grams, bodies: Bodies, N: float, sigma: Array, rounds: int = 8) -> Fit:
-    """Fit the standard parameters of a robot that can exist, near known values if there are any.
+    """Fit the standard parameters under physical conditions, and near known values if there are
+    any.
 
     N : number of independent rows of a joint.
     sigma : residuals of the joints that give the first weights; each fit gives new ones, at most
@@ -346,7 +353,7 @@ def physical_fit(grams: Grams, bodies: Bodies, N: float, sigma: Array, rounds: i
 
 
 def quick_fit(grams: Grams, bodies: Bodies, N: float, sigma: Array) -> Fit:
-    """Fit the standard parameters of a physical robot once, with weights from given residuals.
+    """Fit the standard parameters under physical conditions once, weighted by given residuals.
 
     The score is at most a few nats above that of `physical_fit`.
     """

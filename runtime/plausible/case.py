@@ -32,7 +32,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """Records, settings (study) and robot model of one identification, as the checks use them.
+    """Records, settings (study) and robot model of one identification, prepared for the checks.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class Case:
         return list(joint_units(self.model))
 
     def grams(self, mask: Array) -> Grams:
-        """Form the normal equations of the samples that `mask`, bool (K, n), selects."""
+        """Form the least-squares normal equations of the samples in `mask`, bool (K, n)."""
         tau = self.samples.tau
         return Grams.of(self.D, tau - self.samples.tau_known, mask, tau)
 
@@ -135,12 +135,15 @@ class Case:
 
     @property
     def silent(self) -> str:
-        """Reason why errors of the study cannot be searched for; an empty string if they can."""
+        """Reason why no search for errors of the study is possible; an empty string if it is
+        possible.
+        """
         return self.unfit or self.few
 
     @cached_property
     def few(self) -> str:
-        """Remark that there are too few samples to search for errors of the study; empty if enough.
+        """Remark that too few samples remain to search for errors of the study; "" if there are
+        enough.
 
         Too few samples do not prevent the check of the robot file's values, because gravity needs
         no motion.
@@ -166,7 +169,7 @@ class Case:
 
     @cached_property
     def sides(self) -> tuple[str, str]:
-        """Sides, "joint" or "motor", on which the files give the positions and the torques.
+        """Sides at which the files give positions and torques: "joint", "motor" or "link" for each.
 
         The side of the torques is "law" if the control law of a controller computed them.
         """
@@ -190,12 +193,15 @@ class Case:
 
     @cached_property
     def baseline(self) -> Baseline | None:
-        """Reference fit, with the study (settings) as given; None if nothing can be fitted."""
+        """Reference fit: the records are fitted with unchanged settings of the study.
+
+        None if nothing can be fitted.
+        """
         return None if self.silent else self._baseline(values=True)
 
     @cached_property
     def validation(self) -> Baseline | None:
-        """The reference fit `baseline`, with samples and regressor of the validation records.
+        """Reference fit `baseline`, prepared to predict the torques of the validation records.
 
         None if there are no validation records, or if they cannot be used.
         """
@@ -212,7 +218,7 @@ class Case:
 
     @cached_property
     def alone(self) -> Baseline | None:
-        """Reference fit that is not drawn towards the values of the robot file.
+        """Reference fit without a penalty on the distance from the robot file's inertial values.
 
         If the file has no values, this is the fit `baseline`.
         """

@@ -1,4 +1,4 @@
-"""Two tables of possible errors (causes) of a study, a robot file or a log, each tried alone.
+"""Two tables of possible errors (causes) of a study, robot file or record, each tried alone.
 
 Each row gives the kind of a cause, for which items it is tried (joints, pairs of joints, frames,
 ...), the sentences of the finding and of the remedy, and the change of the samples or of the table
@@ -64,7 +64,7 @@ ENTRY = re.compile(r"free_(alpha|[drb])(\d+)")
 
 @dataclass(frozen=True, eq=False)
 class Cause:
-    """One possible error of a study, a robot file or a log, and the change that corrects it.
+    """One possible error of a study, a robot file or a record, and the change that corrects it.
 
     Attributes
     ----------
@@ -113,18 +113,20 @@ class Cause:
         return still and self.rate == 1 and not self.constants
 
     def states(self, samples: Samples) -> tuple[Array, Array, Array]:
-        """Compute q, qd and qdd of the samples after the correction, shape (K, n) each."""
+        """Compute q, qd and qdd of the samples after the correction of the error, shape (K, n)
+        each.
+        """
         q = samples.q @ self.P.T + self.p
         qd = self.rate * samples.qd @ self.P.T
         qdd = self.rate**2 * samples.qdd @ self.P.T
         return q, qd, qdd
 
     def torque(self, samples: Samples) -> Array:
-        """Compute the torques that the model has to explain after the correction, shape (K, n)."""
+        """Compute the torques to which the model is fitted after the correction, shape (K, n)."""
         return np.asarray(samples.tau @ self.T.T - self.subtracted(samples))
 
     def subtracted(self, samples: Samples) -> Array:
-        """Compute the torques that the model lacks, to subtract from the measured torques.
+        """Compute the torques that the model lacks; they are subtracted from the measured torques.
 
         They are s known + rho, shape (K, n).
         """
@@ -148,7 +150,7 @@ def unmodelled_torques(samples: Samples) -> Array:
 
 
 def unchanged_study(n: int, **changed: Any) -> Cause:
-    """Make a `Cause` that leaves a study of n joints unchanged, except for the given fields."""
+    """Make a `Cause` for n joints that corrects nothing, except by the given fields."""
     plain = {"kind": "", "says": "", "remedy": "", "subject": ""}
     return Cause(**plain | {"P": np.eye(n), "p": np.zeros(n), "T": np.eye(n)} | changed)
 
@@ -201,7 +203,8 @@ class Robot:
         return np.where(np.arange(self.n) == j, value, others)
 
     def positions(self, E: Array) -> Maps:
-        """Convert a correction matrix E of the position columns in the files to the joint side.
+        """Compute the correction of joint positions from the correction E of the positions in the
+        files.
 
         Return P of q' = P q + p, and p for files on the side of the motors. For these files,
         with R the gear ratio,
@@ -214,7 +217,8 @@ class Robot:
         return {"P": E}
 
     def torques(self, E: Array) -> Maps:
-        """Convert a correction matrix E of the torque columns in the files to the joint side.
+        """Compute the correction of joint torques from the correction E of the torques in the
+        files.
 
         Return T of the correction tau' = T tau. For files on the side of the motors, with R the
         gear ratio,
@@ -227,12 +231,15 @@ class Robot:
 
     @property
     def gravity(self) -> Array:
-        """Gravity vector of the robot file in frame 0, shape (3,), m/s^2; 0 without `variants`."""
+        """Gravity vector of the robot file in frame 0, shape (3,), m/s^2.
+
+        It is zero if the Robot was made without `variants`.
+        """
         return np.array([self.free.get(key, 0.0) for key in GRAVITY])
 
     @property
     def frames(self) -> list[int]:
-        """Numbers of the frames whose geometry may be altered to test for an error in the robot file.
+        """Numbers of the frames whose geometry may be altered to test the robot file for errors.
 
         Frames of constrained joints are not among them.
         """
@@ -277,7 +284,7 @@ class Row:
     change: Callable[[Robot, Item], Mapping[str, Any]] = lambda robot, item: {}
 
     def cause(self, robot: Robot, item: Item, *xi: float) -> Cause:
-        """Make the possible error (cause) for one item, for instance for one joint.
+        """Make the `Cause` of this kind of error for one item, for instance for one joint.
 
         Rows of NUMBERS also need xi, the unknown number.
         """
@@ -298,12 +305,12 @@ class Row:
 
 
 def study(robot: Robot) -> Iterator[Item]:
-    """Yield one error to try, as an empty mapping: it concerns the whole study."""
+    """Yield one empty mapping: the error concerns the whole study, not one joint."""
     yield {}
 
 
 def several_joints(robot: Robot) -> Iterator[Item]:
-    """Yield one error of all joints together, as an empty mapping, if there are several joints."""
+    """Yield one empty mapping, for an error of all joints together; nothing for a single joint."""
     yield from [{}] if robot.n > 1 else []
 
 
@@ -320,17 +327,17 @@ def senses(robot: Robot) -> Iterator[Item]:
 
 
 def joints_of_several(robot: Robot) -> Iterator[Item]:
-    """Yield each joint of a robot with several joints; nothing if there is only one."""
+    """Yield the number and the label of each joint; nothing if the robot has only one joint."""
     yield from joints(robot) if robot.n > 1 else ()
 
 
 def turning_joints(robot: Robot) -> Iterator[Item]:
-    """Yield each revolute joint."""
+    """Yield the number and the label of each revolute joint."""
     yield from (item for item in joints(robot) if robot.turning[item["j"]])
 
 
 def turns(robot: Robot) -> Iterator[Item]:
-    """Yield each revolute joint three times: its zero may be wrong by 90, -90 or 180 degrees."""
+    """Yield each revolute joint with an error of its zero position: 90, -90 and 180 degrees."""
     for item in turning_joints(robot):
         for text, angle in TURNS.items():
             yield {**item, "turn": text, "angle": angle}
@@ -395,7 +402,7 @@ def position_unit_of_joints(robot: Robot) -> Iterator[Item]:
 
 
 def of_each_joint(robot: Robot, items: Iterator[Item]) -> Iterator[Item]:
-    """Yield an error of several joints for each of these joints alone; nothing if it has only one."""
+    """Yield, for an error of several joints, the same error of each of these joints alone."""
     for item in items:
         for j in np.flatnonzero(item["chosen"]) if item["chosen"].sum() > 1 else ():
             yield {**item, "chosen": np.arange(robot.n) == j, "joint": robot.labels[j]}
@@ -435,7 +442,7 @@ def known_torques(robot: Robot) -> Iterator[Item]:
 
 
 def geared(robot: Robot) -> Iterator[Item]:
-    """Yield one error to try, as an empty mapping, if the robot has gears.
+    """Yield one empty mapping, for an error of the gear ratios; nothing if the robot has no gears.
 
     A ratio may be missing or applied twice.
     """
@@ -443,7 +450,7 @@ def geared(robot: Robot) -> Iterator[Item]:
 
 
 def with_constants(robot: Robot) -> Iterator[Item]:
-    """Yield one error to try, as an empty mapping, if the drives have torque constants.
+    """Yield one empty mapping, for an error of the torque constants; nothing without them.
 
     The torque constants may be missing, or applied to signals that are torques already.
     """
@@ -451,7 +458,7 @@ def with_constants(robot: Robot) -> Iterator[Item]:
 
 
 def with_offsets(robot: Robot) -> Iterator[Item]:
-    """Yield one error to try, as an empty mapping, if the drives have position offsets.
+    """Yield one empty mapping, for an error of the position offsets; nothing without them.
 
     The offsets may be missing or wrong.
     """
@@ -524,7 +531,7 @@ def lengths(robot: Robot) -> Iterator[Item]:
 
 
 def odd_lengths(robot: Robot) -> Iterator[Item]:
-    """Yield each unusual entry d, r, b of the table of frames, times 1000 and 1/1000 (mm for m)."""
+    """Yield each very long or very short d, r or b of the frames, with the factors 1000, 1/1000."""
     for item in lengths(robot):
         if not LIMIT.MM_BELOW < abs(item["length"]) < LIMIT.MM_ABOVE:
             for text, factor in LENGTHS.items():
@@ -540,7 +547,7 @@ def exchanged_lengths(robot: Robot) -> Iterator[Item]:
 
 
 def odd_tables(robot: Robot) -> Iterator[Item]:
-    """Yield all lengths of the table of frames, times 1000 and 1/1000: mm and m may be confused.
+    """Yield all lengths of the table of frames times 1000, then times 1/1000 (mm for m, m for mm).
 
     Only if the longest length is too long or too short for an arm.
     """
@@ -592,7 +599,7 @@ def entries(robot: Robot, names: str) -> Iterator[Item]:
 
 
 def slow_joints(robot: Robot) -> Iterator[Item]:
-    """Yield one error to try: all joints whose friction at low speed is missing in the model.
+    """Yield one error to try: the model lacks friction at low speed in some joints.
 
     Nothing is yielded if no joint certainly has such friction.
     """
@@ -605,22 +612,22 @@ def slow_joints(robot: Robot) -> Iterator[Item]:
 
 
 def in_positions(robot: Robot, item: Item) -> Maps:
-    """Make the correction of the positions from a matrix E that reorders or reverses columns."""
+    """Make the correction of positions from a matrix E that reorders columns or changes signs."""
     return robot.positions(item["E"])
 
 
 def in_torques(robot: Robot, item: Item) -> Maps:
-    """Make the correction of the torques from a matrix E that reorders or reverses columns."""
+    """Make the correction of torques from a matrix E that reorders columns or changes signs."""
     return robot.torques(item["E"])
 
 
 def in_both(robot: Robot, item: Item) -> Maps:
-    """Make the correction of positions and torques from E, which reorders or reverses columns."""
+    """Make the correction of positions and torques from a matrix E (other order or signs)."""
     return robot.positions(item["E"]) | robot.torques(item["E"])
 
 
 def turned(*quantities: str) -> Callable[[Robot, Item], Mapping[str, Any]]:
-    """Make a function that writes a reversed sign as settings of the study (record.scale).
+    """Make a function that writes reversed signs of columns as the study's setting `record.scale`.
 
     The sign is that of the joint of the item, or of all joints if the item has none.
 
@@ -674,7 +681,7 @@ def changed_unit(
 
 
 def transmitted(robot: Robot, *, positions: bool, torques: bool, to_joints: bool) -> Maps:
-    """Make the correction that converts positions, torques or both from motor to joint or back."""
+    """Make the correction that converts positions, torques or both from motor to joint, or back."""
     inverse = np.linalg.inv(robot.R)
     P, p, T = (
         (inverse, robot.offset, robot.R.T)
@@ -720,7 +727,7 @@ def gravity(item: Item) -> Maps:
 
 
 def chosen(item: Item) -> Array:
-    """Make the diagonal matrix that converts the unit of some positions or torques.
+    """Make the diagonal matrix that multiplies some joint signals by the factor of another unit.
 
     Its elements are the unit-conversion factor for these joints, and 1 for the others.
     """

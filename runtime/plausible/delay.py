@@ -203,9 +203,9 @@ class Shifts:
         self.mask = moving & ~(np.any(steps, axis=0) & flat).any(axis=2)
 
     def shifted(self, shift: Array) -> Array:
-        """Interpolate each joint torque at times later by the `shift` of the joint, s.
+        """Interpolate the torque of each joint at the times t + shift, s, shape (K, n).
 
-        The result has the shape (K, n).
+        Each joint has its own shift.
         """
         return np.column_stack(
             [torque(self.t + d) for torque, d in zip(self.torques, shift, strict=True)]

@@ -113,7 +113,7 @@ def jumps(case: Case) -> Answer:
 
 
 def _usual(x: Array) -> Array:
-    """Compute the usual change of each joint: the 90 % quantile of its changes above zero.
+    """Compute the usual change of each joint: the 90 % quantile of all changes that are not zero.
 
     `x` holds the sizes of the changes, shape (N, n); the result has the shape (n,).
     """
@@ -137,7 +137,7 @@ def _frozen(steps: Array, sharp: Array) -> Array:
 
 
 def _runs(high: Array, median: int) -> tuple[Array, Array]:
-    """Find, for each jump, the first and the last of the steps between samples that form the jump.
+    """Find the start and the end of each jump: its first and its last step between samples.
 
     Resampling may spread a jump over several steps.
     """

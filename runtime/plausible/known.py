@@ -82,7 +82,8 @@ class KnownValues(Result):
 
     @property
     def heavy(self) -> bool:
-        """Whether measured gravity torques are far above computed ones in all joints, or far below.
+        """Whether the measured gravity torques of all joints are far above, or all far below,
+        computed ones.
 
         All ratios are then on the same side of the range LIMIT.CAD_RATIOS. Wrong time stamps cannot
         cause this.
@@ -92,7 +93,8 @@ class KnownValues(Result):
 
     @property
     def off(self) -> tuple[str, ...]:
-        """Sentences on the joints whose measured torques do not agree with the computed ones.
+        """Sentences that name the joints whose measured torques differ too much from the computed
+        ones.
 
         These are joints with ratios outside LIMIT.CAD_RATIOS, or with errors above LIMIT.CAD_ERROR.
         """
@@ -173,7 +175,7 @@ class TorqueUnit(Part):
     title = "Unit of the torques"
 
     def warnings(self) -> tuple[str, ...]:
-        """Return the warning, as a tuple of one text: may the torques have another unit?"""
+        """Return a tuple of one text: the warning that the torques may have another unit."""
         return (self.sentence,)
 
 
@@ -185,7 +187,8 @@ def torque_unit(result: Identification) -> TorqueUnit | None:
 
 
 def torque_unit_doubt(model: GeneratedModel, observation: Observation, by_law: bool) -> str:
-    """Ask the user whether torques are in N m, if their size contradicts the robot file.
+    """Write a question about the unit of the torques, if their size contradicts the robot file's
+    values.
 
     An empty string if nothing contradicts the unit, or if the file lacks values.
     """

@@ -42,7 +42,7 @@ Array = np.ndarray
     f"standing at most {100 * LIMIT.REST_SHARE:g} % of the rows that are used",
 )
 def rest(case: Case) -> Answer:
-    """Check how long each joint rests, and how the fit changes without the rows at rest."""
+    """Check how long each joint rests, and how the fit changes without the samples at rest."""
     model, study = case.model, case.study
     share = standing_share(case.samples, study)
     worst = int(np.argmax(share))
@@ -74,7 +74,7 @@ def rest(case: Case) -> Answer:
 
 
 def standing_share(samples: Samples, study: Study) -> Array:
-    """Compute, for each joint, the share of its used rows in which it rests, shape (n,)."""
+    """Compute, for each joint, the share of its used samples at which it rests, shape (n,)."""
     speed = np.where(
         samples.still, np.inf, np.abs(samples.qd)
     )  # a joint that never moves is told as such
@@ -84,7 +84,7 @@ def standing_share(samples: Samples, study: Study) -> Array:
 
 
 def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ...] | None:
-    """Propose the speed threshold `rows.low_speed` that leaves out the rows of joints at rest.
+    """Propose a speed `rows.low_speed`, below which the samples of a joint are left out as resting.
 
     In rad/s or m/s: one number for all joints if their thresholds are similar, otherwise one for
     each joint. None if every joint rests in at most LIMIT.REST_SHARE of its rows.
@@ -100,7 +100,8 @@ def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ..
 
 
 def speed_of_rest(problem: Problem) -> float | tuple[float, ...] | None:
-    """Propose the speed threshold that leaves out rows at rest, for an identification problem.
+    """Propose the speed below which the samples of a joint are left out, for an identification
+    problem.
 
     See `low_speed_of_rest`.
     """
@@ -108,7 +109,10 @@ def speed_of_rest(problem: Problem) -> float | tuple[float, ...] | None:
 
 
 def _rounded_up(x: float) -> float:
-    """Round x up to two digits; a smaller threshold would not leave out all rows at rest."""
+    """Round a speed threshold x up to two significant digits.
+
+    A smaller threshold would not leave out all rows at rest.
+    """
     digit = 10.0 ** (np.floor(np.log10(x)) - 1) if x > 0 else 1.0
     return float(f"{np.ceil(x / digit * (1 - 1e-12)) * digit:.2g}")
 
@@ -153,10 +157,11 @@ def excited(observation: Observation, signals: Signals, rate: float) -> Answer |
 
 
 def unexcited_shares(observation: Observation, signals: Signals, rate: float) -> dict[str, float]:
-    """Predict how uncertain each parameter is, in % of the largest value that it can have.
+    """Predict the standard deviation of each parameter, in % of the largest value that it can have.
 
-    A parameter has this value if it alone produces all measured torques. The result is share_i of the module docstring, by parameter name. Raises LinAlgError if W is
-    rank-deficient, and InputError if a torque is zero throughout.
+    A parameter has this value if it alone produces all measured torques. The result is share_i of
+    the module docstring, by parameter name. Raises LinAlgError if W is rank-deficient, and
+    InputError if a torque is zero throughout.
     """
     s = np.array(
         [

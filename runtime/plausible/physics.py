@@ -42,7 +42,7 @@ def not_asked(case: Case) -> Answer | None:
     "alternatives below",
 )
 def physics(case: Case) -> Answer | None:
-    """Compare, joint by joint, the error of a physical robot with that of a fit of free parameters.
+    """Compare, for each joint, the torque error of a physical robot with that of free parameters.
 
     None if nothing is fitted.
     """
@@ -71,7 +71,7 @@ def physics(case: Case) -> Answer | None:
     "from its model describe that model, not the robot",
 )
 def measured(case: Case) -> Answer | None:
-    """Check whether the torques were measured: they must show friction and noise.
+    """Check that the torques were measured, not computed: measured torques show friction and noise.
 
     Friction is measured as a share of the torque of a joint, noise by fifth differences of the
     samples. None if the law of a controller gives the torques, or if nothing is fitted.
@@ -108,7 +108,7 @@ def measured(case: Case) -> Answer | None:
     "drives.ratio, torque_constant)",
 )
 def size(case: Case) -> Answer | None:
-    """Check whether the mass that explains the torques suits the reach of the robot.
+    """Check whether the fitted total mass of the links suits the reach of the robot.
 
     None if either is unknown, or if a torque is not in N m.
     """
@@ -241,7 +241,9 @@ def gain_of_alternative(case: Case, trial: Trial) -> float:
 
 
 def late_gain(case: Case) -> float:
-    """Compute the log-likelihood gained by correcting torque delays, nats; 0 if none is certain."""
+    """Compute the log-likelihood gained by correcting torque delays, nats; 0 if no delay is
+    certain.
+    """
     if case.baseline is None or case.late is None:
         return 0.0
     return gain_of_delays(case, case.late) if certain_joints(case).any() else 0.0

@@ -95,7 +95,7 @@ class Samples:
         return np.asarray((np.ptp(self.tau, axis=0) <= 1e-9 * size) & ~self.without_motor())
 
     def thinned(self, most: int) -> Samples:
-        """Reduce the samples to at most `most` instants, at equal distances."""
+        """Keep every k-th sample, with the smallest k that leaves at most `most` samples."""
         kept = np.arange(0, len(self), -(-len(self) // most))
         return replace(self, **{name: getattr(self, name)[kept] for name in SIGNALS})
 
@@ -171,7 +171,7 @@ def filtered(reading: Prepared, study: Study) -> Filtered:
 
 
 def samples_of(records: Sequence[Prepared | Filtered], study: Study) -> Samples:
-    """Select at most LIMIT.INSTANTS_KEPT filtered instants of all records, within their windows.
+    """Filter all records, and select at most LIMIT.INSTANTS_KEPT samples in their time windows.
 
     Raises
     ------
@@ -217,7 +217,7 @@ def usable(record: Record, study: Study, before: int, after: int) -> Array:
 
 
 def _instants(through: Filtered, number: int) -> Samples:
-    """Select filtered samples of one record, about 0.4/f seconds apart; f: cut-off frequency.
+    """Select samples of one filtered record, about 0.4/f seconds apart (f: cut-off frequency).
 
     If these are fewer than LIMIT.INSTANTS_LEAST in a long record, twice as many are chosen. A time
     of 2/cutoff is left out at each end.

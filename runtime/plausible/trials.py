@@ -81,7 +81,7 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
-    """Reference fit, with the study as given; a fit with an error corrected is compared to it.
+    """Reference fit, with the study as given, to which fits with a corrected error are compared.
 
     Attributes
     ----------
@@ -155,7 +155,7 @@ class Baseline:
 
     @cached_property
     def as_given(self) -> tuple[Array, Array, Array]:
-        """Regressor, torques and mask of used rows for the study as given."""
+        """Regressor, torques and used samples (a mask), with unchanged settings of the study."""
         rows = self.rows(unchanged_study(self.samples.n))
         assert rows is not None
         return rows
@@ -185,7 +185,7 @@ class Baseline:
         return grams if grams.of_joints.shape[1] == p + 1 else grams.mapped(self.physical.K)
 
     def bound(self, grams: Grams) -> Fit:
-        """Fit without physical conditions: no physical robot has a better score on the same rows.
+        """Fit without physical conditions; no physical fit of the same samples has a better score.
 
         If the robot file has values of links, the parameters are drawn towards them.
         """
@@ -196,7 +196,8 @@ class Baseline:
     def fit(
         self, grams: Grams, how: Callable[..., Fit] = physical_fit, sigma: Array | None = None
     ) -> Fit:
-        """Fit standard parameters that a physical robot can have, by `how`: physical_fit or quick_fit.
+        """Fit the standard parameters under physical conditions, by physical_fit or quick_fit
+        (`how`).
 
         sigma : residuals of the joints that give the first weights; default: those of least
             squares.
@@ -205,7 +206,8 @@ class Baseline:
         return how(self.standard(grams), self.bodies, self.N, sigma)
 
     def trial(self, cause: Cause, sigma: Array | None = None) -> Trial:
-        """Fit a physical robot with one possible error (cause) corrected, and compute the gain.
+        """Correct one possible error (cause), fit a physical robot, and compute how much the fit
+        improves.
 
         The gain is that of the score, in nats. The number of independent rows is the larger one of
         the study and of the cause.
@@ -224,7 +226,8 @@ class Baseline:
         return Trial(cause, fit, gain)
 
     def unseen(self, cause: Cause) -> float:
-        """Compute how well a fit with one possible error corrected predicts rows it has not used.
+        """Correct one possible error, and compute how well a fit of half of the rows predicts the
+        others.
 
         The rows are divided into two parts, of alternating blocks of time. The fit of each part
         predicts the other part; the result is the score in nats, and smaller is better.
@@ -242,7 +245,8 @@ class Baseline:
         return score
 
     def beyond(self, V: Array) -> float:
-        """Compute the largest share of torques V that no parameter values can explain.
+        """Compute the largest share, of m given sets of torques, that no parameter values can
+        explain.
 
         For each of the m sets of torques, it is the norm of the part outside the span of W, over the
         norm of the set.
@@ -279,7 +283,8 @@ class Baseline:
 
     @cached_property
     def normal(self) -> tuple[Array, Array, Array, Array]:
-        """Terms of linear equations for the parameters and an unknown number xi, such as an offset.
+        """Four arrays of the linearised least-squares problem, in which an error of size xi is
+        fitted.
 
         They are W over the standard parameters, shape (K, n, p), the torques that W explains,
         shape (K, n), the residuals e divided by sigma, shape (K, n), and the matrix A + B.
@@ -292,7 +297,8 @@ class Baseline:
         return W, explained, e, A + self.bodies.stiffness(self.given.X)
 
     def effect(self, change: Callable[[float], Cause]) -> Array:
-        """Compute the derivative of the torques with respect to an unknown number xi, shape (K, n).
+        """Compute the derivative of the torques with respect to the size xi of an error, shape (K,
+        n).
 
         The number is for instance a factor or a zero; J = d tau/d xi is a finite difference.
 
@@ -310,7 +316,8 @@ class Baseline:
         return np.asarray((moved - plain) / LIMIT.DIFFERENCE_STEP)
 
     def first_step(self, J: Array) -> tuple[Array, Array] | None:
-        """Estimate small errors, such as that of a joint's zero, by one linearised step from the residuals.
+        """Estimate the sizes of small errors from the residuals, by one linearised least-squares
+        step.
 
         The parameters of the model are free.
 
@@ -345,7 +352,7 @@ def baseline_of(
     torque_side: str = "joint",
     values: bool = True,
 ) -> Baseline:
-    """Fit the samples with the study as given: with free parameters, and as a physical robot.
+    """Make the reference fit of the samples, by free parameters and by a physical robot.
 
     D : regressor at the samples, shape (K, n, b).
     torque_side : side of the torques in the files, motor or joint.
@@ -387,7 +394,7 @@ def regressor(model: GeneratedModel, states: tuple[Array, Array, Array], **const
 
 
 def bodies_of(physical: PhysicalModel, size: float, Y: Array, values: bool) -> Bodies:
-    """Make the conditions on the bodies of a robot from its length `size`, m, and its torques Y.
+    """Make the physical conditions on the links of a robot of length `size`, m, with the torques Y.
 
     The usual mass of a link follows from the largest torque.
     """
@@ -397,7 +404,7 @@ def bodies_of(physical: PhysicalModel, size: float, Y: Array, values: bool) -> B
 
 
 def counting_rows(D: Array, Y: Array, mask: Array, X: Array) -> float:
-    """Estimate how many rows of a joint are independent, on average over the joints that move.
+    """Estimate the number of independent samples of a joint, on average over the joints that move.
 
     The number is smaller than that of the rows, because neighbouring residuals are correlated.
     """
@@ -631,13 +638,16 @@ def decisive(
 
 
 def takes_away(given: Fit, fit: Fit) -> Array:
-    """Whether the error of each joint is clearly smaller in `fit` than in `given`, bool (n,)."""
+    """Whether the torque error of each joint is clearly smaller in `fit` than in `given`, bool
+    (n,).
+    """
     ratio = given.errors / fit.errors.clip(0.1)
     return np.asarray((ratio > LIMIT.VISIBLE) & (given.errors - fit.errors > 0.2))
 
 
 def leaves_values(fit: Fit, baseline: Baseline) -> bool:
-    """Whether the fitted bodies need far larger or smaller torques than those of the robot file.
+    """Whether the fitted links need far larger or smaller torques than links with the file's
+    values.
 
     The ratio of the torques is then outside LIMIT.CAD_RATIOS. False if the file does not give every
     body.
@@ -676,7 +686,7 @@ def _misfit(grams: Grams, X: Array) -> float:
 
 
 def loads(baseline: Baseline) -> list[Trial]:
-    """Fit the last link with free inertial parameters, not those of the file: it may hold a load.
+    """Fit the records with free inertial parameters of the last link, which may carry a load.
 
     The ten parameters of this link cost half of log N each. The list is empty if the file does not
     give them.

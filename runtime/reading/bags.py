@@ -72,12 +72,12 @@ class JointState:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class JointTable(Table):
-    """Table of the messages of one ROS topic; its columns are empty until `chosen` selects some."""
+    """Table of the JointState messages of a ROS topic; `chosen` reads columns from the messages."""
 
     messages: tuple[JointState, ...]
 
     def chosen(self, names: Sequence[str]) -> Table:
-        """Make the table of the named columns, from the messages that contain one of their joints.
+        """Make a table of the named columns; messages without any of their joints are left out.
 
         If no message contains such a joint, all messages are used, so that the error names the
         missing joint.

@@ -34,7 +34,7 @@ def column_names(
     joints: Sequence[str] = (),
     motors: Sequence[bool] = (),
 ) -> Columns:
-    """Find the names of the columns of a record to read: given in the settings, or default names.
+    """Find the names of the columns of a record: those in the settings, or else default names.
 
     Default names are t, q1 ... qn, tau1 ... taun; in a bag, the joints of its messages.
 
@@ -86,7 +86,7 @@ def column_names(
 
 
 def _of_motors(names: tuple[str, ...], motors: Sequence[bool]) -> tuple[str, ...]:
-    """Insert the mark NONE in the list of torque columns for each joint without a motor.
+    """Insert NONE (no column) into the list of torque columns for each joint without a motor.
 
     names : columns of all joints, or of the joints with a motor only. Other names are returned
     unchanged.
@@ -102,7 +102,7 @@ def _of_motors(names: tuple[str, ...], motors: Sequence[bool]) -> tuple[str, ...
 def _meant(
     table: Table, key: str, quantity: str, names: Sequence[str], joints: Sequence[str]
 ) -> tuple[str, ...]:
-    """Find the columns of positions, torques or references that the setting `names` lists.
+    """Find the columns of positions, torques or references by their names in the settings.
 
     key : "q", "tau" or "qr". quantity : name of the same quantity in bags, such as "effort".
     """
@@ -152,9 +152,10 @@ def _numbered_joints(table: Table) -> tuple[str, ...]:
 
 
 def _of_joint(table: Table, key: str, joint: str) -> str:
-    """Find the column of one joint, whose name is the joint's, perhaps with a word like pos or tau.
+    """Find the column of one joint by its name, for instance q_elbow, elbow.pos or effort/elbow.
 
-    For instance q_elbow, elbow.pos or effort/elbow.
+    The column has the name of the joint, alone or with a word like pos or tau; a name with such a
+    word is preferred.
     """
     forms = {
         form

@@ -58,7 +58,7 @@ BAG = ".db3"  # a folder is read as one
 
 
 def read_table(path: Path, topic: str | None = None, decimal: str = ".") -> Table:
-    """Read a measured file as a Table.
+    """Read a measured file of any known format as a Table of named columns.
 
     The hash is computed first, so that a file that unpacks to too many bytes is refused.
 

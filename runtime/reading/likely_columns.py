@@ -147,7 +147,7 @@ def known_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str,
 
 
 def may_be_currents(names: Sequence[str]) -> bool:
-    """Whether a column name has a word for current or effort, whose unit depends on the driver."""
+    """Whether any column name contains a word for current or effort, so that its unit may be A."""
     words = {*CURRENTS, "effort", "efforts"}
     meanings = map(_quantity, names)
     return any(key == "tau" and WORDS["tau"][place] in words for key, place in meanings)

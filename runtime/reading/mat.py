@@ -39,7 +39,7 @@ Member = np.ndarray | Mapping[str, Any] | str
 
 
 def read_mat(path: Path, options: Options) -> Table:
-    """Read a .mat file as a Table."""
+    """Read the numeric arrays of a .mat file as a Table of named columns."""
     with opened(path) as file:
         head = file.read(PLACES[-1] + len(HDF5))
     arrays: dict[str, np.ndarray] = {}

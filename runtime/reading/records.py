@@ -1,4 +1,4 @@
-"""Conversion of the files of a measurement to Records in SI units, at the joints.
+"""Reading of measured files as Records, converted to the joint side and to SI units.
 
     records = read_records(settings, model, folder="measurements")
 
@@ -71,7 +71,7 @@ def _pieces(
     folder: Path,
     missing: bool,
 ) -> list[Record]:
-    """Read one record; return it alone, or the records into which gaps of the time split it.
+    """Read one record; return a list of this record, or of its parts between gaps of the time.
 
     `resample` splits a record at gaps and where time goes back.
     """
@@ -156,7 +156,7 @@ class Signal:
 def _signals(
     columns: Columns, first: Table, last: Table, other: Table, missing: bool
 ) -> dict[str, Signal]:
-    """Read the requested columns and return them by quantity, for instance "q" or "tau"."""
+    """Read the columns of a record, and return them by quantity, for instance "q" or "tau"."""
     places = {
         "t": (first, () if columns.t is None else (columns.t,)),
         "q": (first, columns.q),

@@ -120,8 +120,8 @@ def resampled(
     *,
     file: str,
 ) -> tuple[list[Stretch], float, str]:
-    """Resample signals at a uniform rate; return parts without gaps, the rate in Hz, and a sentence
-    for the user that says what was resampled.
+    """Resample signals at a uniform rate; return the parts without gaps, the rate, Hz, and a
+    remark.
 
     Parameters
     ----------

@@ -122,7 +122,8 @@ class Columns(Settings):
 
     @property
     def further(self) -> dict[str, tuple[str, ...]]:
-        """Columns of signals that belong to no joint: channels (temperature ...) and wrenches.
+        """Columns of signals that belong to no joint: channels (temperature ...) and sensor
+        wrenches.
 
         They are listed by name of the channel or wrench.
         """
@@ -145,7 +146,7 @@ class Columns(Settings):
 
 
 class Units(Settings):
-    """Units of the columns: one, or one per joint, by any name of `runtime.reading.units`.
+    """Units of the columns of a record: one unit, such as deg, for all joints, or one per joint.
 
     Counts need the counts per revolution; the torque constant converts currents and voltages to
     torque.
@@ -166,7 +167,7 @@ class Units(Settings):
 
 
 class Scale(Settings):
-    """Factors on the columns before the conversion of units.
+    """Factors that multiply the columns of a record before their units are converted.
 
     A factor is a number, one number per joint, or the name of a scalar in the file.
 
@@ -187,7 +188,7 @@ class Scale(Settings):
 
 
 class Resample(Settings):
-    """Conversion of time stamps that are not uniform; without this section nothing is resampled.
+    """Settings to resample a record with irregular time stamps; if absent, nothing is resampled.
 
     Attributes
     ----------
@@ -213,7 +214,7 @@ class Resample(Settings):
 
 
 class RecordSettings(Settings):
-    """One measured record, or several alike: their files, and the meaning of their columns.
+    """Settings of one measured record, or of several alike: their files, columns and units.
 
     Attributes
     ----------
@@ -329,12 +330,12 @@ class RecordSettings(Settings):
 
     @property
     def by_law(self) -> bool:
-        """Whether a control law gives the torque: the settings name q_ref, but no column tau."""
+        """Whether a control law computes the torque: the settings name q_ref, but no column tau."""
         return bool(self.columns.q_ref) and not self.columns.tau
 
     @property
     def sides(self) -> tuple[str, str]:
-        """Sides on which positions and torques were measured: each "motor", "joint" or "link"."""
+        """Sides at which positions and torques were measured, each "motor", "joint" or "link"."""
         return self.side, self.torque_side or self.side
 
 

@@ -105,7 +105,7 @@ class Table:
         )
 
     def read(self, names: Sequence[str], *, empty: bool = False, hint: str = "") -> Array:
-        """Return the columns called `names` side by side, shape (N, k).
+        """Return the columns called `names` as one array, shape (N, k), in the order of `names`.
 
         Raise InputError for a name that the file does not have, and for values that are not
         numbers.

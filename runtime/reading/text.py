@@ -143,7 +143,7 @@ def _by_fields(
     refused: dict[str, InputError],
     empty: dict[str, str],
 ) -> Array:
-    """Read the numbers of the lines field by field, shape (N, k), with nan for all other texts.
+    """Read the numbers of the lines, shape (N, k), with nan for fields that are not numbers.
 
     Columns with other texts are added to `refused`, columns with empty fields to `empty`.
     """

@@ -35,7 +35,7 @@ HEADER = b"MATLAB 5.0 MAT-file, written by symgen"
 
 
 def estimate_arrays(fit: Estimate) -> dict[str, Array]:
-    """Convert an Estimate into named arrays: shapes (b,), (b, b), and (n,) for values per joint."""
+    """Convert an Estimate into named arrays, such as X, shape (b,), and covariance, (b, b)."""
     joints = fit.per_joint
     return {
         "names": _texts(fit.names),
@@ -78,7 +78,7 @@ def estimate_arrays(fit: Estimate) -> dict[str, Array]:
 
 
 def array_files(stem: str, arrays: Mapping[str, Array]) -> dict[str, str | bytes]:
-    """Return the contents of two files with named arrays: stem.npz (NumPy), stem.mat (MATLAB)."""
+    """Return named arrays as the contents of two files: stem.npz (NumPy) and stem.mat (MATLAB)."""
     return {f"{stem}.npz": npz(arrays), f"{stem}.mat": mat(arrays)}
 
 
@@ -108,7 +108,7 @@ def mat(arrays: Mapping[str, Array]) -> bytes:
 
 
 def matlab_names(names: Iterable[str]) -> tuple[str, ...]:
-    """Change names into different names that MATLAB accepts as variables.
+    """Convert names to variable names that MATLAB accepts and that all differ.
 
     A name has a letter first, then letters, digits and _, at most 63 characters; it is no keyword.
     """

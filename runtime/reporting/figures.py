@@ -75,7 +75,7 @@ def png(figure: Figure) -> bytes:
 
 
 def joint_overlay(joint: JointComparison, unit: str = "N m", source: str = "measured") -> Figure:
-    """Draw measured and predicted torque of one joint, with the error below (chapter, Fig. 4).
+    """Draw measured and predicted torque of one joint, with the error below, over time.
 
     source : "measured" or "simulated".
     """
@@ -93,7 +93,7 @@ def joint_overlay(joint: JointComparison, unit: str = "N m", source: str = "meas
 def torque_overlay(
     comparison: Sequence[JointComparison], unit: str = "N m", source: str = "measured"
 ) -> Figure:
-    """Draw measured torque, predicted torque and error of each joint: Fig. 4 of the chapter."""
+    """Draw measured torque, predicted torque and error of each joint, as Fig. 4 of the chapter."""
 
     def draw(ax: Axes, joint: JointComparison) -> None:
         _torques(ax, ax, joint, source)
@@ -103,7 +103,7 @@ def torque_overlay(
 
 
 def residual_histogram(comparison: Sequence[JointComparison], unit: str = "N m") -> Figure:
-    """Draw histograms of the residuals of every joint, scaled by their standard deviation.
+    """Draw a histogram of the residuals of each joint, divided by their standard deviation.
 
     The line is the normal distribution.
     """

@@ -26,7 +26,7 @@ LINES = ("-", "--", ":", "-.")
 
 
 def motion_figure(excitation: Excitation) -> Figure:
-    """Draw, over time, q, qd, qdd of every joint relative to their limits, and the torques."""
+    """Draw q, qd and qdd of every joint over time, as shares of their limits, and the torques."""
     (t, q, qd, qdd, tau), limits = excitation.sampled(), excitation.limits
     middle, half = (limits.lower + limits.upper) / 2, (limits.upper - limits.lower) / 2
     limited = bool(np.all(np.isfinite(limits.tau)))
@@ -90,7 +90,7 @@ def simulation_figure(
 
 
 def excitation_page(excitation: Excitation) -> Page:
-    """Build the report page of an exciting motion: figure, limits used, and expected sigma."""
+    """Build the report page of an exciting motion, with the expected standard deviations."""
     shown = (
         "position, velocity, acceleration of every joint as a share of its limits, and "
         "torques, over time"

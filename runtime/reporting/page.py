@@ -106,7 +106,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Number:
-    """A number that a report page shows below its verdict, with its label."""
+    """A number with a label, which a report page shows below the verdict."""
 
     label: str
     value: str

@@ -113,7 +113,8 @@ def part_page(
 
 
 def checks_section(checklist: Checklist) -> Section:
-    """Build the folded section of the checks: question, answer, limit, and remedy if there is one.
+    """Build the collapsible section of the checks: question, answer, limit, and remedy if there is
+    one.
 
     Checks that are not good have a table of their own, which is the first.
     """
@@ -133,7 +134,7 @@ def checks_section(checklist: Checklist) -> Section:
 
 
 def settings_section(study: str) -> Section:
-    """Build the folded section that lists every setting of the study that has a value.
+    """Build the collapsible section that lists every setting of the study that has a value.
 
     study : text of study.yaml.
     """

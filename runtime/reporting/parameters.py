@@ -180,7 +180,7 @@ def correlation_section(result: Identification) -> Section:
 
 
 def correlation_matrix(fit: Estimate, most: int = LIMIT.CORRELATIONS_SHOWN) -> Matrix | None:
-    """Select the most correlated parameters and their correlations, eq. (10), in column order.
+    """Select the most correlated parameters, and make a table of their correlations.
 
     None for a single parameter, or if the estimate has no covariance.
     """

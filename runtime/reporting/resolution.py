@@ -19,7 +19,7 @@ def resolution_section(
     curve: Cestac | None = None,
     names: Sequence[str] = (),
 ) -> Section:
-    """Build the section of a study of encoder steps: tables of errors, curve of %e over Delta.
+    """Build the section of a study of encoder steps: tables of errors, and curves over the step.
 
     The table is Table 3 of the chapter, with both definitions of %e(rho).
 
@@ -32,9 +32,10 @@ def resolution_section(
 
 
 def level_numbers(result: Cestac) -> list[Number]:
-    """Write the verdict of each encoder or torque step, with the parameter that changes most.
+    """Write, for each encoder or torque step, the verdict and the largest error, %.
 
-    Encoder steps are given in counts per turn and bits too. The numbers are for the head of a page.
+    The error is that of a parameter or of the residual. Encoder steps are given in counts per turn
+    and bits too. The numbers are for the head of a page.
     """
     states: dict[str, State] = {"unbiased": "good", "doubtful": "doubtful", "biased": "no"}
     turns = not {*result.reference.units.values()} & {"N*s/m", "kg"}

@@ -43,11 +43,11 @@ ADVICE = {
 
 
 class OutputError(InputError):
-    """Results cannot be written; the message says where, why, and what to do."""
+    """Error raised if results cannot be written; the message names the file, reason and remedy."""
 
 
 class Results:
-    """A folder into which a command writes its results; made by `results_in`."""
+    """A results folder: a command writes either all its files into this folder, or none."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -73,7 +73,7 @@ class Results:
         return [self.folder / name for name in contents]
 
     def recover(self) -> None:
-        """Finish interrupted writing: move complete files up, delete incomplete files."""
+        """Finish an interrupted write: move complete files to their place, delete the others."""
         for unfinished in self.folder.glob(f"{UNFINISHED}*"):
             if unfinished.is_dir() and not unfinished.is_symlink():  # rmtree waits for a pipe
                 shutil.rmtree(unfinished, ignore_errors=True)

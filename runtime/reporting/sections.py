@@ -20,7 +20,7 @@ FIGURES_SHOWN = 8  # of joints, before the table of parameters
 
 
 def detail_sections(result: Identification) -> list[Section]:
-    """Build the folded report sections: fit errors, removed parameters, validation, residuals."""
+    """Build the collapsible report sections, such as fit errors, validation and residuals."""
     trust = result.uncertainty
     sections = [
         *other_torques_section(result),
@@ -40,10 +40,10 @@ def detail_sections(result: Identification) -> list[Section]:
 
 
 def torque_section(result: Identification) -> Section:
-    """Build the section of measured and predicted torques: Figure 4 of the chapter for each joint.
+    """Build the section of measured and predicted torques, with one figure for each joint.
 
-    If there are many joints, only the joints with the largest errors are shown. A script on the
-    page lets the reader zoom.
+    The figures are as Figure 4 of the book chapter. If there are many joints, only the joints with
+    the largest errors are shown. A script on the page lets the reader zoom.
     """
     shown = _joints_shown(result)
     section = _torque_figures(result, shown, f"{result.source.capitalize()} and predicted torques")
@@ -64,7 +64,7 @@ def other_torques_section(result: Identification) -> list[Section]:
 
 
 def _joints_shown(result: Identification) -> list[JointComparison]:
-    """Select the joints whose torque figures come before the parameters, in the order of the robot.
+    """Select the joints whose torque figures come first on the page, in the order of the robot.
 
     If there are many joints, these are the joints with the largest errors.
     """

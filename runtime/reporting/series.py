@@ -45,7 +45,7 @@ class Series:
 
     @property
     def data(self) -> Mapping[str, Any]:
-        """Samples of the two curves of a figure as JSON values; times start at zero, nan breaks a curve."""
+        """The two curves as JSON values for the script; times start at zero, nan breaks a curve."""
         start = float(np.nanmin(self.t)) if len(self.t) else 0.0
         arrays = {"t": self.t - start, "measured": self.measured, "predicted": self.predicted}
         return {
@@ -59,7 +59,7 @@ class Series:
 def series(
     joint: JointComparison, unit: str, source: str, most: int = LIMIT.INSTANTS_SHOWN
 ) -> Series:
-    """Make the lines of measured and predicted torque of a joint, broken where rows are missing."""
+    """Make the curves of measured and predicted torque of a joint, with breaks at left-out rows."""
     kept = extremes(np.array([joint.measured, joint.predicted, joint.error]), most)
     piece = np.searchsorted(gaps(joint.t), kept, side="right")
     holes = np.flatnonzero(np.diff(piece)) + 1
@@ -90,7 +90,7 @@ def extremes(values: Array, most: int) -> Array:
 
 
 def gaps(t: Array) -> Array:
-    """Find the rows before which a plotted line must break, as indices.
+    """Find the samples before which a plotted line is interrupted, and return their indices.
 
     A line breaks if rows are left out, or if time goes back because another record starts.
     """

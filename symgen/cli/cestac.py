@@ -52,7 +52,8 @@ def cestac(
     ] = False,
     json: options.Json = False,
 ) -> None:
-    """Study the encoder resolution. Exit code 1 if the estimate is biased at one of the steps.
+    """Study how coarser encoders change the estimate. The exit code is 1 if the estimate is biased
+    at one of the encoder or torque steps.
 
     With --advise, exit code 1 if the estimate would be biased at one of the steps of --delta, or if
     the runs contradict the prediction. Encoders are read both as positions and as counts; --reader

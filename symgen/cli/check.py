@@ -28,8 +28,8 @@ def check(
         ),
     ] = None,
 ) -> None:
-    """Verify the base parameters of ROBOT by exact rank, by identities at new geometry and by
-    numeric rank, and every function of the NumPy module by independent dynamics.
+    """Verify the base parameters of ROBOT by exact rank, by numeric rank and by identities at
+    random lengths. Verify every function of the NumPy module by an independent computation.
     """
     with reported_errors():
         from json import dumps

@@ -25,7 +25,8 @@ def compare(
     exact: options.Exact = False,
     json: options.Json = False,
 ) -> None:
-    """Identify ROBOT with each treatment of the records, and rank them by how well they predict the validation record.
+    """Identify ROBOT with the settings of each STUDY, and rank the studies by how well they predict
+    the validation record.
 
     A single study gives up to three treatments: as stated, without the rows of resting joints, and
     without its known torques. Each treatment uses the set of parameters that predicts best. Exit

@@ -66,8 +66,8 @@ def convert(
     ] = None,
     force: options.Force = False,
 ) -> None:
-    """Write the robot IN in the format of OUT. Report what was read differently from what the file
-    says, and what OUT cannot hold.
+    """Convert the robot IN to the format of OUT. Report what was read differently from the text of
+    IN, and what OUT cannot store.
 
     OUT is written whole or not at all. If it would describe another mechanism, nothing is written
     and the exit code is 2.

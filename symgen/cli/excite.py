@@ -51,8 +51,8 @@ def excite(
     exact: options.Exact = False,
     json: options.Json = False,
 ) -> None:
-    """Search an exciting motion. Families, limits and distances are settings of the section
-    `excitation` of a study file.
+    """Search an exciting motion, from which the parameters of ROBOT can be identified well. Kind
+    and limits of the motion are settings of the section `excitation` of a study file.
 
     With --poses, search poses at rest, which identify the parameters of gravity.
 

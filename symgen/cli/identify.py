@@ -56,8 +56,8 @@ def identify(
     ] = None,
     json: options.Json = False,
 ) -> None:
-    """Identify the base parameters of ROBOT from RECORD, or from several fitted together. Ends with
-    the verdict: exit code 0 for Yes and With care, 1 for No.
+    """Identify the base parameters of ROBOT from RECORD, or from several records fitted together.
+    The exit code is 0 for the verdicts Yes and With care, 1 for No.
     """
     with session.progress_lines(), session.results_in(output) as results:
         import runtime

@@ -14,7 +14,7 @@ from symgen.cli.session import fail, reported_errors
 def new(
     file: Annotated[Path, typer.Argument(help="Robot file to create, e.g. my_arm.yaml.")],
 ) -> None:
-    """Write a robot file with every section explained. Never overwrites."""
+    """Write a robot file with an explanation of every section; never overwrite an existing file."""
     with reported_errors():
         from symgen.description.new import skeleton_for
 

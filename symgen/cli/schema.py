@@ -24,8 +24,8 @@ def schema(
         ),
     ] = "robot",
 ) -> None:
-    """Print a JSON Schema. The first line of a file of `symgen new` names the installed copy of the
-    schema of robot files.
+    """Print the JSON Schema of one kind of file. A file of `symgen new` names, in its first line,
+    the installed copy of the schema of robot files.
     """
     if of not in KINDS:
         fail(f"--of {of}; expected one of {', '.join(KINDS)}")

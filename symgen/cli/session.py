@@ -343,7 +343,7 @@ def names_of(text: str | None) -> str | list[str] | None:
 
 @contextmanager
 def map_of(workers: int, scheduler: str | None = None) -> Iterator[Any]:
-    """Yield a map function that runs in worker processes or on a Dask cluster.
+    """Yield a function like `map` that runs its calls in worker processes or on a Dask cluster.
 
     The options --workers and --scheduler specify which.
     """

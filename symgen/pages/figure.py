@@ -45,7 +45,7 @@ def figure(robot: Robot, closure: Closure) -> dict[str, Any]:
 
 
 def joint_ranges(robot: Robot, closure: Closure, size: float) -> list[dict[str, Any]]:
-    """Choose the range and the first position of the slider of every actuated joint.
+    """Choose the range and the initial position of the slider of every actuated joint.
 
     The range is that of the joint limits. Without limits it is half a turn to either side, or half
     of `size`, the size of the robot, for a prismatic joint. The start is 0 if 0 is in the range.

@@ -107,7 +107,7 @@ def selected(regrouping: Regrouping, only: str | None) -> list[BaseParameter]:
 
 
 def recursive_formulas(regrouping: Regrouping) -> list[tuple[str, Formula]]:
-    """Return name and formula of each regrouped parameter, link by link: XXR_i = XX_i + YYR_j + ...
+    """Return name and formula of each regrouped parameter, link by link: XX2R = XX2 + YY3R + ...
 
     Each formula uses parameters that have themselves been regrouped, not their full formulas.
     """

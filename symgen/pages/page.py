@@ -193,7 +193,7 @@ def printed(text: str) -> str:
 
 
 def _places(parameters: Sequence[Effect]) -> dict[str, list[dict[str, Any]]]:
-    """Group the standard parameters by link or joint, each with its role: alone, regrouped or none.
+    """Group the standard parameters by link or joint, and mark each: alone, regrouped or none.
 
     The mark none means that the parameter has no effect.
     """
@@ -207,7 +207,7 @@ def _places(parameters: Sequence[Effect]) -> dict[str, list[dict[str, Any]]]:
 
 
 def _without_effect(parameters: Sequence[Effect]) -> list[tuple[list[MathML], str]]:
-    """Group the standard parameters that have no effect by the reason for this.
+    """Group the standard parameters that have no effect on the torques by the reason for this.
 
     Return pairs of the parameters and the reason that they share.
     """

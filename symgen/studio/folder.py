@@ -43,7 +43,7 @@ RESULT_FILES = ("estimate.json", "cestac.json", "advice.json")  # of a run that 
 
 
 class WorkFolder:
-    """The folder of one robot with its records and results.
+    """A folder on disk with the files of one robot: robot file, study, records and results.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class WorkFolder:
             remove(left)
 
     def write(self, name: str, content: str | bytes) -> None:
-        """Write a file of the folder, whole or not at all."""
+        """Write a file into the work folder, completely or not at all."""
         write_all(self.path, {name: content})
 
     def read(self, name: str) -> str:
@@ -91,7 +91,7 @@ class WorkFolder:
         return sorted((self.path / "history" / history).glob("[0-9]*"), key=lambda p: int(p.name))
 
     def keep(self, kind: str, history: str = "") -> None:
-        """Copy the present robot or study to the end of a history of earlier versions."""
+        """Copy the present robot or study into the history, as its latest version."""
         place, before = self.path / "history" / (history or kind), self.kept(history or kind)
         own = [path for path in self.path.glob(f"{kind}.*") if path.is_file()]
         if own:

@@ -34,7 +34,7 @@ SECURITY_HEADERS = {
 
 
 class Guard:
-    """A layer that refuses, with status 4xx, every request that is not from a page of this server.
+    """An ASGI layer that refuses (status 4xx) every request that is not from a page of this server.
 
     Refused requests do not reach the application.
 

@@ -123,7 +123,7 @@ def formulas(path: str, before: str) -> dict[str, Any]:
 
 @answered
 def model(path: str, request: Mapping[str, str]) -> dict[str, Any]:
-    """Prepare a symbolic model of the robot typeset, and as text, LaTeX and SymPy.
+    """Prepare a symbolic model of the robot in four forms: typeset, text, LaTeX and SymPy.
 
     A long closed form is typeset as recursion. A model without closed form is its recursion in all
     forms.
@@ -251,7 +251,7 @@ def series(path: str, request: Mapping[str, str]) -> dict[str, Any]:
 
 @answered
 def changes(path: str, request: Mapping[str, str]) -> dict[str, Any]:
-    """Compare the parameters of a run with the values of the robot file, as its report does.
+    """Compare the parameters of a run with the values of the robot file, as in the run's report.
 
     The table columns are empty if the robot file has no values, or if it has changed since the run.
 

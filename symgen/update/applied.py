@@ -210,7 +210,7 @@ def _percent(c: Change) -> str:
 
 
 def _by_place(lines: Sequence[str]) -> str:
-    """Group texts such as `link 2: mass` by link, and join the groups into one text."""
+    """Group texts such as `link 2: mass` by link, and join them: `link 2: mass, centre`."""
     places: dict[str, list[str]] = {}
     for line in lines:
         place, _, what = line.partition(": ")

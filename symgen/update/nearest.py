@@ -1,4 +1,4 @@
-"""Find the physically possible robot with given base parameters that is nearest to a file.
+"""Find the physically possible robot with given base parameters, nearest to a file's values.
 
 This is the optimisation of the feasible estimate in `identify`, with the file as prior:
 
@@ -51,7 +51,7 @@ TINY = 1e-15  # SI; an eigenvalue so little below zero is rounding
 
 @dataclass(frozen=True, eq=False)
 class Nearest:
-    """Result of `nearest`: masses, centres, tensors and joint parameters nearest to a file.
+    """Result of `nearest`: masses, centres of mass, inertia tensors and joint parameters.
 
     The numbers u, shape (p,), are mass, centre and tensor of each link, and the parameters of the
     elements on the joints.
@@ -87,7 +87,7 @@ class Nearest:
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """The unknowns of the optimisation in `nearest`: masses, centres, tensors and joint parameters.
+    """Unknowns of the optimisation in `nearest`: link and joint values as in the file.
 
     Each link of the file has ten unknowns; joint parameters are those of the elements on the
     joints.
@@ -114,7 +114,7 @@ class Numbers:
     masses: Array
 
     def head(self, count: int) -> Numbers:
-        """Return the optimisation problem restricted to its first `count` unknowns."""
+        """Return the unknowns with the indices 0 ... `count` - 1 alone, to optimise only these."""
         p = self.physical
         kept = tuple(c for c in p.conditions if max(c.numbers) < count)
         part = replace(p, standard=p.standard[:count], K=p.K[:, :count], conditions=kept)
@@ -123,7 +123,7 @@ class Numbers:
         return Numbers(part, links, *(x[:count] for x in of_numbers))
 
     def chi(self, u: Array) -> Array:
-        """Compute standard parameters, shape (p,), from the unknowns u (masses, centres ...)."""
+        """Compute standard parameters, shape (p,), from the unknowns u (link and joint values)."""
         chi = u.copy()
         for link, at in self.links:
             chi[at] = link.place.ten(u[at])
@@ -145,7 +145,7 @@ class Numbers:
         return T
 
     def seen(self, u: Array) -> Array:
-        """Find the link and joint values on which a base parameter depends; bool, shape (p,)."""
+        """Find the link and joint values that affect any base parameter; bool, shape (p,)."""
         A = self.physical.K @ self.slope(u) * self.size
         share = np.abs(A) > MISSED * np.linalg.norm(A, axis=1, keepdims=True)
         return np.asarray(np.any(share, axis=0))
@@ -159,7 +159,7 @@ def nearest(
     X: Array,
     absent: Collection[str] = (),
 ) -> Nearest:
-    """Find the physically possible robot with base parameters X nearest to the values of the file.
+    """Find the physically possible robot with base parameters X that is nearest to a file's values.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def _of_file(
     values: Mapping[str, float],
     absent: Collection[str],
 ) -> tuple[Numbers, dict[str, int], list[int]]:
-    """Collect the unknowns from the file, in the order in which the optimisation changes them.
+    """Collect the unknowns of `nearest` from the file, sorted by the attempt that may change them.
 
     Return the unknowns, the index of each element, and for each attempt how many numbers may
     change. The first attempt has the first link of each body, and the elements. The second adds
@@ -281,7 +281,7 @@ def _of_file(
 
 
 def _sizes_of(x: Array) -> Array:
-    """Estimate typical sizes of the mass, the centre and the tensor of a link, shape (10,).
+    """Estimate typical sizes of mass, centre of mass and inertia tensor of a link, shape (10,).
 
     The sizes of centre and tensor follow from the extent of the link.
     """
@@ -291,7 +291,7 @@ def _sizes_of(x: Array) -> Array:
 
 
 def _spare(physical: PhysicalModel, own: Sequence[str], absent: Sequence[str]) -> list[str]:
-    """Find the joint parameters that the file lacks and that other parameters can replace."""
+    """Find the joint parameters that are not in the file and that other parameters can replace."""
     spare: list[str] = []
 
     def rank(names: Sequence[str]) -> int:
@@ -386,7 +386,7 @@ def _hold(part: Numbers, chi: Array) -> Array:
 
 
 def strange(link: FileLink, closest: Nearest) -> str:
-    """Describe how far mass and centre of a link are from the file; "" if they are near.
+    """Describe how far mass and centre of mass of a link are from the file's; "" if they are near.
 
     They are near if the mass is within a factor STRANGE and the centre has moved by no more than
     the size of the link.

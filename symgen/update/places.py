@@ -52,7 +52,7 @@ POSE = 1e-6  # m, rad: frames of two descriptions of one robot differ by no more
 
 @dataclass(frozen=True)
 class Attributes:
-    """Names of the XML attributes for masses, tensors, friction ... in one format (URDF or MJCF).
+    """Names of the XML attributes for mass, inertia tensor, friction ... in URDF or in MJCF.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Attributes:
 
     @property
     def order(self) -> list[int]:
-        """Order of mass, centre and tensor elements in the file, as indices into NUMBERS."""
+        """Order of mass, centre of mass and inertia in the file, as indices into NUMBERS."""
         return [k for row in self.inertial.values() for places in row.values() for k in places]
 
 
@@ -104,7 +104,7 @@ MJCF = Attributes(
 
 @dataclass(frozen=True, eq=False)
 class LinkPlace:
-    """The XML elements of a link, and the frames in which the file gives mass, centre and tensor.
+    """XML elements of a link, and the frames of its centre of mass and inertia tensor in the file.
 
     Attributes
     ----------
@@ -136,7 +136,8 @@ class LinkPlace:
         return self.attributes is MJCF and not full
 
     def numbers(self, ten: Array) -> Array:
-        """Convert inertial parameters in frame j to mass, centre and tensor as in the file.
+        """Convert ten inertial parameters in frame j to mass, centre of mass and tensor of the
+        file.
 
         The argument has the order XX .. ZZ, MX, MY, MZ, M, the result the order of NUMBERS.
         """
@@ -152,7 +153,8 @@ class LinkPlace:
         return np.array([own.M, *(R.T @ (own.pose[:3, 3] - self.X[:3, 3])), *tensor])
 
     def ten(self, x: Array) -> Array:
-        """Convert mass, centre and tensor as in the file to inertial parameters in frame j.
+        """Convert mass, centre of mass and tensor of the file to ten inertial parameters in frame
+        j.
 
         The argument and the result have the shape (10,).
         """
@@ -164,7 +166,7 @@ class LinkPlace:
         return ten_of(Inertial(float(x[0]), pose, I), self.X)
 
     def write(self, edits: XmlEdits, x: Array) -> None:
-        """Add to `edits` the changes that set mass, centre and tensor to x, shape (10,)."""
+        """Add to `edits` the changes that set mass, centre of mass and tensor to x, shape (10,)."""
         if self.inertial is None:
             row = self.attributes.inertial[""]
             words = _words({key: x[[*row[key]]] for key in ("pos", "mass", "fullinertia")})
@@ -320,7 +322,7 @@ def _words(attributes: Mapping[str, Any]) -> str:
 
 
 def principal(I: Array) -> tuple[Array, Array]:
-    """Compute principal moments (3,) and axes V (3, 3) of a tensor: I = V diag(moments) V'.
+    """Compute principal moments and axes V of an inertia tensor: I = V diag(moments) V'.
 
     Order and signs of the axes are chosen so that V is as near to the identity as possible.
     """
@@ -362,7 +364,7 @@ def _bodies(e: XmlElement) -> Iterator[XmlElement]:
 
 @dataclass(frozen=True, eq=False)
 class FileLink:
-    """A link of a URDF or MJCF file that has inertia.
+    """A link of a URDF or MJCF file, with its inertial parameters and its XML elements.
 
     Attributes
     ----------
@@ -383,13 +385,13 @@ class FileLink:
 
     @property
     def numbers(self) -> Array:
-        """Mass, centre and tensor as the file states them, shape (10,), in the order of NUMBERS."""
+        """Mass, centre of mass and inertia tensor in the file, shape (10,); order as in NUMBERS."""
         return self.place.numbers(self.ten) if self.place.stated is None else self.place.stated
 
 
 @dataclass(frozen=True, eq=False)
 class RobotText:
-    """A parsed URDF or MJCF file: its tree, its frame table, and the XML elements with its numbers.
+    """A parsed URDF or MJCF file: tree of links, frame table, and XML elements with the numbers.
 
     Attributes
     ----------

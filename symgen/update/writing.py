@@ -41,7 +41,7 @@ class Writing:
     root: Array
 
     def links(self, edits: XmlEdits) -> list[Change]:
-        """Edit the links in the file; return a Change for each mass, centre and tensor element."""
+        """Edit the links in the file; return a Change for each mass, centre and inertia number."""
         rows, moved = [], []
         for link in self.text.links:
             x = self.nearest.u[self.nearest.links[link.name]]
@@ -107,7 +107,7 @@ class Writing:
 
     @property
     def placeless(self) -> dict[str, float]:
-        """New values, by name, of changed parameters for which the format has no attribute."""
+        """New values, by name, of changed parameters that the file format cannot store."""
         return {
             name: float(self.nearest.u[k])
             for name, k in self.nearest.elements.items()

@@ -57,7 +57,7 @@ class XmlEdits:
         values: Sequence[float],
         default: Sequence[float] | None = None,
     ) -> None:
-        """Replace the first numbers of attribute `name` by `values`; equal numbers stay as written.
+        """Replace the first numbers of attribute `name` by `values`; equal numbers keep their text.
 
         Parameters
         ----------
