@@ -258,9 +258,16 @@ def empty_figure(size: tuple[float, float]) -> Figure:
 
 
 def _rendered(figure: Figure, form: str) -> bytes:
-    """Convert a matplotlib figure to the bytes of a file in the format "svg" or "png"."""
+    """Convert a matplotlib figure to the bytes of a file in the format "svg" or "png".
+
+    The constrained layout is computed once, at the first file; matplotlib would compute it at each
+    drawing, and draw twice.
+    """
     stream = BytesIO()
     with mpl.rc_context(STYLE):
+        if layout := figure.get_layout_engine():
+            layout.execute(figure)
+            figure.set_layout_engine(None)
         figure.savefig(
             stream,
             format=form,
