@@ -349,7 +349,7 @@ def essential(
     *,
     simulator: Simulator | None = None,
 ) -> Essential:
-    """Find the essential parameters (section 4.1.1) of one or several records.
+    """Find the essential parameters: the few that explain the torques nearly as well as all.
 
     The method of the study is used; a method that is not linear is replaced by least squares with
     the same weights.

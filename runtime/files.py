@@ -185,7 +185,7 @@ def _(result: Excitation, folder: Path, study: Study) -> Files:
 
 @files_of.register
 def _(result: StaticPoses, folder: Path, study: Study) -> Files:
-    """Make a table of static poses (column t has the number of the pose), and the page on these poses.
+    """Make the files of static poses: table (column t: number of the pose), JSON data and page.
 
     With columns of measured torques added, the table is a record.
     """

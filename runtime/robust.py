@@ -122,12 +122,12 @@ def _iterated(start: Beginning, W: Array, X: Array, loss: str) -> Robust:
 
 
 def _weighted(observation: Observation, W: Array, raw: Factor, root: Array) -> Factor:
-    """Compute the triangular factor of [W Y] after row i is multiplied by root[i]."""
+    """Compute the triangular factor of [W Y] with each row i of W and Y multiplied by root[i]."""
     return factor(W * root[:, None], observation.Y * root, observation.rows, raw.names)
 
 
 def _scales(observation: Observation, raw: Factor, e: Array) -> Array:
-    """Compute the robust scale S_j of the residuals of each joint from their median, shape (n,)."""
+    """Compute a robust standard deviation of each joint's residuals from medians, shape (n,)."""
     by_joint = [e[observation.joint(j)] for j in range(observation.n)]
     S = np.array(
         [

@@ -150,7 +150,7 @@ class Drives:
 
 
 def encoder_drives(side: str, drives: Drives | None, section: str = "signals") -> Drives | None:
-    """Return the drives that link joint and encoder positions; None for encoders at the joints.
+    """Return the drives that convert joint to encoder positions; None for encoders at the joints.
 
     Raise SettingsError if the encoders are at the motors and the robot has no drives. section :
     section of the study whose key `side` is "joint" or "motor", for messages.

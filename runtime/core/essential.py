@@ -86,7 +86,7 @@ class Essential(Result):
         return tuple(step.name for step in self.trail if step.removed)
 
     def to_table(self) -> str:
-        """Write a table of the removed parameters, then the number left at each threshold."""
+        """Write a table of the removed parameters, then the number left at each threshold value."""
         first = len(self.all_parameters.names)
         lines: list[Sequence[str]] = [("removed", "left", "%sigma", "sigma_rho ratio")]
         for k, step in enumerate(self.trail):

@@ -83,7 +83,7 @@ class Lowpass(Settings):
 
 
 class Decimate(Settings):
-    """Decimation of Y and of every column of W: low-pass filter, then one sample in `factor`.
+    """Decimation of Y and of every column of W: low-pass filter, then every `factor`-th sample.
 
     The filter is Chebyshev I of order 8, 0.05 dB, 0.8/factor, zero phase.
 

@@ -200,7 +200,7 @@ class Cestac(Result, Part):
 
     @property
     def finer_for_values(self) -> str:
-        """Sentence on a parameter that needs a finer encoder step than the residual; "" if none."""
+        """Sentence on a parameter that a step changes while the residual hardly grows, or ""."""
         apart = (
             level
             for level in self.levels
@@ -222,7 +222,7 @@ class Cestac(Result, Part):
 
     @property
     def message(self) -> str:
-        """Sentence with the verdict for each rounding step and the parameter that changes most."""
+        """Sentence with the verdict and the largest error, %, at each rounding step."""
         if not self.levels:
             return "Nothing was perturbed."
         by_verdict: dict[str, list[str]] = {}
@@ -260,7 +260,7 @@ class Cestac(Result, Part):
         return f"{means.to_text()}\n\n{residual.to_text()}\n\n{notes}\n\n{below}"
 
     def text(self) -> str:
-        """Return the text that explains the two verdicts and gives them for every rounding step."""
+        """Return the verdicts at every rounding step, after an explanation of both kinds."""
         verdicts = [f"{r.level.label}: {r.message}" for r in self.levels]
         return "\n".join([VERDICTS, *verdicts, *self.notes])
 
@@ -374,7 +374,7 @@ class Cestac(Result, Part):
         }
 
     def _level_summary(self, level: LevelResult) -> dict[str, Any]:
-        """Return the results for one rounding step, for cestac.json; many runs are left out.
+        """Return the results at one rounding step for cestac.json, without the runs if many.
 
         The number of runs is always given.
         """
@@ -488,7 +488,7 @@ def texts(words: Iterable[str]) -> Array:
 
 
 def names_judged(settings: CestacSettings) -> dict[str, tuple[str, ...]]:
-    """Return the parameter names that study.cestac lists for the verdict, for the provenance."""
+    """Return the parameters listed in `cestac.columns` of a study, for the provenance."""
     return {} if isinstance(settings.columns, str) else {JUDGED: settings.columns}
 
 

@@ -67,7 +67,7 @@ def unit_columns(R11: Array) -> tuple[Array, Array]:
 
 
 def rank_tolerance(factor: Factor) -> float:
-    """Compute the default tolerance for the rank: the smallest ratio s_i/s_1 of singular values.
+    """Compute the default limit of s_i/s_1 above which a singular value s_i counts in the rank.
 
     It is the number of rows times the unit round-off.
     """
@@ -98,7 +98,7 @@ def solve(factor: Factor, tolerance: float | None = None) -> Solution:
 
 
 def null_groups(V2t: Array, names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
-    """Group the parameters that the record cannot separate, from the null directions of W.
+    """Group the parameters that the record cannot separate, from the null space of W.
 
     V2t, shape (b - rank, b), has the null directions as orthonormal rows. A group contains names
     whose entries of P = V_2 V_2' (diagonal: its square root) exceed LIMIT.NULL_PARTICIPATION.
