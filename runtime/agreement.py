@@ -171,7 +171,7 @@ def agreeing(found: Homogeneity) -> Answer:
 
 
 def agreement(result: Identification) -> Homogeneity | None:
-    """Compare the parameters that each record alone gives; validation records are included.
+    """Fit each record alone, validation records too, and compare the parameters between records.
 
     All parameters are compared. If one record does not determine all of them, only the essential
     parameters are compared.

@@ -103,7 +103,7 @@ class ExpectedError(Part):
 
     @property
     def expected_error(self) -> float:
-        """Expected error of torques predicted over the joint ranges at up to half speed, %."""
+        """Expected error, %, of torques predicted in the joint ranges up to half maximum speed."""
         return self.expected.error
 
     @cached_property

@@ -45,7 +45,7 @@ def report(
     *,
     study: Study | None = None,
 ) -> list[Path]:
-    """Write the report and the files of a result into a folder: all of them, or none.
+    """Write the report and the files of a result into a folder; if one file fails, write none.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def report(
 
 @singledispatch
 def files_of(result: object, folder: Path, study: Study) -> Files:
-    """Make the contents of all files of a result, by file name, for `folder`.
+    """Make the contents of all files of a result, as a mapping from file name to content.
 
     InputError for a result that has no files.
     """

@@ -35,7 +35,7 @@ Array = np.ndarray
 def crossings(
     records: Sequence[tuple[Array, Mapping[str, Array], float]], signals: Signals
 ) -> tuple[tuple[float, ...], str]:
-    """Find the frequency, Hz, above which recorded velocities replace differentiated positions.
+    """Find the frequencies, Hz, above which recorded velocities replace differentiated positions.
 
     Return the frequencies (signals.velocity of a study) and a sentence on them. For a joint whose
     recorded velocity is not used, the frequency is half the sampling rate of the slowest record.

@@ -140,7 +140,7 @@ def study_schema() -> dict[str, Any]:
 
 
 def load_study(path: str | Path) -> Study:
-    """Read a study file.
+    """Read a study file and return its settings as a Study.
 
     An invalid file raises SettingsError with file, line and key.
     """

@@ -100,7 +100,7 @@ def force_sensors(problem: Problem) -> Problem:
 
 
 def _record(record: Record, channels: Sequence[str]) -> Record:
-    """Add to a record six fixed joints for each force sensor; their torques are its wrench."""
+    """Add six fixed joints per force sensor to a record; their torques are the measured wrench."""
     rest = np.zeros((len(record), 6 * len(channels)))
     others = {
         c: np.hstack([x, rest * (np.nan if c == "q_link" else 0)]) if c in JOINT_CHANNELS else x

@@ -134,7 +134,10 @@ class Drives:
 
     @property
     def motion(self) -> Array:
-        """Gear-ratio matrix R of the positions, shape (n, n); diagonal if couplings are ignored."""
+        """Matrix R of gear ratios, shape (n, n), in the motor positions qm = R (q - offset).
+
+        R is diagonal if the couplings of the gears are not used for positions.
+        """
         return self._matrix("position")
 
     def _matrix(self, quantity: str) -> Array:

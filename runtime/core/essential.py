@@ -162,7 +162,9 @@ def essential_of(
 
 
 def _removals(steps: Sequence[Removal], threshold: float) -> int:
-    """Count the parameters removed before sigma_rho reaches `threshold` times its first value."""
+    """Count the removals before the residual deviation sigma_rho is `threshold` times the first
+    one.
+    """
     return next((k for k, step in enumerate(steps) if not step.ratio < threshold), len(steps))
 
 

@@ -55,8 +55,7 @@ def observe_rows(problem: Problem) -> Observation:
 
 
 def observed_unseen(problem: Problem, k: int) -> Observation:
-    """Build the matrix W and the torques Y of validation record k (k from 0), which is not fitted.
-    """
+    """Build W and Y of validation record k, counted from 0, which is not used for the fit."""
     alone = problem.changed(records=(problem.unseen[k],), unseen=())
     if "prepared_unseen" in vars(problem):
         alone.prepared[0].take_states(problem.prepared_unseen[k])

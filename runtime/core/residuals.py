@@ -188,7 +188,7 @@ def unseen_by_blocks(observation: Observation, fit: Estimate) -> float:
 
 
 def _lagged_sums(x: Array, place: Array, starts: Array) -> tuple[Array, Array]:
-    """Compute the sums of products x_t x_(t+k), k = 0, 1 ..., and the number of products in each.
+    """Compute the sums of products x_t x_(t+k) of residuals x, k = 0, 1 ..., and their number.
 
     x has shape (N,), `place` its places on a uniform grid. No pair combines different records,
     which begin at `starts`.
@@ -208,7 +208,7 @@ def _lagged_sums(x: Array, place: Array, starts: Array) -> tuple[Array, Array]:
 def p_value(
     squares_first: float, squares: float, terms_first: int, terms: int, count: float
 ) -> float:
-    """Compute the p-value of an F-test: does a model with more terms fit better than the first one?
+    """Compute the p-value of an F-test: does a model with more terms fit better than another?
 
     squares_first, squares : sums of squared residuals of both models. terms_first, terms : numbers
     of terms. count : number of independent samples.

@@ -247,9 +247,9 @@ class Identification:
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
-        """Sentences on the records: time stamps, subtracted torques, low-pass filter, findings.
+        """Sentences on the records: time stamps, subtracted torques, low-pass, other findings.
 
-        Findings are sentences of the readers and the steps.
+        Other findings are messages of the readers and the preparation steps.
         """
         texts = {
             (record.origin.whole or record.name, record.origin.time): None

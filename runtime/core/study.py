@@ -103,7 +103,7 @@ class Decimate(Settings):
 
 
 class Signals(Settings):
-    """Filters from measured positions to q, qd, qdd.
+    """Settings of the filters that compute q, qd, qdd from measured positions.
 
     Attributes
     ----------
@@ -165,7 +165,7 @@ class Signals(Settings):
 
     @property
     def window_of_torques(self) -> int:
-        """Median window for torques, in samples; for "auto", the window for positions."""
+        """Window of the torque median filter, in samples; for "auto", the window of positions."""
         return self.median if isinstance(self.torque_median, str) else self.torque_median
 
     @property

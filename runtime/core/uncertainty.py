@@ -315,7 +315,7 @@ def block_bootstrap(
 
 
 def f_tests(essential: Essential, share: float = 1.0) -> tuple[FTest, ...]:
-    """Test by F-tests whether the removed parameters have an effect.
+    """Test by F-tests whether the removed parameters have a significant effect on the torques.
 
     There are no tests without more rows than parameters. share : effective number of rows divided
     by the number of rows.

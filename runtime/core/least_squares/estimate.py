@@ -183,7 +183,7 @@ class Estimate:
 
     @property
     def worst_joint(self) -> JointFit:
-        """Fit of the joint with the largest relative error, among joints with rows and a motor.
+        """Fit of the joint with the largest relative error, of joints with a motor and rows in W.
 
         If there is no such joint, an axis of a force sensor; it may measure only its noise.
         """

@@ -111,7 +111,7 @@ def _iterated(start: System) -> System:
 
 
 def _covariance(start: System) -> System:
-    """Weight the n rows of one instant by L^-1, with L L' the covariance of the joint residuals.
+    """Multiply the n rows of each sample by L^-1; L L' is the covariance of the joint residuals.
 
     The weights of `start` are used if the residuals are linearly dependent.
     """
