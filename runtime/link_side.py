@@ -1,4 +1,4 @@
-"""Treat torques measured behind the gears, without friction and inertia of the drives."""
+"""Fit torques measured behind the gears, without friction and inertia of the drives."""
 
 from __future__ import annotations
 

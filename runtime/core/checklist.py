@@ -53,7 +53,7 @@ class Checklist(Result):
 
     @property
     def state(self) -> State:
-        """Worst state of all checks: "no", "doubtful" or "good"; "open" if no check has a state."""
+        """Worst state of all checks: "no", "doubtful" or "good"; "open" if no check is answered."""
         return next(
             (state for state in WORST if any(check.state == state for check in self.checks)), "open"
         )

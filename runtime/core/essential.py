@@ -162,9 +162,7 @@ def essential_of(
 
 
 def _removals(steps: Sequence[Removal], threshold: float) -> int:
-    """Count the removals before the residual deviation sigma_rho is `threshold` times the first
-    one.
-    """
+    """Count the removals for which sigma_rho stays below `threshold` times its first value."""
     return next((k for k, step in enumerate(steps) if not step.ratio < threshold), len(steps))
 
 

@@ -254,7 +254,7 @@ class Record:
         return len(self.t)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return a function by which pickle rebuilds the record from its fields, and no arguments.
+        """Return a function that rebuilds the record from its fields, for pickle.
 
         Values computed from the fields are not sent.
         """

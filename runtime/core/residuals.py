@@ -166,7 +166,7 @@ def effective_share(joints: Sequence[Whiteness]) -> float:
 
 
 def unseen_by_blocks(observation: Observation, fit: Estimate) -> float:
-    """Compute the factor that corrects variances from time blocks for longer correlated residuals.
+    """Compute the factor that corrects variances from time blocks for correlation beyond a block.
 
     Variances from blocks of L seconds assume that the blocks are independent. With residuals that
     are correlated as exp(-t/tau), the factor is

@@ -37,7 +37,7 @@ ADDED = ("two-point", "gaussian", "uniform")  # Modes that add Delta xi
 
 
 def stream(seed: int, *key: int) -> np.random.Generator:
-    """Return a random number generator that depends only on the seed and on a key (level, run).
+    """Return a random number generator fixed by the seed and a key such as (level, run).
 
     Generators of different keys are independent.
     """

@@ -92,7 +92,7 @@ class Runs(Sequence[Run]):
 
 @dataclass(frozen=True)
 class Level:
-    """One level of a study: rounding steps of positions and torques; 0 means no rounding.
+    """One pair of rounding steps of a study: for positions and for torques; 0 means no rounding.
 
     Attributes
     ----------

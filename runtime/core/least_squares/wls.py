@@ -1,4 +1,4 @@
-"""Least squares weighted by joint: rows of joint j are divided by their residual deviation s_j.
+"""Least squares with rows of joint j divided by s_j, the standard deviation of its residuals.
 
     X = argmin sum_j ||Y_j - W_j X||^2 / s_j^2,    C = (sum_j W_j'W_j / s_j^2)^-1
 
