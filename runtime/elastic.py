@@ -117,7 +117,7 @@ def elastic_gears(result: Identification) -> Elasticity | None:
 
 
 def elasticity(problem: Problem, names: Sequence[str], X: Array) -> Elasticity | None:
-    """Estimate the stiffness of the joints with two encoders from all records of a problem.
+    """Estimate stiffness and damping of the gears with two encoders, from all records of a problem.
 
     The problem must be prepared. None if no record has link positions.
 

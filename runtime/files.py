@@ -45,7 +45,7 @@ def report(
     *,
     study: Study | None = None,
 ) -> list[Path]:
-    """Write the report and the files of a result into a folder; if one file fails, write none.
+    """Write the report and all files of a result into a folder; if a file fails, write none.
 
     Parameters
     ----------

@@ -39,7 +39,7 @@ from runtime.reading.units import speed
 
 
 class Rows(chapter.Rows):
-    """Selection of the rows of W and Y that are used.
+    """Settings that select the rows of W and Y that are used.
 
     Attributes
     ----------

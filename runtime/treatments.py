@@ -148,7 +148,7 @@ class Ranking:
 def compare(
     problems: Mapping[str, Problem], extras: Sequence[Extra], of_the_best: Sequence[Extra] = ()
 ) -> Ranking:
-    """Identify with several settings (studies) and order them by their error on unseen data.
+    """Identify a robot by each treatment of its records, and order these by prediction error.
 
     Parameters
     ----------

@@ -175,7 +175,7 @@ class Signals(Settings):
 
 
 class Rows(Settings):
-    """Selection of the rows of W and Y.
+    """Settings that select the rows of W and Y.
 
     Attributes
     ----------
@@ -216,7 +216,7 @@ class EstimateSettings(Settings):
 
 
 class EssentialSettings(Settings):
-    """Elimination of parameters while sigma_rho stays below a threshold (chapter, section 4.1.1).
+    """Settings of the elimination: parameters are removed while sigma_rho is below a threshold.
 
     Attributes
     ----------

@@ -112,12 +112,12 @@ def null_groups(V2t: Array, names: Sequence[str]) -> tuple[tuple[str, ...], ...]
 
 
 def joint_scatter(factor: Factor, tolerance: float | None = None) -> Array:
-    """Compute the residual standard deviation s_j of each joint, fitted alone, shape (n,).
+    """Compute the residual standard deviation s_j of each joint, with X fitted to this joint only.
 
         s_j^2 = ||Y_j - W_j X_j||^2 / (N_j - b_j)
 
     X_j is fitted to the rows of joint j only, and b_j = rank(W_j) with unit columns.
-    nan if a joint has no more rows than b_j.
+    The shape is (n,); nan if a joint has no more rows than b_j.
     """
     scatter = []
     for joint in factor.joints:
