@@ -66,13 +66,13 @@ class Disagreement:
 
     @property
     def difference(self) -> float:
-        """Difference of this record's value from the mean of the other records, % of the larger."""
+        """Difference of this value from the mean of the other records, % of the larger value."""
         return 100 * abs(self.value - self.others) / max(abs(self.value), abs(self.others))
 
 
 @dataclass(frozen=True)
 class Homogeneity(Result, Part, keys="records parameters agree disagreements untested"):
-    """Result of a comparison of records: whether they give the same parameters.
+    """Result of the comparison of records: whether all records give the same parameters.
 
     Attributes
     ----------
@@ -100,11 +100,14 @@ class Homogeneity(Result, Part, keys="records parameters agree disagreements unt
 
     @property
     def records_differ(self) -> bool:
-        """Whether a parameter differs between records by more than LIMIT.RELEVANT_DIFFERENCE %."""
+        """Whether a parameter differs between records by more than 10 % of its value.
+
+        The limit is LIMIT.RELEVANT_DIFFERENCE.
+        """
         return any(d.difference > LIMIT.RELEVANT_DIFFERENCE for d in self.disagreements)
 
     def checks(self) -> tuple[Check, ...]:
-        """Return the check of the report that asks whether the records agree, as a tuple."""
+        """Return the check "Do the records agree?" of the report, as a tuple with one check."""
         return (agreeing(self),)
 
     def text(self) -> str:
@@ -168,7 +171,7 @@ def agreeing(found: Homogeneity) -> Answer:
 
 
 def agreement(result: Identification) -> Homogeneity | None:
-    """Compare the parameters that each record alone gives; validation records are included.
+    """Fit each record alone, validation records too, and compare the parameters between records.
 
     All parameters are compared. If one record does not determine all of them, only the essential
     parameters are compared.

@@ -1,4 +1,4 @@
-"""Models of records in A or V without a torque constant: `record.torque_constant: none`.
+"""Models for records whose torques are drive commands in A or V (`record.torque_constant: none`).
 
 Torques are linear in the parameters, so such a fit is possible; each parameter then has the unit of
 the robot file with A (or V) in place of N m, such as A*s**2/rad for an inertia. Parameters that act
@@ -44,7 +44,7 @@ class CommandModel:
 
 
 def in_commands(text: str, unit: str) -> str:
-    """Return the unit `text` of a parameter with `unit` (A or V) in place of N m or N."""
+    """Rewrite the unit `text` of a parameter in A or V: "N*m*s/rad" becomes "A*s/rad"."""
     if text in INERTIAS:
         return unit + INERTIAS[text]
     for torque in ("N*m", "N"):

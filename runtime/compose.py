@@ -349,7 +349,7 @@ def essential(
     *,
     simulator: Simulator | None = None,
 ) -> Essential:
-    """Find the essential parameters (section 4.1.1) of one or several records.
+    """Find the essential parameters: the few that explain the torques nearly as well as all.
 
     The method of the study is used; a method that is not linear is replaced by least squares with
     the same weights.
@@ -462,7 +462,7 @@ def compare(
     *,
     variants: GeneratedModel | None = None,
 ) -> Ranking:
-    """Identify with several settings (studies) and order them by their error on unseen data.
+    """Identify a robot by several studies (settings), and order these by error on validation data.
 
     Parameters
     ----------
@@ -590,7 +590,7 @@ def excite(
     map: Callable[..., Iterable[Any]] = map,
     progress: Callable[[int, int], None] | None = None,
 ) -> Excitation:
-    """Search an exciting motion, within the limits, that minimises the criterion of the study.
+    """Search an exciting motion within the robot's limits, with the best criterion of the study.
 
     The best motion over all starts of the search is returned. Without records, the values of the
     robot file serve as parameters.

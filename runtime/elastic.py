@@ -37,7 +37,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Elasticity(Result, Part):
-    """Stiffness and damping of the gears with two encoders, shape (k,) each.
+    """Stiffness and damping of k gears that have an encoder on each side, shape (k,) each.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Elasticity(Result, Part):
         return "\n".join(self.sentences)
 
     def brief(self) -> str:
-        """Return the same text as `text`."""
+        """Return one sentence per gear, as `text` does; this result has no shorter text."""
         return self.text()
 
     @property
@@ -117,7 +117,7 @@ def elastic_gears(result: Identification) -> Elasticity | None:
 
 
 def elasticity(problem: Problem, names: Sequence[str], X: Array) -> Elasticity | None:
-    """Estimate the stiffness of the joints with two encoders from all records of a problem.
+    """Estimate stiffness and damping of the gears with two encoders, from all records of a problem.
 
     The problem must be prepared. None if no record has link positions.
 
@@ -143,7 +143,7 @@ def elasticity(problem: Problem, names: Sequence[str], X: Array) -> Elasticity |
 
 
 def _gear(records: Sequence[Prepared], j: int, Ia: float | None) -> tuple[float, ...]:
-    """Fit stiffness K and damping D of one gear; return K, its sigma, D, its sigma, and time lag.
+    """Fit one gear: return stiffness and damping, each with its standard deviation, and a time lag.
 
     K and D are nan if the records do not determine the stiffness.
     """
@@ -189,7 +189,7 @@ def _gear(records: Sequence[Prepared], j: int, Ia: float | None) -> tuple[float,
 
 
 def _inertia(model: GeneratedModel, q: Array, names: Sequence[str], X: Array) -> Array:
-    """Compute the inertia A_jj about each joint at q from the parameters X, shape (n,).
+    """Compute the inertia about each joint at the position q from the parameters X, shape (n,).
 
     An inertia that is not positive becomes nan.
     """

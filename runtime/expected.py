@@ -59,7 +59,7 @@ Array = np.ndarray
 
 
 class Expected(NamedTuple):
-    """Expected error of predicted torques, and the limits of its likely interval, %."""
+    """Expected error of predicted torques, %, with lower and upper limit of its likely range, %."""
 
     error: float
     low: float
@@ -93,7 +93,7 @@ def expected_off(likely: Expected) -> Answer | None:
 
 @dataclass(frozen=True, eq=False)
 class ExpectedError(Part):
-    """Report part on the expected error of torques that the final parameters predict."""
+    """Part of the report: the expected error of torques that the final parameters predict."""
 
     result: Identification
 
@@ -103,7 +103,7 @@ class ExpectedError(Part):
 
     @property
     def expected_error(self) -> float:
-        """Expected error of torques predicted over the joint ranges at up to half speed, %."""
+        """Expected error, %, of torques predicted in the joint ranges up to half maximum speed."""
         return self.expected.error
 
     @cached_property
@@ -126,7 +126,7 @@ class ExpectedError(Part):
         )
 
     def checks(self) -> tuple[Check, ...]:
-        """Return the check of the expected error of predicted torques; no check if unknown."""
+        """Return the check of the expected error of predicted torques, if this error is known."""
         check = expected_off(self.expected)
         return () if check is None else (check,)
 
@@ -207,7 +207,7 @@ def expected_error(
 
 
 def with_values(physical: PhysicalModel, K: Array, R: Array, y: Array) -> tuple[Array, Array]:
-    """Estimate standard parameters chi from rows R K chi = y and from the values of the robot file.
+    """Estimate standard parameters chi from equations R K chi = y and the values of the robot file.
 
     The rows have errors of variance 1. Parameters without a value are free. Return chi and its
     covariance.

@@ -45,7 +45,7 @@ def report(
     *,
     study: Study | None = None,
 ) -> list[Path]:
-    """Write the report and the files of a result into a folder: all of them, or none.
+    """Write the report and all files of a result into a folder; if a file fails, write none.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def report(
 
 @singledispatch
 def files_of(result: object, folder: Path, study: Study) -> Files:
-    """Make the contents of all files of a result, by file name, for `folder`.
+    """Make the contents of all files of a result, as a mapping from file name to content.
 
     InputError for a result that has no files.
     """
@@ -185,7 +185,7 @@ def _(result: Excitation, folder: Path, study: Study) -> Files:
 
 @files_of.register
 def _(result: StaticPoses, folder: Path, study: Study) -> Files:
-    """Make a table of static poses (column t has the number of the pose), and the page on these poses.
+    """Make the files of static poses: table (column t: number of the pose), JSON data and page.
 
     With columns of measured torques added, the table is a record.
     """

@@ -1,4 +1,4 @@
-"""Use torques measured behind the gears, which friction and inertia of the drives do not affect."""
+"""Fit torques measured behind the gears, without friction and inertia of the drives."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ Array = np.ndarray
 
 
 def share_taken(tau: Array, q: Array, rate: float, window: int) -> Array:
-    """Compute the share of each joint torque that a running median removes in time with the motion.
+    """Compute the share of each joint torque that follows the motion and that the median removes.
 
     Return the shares, shape (n,). The share of a joint is 0 if most of the removed torque does not
     depend on the motion.

@@ -57,7 +57,7 @@ class IrlsOptions(LinearOptions):
 
 @dataclass(frozen=True, eq=False)
 class Robust:
-    """State of robust least squares after one pass: X, residuals, weights and residual scales.
+    """State of robust least squares after one pass: X, residuals, weights and scales of the joints.
 
     X are the parameters, shape (b,), u the scaled residuals and w the weights, shape (r,), and S
     the scales of the joints, shape (n,). T fulfils T T' = (sum_j W_j'W_j / S_j^2)^-1.
@@ -86,7 +86,7 @@ def fit(start: Beginning) -> Fitted:
 
 
 def weight(u: Array, loss: str, tuning: float) -> Array:
-    """Compute the weights w(u), between 0 and 1, of rows with scaled residuals u."""
+    """Compute the weights w(u), 0 to 1, of rows; u is the residual over its standard deviation."""
     if loss == "huber":
         return np.asarray(np.minimum(1.0, tuning / np.maximum(np.abs(u), np.finfo(float).tiny)))
     return np.where(np.abs(u) < tuning, (1 - (u / tuning) ** 2) ** 2, 0.0)
@@ -122,12 +122,12 @@ def _iterated(start: Beginning, W: Array, X: Array, loss: str) -> Robust:
 
 
 def _weighted(observation: Observation, W: Array, raw: Factor, root: Array) -> Factor:
-    """Compute the triangular factor of [W Y] after row i is multiplied by root[i]."""
+    """Compute the triangular factor of [W Y] with each row i of W and Y multiplied by root[i]."""
     return factor(W * root[:, None], observation.Y * root, observation.rows, raw.names)
 
 
 def _scales(observation: Observation, raw: Factor, e: Array) -> Array:
-    """Compute the robust scale S_j of the residuals of each joint from their median, shape (n,)."""
+    """Compute a robust standard deviation of each joint's residuals from medians, shape (n,)."""
     by_joint = [e[observation.joint(j)] for j in range(observation.n)]
     S = np.array(
         [
@@ -139,7 +139,7 @@ def _scales(observation: Observation, raw: Factor, e: Array) -> Array:
 
 
 def _fit_of_last_pass(start: Beginning, W: Array, fit: Robust) -> Fitted:
-    """Build the result from the last pass of the iteration, with a robust covariance."""
+    """Build the result of the last pass: weighted rows, X and its covariance for this method."""
     observation, options = start.observation, start.options
     r, b = W.shape
     loss, tuning = options.loss, _tuning(options, options.loss)
@@ -183,7 +183,7 @@ def _fit_of_last_pass(start: Beginning, W: Array, fit: Robust) -> Fitted:
 
 
 def _note_of_shares(shares: Mapping[str, float]) -> str:
-    """Write a note on the share of down-weighted rows of each joint."""
+    """Write a note on the share of rows of each joint that have a small weight."""
     text = (
         f"Share of rows with a weight below {LIMIT.DOWN_WEIGHTED:g}: "
         + ", ".join(f"joint {joint} {100 * share:.1f} %" for joint, share in shares.items())

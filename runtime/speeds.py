@@ -1,4 +1,4 @@
-"""Combine recorded velocities with differentiated positions, to have the least noise.
+"""Combine recorded velocities with differentiated positions to get velocities with the least noise.
 
     qd = v + L (dq/dt - v)          L = 1/(1 + (f/f_c)^2), zero phase
     2 pi f_c = sigma_v/sigma_q      standard deviations of the white noise of v and of q
@@ -35,7 +35,7 @@ Array = np.ndarray
 def crossings(
     records: Sequence[tuple[Array, Mapping[str, Array], float]], signals: Signals
 ) -> tuple[tuple[float, ...], str]:
-    """Find the frequency of each joint, Hz, above which its recorded velocity is used.
+    """Find the frequencies, Hz, above which recorded velocities replace differentiated positions.
 
     Return the frequencies (signals.velocity of a study) and a sentence on them. For a joint whose
     recorded velocity is not used, the frequency is half the sampling rate of the slowest record.

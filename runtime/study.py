@@ -39,7 +39,7 @@ from runtime.reading.units import speed
 
 
 class Rows(chapter.Rows):
-    """Selection of the rows of W and Y that are used.
+    """Settings that select the rows of W and Y that are used.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Rows(chapter.Rows):
 
 
 class ValidateSettings(chapter.ValidateSettings):
-    """Choice of the data that parameters are fitted to and of the data that they predict.
+    """Settings for validation: data to which parameters are fitted, and data that they predict.
 
     Attributes
     ----------
@@ -140,7 +140,7 @@ def study_schema() -> dict[str, Any]:
 
 
 def load_study(path: str | Path) -> Study:
-    """Read a study file.
+    """Read a study file and return its settings as a Study.
 
     An invalid file raises SettingsError with file, line and key.
     """
@@ -154,7 +154,7 @@ def study_from_text(text: str, *, file: str = "study") -> Study:
 
 
 def study_of(record: str | Path) -> tuple[Study, Path]:
-    """Return the study settings that belong to a dataset, a study file or a measured file.
+    """Make a Study from a study file, from the name of a dataset, or from a measured file.
 
     Return the Study, and the folder to which its file names are relative.
 
@@ -319,7 +319,7 @@ def study_text(study: Study, destination: Path, *, defaults: bool = True) -> str
 
 
 def _differing(mapping: Mapping[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings in `mapping` that differ from the defaults `usual`, at every depth."""
+    """Return the settings in `mapping` that differ from the defaults `usual`, nested ones too."""
     return {
         key: _differing(value, usual[key])
         if isinstance(value, Mapping) and isinstance(usual.get(key), Mapping)

@@ -1,4 +1,4 @@
-"""Find which choice of settings for the same records predicts validation records best.
+"""Find which treatment of the records (choice of settings) predicts validation records best.
 
 A treatment is a choice of settings, for instance with all rows or without rows at rest, with the
 counterbalance torque known or not. Every candidate is identified with its own settings. Of its sets
@@ -42,7 +42,7 @@ STATED = "as stated"
 
 @dataclass(frozen=True, eq=False)
 class Ranking:
-    """Result of a comparison: ways to treat the records, ordered by their prediction error.
+    """Result of a comparison of treatments (settings for the same records), the best first.
 
     Attributes
     ----------
@@ -63,14 +63,12 @@ class Ranking:
 
     @property
     def best(self) -> Identification:
-        """Identification with the settings (treatment) of the records that predict unseen data
-        best.
-        """
+        """Identification with the treatment that predicts validation records best."""
         return next(iter(self.results.values()))
 
     @property
     def mean_errors(self) -> dict[str, float]:
-        """Mean prediction error of each treatment, %, over the validation rows of all treatments.
+        """Mean error, %, with which each treatment predicts the validation rows of all treatments.
 
         It is the geometric mean of e_ck over k.
         """
@@ -90,7 +88,7 @@ class Ranking:
         return f"Predicts {self.best.unseen} best: {first}{then} of the measured torques."
 
     def table(self) -> Table:
-        """Return a table with a line for each treatment of the records: parameters, errors, use."""
+        """Return a table with one line per treatment: parameters, errors in %, verdict."""
         header = (
             "treatment",
             "parameters",
@@ -150,7 +148,7 @@ class Ranking:
 def compare(
     problems: Mapping[str, Problem], extras: Sequence[Extra], of_the_best: Sequence[Extra] = ()
 ) -> Ranking:
-    """Identify with several settings (studies) and order them by their error on unseen data.
+    """Identify a robot by each treatment of its records, and order these by prediction error.
 
     Parameters
     ----------
@@ -205,10 +203,10 @@ def treatments(
     steps: Sequence[Step],
     speed_of_rest: Callable[[Problem], float | tuple[float, ...] | None],
 ) -> dict[str, Problem]:
-    """Return one to three variants of a problem, which treat its records in different ways.
+    """Make one to three variants of a problem, which use different rows or torques of its records.
 
-    The variants are: as stated, without the rows of resting joints, and without known torques. All
-    steps are applied to each.
+    The variants are: as stated, without the rows of resting joints, and without known torques (also
+    without the resting rows, if there is a variant without them). All steps are applied to each.
 
     speed_of_rest : function that returns rows.low_speed of a prepared problem to leave out the rows
         of resting joints; None if few joints rest.
@@ -231,9 +229,7 @@ def treatments(
 
 
 def standing_set(result: Identification) -> tuple[SetName, Estimate]:
-    """Find which set of parameters (all, essential ...) predicts unseen data best, and its
-    estimate.
-    """
+    """Return name and estimate of the set of parameters that predicts validation records best."""
     name = best_set(result.set_errors, essential=True) if result.set_errors else "all"
     fit = result.sets.get(name, result.estimate)
     if name == "essential" and not result.sets:  # of a method that is not linear

@@ -1,4 +1,4 @@
-"""Use force sensors: each sensor adds six rows per sample, besides or instead of joint torques.
+"""Use force sensors: each adds six rows to W and Y per sample, three forces and three moments.
 
 A sensor before link j measures the wrench (force and moment) that moves link j and the links behind
 it, in the axes of frame j about its origin. This wrench equals the torques of six additional joints
@@ -50,7 +50,7 @@ READ_SAMPLE_BY_SAMPLE = ("lowpass", "static")
 
 
 def force_sensors(problem: Problem) -> Problem:
-    """Add six fixed joints to the model and to the records for each force sensor.
+    """Add six fixed joints per force sensor to model and records; their torques are the wrench.
 
     This is a step of the preparation of a problem. A problem without force sensors is not changed.
 
@@ -100,7 +100,7 @@ def force_sensors(problem: Problem) -> Problem:
 
 
 def _record(record: Record, channels: Sequence[str]) -> Record:
-    """Add to a record six fixed joints for each force sensor; their torques are its wrench."""
+    """Add six fixed joints per force sensor to a record; their torques are the measured wrench."""
     rest = np.zeros((len(record), 6 * len(channels)))
     others = {
         c: np.hstack([x, rest * (np.nan if c == "q_link" else 0)]) if c in JOINT_CHANNELS else x

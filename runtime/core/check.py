@@ -54,7 +54,7 @@ class Check:
 
     @property
     def sentence(self) -> str:
-        """The question, what was found and what to do, as one text."""
+        """Text of the check: its question, what was found, and the remedy if there is one."""
         remedy = f" {self.remedy[0].upper()}{self.remedy[1:]}." if self.remedy else " "
         return f"{self.question} {self.finding}.{remedy}"
 

@@ -53,7 +53,7 @@ class Checklist(Result):
 
     @property
     def state(self) -> State:
-        """The worst state of all checks: "no", "doubtful" or "good"; "open" without answers."""
+        """Worst state of all checks: "no", "doubtful" or "good"; "open" if no check is answered."""
         return next(
             (state for state in WORST if any(check.state == state for check in self.checks)), "open"
         )
@@ -229,7 +229,7 @@ def remark(check: Check, counts: bool) -> Check:
     "fewer parameters (essential.threshold)",
 )
 def rank_and_condition(estimate: Estimate, fit: Estimate) -> Answer:
-    """Check the rank of the observation matrix W, and its condition number with unit columns.
+    """Check the rank of the observation matrix W, and its condition number with columns of norm 1.
 
     The rank is checked for all parameters (`estimate`) and for the used ones (`fit`), the condition
     number for the used parameters only.

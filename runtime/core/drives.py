@@ -134,7 +134,10 @@ class Drives:
 
     @property
     def motion(self) -> Array:
-        """Gear-ratio matrix R of the positions, shape (n, n); diagonal if couplings are ignored."""
+        """Matrix R of gear ratios, shape (n, n), in the motor positions qm = R (q - offset).
+
+        R is diagonal if the couplings of the gears are not used for positions.
+        """
         return self._matrix("position")
 
     def _matrix(self, quantity: str) -> Array:
@@ -150,7 +153,7 @@ class Drives:
 
 
 def encoder_drives(side: str, drives: Drives | None, section: str = "signals") -> Drives | None:
-    """Return the drives that link joint and encoder positions; None for encoders at the joints.
+    """Return the drives that convert joint to encoder positions; None for encoders at the joints.
 
     Raise SettingsError if the encoders are at the motors and the robot has no drives. section :
     section of the study whose key `side` is "joint" or "motor", for messages.

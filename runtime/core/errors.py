@@ -125,7 +125,7 @@ class DataUnavailableError(InputError):
 
 
 def instant(t: float) -> str:
-    """Write a time, s, for messages: six digits; to the millisecond if it is 1e5 s or more.
+    """Write a time in s as text for messages: six digits, or down to milliseconds from 1e5 s.
 
     Time stamps that count from an epoch such as 1970 are that large.
     """

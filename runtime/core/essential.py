@@ -86,7 +86,7 @@ class Essential(Result):
         return tuple(step.name for step in self.trail if step.removed)
 
     def to_table(self) -> str:
-        """Write a table of the removed parameters, then the number left at each threshold."""
+        """Write a table of the removed parameters, then the number left at each threshold value."""
         first = len(self.all_parameters.names)
         lines: list[Sequence[str]] = [("removed", "left", "%sigma", "sigma_rho ratio")]
         for k, step in enumerate(self.trail):
@@ -162,7 +162,7 @@ def essential_of(
 
 
 def _removals(steps: Sequence[Removal], threshold: float) -> int:
-    """Count the parameters removed before sigma_rho reaches `threshold` times its first value."""
+    """Count the removals for which sigma_rho stays below `threshold` times its first value."""
     return next((k for k, step in enumerate(steps) if not step.ratio < threshold), len(steps))
 
 

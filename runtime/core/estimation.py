@@ -55,7 +55,7 @@ def observe_rows(problem: Problem) -> Observation:
 
 
 def observed_unseen(problem: Problem, k: int) -> Observation:
-    """Build the matrix W and the torques Y of validation record k, not fitted; k counts from 0."""
+    """Build W and Y of validation record k, counted from 0, which is not used for the fit."""
     alone = problem.changed(records=(problem.unseen[k],), unseen=())
     if "prepared_unseen" in vars(problem):
         alone.prepared[0].take_states(problem.prepared_unseen[k])
@@ -150,7 +150,7 @@ def method_of(settings: EstimateSettings, methods: Mapping[str, Method]) -> Meth
 
 
 def point_estimate(settings: EstimateSettings, methods: Mapping[str, Method]) -> EstimateSettings:
-    """Return faster settings that omit resampled records, if only the values of X are needed.
+    """Return settings for a faster fit that gives X only, without explanations for the user.
 
     Methods that have no such options use the settings unchanged.
     """

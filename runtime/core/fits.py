@@ -51,7 +51,7 @@ class Fits:
     settings: Mapping[Any, EstimateSettings]
 
     def best(self, validation: Sequence[CrossValidation], study: Study) -> Estimate:
-        """Return the estimate of the set of parameters that predicts unseen data best.
+        """Return the estimate of the set of parameters that best predicts data not fitted.
 
         If the method is not linear, return the estimate of all parameters.
         """
@@ -136,7 +136,7 @@ def _validation(
     choices: Mapping[Any, EstimateSettings],
     known: Mapping[Any, Estimate],
 ) -> tuple[tuple[CrossValidation, ...], tuple[str, ...]]:
-    """Predict, by each set of parameters, other time windows of the records, then other records.
+    """Predict other time windows, then other records, with every set of parameters.
 
     Between windows, the sets `choices` are fitted again; on further records the estimates `known`,
     from all rows, are used. Return the validations, and sentences on those that failed.

@@ -61,7 +61,7 @@ def is_writable_by_others(folder: Path) -> bool:
 
 
 def is_emitted(text: bytes) -> bool:
-    """Whether this installation has generated and certified the given text of a module."""
+    """Whether this installation has generated a module with this text and has stored its hash."""
     try:
         folder = cache_folder("modules")
         return (folder / sha256(text).hexdigest()[:KEY]).is_dir() and not is_writable_by_others(

@@ -139,7 +139,9 @@ def require_emitted(model: Any) -> None:
 
 
 def _reduced(module: ModuleType) -> tuple[Callable[..., ModuleType], tuple[Any, ...]]:
-    """Return how pickle sends a module to another process: an emitted module is sent as its text.
+    """Return the function and the arguments from which pickle rebuilds a module in another process.
+
+    An emitted module is sent as its text.
 
     The receiving process trusts the sending one. Any other module is imported by its name. Raise
     InputError for an emitted module without a file.
@@ -240,7 +242,7 @@ def constants_of(model: GeneratedModel, constants: Mapping[str, float]) -> dict[
 
 
 def channels_of(model: GeneratedModel) -> Mapping[str, tuple[str, ...]]:
-    """Return the parameters that depend on each extra measured signal, such as a temperature.
+    """Return, for each measured signal such as a temperature, the parameters that depend on it.
 
     A channel is a measured quantity in a law of the robot file, such as a temperature: a constant
     that is a function of time.

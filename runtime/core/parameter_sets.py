@@ -47,7 +47,7 @@ ORDER: tuple[SetName, ...] = ("essential", "feasible", "all")
 def least_squares_sets(
     settings: EstimateSettings, reduced: Essential
 ) -> tuple[dict[SetName, Estimate], dict[SetName, EstimateSettings]]:
-    """Return an estimate of the essential parameters and one of all, each with the settings of its fit.
+    """Return the estimates of the essential and of all parameters, and the settings of each fit.
 
     The method of estimation is linear.
     """
@@ -73,7 +73,7 @@ def physical_asked(errors: Mapping[Any, float], first: bool) -> bool:
 
 
 def physical_possible(observation: Observation, settings: EstimateSettings, fit: Estimate) -> bool:
-    """Whether settings and fit permit a second fit, of physically consistent parameters.
+    """Whether a second fit, of physically consistent parameters, is possible after this fit.
 
     `fit` has all parameters. This needs all columns, a fit with status ok, and weights other than
     "covariance".
@@ -136,7 +136,7 @@ def best_set(errors: Mapping[Any, float], essential: bool = False) -> SetName:
 
 
 def whole_set(names: Collection[SetName], model_columns: SetName) -> SetName:
-    """Return the name of the set of parameters to use if all base parameters need values.
+    """Return the name of the set of parameters to use where every base parameter needs a value.
 
     A robot file, for instance, needs all of them.
 

@@ -97,7 +97,7 @@ class Part:
 
     @property
     def records_differ(self) -> bool:
-        """Whether the records seem to come from different robots."""
+        """Whether the parameters of the records differ as if the robot had changed."""
         return False
 
     def text(self) -> str:

@@ -103,7 +103,7 @@ class Problem:
         return tuple(self.reading(record) for record in self.unseen)
 
     def reading(self, record: Record) -> Prepared:
-        """Combine a record with the settings and the function that compute its states q, qd, qdd.
+        """Combine a record with settings and reader into a Prepared, which computes q, qd, qdd.
 
         A record without drives gets those of the model.
         """

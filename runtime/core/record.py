@@ -222,7 +222,7 @@ class Record:
         return self.tau if self.tau_known is None else self.tau - self.tau_known
 
     def moved(self, q: Array, **changes: Any) -> Record:
-        """Copy the record with other positions, and therefore without its recorded velocities.
+        """Copy the record with other positions q, and without its recorded velocities.
 
         changes : new values of other fields.
         """
@@ -254,7 +254,7 @@ class Record:
         return len(self.t)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return how pickle rebuilds the record in another process: from its fields only.
+        """Return a function that rebuilds the record from its fields, for pickle.
 
         Values computed from the fields are not sent.
         """

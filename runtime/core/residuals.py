@@ -72,7 +72,7 @@ class Whiteness:
 
     @property
     def white(self) -> bool:
-        """Whether the Ljung-Box test at 5 % accepts that the residuals are independent."""
+        """Whether the Ljung-Box test at 5 % finds no dependence between the residuals."""
         return bool(self.p >= LIMIT.SIGNIFICANT)
 
 
@@ -138,7 +138,7 @@ def residual_correlation(residual: Array) -> Array:
 
 
 def correlation(products: Array, pairs: Array) -> Array:
-    """Compute the autocorrelation rho_k, k = 1, 2 ..., from sums of products of residuals.
+    """Compute the autocorrelation rho_k, k = 1, 2 ..., of residuals from sums of their products.
 
     products : sums at the distances k = 0, 1 ...; pairs : number of products in each sum. rho_k is
     0 for a distance without pairs.
@@ -149,7 +149,7 @@ def correlation(products: Array, pairs: Array) -> Array:
 
 
 def correlation_time(rho: Array) -> float:
-    """Compute the correlation time, in rows, from the autocorrelation rho_k, k = 1, 2 ...
+    """Compute the correlation time, as a number of rows, from the autocorrelation rho_k.
 
     It is 1 + 2 sum_k rho_k; the sum ends before the first rho_k that is not positive.
     """
@@ -158,7 +158,7 @@ def correlation_time(rho: Array) -> float:
 
 
 def effective_share(joints: Sequence[Whiteness]) -> float:
-    """Compute the number of effective (independent) rows as a fraction of all rows of all joints.
+    """Compute the share of effective (independent) rows among all rows of all joints, 0 to 1.
 
     The result is at most 1.
     """
@@ -166,7 +166,7 @@ def effective_share(joints: Sequence[Whiteness]) -> float:
 
 
 def unseen_by_blocks(observation: Observation, fit: Estimate) -> float:
-    """Compute the factor that corrects block variances for residuals correlated beyond a block.
+    """Compute the factor that corrects variances from time blocks for correlation beyond a block.
 
     Variances from blocks of L seconds assume that the blocks are independent. With residuals that
     are correlated as exp(-t/tau), the factor is
@@ -188,7 +188,7 @@ def unseen_by_blocks(observation: Observation, fit: Estimate) -> float:
 
 
 def _lagged_sums(x: Array, place: Array, starts: Array) -> tuple[Array, Array]:
-    """Compute the sums of products x_t x_(t+k), k = 0, 1 ..., and the number of products in each.
+    """Compute the sums of products x_t x_(t+k) of residuals x, k = 0, 1 ..., and their number.
 
     x has shape (N,), `place` its places on a uniform grid. No pair combines different records,
     which begin at `starts`.
@@ -208,7 +208,7 @@ def _lagged_sums(x: Array, place: Array, starts: Array) -> tuple[Array, Array]:
 def p_value(
     squares_first: float, squares: float, terms_first: int, terms: int, count: float
 ) -> float:
-    """Compute the p-value of an F-test: does a model with more terms fit better than the first one?
+    """Compute the p-value of an F-test: does a model with more terms fit better than another?
 
     squares_first, squares : sums of squared residuals of both models. terms_first, terms : numbers
     of terms. count : number of independent samples.

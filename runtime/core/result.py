@@ -50,7 +50,7 @@ from runtime.core.validation import (
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """Parameters of one robot from one or several records, with everything that was computed.
+    """Parameters of one robot from one or several records, with the results of all analyses.
 
     Attributes
     ----------
@@ -213,7 +213,7 @@ class Identification:
 
     @cached_property
     def written_sets(self) -> Mapping[SetName, Estimate]:
-        """Estimates by parameter set; a physical set is added if the final model is "essential".
+        """Estimates of each set of parameters; for a final model "essential" also a physical set.
 
         A robot file or a program needs all parameters, which the essential set does not have.
         """
@@ -241,15 +241,15 @@ class Identification:
 
     @cached_property
     def record_errors(self) -> tuple[RecordError, ...]:
-        """Relative error of each fitted record with the final model; empty for one record."""
+        """Relative error, %, of each fitted record with the final model; empty for one record."""
         names = record_names(self.records)
         return record_errors(self.observation, self.model_estimate, names) if len(names) > 1 else ()
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
-        """Sentences on the records: time stamps, subtracted torques, low-pass filter, findings.
+        """Sentences on the records: time stamps, subtracted torques, low-pass, other findings.
 
-        Findings are sentences of the readers and the steps.
+        Other findings are messages of the readers and the preparation steps.
         """
         texts = {
             (record.origin.whole or record.name, record.origin.time): None
@@ -350,12 +350,12 @@ class Identification:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences to read before the values are used, also on correlated parameters."""
+        """Warnings to read before the values are used, including those on correlated parameters."""
         return (*self.own_warnings, *self.correlations.warnings)
 
     @property
     def own_warnings(self) -> tuple[str, ...]:
-        """Warnings about single joints and from further analyses, without those about correlations.
+        """Warnings on single joints and from further analyses; correlations are left out.
 
         Joints are named that have no rows, that have negative friction or motor inertia, or that
         lost their parameters in the elimination.
@@ -437,7 +437,7 @@ class Identification:
         return "\n".join([head, *lines[:room], f"Unexplained by joint: {by_joint}"])
 
     def _lines(self, names: Sequence[str]) -> list[str]:
-        """Write values with 95 % intervals and units, several parameters per line."""
+        """Write parameters with 95 % intervals and units, several parameters per line."""
         fit = self.model_estimate
         k = [fit.names.index(name) for name in names]
         units = [fit.units.get(name, "") for name in names]
@@ -480,7 +480,7 @@ class Identification:
 
     @property
     def ranking(self) -> str:
-        """Sentence that ranks the sets of parameters by their predictions; "" without sets."""
+        """Sentence that ranks the sets of parameters by prediction error; "" without sets."""
         return (
             ranking_text(
                 self.set_errors,

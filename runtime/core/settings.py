@@ -53,7 +53,7 @@ LIMITS = {
 
 
 class Written:
-    """Annotation of a type for the JSON Schema: a file may write its values in several forms.
+    """Type annotation for the JSON Schema: in a file, values of this type may have several forms.
 
     For instance, a number may also be written as a text.
 

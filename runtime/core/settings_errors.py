@@ -60,7 +60,7 @@ def settings_error(error: ValidationError, given: Any, path: Path = ()) -> Setti
 
 
 def _problem(details: ErrorDetails, given: Any) -> tuple[Path, str]:
-    """Return the keys at which pydantic found one error, and the reason as text.
+    """Return the keys of the setting in which pydantic found an error, and the reason as text.
 
     The path has the keys of `loc` without the members of unions, which are not keys.
     """

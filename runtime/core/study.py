@@ -83,7 +83,7 @@ class Lowpass(Settings):
 
 
 class Decimate(Settings):
-    """Decimation of Y and of every column of W: low-pass filter, then one sample in `factor`.
+    """Decimation of Y and of every column of W: low-pass filter, then every `factor`-th sample.
 
     The filter is Chebyshev I of order 8, 0.05 dB, 0.8/factor, zero phase.
 
@@ -103,7 +103,7 @@ class Decimate(Settings):
 
 
 class Signals(Settings):
-    """Filters from measured positions to q, qd, qdd.
+    """Settings of the filters that compute q, qd, qdd from measured positions.
 
     Attributes
     ----------
@@ -165,7 +165,7 @@ class Signals(Settings):
 
     @property
     def window_of_torques(self) -> int:
-        """Median window for torques, in samples; for "auto", the window for positions."""
+        """Window of the torque median filter, in samples; for "auto", the window of positions."""
         return self.median if isinstance(self.torque_median, str) else self.torque_median
 
     @property
@@ -175,7 +175,7 @@ class Signals(Settings):
 
 
 class Rows(Settings):
-    """Selection of the rows of W and Y.
+    """Settings that select the rows of W and Y.
 
     Attributes
     ----------
@@ -216,7 +216,7 @@ class EstimateSettings(Settings):
 
 
 class EssentialSettings(Settings):
-    """Elimination of parameters while sigma_rho stays below a threshold (chapter, section 4.1.1).
+    """Settings of the elimination: parameters are removed while sigma_rho is below a threshold.
 
     Attributes
     ----------

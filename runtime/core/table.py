@@ -132,7 +132,7 @@ def with_intervals(
 
 
 def interval(value: float, half: float) -> tuple[str, str]:
-    """Write a value and the half-width of its interval, both to two digits of the half-width."""
+    """Write a value and the half-width of its interval, rounded to two digits of the half-width."""
     if not (isfinite(half) and half > 0 and isfinite(value)):
         return f"{value:.4g}", f"{half:.2g}"
     place = floor(log10(half)) - 1

@@ -180,7 +180,7 @@ class Uncertainty(Result):
 
     @property
     def too_short(self) -> str:
-        """Sentence with a remedy, if residuals are correlated for longer than a block of time."""
+        """Sentence, with a remedy, on residuals that are correlated for longer than a block."""
         return (
             f"The residuals remember {self.memory:.2g} s, the blocks last "
             f"{self.bootstrap.length:.2g} s: the corrected deviations may be too small. Find what "
@@ -315,7 +315,7 @@ def block_bootstrap(
 
 
 def f_tests(essential: Essential, share: float = 1.0) -> tuple[FTest, ...]:
-    """Test by F-tests whether the removed parameters have an effect.
+    """Test by F-tests whether the removed parameters have a significant effect on the torques.
 
     There are no tests without more rows than parameters. share : effective number of rows divided
     by the number of rows.

@@ -67,7 +67,7 @@ class JointComparison:
 
 
 def direct_comparison(observation: Observation, fit: Estimate) -> tuple[JointComparison, ...]:
-    """Compare the measured torques Y with the predicted W X, row by row, for each joint."""
+    """Compare the measured torques Y with the predicted torques W X of each joint, row by row."""
     missing = [name for name in fit.names if name not in observation.names]
     if missing:
         raise InputError(
@@ -136,7 +136,7 @@ class CrossValidation(Result):
         }
 
     def beside(self, other: CrossValidation) -> CrossValidation:
-        """Combine two validations on the same parts of the data into one."""
+        """Combine two validations on the same data, of different sets of parameters, into one."""
         predictions = (*self.predictions, *other.predictions)
         joints = self.joints or other.joints
         missing = (*self.missing, *other.missing)
@@ -180,7 +180,7 @@ def prediction_errors(observation: Observation, fit: Estimate) -> tuple[float, t
 
 @dataclass(frozen=True)
 class RecordError:
-    """Error of one record in the common fit of several records.
+    """Relative error of one record with parameters that were fitted to several records together.
 
     Attributes
     ----------

@@ -281,7 +281,7 @@ def _measured(record: PreparedRecord) -> Iterator[memoryview]:
 def _identity(
     task: Task, described: Mapping[str, Any], provenance: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return all data on which the results of the runs depend, as JSON values, to identify a study.
+    """Return the data that identify a study on disk: all data that influence its runs.
 
     The number of runs is left out, so that a finished study can continue with more runs.
     """

@@ -1,4 +1,4 @@
-"""Round measurements as coarser sensors would, and build the system Y = W X + rho that results.
+"""Round measured positions and torques as coarser sensors would, and build Y = W X + rho from them.
 
 Eqs. (15), (16), (28).
 
@@ -42,7 +42,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class PreparedRecord:
-    """One measured record, filtered, with its selected rows: data that are the same in every run.
+    """One measured record after filtering and selection of rows; the same in every run of a study.
 
     Attributes
     ----------
@@ -258,7 +258,7 @@ def _measured(problem: Problem, records: Sequence[Prepared]) -> Observation:
 
 
 def stream_keys(draw: tuple[int, ...], k: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Return the keys of the two random streams of record k: for its positions and torques.
+    """Return the keys of two random generators for record k: for its positions, for its torques.
 
     They are (*draw, 2 k) and (*draw, 2 k + 1); the positions of record 0 have the key `draw`
     itself.
@@ -377,7 +377,7 @@ def run_states(task: Task, record: PreparedRecord, q: Array, level: Level) -> St
 
 
 def _moved(task: Task, record: PreparedRecord, q: Array) -> Record:
-    """Make a Record with the positions q of one run, from which encoder counts give its states."""
+    """Make a Record with the positions q of one run, for a reader of encoder counts."""
     origin = Origin(drives=task.drives)
     t = np.arange(len(q)) / record.rate
     return Record(t, q, record.tau, rate=record.rate, missing=record.missing, origin=origin)

@@ -167,7 +167,7 @@ class Cestac(Result, Part):
 
     @cached_property
     def deciding(self) -> tuple[str, ...]:
-        """Names of the parameters that decide the verdict: those with a small %sigma (11).
+        """Names of the parameters that decide the verdict: those with a small %sigma, eq. (11).
 
         Their %sigma is at most LIMIT.DECIDING, and study.cestac.columns names them or is
         "essential" or "all".
@@ -200,7 +200,7 @@ class Cestac(Result, Part):
 
     @property
     def finer_for_values(self) -> str:
-        """Sentence on a parameter that needs a finer encoder step than the residual; "" if none."""
+        """Sentence on a parameter that rounding changes while the residual hardly grows, or ""."""
         apart = (
             level
             for level in self.levels
@@ -222,7 +222,7 @@ class Cestac(Result, Part):
 
     @property
     def message(self) -> str:
-        """Sentence with the verdict for each rounding step and the parameter that changes most."""
+        """Sentence with the verdict and the largest error, %, at each rounding step."""
         if not self.levels:
             return "Nothing was perturbed."
         by_verdict: dict[str, list[str]] = {}
@@ -248,7 +248,7 @@ class Cestac(Result, Part):
         return bool(sum(len(level.runs) for level in self.levels) <= LIMIT.RUNS_LISTED)
 
     def brief(self) -> str:
-        """Return a short text: the verdict for every rounding step, then the table of errors %e."""
+        """Return a short text: verdict at each rounding step, then a table of parameter errors."""
         errors = self.error_table()
         return "\n".join([self.message, "", errors.caption, errors.to_text(), *self.notes])
 
@@ -260,7 +260,7 @@ class Cestac(Result, Part):
         return f"{means.to_text()}\n\n{residual.to_text()}\n\n{notes}\n\n{below}"
 
     def text(self) -> str:
-        """Return the text that explains the two verdicts and gives them for every rounding step."""
+        """Return the verdicts at every rounding step, after an explanation of both kinds."""
         verdicts = [f"{r.level.label}: {r.message}" for r in self.levels]
         return "\n".join([VERDICTS, *verdicts, *self.notes])
 
@@ -300,7 +300,7 @@ class Cestac(Result, Part):
         )
 
     def error_table(self) -> Table:
-        """Return the table of the errors %e (21), with %sigma (20), for every rounding step.
+        """Return the table of errors %e, eq. (21), and %sigma, eq. (20), at every rounding step.
 
         It has one line per parameter; `*` marks parameters that do not decide the verdict.
         """
@@ -374,7 +374,7 @@ class Cestac(Result, Part):
         }
 
     def _level_summary(self, level: LevelResult) -> dict[str, Any]:
-        """Return the results for one rounding step, for cestac.json; many runs are left out.
+        """Return the results at one rounding step for cestac.json; a long list of runs is left out.
 
         The number of runs is always given.
         """
@@ -384,7 +384,7 @@ class Cestac(Result, Part):
 
 
 def error_against_resolution(result: Cestac, names: Sequence[str] = ()) -> Figure:
-    """Draw the error %e (21) against the encoder step Delta, on logarithmic axes.
+    """Draw the parameter error %e, eq. (21), against the encoder step Delta, on logarithmic axes.
 
     The limits of the verdict and the increase of the residual are drawn too.
 
@@ -488,7 +488,7 @@ def texts(words: Iterable[str]) -> Array:
 
 
 def names_judged(settings: CestacSettings) -> dict[str, tuple[str, ...]]:
-    """Return the parameter names that study.cestac lists for the verdict, for the provenance."""
+    """Return the parameters listed in `cestac.columns` of a study, for the provenance."""
     return {} if isinstance(settings.columns, str) else {JUDGED: settings.columns}
 
 

@@ -37,7 +37,7 @@ ADDED = ("two-point", "gaussian", "uniform")  # Modes that add Delta xi
 
 
 def stream(seed: int, *key: int) -> np.random.Generator:
-    """Return a random generator that depends only on the seed and on a key such as (level, run).
+    """Return a random number generator fixed by the seed and a key such as (level, run).
 
     Generators of different keys are independent.
     """
@@ -47,7 +47,7 @@ def stream(seed: int, *key: int) -> np.random.Generator:
 def rounded(
     x: Array, step: float, mode: Mode, rng: np.random.Generator, uneven: float = 0.0
 ) -> Array:
-    """Round x at random by the law `mode`, as an encoder with steps of `step` would.
+    """Round x at random by the rounding law `mode`, like an encoder with the resolution `step`.
 
     x : shape (N, n) or (N,); step : in the unit of x.
     uneven : standard deviation of the lines of law phase from even spacing, in steps.
@@ -94,7 +94,7 @@ def counted(x: Array, step: float, phase: float, uneven: float, rng: np.random.G
 
 
 def noise(shape: tuple[int, ...], mode: Mode, rng: np.random.Generator) -> Array:
-    """Draw random numbers xi, shape (N, n); a rounding law adds Delta xi to the measurement."""
+    """Draw random numbers xi, shape (N, n): x + Delta xi is x rounded at random to steps Delta."""
     if mode == "two-point":
         return signs(shape, rng)
     return rng.standard_normal(shape) if mode == "gaussian" else rng.uniform(-1.0, 1.0, shape)

@@ -25,7 +25,7 @@ USABLE = ("ok", "weak-instruments")  # Status of an estimate that counts as a ru
 
 
 def run_block(task: Task, keys: Sequence[tuple[int, int]]) -> Runs:
-    """Compute several runs of a study one after the other, given as (level, run) numbers."""
+    """Compute the runs of a study with the given (level, run) numbers, one after the other."""
     columns = task.columns
     return Runs.of([one_run(columns, task, key) for key in keys], len(task.names))
 

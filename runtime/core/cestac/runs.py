@@ -50,7 +50,7 @@ class Runs(Sequence[Run]):
 
     @classmethod
     def of(cls, runs: Sequence[Run], b: int) -> Runs:
-        """Collect single runs, with b parameters each, in arrays."""
+        """Collect single runs, with b parameters each, in the arrays of one Runs object."""
         return cls(
             np.array([run.level for run in runs], dtype=np.int64),
             np.array([run.run for run in runs], dtype=np.int64),
@@ -60,9 +60,7 @@ class Runs(Sequence[Run]):
 
     @classmethod
     def joined(cls, parts: Sequence[Runs], b: int) -> Runs:
-        """Join several groups of runs, sorted by rounding step and run number, without repeated
-        runs.
-        """
+        """Join groups of runs, sorted by rounding step and run number, without repeated runs."""
         parts = [cls.of((), b), *parts]
         fields = [
             np.concatenate([getattr(part, name) for part in parts])
@@ -94,7 +92,7 @@ class Runs(Sequence[Run]):
 
 @dataclass(frozen=True)
 class Level:
-    """One pair of rounding steps (level) of a study: for positions and for torques; 0: not rounded.
+    """One pair of rounding steps of a study: for positions and for torques; 0 means no rounding.
 
     Attributes
     ----------
@@ -109,7 +107,7 @@ class Level:
 
     @property
     def label(self) -> str:
-        """Text for a pair of rounding steps: `2*pi/10000` (position), `Phi 0.01` (torque)."""
+        """Text for a pair of rounding steps: `2*pi/10000` (positions) or `Phi 0.01` (torques)."""
         parts = []
         if self.delta:
             counts = 2 * np.pi / self.delta

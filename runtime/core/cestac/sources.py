@@ -81,7 +81,7 @@ class Loop(Protocol):
         """Build the system Y = W X + rho of the measured records of the control loop."""
 
     def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
-        """Add this control loop to `observation`, with the rounded positions in its records."""
+        """Return `observation` with this control loop, whose records have the rounded positions."""
 
     def rows(self, level: Level, draw: tuple[int, ...]) -> Observation:
         """Simulate the loop with encoder steps level.delta, and build its system Y = W X + rho."""

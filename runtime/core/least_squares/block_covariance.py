@@ -59,9 +59,10 @@ def block_covariance(blocks: Iterable[Array], X: Array, T: Array) -> Array:
 def corrected_deviations(
     blocks: Iterable[Array], bands: Iterable[Array], X: Array, T: Array
 ) -> Array:
-    """Compute standard deviations of X that allow for slow noise and for friction not in the model.
+    """Compute standard deviations of X, shape (b,), corrected for slow noise and unmodelled
+    friction.
 
-    Shape (b,): from the jackknife over blocks of time, or over bands of speed where this one is
+    They are from the jackknife over blocks of time, or over bands of speed where this one is
     clearly larger. nan where only one block determines a parameter.
 
     Parameters
@@ -77,7 +78,7 @@ def corrected_deviations(
 
 
 def band_variances(bands: Iterable[Array], X: Array, T: Array) -> Array:
-    """Compute the variances of X from the jackknife over bands of speed, shape (b,).
+    """Compute the variances of X, shape (b,), by a jackknife over bands (intervals) of joint speed.
 
     They are v = diag(C_v) diag(T T')/diag(C_0), and about zero for one band. The parameters are
     those of `block_covariance`.
@@ -121,10 +122,9 @@ def deletions(blocks: Iterable[Array], X: Array, T: Array, into: Array) -> Array
 
 
 def _without_its_own(G: Array, g: Array, into: Array, size: Array) -> Array:
-    """Compute how X changes without one block, in combinations that other blocks determine.
+    """Compute the change of X without one block; nan where only this block determines a parameter.
 
-    It is into (1 - G)^-1 g on these directions, and nan for a parameter that depends on another
-    direction.
+    The change is into (1 - G)^-1 g, in the directions that other blocks determine too.
     """
     share, V = np.linalg.eigh(G)
     others = share < 1 - LIMIT.BLOCK_ALONE

@@ -47,7 +47,7 @@ Status = Literal[
 
 @dataclass(frozen=True)
 class JointFit:
-    """Quality of the fit of one joint: residual norm, relative error and weight of its rows.
+    """Quality of the fit of one joint: residual norm, relative error and scale s_j of its rows.
 
     Attributes
     ----------
@@ -183,7 +183,7 @@ class Estimate:
 
     @property
     def worst_joint(self) -> JointFit:
-        """Fit of the joint with the largest relative error, among joints with rows and a motor.
+        """Fit of the joint with the largest relative error, of joints with a motor and rows in W.
 
         If there is no such joint, an axis of a force sensor; it may measure only its noise.
         """
@@ -211,7 +211,7 @@ class Estimate:
 
     @classmethod
     def from_json(cls, text: str, *, file: str = "estimate.json") -> Estimate:
-        """Read an Estimate from the JSON text of `to_json`; every bit of its numbers is the same.
+        """Read an Estimate from the JSON text of `to_json`, with exactly the same numbers.
 
         Other keys of estimate.json are ignored. Raises InputError if the text is not JSON, has
         another schema or is incomplete; `file` is the name in its message.

@@ -28,7 +28,7 @@ from runtime.core.study import EstimateSettings
 
 
 class LinearOptions(Settings):
-    """Setting estimate.options of the methods ols and wls, and of methods that start from them.
+    """Options of the methods ols and wls (estimate.options), and of methods that start from them.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class LinearOptions(Settings):
 
 @dataclass(frozen=True)
 class System:
-    """The QR factor of one system Y = W X + rho, before and after weighting.
+    """One system Y = W X + rho, stored as QR factors before and after weighting of its rows.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class System:
         return self.raw.names
 
     def select(self, names: Sequence[str]) -> System:
-        """Return the system reduced to the parameters `names`, each a column of W."""
+        """Return the same system with only the columns of W for the parameters `names`."""
         return self._changed(lambda factor: factor.select(names))
 
     def drop(self, name: str) -> System:
@@ -126,7 +126,7 @@ class System:
         )
 
     def band_rows(self) -> Iterator[Array]:
-        """Yield the weighted rows [W Y] of every band of speed, shape (rows, b + 1)."""
+        """Yield the weighted rows [W Y] of every band (interval) of speed, shape (rows, b + 1)."""
         return self.observation.band_rows(self.names, 1 / np.array(self.scales), self.whitener)
 
 
@@ -232,7 +232,7 @@ def labels_of(model: GeneratedModel | None, n: int) -> tuple[str, ...]:
 
 
 def condition(factor: Factor, rank: int) -> float:
-    """Compute the condition number of W from its factor; inf if W is rank-deficient."""
+    """Compute the condition number of W from its triangular factor; inf if W is rank-deficient."""
     b = len(factor.names)
     return (float(np.linalg.cond(factor.R11)) if b else 1.0) if rank == b else np.inf
 

@@ -174,7 +174,7 @@ def linear_estimate(
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Estimate:
-    """Estimate X of Y = W X + rho by linear least squares; SettingsError unless ols or wls.
+    """Estimate X of Y = W X + rho by the method ols or wls; SettingsError for another method.
 
     Parameters
     ----------

@@ -67,7 +67,7 @@ def unit_columns(R11: Array) -> tuple[Array, Array]:
 
 
 def rank_tolerance(factor: Factor) -> float:
-    """Compute the default tolerance for the rank: the smallest ratio s_i/s_1 of singular values.
+    """Compute the default limit of s_i/s_1 above which a singular value s_i counts in the rank.
 
     It is the number of rows times the unit round-off.
     """
@@ -98,7 +98,7 @@ def solve(factor: Factor, tolerance: float | None = None) -> Solution:
 
 
 def null_groups(V2t: Array, names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
-    """Group the parameters that the record cannot separate, from the null directions of W.
+    """Group the parameters that the record cannot separate, from the null space of W.
 
     V2t, shape (b - rank, b), has the null directions as orthonormal rows. A group contains names
     whose entries of P = V_2 V_2' (diagonal: its square root) exceed LIMIT.NULL_PARTICIPATION.
@@ -112,12 +112,12 @@ def null_groups(V2t: Array, names: Sequence[str]) -> tuple[tuple[str, ...], ...]
 
 
 def joint_scatter(factor: Factor, tolerance: float | None = None) -> Array:
-    """Compute the residual standard deviation s_j of each joint, fitted alone, shape (n,).
+    """Compute the residual standard deviation s_j of each joint, with X fitted to this joint only.
 
         s_j^2 = ||Y_j - W_j X_j||^2 / (N_j - b_j)
 
     X_j is fitted to the rows of joint j only, and b_j = rank(W_j) with unit columns.
-    nan if a joint has no more rows than b_j.
+    The shape is (n,); nan if a joint has no more rows than b_j.
     """
     scatter = []
     for joint in factor.joints:

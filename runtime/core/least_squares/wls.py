@@ -1,4 +1,4 @@
-"""Least squares weighted by joint: rows of joint j are divided by s_j, the spread of its residuals.
+"""Least squares with rows of joint j divided by s_j, the standard deviation of its residuals.
 
     X = argmin sum_j ||Y_j - W_j X||^2 / s_j^2,    C = (sum_j W_j'W_j / s_j^2)^-1
 
@@ -34,7 +34,7 @@ from runtime.core.study import EstimateSettings
 def weighted(
     observation: Observation, settings: EstimateSettings, options: LinearOptions
 ) -> System:
-    """Weight the rows as `settings.weights` says; WLS must weight, so "none" means one weight a joint.
+    """Weight the rows for the method wls, in which `weights: none` means one weight for each joint.
 
     The name of the method, wls, promises weights. s_j is computed from joint j alone, or from the
     common least squares if joint j has too few rows. It is never zero.
@@ -60,7 +60,7 @@ def by_weights(
 
 
 def common_scales(raw: Factor, X: np.ndarray, rank: int) -> np.ndarray:
-    """Compute the residual standard deviation s_j of each joint, from one common X, shape (n,).
+    """Compute the residual standard deviation s_j of each joint for a common X, shape (n,).
 
     Each joint loses its share b N_j/r of the degrees of freedom.
     """
@@ -111,7 +111,7 @@ def _iterated(start: System) -> System:
 
 
 def _covariance(start: System) -> System:
-    """Weight the n rows of one instant by L^-1, with L L' the covariance of the joint residuals.
+    """Multiply the n rows of each sample by L^-1; L L' is the covariance of the joint residuals.
 
     The weights of `start` are used if the residuals are linearly dependent.
     """

@@ -109,7 +109,7 @@ class Factor:
 
     @property
     def r12(self) -> Array:
-        """Vector r_12 = Q'Y, shape (b,): the component of Y in the range of W."""
+        """Vector r_12 = Q'Y, shape (b,), with W = Q R_11: the component of Y in the range of W."""
         return self.R[:-1, -1]
 
     @property

@@ -38,7 +38,7 @@ filter, at the rate of eq. (13).
 
 @dataclass(frozen=True, eq=False)
 class LoopRows:
-    """Control loop whose simulation gives the rows of a system Y = W X + rho, and their numbers.
+    """Simulated control loop that gives rows of Y = W X + rho, with the numbers of these rows.
 
     loop : `runtime.loop.closed_loop`. rows : shape (r,).
     """
@@ -122,7 +122,7 @@ class Observation:
 
     @property
     def joints(self) -> Array:
-        """Number of the joint to which each row belongs, from 0, shape (r,)."""
+        """Number of the joint of each row of W and Y, counted from 0, shape (r,)."""
         return np.repeat(np.arange(self.n), self.rows)
 
     @property
@@ -161,9 +161,9 @@ class Observation:
         return replace(self, W=np.asfortranarray(self.W[:, kept]), names=tuple(names))
 
     def equal_parts(self, count: int) -> Array:
-        """Divide the time span into `count` equal intervals; number the interval of each row.
+        """Return the number of the time interval of each row, for `count` equal ones, shape (r,).
 
-        Shape (r,); numbers start from 0.
+        The numbers start from 0.
         """
         start, end = self.span  # the same of rows of one instant
         return np.asarray(
@@ -230,10 +230,9 @@ class Observation:
         return float(max(max(self.rows) / BLOCKS, SHORTEST) / self.rate)
 
     def blocks(self, length: float | None = None) -> Array:
-        """Divide the records into intervals of `length` seconds; number the interval of each row.
+        """Return the number of the time block of each row, for blocks of `length` s, shape (r,).
 
-        Shape (r,), numbers from 0. Such an interval is a block of residuals; no interval extends
-        over two records.
+        The numbers start from 0. No block extends over two records.
         """
         _, record = np.unique(self.record, return_inverse=True)
         first = np.full(record.max() + 1, np.inf)
@@ -246,9 +245,9 @@ class Observation:
         )
 
     def bands(self) -> Array:
-        """Divide the rows of each joint into BANDS bands of its speed; number the band of each row.
+        """Return the number of the speed band of each row, shape (r,): each joint has BANDS bands.
 
-        Shape (r,), numbers from 0. The bands of a joint have equally many rows. If the speed is
+        The numbers start from 0. The bands of a joint have equally many rows. If the speed is
         unknown or zero, all rows of the joint are in one band.
         """
         band = np.zeros(len(self.Y), dtype=np.intp)
@@ -271,7 +270,7 @@ class Observation:
     def _weighted_rows(
         self, names: Sequence[str], weights: Array, groups: Array, whitener: Array | None
     ) -> Iterator[Array]:
-        """Yield the weighted rows of [W Y] of one group after another; groups: shape (r,)."""
+        """Yield the weighted rows of [W Y] of each group; `groups` has the group of each row."""
         kept = column_numbers(names, self.names)
         if whitener is not None:
             A = np.column_stack([self.W[:, kept], self.Y])
@@ -344,13 +343,13 @@ def whitened(A: Array, whitener: Array) -> Array:
 
 
 def halves(t0: float, t1: float) -> tuple[Window, Window]:
-    """Split the interval [t0, t1], s, into two halves without a common instant."""
+    """Split the time interval [t0, t1], s, into two halves that have no sample in common."""
     middle = (t0 + t1) / 2
     return (t0, middle), (float(np.nextafter(middle, t1)), t1)
 
 
 def stack(observations: Sequence[Observation]) -> Observation:
-    """Stack the rows Y = W X + rho of several records of one robot into one system, joint-major.
+    """Stack the rows Y = W X + rho of several records of one robot, with all rows of joint 1 first.
 
     `record` of the result has the number of the record of each row.
     """

@@ -24,7 +24,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """Weights of the rows (1/s_j) and of the columns (|X_i|) of the observation matrix W.
+    """Weights of the observation matrix W: rows by 1/s_j of joint j, columns by |X_i|.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class Weights:
 
 
 def kept_correlation(signals: Signals, rate: float) -> Array:
-    """Compute the correlation of decimated torque noise between rows that are 0, 1, 2 ... apart.
+    """Compute the correlation of torque noise between decimated samples 0, 1, 2 ... rows apart.
 
     The noise is white before the decimation, at the sampling rate `rate`, Hz.
     """

@@ -78,7 +78,7 @@ class Prepared:
 
     @cached_property
     def selection(self) -> Selection:
-        """Rows of the record that are used, chosen by time, decimation, speed and mask `keep`."""
+        """Used rows of the record, chosen by time, decimation, speed and the mask `keep`."""
         signals, rows = self.study.signals, self.study.rows
         return select_rows(self.record, self.states.qd, signals, rows, keep=self.keep)
 
@@ -88,7 +88,7 @@ class Prepared:
         return decimated_torque(self.record.torque, self.selection)
 
     def certain(self, model: GeneratedModel) -> Selection:
-        """Return the selected rows without those of unknown state or unsure friction direction."""
+        """Return the used rows, without those of unknown state or uncertain friction direction."""
         return certain(model, self.states, self.selection)
 
     def observation(

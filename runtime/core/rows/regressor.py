@@ -75,7 +75,7 @@ class Columns:
 
     @cached_property
     def tape(self) -> Tape | None:
-        """Operations that compute the regressor entries, to be repeated; None if they are unknown."""
+        """Recorded operations that compute the regressor entries; None if recording them failed."""
         n = len(self.model.JOINTS)
         return recorded(self.model, [divmod(int(place), n) for place in self.entries.place])
 
@@ -100,7 +100,7 @@ class Columns:
         return store
 
     def signals(self, states: States, plan: Plan | None) -> Iterator[tuple[slice, Array]]:
-        """Yield the decimated distinct entries of W for one slice of instants after the other.
+        """Yield the distinct entries of W, decimated, one slice of the kept samples at a time.
 
         Their shape is (S, instants). Arrays are valid until the next ones are requested.
 
@@ -116,7 +116,7 @@ class Columns:
             yield slice(t0, t1), self._evaluated(states[t0:t1])
 
     def _evaluated(self, states: States) -> Array:
-        """Compute the distinct entries of the regressor, shape (S, B), at B given states.
+        """Compute the S distinct entries of the regressor at B given states, shape (S, B).
 
         The array is valid until the next call.
         """

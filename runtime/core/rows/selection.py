@@ -125,7 +125,7 @@ EXCERPT = 2**16
 
 
 def excerpt(record: Record, rows: Rows) -> slice:
-    """Return the slice of the first samples in the time window, which determine "auto" settings.
+    """Return the slice of the first samples in the time window, from which "auto" settings follow.
 
     It has EXCERPT samples at most.
     """

@@ -117,7 +117,7 @@ class Tape:
         self._rooms: dict[int, tuple[Array, list[Any], list[Any]]] = {}
 
     def evaluate(self, q: Array, qd: Array, qdd: Array, out: Array) -> Array:
-        """Compute the entries of D, shape (S, B), at B given states into the array `out`."""
+        """Compute S entries of the regressor D at B states into the array `out`, shape (S, B)."""
         B = len(q)
         if B not in self._rooms:
             self._rooms[B] = self._bound(B)

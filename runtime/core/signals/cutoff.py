@@ -108,7 +108,7 @@ def noise_share(q: Array, rate: float, low: Lowpass, median: int = 1) -> Array:
 
 
 def _gain(f: Array, rate: float, low: Lowpass, cutoffs: Array) -> Array:
-    """Compute the gain G of the low-pass on the acceleration, shape (cut-offs, frequencies)."""
+    """Compute the gain G of the low-pass filter on accelerations, shape (cut-offs, frequencies)."""
     ratio = np.tan(np.pi * f / rate) / np.tan(np.pi * cutoffs / rate)[:, None]
     return np.asarray((1 + ratio ** (2 * low.order)) ** -float(max(len(set(low.on)), 1)))
 

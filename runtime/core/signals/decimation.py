@@ -60,7 +60,7 @@ TRUNCATION = 1e-20
 
 @dataclass(frozen=True, eq=False)
 class Operator:
-    """Modal form (poles, residues) of the decimation filter for one factor n_d; m = 4 modes.
+    """Decimation filter for one factor n_d in modal form: its poles and residues, m = 4 modes.
 
     D : real.   c, lam : complex, shape (m,).
     """
@@ -78,7 +78,7 @@ class Operator:
 
     @property
     def reach(self) -> int:
-        """Number of samples until the slowest mode decays to TRUNCATION."""
+        """Number of samples until the slowest mode of the filter decays to the share TRUNCATION."""
         return ceil(log(TRUNCATION) / log(np.abs(self.lam).max()))
 
 

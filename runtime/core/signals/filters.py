@@ -103,7 +103,7 @@ def filtered_states(q: Array, rate: float, signals: Signals, v: Array | None = N
 
 
 def blended(qd: Array, v: Array, rate: float, crossing: float | tuple[float, ...]) -> Array:
-    """Combine differentiated positions qd at low with recorded velocities v at high frequencies.
+    """Combine velocities: differentiated positions qd at low, recorded v at high frequencies.
 
     The result v + L (qd - v), shape (N, n), uses the zero-phase first-order low-pass L at
     `crossing`, Hz (`runtime.speeds`).
@@ -206,7 +206,7 @@ def decimation_factor(signals: Signals, rate: float) -> int:
 
 
 def kept_samples(N: int, factor: int, phase: str) -> Array:
-    """Return the indices of the samples that decimation keeps, one in `factor`.
+    """Return the indices of the samples that decimation keeps: every `factor`-th sample.
 
     The first sample is kept, or the last one (MATLAB).
     """

@@ -95,7 +95,7 @@ def bandwidth(signals: Signals, rate: float) -> Bandwidth:
 
 
 def _power(sos: Array, w: Array) -> Array:
-    """Compute the gain |H|^2 of a filter that runs forward and backward."""
+    """Compute the gain |H|^2 of a filter that runs forward and backward, at the frequencies w."""
     return np.asarray(np.abs(sosfreqz(sos, w)[1]) ** 2)
 
 
@@ -109,5 +109,5 @@ def _covariance(K: Array) -> Array:
 
 
 def _transform(spectrum: Array) -> Array:
-    """Compute the correlation at lags 0, 1, 2 ... of a signal with a given real, even spectrum."""
+    """Compute the correlation at lags 0, 1, 2 ... of a signal from its real, even spectrum."""
     return np.asarray(np.fft.irfft(spectrum)[: len(spectrum) - 1])

@@ -45,7 +45,7 @@ class SpeedAgreement:
 
 
 def agreement(q: Array, v: Array, rate: float, signals: Signals) -> SpeedAgreement:
-    """Compare recorded velocities v with differences of positions q, by gain and delay.
+    """Compare recorded velocities v with differences of positions q, by gain, delay and noise.
 
     Both have shape (N, n) and pass the low-pass of the study first.
     """
