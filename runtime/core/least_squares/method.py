@@ -101,7 +101,7 @@ class Method:
         Function that makes the rows of a problem, for a method that needs rows of its own, such as
         one that simulates the closed loop of the records; None: the rows of the measured positions.
     brief : mapping
-        Options that leave out resampled records and explanations.
+        Options of the method that give the estimate alone, such as {"explain": False}.
     any_rank : bool
         Whether the method gives an estimate if the rows do not determine all parameters.
     """
