@@ -209,7 +209,8 @@ class Text:
                 self.called[node.index] = self._made_of(node) or self._part_of(node, whole)
 
     def _wholes(self, outputs: Sequence[Scalar | int], labels: Sequence[str]) -> dict[int, str]:
-        """Find for each graph node the named quantity that contains the node: N16 for node N16a.
+        """Find, for each graph node, the named quantity that is computed from it, such as N16 for
+        node N16a.
 
         This is the first named quantity that uses the node, or else the first output. An unnamed
         node gets a name from it.
