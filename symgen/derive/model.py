@@ -55,7 +55,8 @@ class Entry:
 
 @dataclass(frozen=True)
 class Case:
-    """Entries of a model that are derived with the same inputs replaced, for instance qdd = 0.
+    """Entries of a model that are derived with the same values of some inputs, for instance qdd =
+    0.
 
     `tag` ends the names of the intermediate variables that these replaced inputs change.
     """
@@ -163,7 +164,8 @@ class Model:
 
     @property
     def printed(self) -> bool:
-        """Whether code generators print the entries of the model from the graph.
+        """Whether generated code computes the entries of the model by formulas from the expression
+        graph.
 
         A model of a chosen frame, such as the Jacobian, is computed in generated code from other
         models.
