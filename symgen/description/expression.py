@@ -613,7 +613,9 @@ def simplified(e: Expression) -> Expression:
 
 
 def _sine_and_rest(m: Monomial) -> list[tuple[Monomial, Monomial]]:
-    """For each cos(a)**2 in the product m, return m with sin(a)**2 instead, and m without it."""
+    """Return two products for each cos(a)**2 in the product m: m with sin(a)**2 in its place, and m
+    without it.
+    """
     pairs = []
     for a, n in m:
         if isinstance(a, Call) and a.function == "cos" and n >= 2:
