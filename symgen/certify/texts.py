@@ -386,7 +386,7 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
             return {f"{CLOSED}1": float("inf")}
 
         def given(f: str, check: Check, k: Any) -> list[list[float]]:
-            """List the argument values for calling a C function at the samples k.
+            """List the values of the arguments with which a C function is called for the samples k.
 
             A closed mechanism has one struct with all its states.
             """

@@ -49,7 +49,8 @@ def loop_ends(robot: Robot, algebra: GraphAlgebra, closure: Closure) -> list[tup
 
 
 def coincidence(ends: list[tuple[Pose, Pose]]) -> list[Scalar]:
-    """Return twelve pose differences per loop, zero if the two frames at its cut joint coincide.
+    """Return twelve differences per loop between the poses of the two frames at its cut joint:
+    three of position, nine of orientation.
 
     The differences are P_cut - P_twin and A_cut - A_twin.
     """
@@ -239,7 +240,8 @@ class Assembly:
         return dict(zip(self.robot.moving, (self.N @ q + self.c).tolist(), strict=True))
 
     def residual(self, q: Array) -> Array:
-        """Return twelve pose differences at the cut joint of each loop, shape (..., loops, 12).
+        """Return, for each loop, twelve differences between the poses of the two frames at its cut
+        joint, shape (..., loops, 12).
 
         Positions are divided by the longest length.
         """
