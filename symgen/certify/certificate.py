@@ -147,8 +147,7 @@ class Certificate:
 
     @property
     def errors(self) -> dict[str, float]:
-        """Largest relative error of each emitted function; its key is a text such as `bias of
-        arm.py`.
+        """Largest relative error of each emitted function, by a key such as `bias of arm.py`.
 
         The error is the difference from independently computed values.
         """
@@ -183,14 +182,14 @@ class Certificate:
         return checks + [check for file, text in self.texts.items() for check in text.checks(file)]
 
     def mapping(self) -> dict[str, Any]:
-        """Return the certificate as plain values for JSON, with null for NaN and infinity."""
+        """Return the certificate as tables, numbers and texts for JSON, with null for NaN and
+        infinity.
+        """
         values = {"valid": self.valid, "numeric_valid": self.numeric_valid, **asdict(self)}
         return dict(_plain(values))
 
     def brief(self) -> str:
-        """Return a text: one line with the verdict (valid or FALSE), then one line per failed
-        check.
-        """
+        """Return a text: a line with the verdict (valid or FALSE), then a line per failed check."""
         verdict = "valid" if self.valid else "FALSE"
         head = (
             f"{self.name}: certificate {verdict}, {self.count} base parameters of "
@@ -329,8 +328,7 @@ def _special(robot: Robot, gap: float, W: Array) -> str:
 
 
 def independent_roots(robot: Robot) -> list[str]:
-    """List the square roots in a robot file whose argument is not a rational number: sqrt(D3**2 +
-    1).
+    """List the square roots in a robot file whose argument is not rational, such as sqrt(2*D3).
 
     Over F_p each of these roots is an independent unknown.
     """

@@ -309,8 +309,8 @@ def _is_of_casadi(name: str, check: Check) -> bool:
 def _by_casadi(
     module: ModuleType, name: str, check: Check, constants: Mapping[str, float]
 ) -> Array:
-    """Evaluate an emitted function by CasADi at all samples; return the results in the shape of
-    NumPy's.
+    """Evaluate an emitted function by CasADi at all samples; return results in the shape NumPy
+    gives.
     """
     function, arguments = _function(module, name, *check.keywords.values()), check.arguments
     alone, ndim = arguments[0].ndim == 1, check.expected.ndim
@@ -438,7 +438,8 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
 
 
 def _closed(library: Path, witness: Witness, constants: list[float]) -> Array:
-    """Close the loops at every state with the compiled C function; return the closed states.
+    """Run the compiled C function that closes the loops at every test state; return the closed
+    states.
 
     A state is NaN if Newton's method fails.
     """

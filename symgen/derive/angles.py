@@ -89,7 +89,7 @@ class Units:
         return parts
 
     def _is_turn(self, m: Monomial, c: Fraction) -> bool:
-        """Whether the angle c*m has m = pi and is a whole multiple of the unit angle pi/D."""
+        """Whether m is pi and the angle c*m is a whole multiple of the unit angle pi/D."""
         return m == PI and (c * self.D).denominator == 1
 
 

@@ -66,8 +66,8 @@ class Closure:
         return sum((g * Expression.symbol(f"q{i}") for i, g in self.row[j].items()), self.offset[j])
 
     def turn(self, j: int) -> tuple[Turn, Expression]:
-        """Return, for a revolute joint j, the pairs (i, n_i) and the constant c of q_j = sum_i n_i
-        q_i + c.
+        """Return, for revolute joint j, pairs (i, n_i) and the constant c of q_j = sum_i n_i q_i +
+        c.
 
         The joints i are independent. Raises DescriptionError if a multiple is not a number.
         """

@@ -252,7 +252,8 @@ def equations(d: Derivation) -> tuple[int, ...]:
 
 
 def rewriting(d: Derivation, request: Request) -> Rewrite:
-    """Return a new graph in which parameters, gravity and inputs are replaced as requested.
+    """Return a new graph to which formulas are copied with parameters, gravity and inputs replaced
+    as in `request`.
 
     Standard parameters become the symbols of the request or zero, gravity becomes that of the
     robot, and the inputs of the request become their values.

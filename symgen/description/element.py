@@ -313,7 +313,8 @@ def check_law(e: Element, robot: Any) -> None:
 
 
 def _positions(robot: Any, row: Any) -> tuple[float, float]:
-    """Choose two joint positions at which a law is tested, if possible within the joint limits.
+    """Choose two joint positions at which a torque law is tested, if possible within the joint
+    limits.
 
     Without limits, or for several joints, the positions are -0.4 and 0.7.
     """

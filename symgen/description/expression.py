@@ -34,7 +34,8 @@ Monomial = tuple[tuple[Atom, int], ...]
 
 @dataclass(frozen=True)
 class Call:
-    """A function of an expression as a factor of a polynomial, for instance cos(q1 + q2).
+    """A function of an expression, such as cos(q1 + q2), that is a factor in the terms of a
+    polynomial.
 
     The functions are cos, sin, sqrt, sign, exp, tanh, inv (1/argument) and pow
     (argument**exponent).

@@ -171,7 +171,9 @@ def _scalar(node: ScalarNode, line: int) -> Any:
 
 
 def tables_of(robot: Robot) -> dict[str, Any]:
-    """Return the data of a robot file for `robot`, by key, with Expression objects, not texts."""
+    """Return the data of a robot file that describes `robot`, by key, with Expression objects, not
+    texts.
+    """
     drives = robot.drives
     return {
         "symgen": SCHEMA,

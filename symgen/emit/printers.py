@@ -87,7 +87,9 @@ class Language:
         return re.sub(r"\bpi\b", self.pi, text)
 
     def entries(self, targets: Sequence[str], value: str, remark: str) -> list[str]:
-        """Write the lines that assign a value to array entries, each with a remark after a tab."""
+        """Write the lines that assign a value to array entries, each line with a comment after a
+        tab.
+        """
         targets = [" = ".join(targets)] if self.chained else targets
         return [f"{self.entry.format(target, value)}\t{remark}" for target in targets]
 
