@@ -121,7 +121,9 @@ class Certificate:
 
     @property
     def numeric_valid(self) -> bool:
-        """Whether the rank by SVD and the torques, both in floats, agree with the formulas."""
+        """Whether the rank by SVD and the torques, both in floating point, agree with the
+        regrouping formulas.
+        """
         return self.numeric_rank == self.count and self.torque_error < TOLERANCE
 
     @property
@@ -133,7 +135,9 @@ class Certificate:
 
     @property
     def formulas(self) -> str:
-        """Text that states how the formulas were checked: exactly modulo primes, or in floats."""
+        """Text that states how the regrouping formulas were checked: exactly modulo primes, or in
+        floats.
+        """
         if not self.primes:
             return "checked in floats"
         sure = f", a false one passes with probability below {self.error_probability:.0e}"
@@ -143,7 +147,10 @@ class Certificate:
 
     @property
     def errors(self) -> dict[str, float]:
-        """Error of each emitted function against independent values, by name: `bias of arm.py`."""
+        """Largest relative error of each emitted function, by a key such as `bias of arm.py`.
+
+        The error is the difference from independently computed values.
+        """
         return {
             f"{name} of {file}": error
             for file, text in self.texts.items()
@@ -175,12 +182,14 @@ class Certificate:
         return checks + [check for file, text in self.texts.items() for check in text.checks(file)]
 
     def mapping(self) -> dict[str, Any]:
-        """Return the certificate as plain values for JSON, with null for NaN and infinity."""
+        """Return the certificate as tables, numbers and texts for JSON, with null for NaN and
+        infinity.
+        """
         values = {"valid": self.valid, "numeric_valid": self.numeric_valid, **asdict(self)}
         return dict(_plain(values))
 
     def brief(self) -> str:
-        """Return a text: one line with the verdict (valid or FALSE), one for each failed check."""
+        """Return a text: a line with the verdict (valid or FALSE), then a line per failed check."""
         verdict = "valid" if self.valid else "FALSE"
         head = (
             f"{self.name}: certificate {verdict}, {self.count} base parameters of "
@@ -190,7 +199,7 @@ class Certificate:
         return "\n".join([head, *wrong, *self.failures])
 
     def __str__(self) -> str:
-        """Return one line per check, marked `ok` or FALSE, then the verdict."""
+        """Return a text: one line per check, marked `ok` or FALSE, then a line with the verdict."""
         head = f"{self.name}: {self.count} base parameters of {self.identities}, {self.method}"
         lines = [f"{'ok   ' if holds else 'FALSE'} {text}" for holds, text in self.checks]
         verdict = f"certificate {'valid' if self.valid else 'FALSE'}"
@@ -207,7 +216,7 @@ def _plain(value: Any) -> Any:
 def certify_formulas(
     regrouping: Regrouping, *, seed: int = 101, sampler: Sampler = sample
 ) -> Certificate:
-    """Check the formulas of `regrouping` and return the certificate.
+    """Check the regrouping formulas of the base parameters, and return the certificate.
 
     `certify.modules.certify` checks the emitted module too.
 
@@ -299,7 +308,9 @@ def certify_formulas(
 
 
 def _special(robot: Robot, gap: float, W: Array) -> str:
-    """Explain why the base parameter columns W lose rank at the constants of the robot file."""
+    """Write the reason why the base parameter columns W have a lower rank at the numbers of the
+    robot file.
+    """
     if roots := independent_roots(robot):
         return (
             f"{', '.join(roots)} {'count' if len(roots) > 1 else 'counts'} as any number: the rank "
@@ -317,7 +328,7 @@ def _special(robot: Robot, gap: float, W: Array) -> str:
 
 
 def independent_roots(robot: Robot) -> list[str]:
-    """List the square roots whose argument is not a rational number, such as sqrt(D3**2 + 1).
+    """List the square roots in a robot file whose argument is not rational, such as sqrt(2*D3).
 
     Over F_p each of these roots is an independent unknown.
     """
@@ -325,7 +336,8 @@ def independent_roots(robot: Robot) -> list[str]:
 
 
 def _too_small(W: Array) -> str:
-    """Write how many combinations of base parameters have almost no effect on the torques.
+    """Return a text with the number of combinations of base parameters that hardly affect the
+    torques.
 
     Their singular values in W are below 1e-9 of the largest.
     """
@@ -334,7 +346,7 @@ def _too_small(W: Array) -> str:
 
 
 def hair_off(robot: Robot, what: str) -> str:
-    """Write the message for a geometry that is almost special: 1.570796 rad instead of pi/2.
+    """Write the error message for a geometry that is almost special, such as 1.570796 rad for pi/2.
 
     The difference from the special geometry has an effect that no record can show.
     """
@@ -347,7 +359,7 @@ def hair_off(robot: Robot, what: str) -> str:
 
 
 def vanishing_denominators(regrouping: Regrouping) -> list[str]:
-    """Describe each formula that divides by zero at the constants of the robot file."""
+    """Describe each regrouping formula that divides by zero at the constants of the robot file."""
     values, texts = regrouping.robot.constants, []
     for b in regrouping.base:
         below = {
@@ -370,7 +382,7 @@ def vanishing_denominators(regrouping: Regrouping) -> list[str]:
 
 
 def degree(regrouping: Regrouping) -> int:
-    """Compute a bound on the polynomial degree of the identities between regressor columns.
+    """Compute an upper bound of the polynomial degree of the identities between regressor columns.
 
     The variables are half-angle tangents, lengths, rates and directions of motion. An entry of the
     regressor passes each frame of a path at most three times: outwards in products of two
@@ -415,7 +427,7 @@ def degree(regrouping: Regrouping) -> int:
 def _modulo(
     regrouping: Regrouping, seed: int, p: int, sampler: Sampler
 ) -> tuple[int | None, list[str]]:
-    """Check, modulo a prime p, the rank of the base parameter columns and all formulas.
+    """Check, modulo a prime p, the rank of the base parameter columns and all regrouping formulas.
 
     Return the rank (None if the loops cannot be closed exactly modulo p), and the columns that
     differ from their formulas.
@@ -471,7 +483,8 @@ def independent(robot: Robot) -> Sample:
 
 
 def numeric_rank(W: Array, *, tolerance: float = 1e-9, proved: int = 0) -> tuple[int, float]:
-    """Compute the rank of a matrix by SVD of its scaled columns, and the gap s_rank / s_(rank+1).
+    """Compute the rank of a matrix by SVD of its scaled columns, and the ratio s_rank / s_(rank+1)
+    of singular values.
 
     If `proved` is a larger rank that was proved exactly, it is the result, provided that its last
     singular value exceeds the next by a factor of SEEN.

@@ -1,4 +1,4 @@
-"""The content of a certificate as plain values, which other programs can verify.
+"""The statements of a certificate as numbers and texts, which other programs can verify.
 
 `docs/examples/check_certificate.py` does this from the frame table, without the code of symgen.
 """
@@ -17,7 +17,7 @@ ENTRIES_OF_FRAMES = ("gamma", "b", "alpha", "d", "theta", "r")
 
 
 def claim(regrouping: Regrouping, certificate: Certificate) -> dict[str, Any]:
-    """Return the statements of a certificate as plain values that other programs can verify.
+    """Return the statements of a certificate as numbers and texts, which other programs can verify.
 
     These are the robot, the relations of its joints, rank, primes, formulas, and for each emitted
     file its hash and its check.
@@ -60,7 +60,7 @@ def claim(regrouping: Regrouping, certificate: Certificate) -> dict[str, Any]:
 
 
 def _element(robot: Robot, e: Element) -> dict[str, Any]:
-    """Describe a family of elements, such as friction or springs, as plain values.
+    """Describe a family of elements, such as friction or springs, by numbers and texts.
 
     For each row the sign of its first coefficient of an actuated joint is included, at the
     constants of the robot file. It defines which direction of motion is positive.

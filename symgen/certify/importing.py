@@ -52,7 +52,7 @@ def cache_folder() -> Path:
 
 
 def cached_path(file: str, text: str) -> Path | None:
-    """Return the path of the cached file whose text without its certificate is `text`.
+    """Return the path of the cached source file whose text, without its certificate, equals `text`.
 
     Return None if there is no such file.
     """
@@ -91,7 +91,7 @@ def stored_path(file: str, text: str) -> Path:
 
 
 def without_certificate(text: str) -> str:
-    """Return the text without the lines of its certificate."""
+    """Return the text of a source file without the lines of its certificate."""
     return CERTIFICATE.sub("", text, count=1)
 
 

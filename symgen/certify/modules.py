@@ -96,7 +96,7 @@ def _certified(
 
 
 def require_valid(certificate: Certificate) -> None:
-    """Raise CertificateError unless all checks of the certificate hold."""
+    """Raise CertificateError if a check of the certificate does not hold."""
     if not certificate.valid:
         wrong = [text for holds, text in certificate.checks if not holds]
         reasons = [t for t in certificate.failures if not t.startswith(("column", "rank"))]

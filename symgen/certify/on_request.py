@@ -27,7 +27,8 @@ States = tuple[Array, Array, Array]
 def requested_values(
     model: Lagrange, regrouping: Regrouping, chi: Array, states: States, tree: States, qddr: Array
 ) -> dict[str, Callable[[], Array]]:
-    """Return functions that compute the expected results of models written only on request.
+    """Return functions that compute the expected results of models, such as the Slotine-Li
+    regressor, that the code generator writes only on request.
 
     The results have shape (N, ...).
 
@@ -45,7 +46,8 @@ def requested_values(
         return np.asarray((columns(q, qd, zero) - columns(q, zero, zero)) * rubs)
 
     def slotine_li() -> Array:
-        """Compute the regressor of Slotine and Li's torque A qddr + C qdr + Q + friction.
+        """Compute the regressor of the torque A qddr + C qdr + Q + friction of the Slotine-Li
+        controller.
 
         C qdr is a difference of torques that are quadratic in the velocities.
         """
@@ -58,7 +60,11 @@ def requested_values(
         return np.asarray(columns(q, zero, qd) - columns(q, zero, zero))
 
     def momentum_rate() -> Array:
-        """Compute the regressor of the momentum rate (1/2) d(qd' p)/dq - Q - friction, p = A qd."""
+        """Compute the regressor of dE/dq - Q - friction, the rate of the momentum A qd without
+        joint torques.
+
+        E = qd' A qd / 2 is the kinetic energy, Q the torques at rest.
+        """
         slope = np.zeros((*q.shape, len(own)))
         for i, e in enumerate(np.eye(q.shape[1])):
             for m, c in SIX_POINTS.items():
@@ -82,7 +88,8 @@ def requested_values(
 
 
 def of_elements(robot: Robot, which: Callable[[Element], bool]) -> Array:
-    """Whether each standard parameter belongs to an element that `which` selects, e.g. friction.
+    """Return, for each standard parameter, whether `which` is true for its element, such as
+    friction.
 
     The result has shape (p,).
     """

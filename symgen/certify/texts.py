@@ -88,7 +88,7 @@ class TextCheck:
 
     @property
     def wrong(self) -> list[str]:
-        """Names of functions that differ from the independent values; NaN is a difference."""
+        """Names of the functions whose results differ from the independent values, or are NaN."""
         return [name for name, error in self.errors.items() if not error < TOLERANCE]
 
     @property
@@ -96,7 +96,9 @@ class TextCheck:
         return not self.wrong and bool(self.errors or self.not_run)
 
     def checks(self, file: str) -> list[tuple[bool, str]]:
-        """List, for each function, whether it agrees with independent values, and its error."""
+        """List a pair per function: whether its results agree with independent values, and a text
+        with its error.
+        """
         if self.not_run:
             return [(True, f"{file} {self.sentence}")]
         return [
@@ -114,7 +116,9 @@ class TextCheck:
 
     @property
     def sentence(self) -> str:
-        """Sentence that names the functions that ran and their agreement, or why nothing ran."""
+        """Sentence for the certificate: which functions were run and agree, or why the file was not
+        run.
+        """
         if self.not_run:
             return f"not run: {self.not_run}"
         uses = ", ".join(self.uses)
@@ -256,7 +260,7 @@ def largest(
 def outcome(
     call: Use, module: ModuleType, name: str, check: Check, constants: Mapping[str, float]
 ) -> bytes | str:
-    """Call a function; return its result as bytes, or the message of its exception."""
+    """Call an emitted function; return its result as bytes, or the message of its exception."""
     try:
         return call(module, name, check, constants).tobytes()
     except Exception as error:  # a text may fail in any way
@@ -264,7 +268,7 @@ def outcome(
 
 
 def difference(value: Any, expected: Array, scale: Array | float) -> float:
-    """Compute the largest difference between `value` and `expected`, relative to `scale`.
+    """Compute the largest difference between the arrays `value` and `expected`, divided by `scale`.
 
     The result is infinite if the shapes differ, or if a difference is NaN.
     """
@@ -282,7 +286,9 @@ def _called(module: ModuleType, name: str, check: Check, constants: Mapping[str,
 
 
 def _stacked(module: ModuleType, name: str, check: Check, constants: Mapping[str, float]) -> Array:
-    """Run a function as on arrays of a package that does not write to arrays."""
+    """Call an emitted function in the mode for array packages that do not allow assignment to
+    entries.
+    """
     vars(module)["_IN_PLACE"] = False
     try:
         return _called(module, name, check, constants)
@@ -291,7 +297,7 @@ def _stacked(module: ModuleType, name: str, check: Check, constants: Mapping[str
 
 
 def _is_of_casadi(name: str, check: Check) -> bool:
-    """Whether CasADi runs a check too.
+    """Whether a test call of an emitted function is also made by CasADi, not only with NumPy.
 
     One state has no observation matrix, CasADi has no blocks of samples, and one text gives the
     Jacobians of all frames: two frames and the default one are run.
@@ -303,7 +309,9 @@ def _is_of_casadi(name: str, check: Check) -> bool:
 def _by_casadi(
     module: ModuleType, name: str, check: Check, constants: Mapping[str, float]
 ) -> Array:
-    """Run a function by CasADi at all samples, and arrange the results as NumPy does."""
+    """Evaluate an emitted function by CasADi at all samples; return results in the shape NumPy
+    gives.
+    """
     function, arguments = _function(module, name, *check.keywords.values()), check.arguments
     alone, ndim = arguments[0].ndim == 1, check.expected.ndim
     N = 1 if alone else len(arguments[0])
@@ -325,7 +333,8 @@ def _function(module: ModuleType, name: str, *frame: int) -> Any:
 
 
 def _derivative_error(module: ModuleType, witness: Witness) -> float:
-    """Compare emitted torque derivatives: by qdd with the inertia matrix A, by X with regressor D.
+    """Compare the emitted derivatives dGamma/dqdd with inertia matrix A, and dGamma/dX with
+    regressor D.
 
     Return the larger of the two errors.
     """
@@ -377,7 +386,7 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
             return {f"{CLOSED}1": float("inf")}
 
         def given(f: str, check: Check, k: Any) -> list[list[float]]:
-            """List the argument values for calling a C function at the samples k.
+            """List the values of the arguments with which a C function is called for the samples k.
 
             A closed mechanism has one struct with all its states.
             """
@@ -429,7 +438,8 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
 
 
 def _closed(library: Path, witness: Witness, constants: list[float]) -> Array:
-    """Close the loops at every state with the compiled C function; return the closed states.
+    """Run the compiled C function that closes the loops at every test state; return the closed
+    states.
 
     A state is NaN if Newton's method fails.
     """
@@ -471,7 +481,9 @@ def _one_state(name: str, text: str) -> list[str]:
 
 
 def _stored(f: str, shape: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the shape in which a result is stored; some models are stored with reversed axes."""
+    """Return the shape in which C stores a result; axes are reversed if the model is stored by
+    columns.
+    """
     return shape[::-1] if MODELS[f].by_columns else shape
 
 
@@ -480,7 +492,7 @@ def _flat(a: Array) -> list[float]:
 
 
 def _run(command: list[str], given: str = "") -> str:
-    """Run a command and return its output.
+    """Run a command of the operating system, such as the C compiler, and return its output as text.
 
     SubprocessError is raised if the command fails or needs too much time.
     """

@@ -44,7 +44,7 @@ RANDOM, OF_THE_FILE = "random constants", "the constants of the file"
 
 @dataclass(frozen=True)
 class Check:
-    """One test call of a function, and the result that the function must give.
+    """One test call of an emitted function: its arguments, and the result that it must return.
 
     Attributes
     ----------
@@ -130,22 +130,28 @@ class Witness:
 
     @property
     def keywords(self) -> dict[str, float]:
-        """Values, for the tests, of the constants that the functions accept as keywords."""
+        """Test values, by name, of the robot constants that the emitted functions accept as
+        keywords.
+        """
         return {name: self.constants[name] for name in self.regrouping.constants}
 
     @property
     def defaults(self) -> dict[str, float]:
-        """Default values, from the robot file, of constants that functions accept as keywords."""
+        """Values in the robot file, by name, of the constants that the emitted functions accept as
+        keywords.
+        """
         return {name: self.robot.constants[name] for name in self.regrouping.constants}
 
     @property
     def tied(self) -> bool:
-        """Whether some joint positions follow only from closure equations, not from a formula."""
+        """Whether some passive joint positions have no formula and follow only from closure
+        equations.
+        """
         return bool(close(self.robot).tied)
 
     @cached_property
     def own(self) -> Array:
-        """Regressor columns of the base parameters, shape (N, n, b).
+        """Regressor columns of the base parameters at the N test states, shape (N, n, b).
 
         They are the columns of the standard parameters that give the base parameters their names.
         """
@@ -153,7 +159,9 @@ class Witness:
 
     @cached_property
     def poses(self) -> Array:
-        """Transformation matrices 0T0 and 0Tj of every frame, shape (N, 1 + frames, 4, 4)."""
+        """Transformation matrices 0T0 and 0Tj of all frames at the N states, shape (N, 1 + frames,
+        4, 4).
+        """
         base = np.broadcast_to(np.eye(4), (len(self.q), 1, 4, 4))
         return np.concatenate([base, self.model.poses(self.x)], axis=1)
 
@@ -317,12 +325,12 @@ def ungrouped(robot: Robot) -> Regrouping:
 
 
 def is_assumed(robot: Robot) -> Array:
-    """Whether the robot file assumes each standard parameter to be zero, shape (p,)."""
+    """Return, for each standard parameter, whether the robot file assumes it zero, shape (p,)."""
     return np.array([name in robot.assume for name in robot.parameters])
 
 
 def bodies(robot: Robot, rng: np.random.Generator) -> Array:
-    """Draw random standard parameters that are possible for rigid bodies, shape (p,).
+    """Draw random, physically possible standard parameters of a robot, shape (p,).
 
     Every link is made of four points of mass. All other parameters lie between 0.1 and 1, except
     those that the robot file assumes zero.
@@ -337,7 +345,9 @@ def bodies(robot: Robot, rng: np.random.Generator) -> Array:
 
 
 def base_values(regrouping: Regrouping, chi: Array, constants: Mapping[str, float]) -> Array:
-    """Compute base parameters X (b, ...) from standard parameters chi (p, ...) by the formulas."""
+    """Compute base parameters X, shape (b, ...), from standard parameters chi, shape (p, ...), by
+    the regrouping formulas.
+    """
     value = dict(zip(regrouping.robot.parameters, chi, strict=True))
     return np.array(
         [

@@ -43,7 +43,8 @@ def fixed_angles(robot: Robot) -> tuple[Expression, ...]:
 
 
 class Units:
-    """Unit angles of a robot, such as pi/12: every fixed angle is a sum of their whole multiples.
+    """Unit angles of a robot, such as pi/12: each constant angle of the robot is a sum of whole
+    multiples of unit angles.
 
     The first unit angle is pi/D. D is the common denominator of the fractions of pi with a moderate
     denominator and of the angles that the square roots need.
@@ -66,7 +67,9 @@ class Units:
 
     @property
     def all(self) -> list[Unit]:
-        """All unit angles: first pi/D, with a common denominator D of the angles, then others."""
+        """List of all unit angles: first pi/D, with a common denominator D of the fixed angles,
+        then others.
+        """
         return [(PI, Fraction(1, self.D)), *self.free.items()]
 
     def of(self, angle: Expression) -> list[tuple[Unit, int]]:
@@ -86,7 +89,7 @@ class Units:
         return parts
 
     def _is_turn(self, m: Monomial, c: Fraction) -> bool:
-        """Whether the angle c*m has m = pi and is a whole multiple of the unit angle pi/D."""
+        """Whether m is pi and the angle c*m is a whole multiple of the unit angle pi/D."""
         return m == PI and (c * self.D).denominator == 1
 
 

@@ -49,7 +49,8 @@ def loop_ends(robot: Robot, algebra: GraphAlgebra, closure: Closure) -> list[tup
 
 
 def coincidence(ends: list[tuple[Pose, Pose]]) -> list[Scalar]:
-    """Return twelve pose differences per loop, zero if the two frames at its cut joint coincide.
+    """Return twelve differences per loop between the poses of the two frames at its cut joint:
+    three of position, nine of orientation.
 
     The differences are P_cut - P_twin and A_cut - A_twin.
     """
@@ -148,7 +149,7 @@ INDEPENDENT_MOTIONS = 1e-7
 
 
 def declared_relations(robot: Robot) -> dict[int, tuple[dict[int, Expression], Expression]]:
-    """Return the joint constraints of a robot file as linear relations q_j = row q + constant.
+    """Return the joint constraints of a robot file as linear relations q_j = sum_i n_ji q_i + c_j.
 
     The result is {j: (row, constant)}; the rows contain only joints without a constraint.
     """
@@ -182,7 +183,8 @@ def open_loops(robot: Robot) -> list[Scalar]:
 
 
 class Assembly:
-    """A mechanism with closed loops, in floating point: finds configurations that close its loops.
+    """Numerical model of a mechanism with closed loops, which finds configurations that close the
+    loops.
 
     A configuration q has shape (..., free joints), in the order of `free`: the moving joints
     without a relation.
@@ -232,13 +234,14 @@ class Assembly:
         return np.array([start.get(j, x) for j, x in zip(self.free, drawn, strict=True)])
 
     def configuration(self, q: Array) -> dict[int, float]:
-        """Return {joint: position} for all moving joints, from the positions q of the joints that
-        no relation gives.
+        """Return {joint: position} of all moving joints; q are the positions of the joints without
+        a relation.
         """
         return dict(zip(self.robot.moving, (self.N @ q + self.c).tolist(), strict=True))
 
     def residual(self, q: Array) -> Array:
-        """Return twelve pose differences at the cut joint of each loop, shape (..., loops, 12).
+        """Return, for each loop, twelve differences between the poses of the two frames at its cut
+        joint, shape (..., loops, 12).
 
         Positions are divided by the longest length.
         """
@@ -283,14 +286,18 @@ class Assembly:
         return closed if self.gap(closed) < 10 * TOLERANCE else None
 
     def rates(self, q: Array) -> Array:
-        """Return the matrix G = dq_passive/dq_actuated, shape (passive joints, actuated joints)."""
+        """Return dq_passive/dq_actuated at configuration q, shape (passive joints, actuated
+        joints).
+        """
         J = differences(self.rows, q)[1]
         return np.asarray(
             -np.linalg.lstsq(J[:, self.passive], J[:, self.active], rcond=INDEPENDENT_MOTIONS)[0]
         )
 
     def mobility(self, q: Array) -> tuple[int, int]:
-        """Return the degrees of freedom with free actuators, and those with blocked actuators."""
+        """Return two numbers of degrees of freedom at configuration q: with free actuators, and
+        with blocked actuators.
+        """
         J = differences(self.rows, q)[1]
         return len(self.free) - _rank(J), len(self.passive) - _rank(J[:, self.passive])
 

@@ -60,11 +60,14 @@ class Closure:
         return (*self.robot.joints, *self.tied)
 
     def formula(self, j: int) -> Expression:
-        """Return q_j as an expression of the independent joint positions."""
+        """Return the position q_j of a moving joint as an expression in independent joint
+        positions.
+        """
         return sum((g * Expression.symbol(f"q{i}") for i, g in self.row[j].items()), self.offset[j])
 
     def turn(self, j: int) -> tuple[Turn, Expression]:
-        """Return the pairs (i, n_i) and the constant c of q_j = sum n_i q_i + c, j revolute.
+        """Return, for revolute joint j, pairs (i, n_i) and the constant c of q_j = sum_i n_i q_i +
+        c.
 
         The joints i are independent. Raises DescriptionError if a multiple is not a number.
         """
@@ -86,7 +89,8 @@ class Closure:
         return tuple(turn), self.offset[j]
 
     def relation(self, row: Mapping[int, Expression], c: Expression = ZERO) -> Relation:
-        """Rewrite a sum row q + c in the independent joints only; return the new row and constant.
+        """Replace all joints in sum_j row_j q_j + c by independent joints; return the new row and
+        constant.
 
         The given row may contain any moving joints.
         """
@@ -98,7 +102,9 @@ class Closure:
         return {i: g for i, g in sorted(total.items()) if g}, c
 
     def in_independent(self, row: Mapping[int, Expression]) -> ActiveRow:
-        """Rewrite a velocity row qd in the independent joints: pairs (joint, coefficient)."""
+        """Express a velocity sum_j row_j qd_j by independent joints; return pairs (joint,
+        coefficient).
+        """
         return tuple(self.relation(row)[0].items())
 
     def project(self, algebra: GraphAlgebra, torque: Mapping[int, Scalar]) -> dict[int, Scalar]:
@@ -139,7 +145,7 @@ def parts(robot: Robot) -> int:
 
 
 def open_tree(robot: Robot) -> Closure:
-    """Return the joint relations of a robot with its loops cut: all moving joints independent."""
+    """Return the `Closure` of a robot whose loops are cut: every moving joint is independent."""
     moving = robot.moving
     passive = tuple(j for j in moving if j not in robot.joints)
     return Closure(robot, {j: {j: ONE} for j in moving}, dict.fromkeys(moving, ZERO), passive)

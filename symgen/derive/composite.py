@@ -70,7 +70,9 @@ class CompositeLinks:
                 self._take(f.j, f.ant)
 
     def _name(self, j: int) -> None:
-        """Name the inertia of link j with all links after it: JP332, MSP32, MP2 ... for j = 2."""
+        """Give names to inertia, first moments and mass of link j with all links after it: JP332,
+        MSP32, MP2 for j = 2.
+        """
         for (k, m), x in zip(PLACES, self.JP[j], strict=True):
             self.algebra.name(x, self.named("JP", k, m, j))
         for k, x in enumerate(self.MSP[j], start=1):

@@ -58,8 +58,8 @@ HALF = Expression.number(Fraction(1, 2))
 
 
 class CompositeRates(CompositeLinks):
-    """The sums HP = sum m rd and BP = sum m r rd' over the points of each link and all links after
-    it; m, r and rd are the mass, position and velocity of a point.
+    """Sums HP of m rd and BP of m r rd' over the mass points of each link and of all links after
+    it; m, r and rd are mass, position and velocity of a point.
 
     A composite link is a link with all links mounted on it. r is in the frame of the link, rd is
     relative to the origin of the frame.

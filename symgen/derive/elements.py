@@ -74,7 +74,9 @@ class _Law:
         return total
 
     def one_sided(self, law: Expression) -> Scalar:
-        """Return the velocity sd or its sign; zero if the motion is not in the direction `when`."""
+        """Return the velocity on which friction in one direction depends, or its sign; zero in the
+        other direction.
+        """
         rate, key = self._atom("qd"), self.motion.geometry.closure.in_independent(self.row)
         if type(rate) is int or not key:
             return 0  # at rest, or the closure holds s still
@@ -112,7 +114,8 @@ class _Law:
         return algebra.function(a.function, *operands)
 
     def _turn(self, angle: Expression) -> tuple[Turn, Expression] | None:
-        """Write an angle as whole multiples of independent joint angles plus a constant.
+        """Write an angle in a torque law as whole multiples of independent joint angles plus a
+        constant.
 
         Return the multiples and the constant, or None if the angle has another form.
         """
@@ -143,7 +146,8 @@ def is_opaque(e: Element, j: int) -> bool:
 def linear_in(
     e: Expression, state: str, along: Row
 ) -> tuple[dict[int, Expression], Expression] | None:
-    """Split an expression that is linear in joint positions or velocities x into row . x + rest.
+    """Split an expression that is linear in joint positions or velocities into coefficients and a
+    constant.
 
     Return the row {joint: coefficient} and the constant rest, or None if e is not linear. x are the
     positions if `state` is q, the velocities if it is qd. The name q (or qd) without a joint number

@@ -124,7 +124,8 @@ def potential_energy(d: Derivation) -> Scalar:
 
 
 def _square(d: Derivation, e: Element, j: int, x: Mapping[int, Scalar]) -> Scalar:
-    """Return twice the energy of an inertia or spring whose parameter is 1: (G x)**2 or x' B x.
+    """Return twice the energy of an inertia or spring with unit parameter: (G x)**2 or x' B x, with
+    joint velocities or positions x.
 
     x are joint velocities (inertia) or positions (spring). The element has a row G or a matrix B.
     """
@@ -135,7 +136,8 @@ def _square(d: Derivation, e: Element, j: int, x: Mapping[int, Scalar]) -> Scala
 
 
 class AtRates(Motion):
-    """Link accelerations for which Newton-Euler gives the torques C qdr, with reference rates qdr.
+    """Link accelerations from which the Newton-Euler recursion computes C qdr, with the Coriolis
+    matrix C and reference velocities qdr.
 
     These accelerations are sum_k qdr_k (a_k + U_k r), see the head of this module; `joint_torques`
     turns them into C qdr. With qdr_k = 1 as the only rate, the result is column k of C.

@@ -327,7 +327,9 @@ class Draw:
     # --- laws ---
 
     def forward(self, node: Node, rate: Fp) -> Fp:
-        """Return random residues b that stand for "the velocity is positive": its sign is 2b - 1.
+        """Return random values b modulo p that replace the truth value, 1 or 0, of "velocity > 0".
+
+        The sign of the velocity is then 2b - 1.
 
         In the robot b is 1 or 0; a formula that holds for random b holds for both. Proportional
         velocities have the same b.
@@ -356,8 +358,8 @@ class Draw:
 
 @lru_cache
 def primes_for(robot: Robot, count: int, seed: int | None = None) -> tuple[int, ...]:
-    """Return `count` primes p modulo which the sines and cosines of the fixed angles and the square
-    roots of a robot have values.
+    """Return `count` primes p for exact arithmetic: modulo p, all sines and cosines of the fixed
+    angles and all square roots of the robot exist.
 
     p < 2**31, and p = -1 modulo 4 and 2D. Without a seed they are the largest such primes; with a
     seed, the largest below a random number. Raises SymgenError if there are too few.
@@ -373,8 +375,8 @@ def primes_for(robot: Robot, count: int, seed: int | None = None) -> tuple[int, 
 
 
 def candidates(robot: Robot, seed: int | None = None) -> Iterator[int]:
-    """Yield primes p modulo which the sines and cosines of the fixed angles and the square roots of
-    a robot have values.
+    """Yield primes p for exact arithmetic: modulo p, all sines and cosines of the fixed angles and
+    all square roots of the robot exist.
 
     p = -1 modulo 4 and 2D, and the large numbers under square roots are squares in F_p. The primes
     are in descending order, from 2**31, or from a random number if a seed is given.

@@ -127,7 +127,9 @@ class Frames:
         return Rotation(None, *self.geometry.algebra.cos_sin(*self._between(j, i)))
 
     def _between(self, j: int, i: int) -> tuple[Turn, Expression]:
-        """Return pairs (k, n_k) and c of the angle sum n_k q_k + c about z from frame i to j."""
+        """Return pairs (k, n_k) and the constant c of the angle sum_k n_k q_k + c about z from
+        frame i to j.
+        """
         (turn, offset), (other, other_offset) = self.geometry.turn[j], self.geometry.turn[i]
         return summed((*turn, *((k, -n) for k, n in other))), offset - other_offset
 

@@ -180,7 +180,7 @@ class Graph:
         self._sealed = state[1]
 
     def scalar(self, index: int, sign: int) -> Scalar:
-        """Return the node number `index` with a sign, 1 or -1."""
+        """Return graph node number `index` as a `Scalar` with the sign 1 or -1."""
         return Scalar(self, self.nodes[index], sign)
 
     def seal(self) -> None:
@@ -243,7 +243,7 @@ class Graph:
         return s if sign > 0 else -s
 
     def call(self, op: str, x: Scalar, *more: Scalar, of: Any = None) -> Scalar:
-        """Return the node of a function of x, such as cos, sqrt or the positive part.
+        """Return the node of a function of x, such as cos, sqrt or the positive part max(x, 0).
 
         Even and odd functions use a positive operand: sin(-x) becomes -sin(x). `of` describes x for
         exact arithmetic, for instance as an Angle (see `Node.value`).

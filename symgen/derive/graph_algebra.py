@@ -79,7 +79,9 @@ class GraphAlgebra:
         return self.graph.symbol(Symbol("parameter", name), fixed=True)
 
     def gravity(self, axis: int) -> Scalar | int:
-        """Return the node of one component of minus gravity in frame 0, m/s**2, or the number 0."""
+        """Return the node of one component of the negative gravity vector in frame 0, m/s**2, or
+        the number 0.
+        """
         symbol = Symbol("gravity", str(axis))
         return self.graph.symbol(symbol, fixed=True) if self.robot.gravity[axis] else 0
 
@@ -151,7 +153,8 @@ class GraphAlgebra:
         return self.graph.call(SIGN, rate, of=Velocity(row))
 
     def one_sided(self, rate: Scalar, row: ActiveRow, when: str) -> tuple[Scalar, Scalar]:
-        """Return sign(sd) and the velocity sd if the motion is in direction `when`, else two zeros.
+        """Return nodes of sign(sd) and of the velocity sd, both zero if the motion is not in
+        direction `when` (positive or negative).
 
         Both are nodes made of positive parts max(x, 0).
         """

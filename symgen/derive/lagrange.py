@@ -235,7 +235,8 @@ class Lagrange:
         return G
 
     def _form(self, e: Element, j: int) -> Array:
-        """Return the matrix B of an element: spring torque c B q, viscous c B qd, inertial c B qdd.
+        """Return the matrix B of an element with parameter c: torque c B q of a spring, c B qd of
+        viscous friction, c B qdd of an inertia.
 
         B has shape (n, n). It is G'G if the element acts along a row G. j is the number in the name
         of the parameter c, for instance 2 for FV2.
@@ -269,7 +270,7 @@ class Lagrange:
         return np.swapaxes(np.concatenate([slope[..., 3], _axial(W)], axis=-1), -1, -2)
 
     def acceleration(self, q: Array, qd: Array, qdd: Array, frame: int) -> Array:
-        """Return the acceleration of a frame in frame 0, shape (..., 6).
+        """Return the linear and angular acceleration of a frame, in frame 0, shape (..., 6).
 
         First the acceleration of its origin, then its angular acceleration wd from
         hat(wd) = Rddot R' + Rdot Rdot'.
@@ -483,8 +484,8 @@ def _start(robot: Robot, q: SX, constants: Mapping[str, SX]) -> tuple[SX, SX]:
 def _law(
     robot: Robot, e: Element, j: int, q: SX, qd: SX, constants: Mapping[str, SX]
 ) -> tuple[SX, SX]:
-    """Return the joint torques, shape (n,), and the energy of a torque law of the user whose
-    parameter is 1.
+    """Return joint torques, shape (n,), and energy of a torque law of the user whose parameter is
+    1.
 
     j is the number in the name of the parameter. CasADi differentiates an energy U to the torque
     dU/dq.

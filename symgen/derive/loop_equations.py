@@ -65,7 +65,9 @@ class LoopSystem:
 
     @property
     def tied(self) -> slice:
-        """Slice of arrays q with the passive joints that only the closure equations determine."""
+        """Slice that selects, in arrays q, the passive joints that only the closure equations
+        determine.
+        """
         return slice(len(self.robot.joints), len(self.closure.independent))
 
     @cached_property

@@ -88,7 +88,7 @@ def find_relations(robot: Robot) -> Closure:
 
 
 def _configurations(assembly: Assembly) -> Iterator[Array]:
-    """Yield configurations that close the loops.
+    """Yield joint configurations in which all loops of the mechanism close.
 
     If the robot has a `start` and a closed configuration near it is found, only this configuration
     is given. Otherwise the search begins at random configurations and, if none of them closes, at
@@ -164,7 +164,8 @@ def _general(assembly: Assembly, q: Array) -> Closure:
 def _angle_sum(
     assembly: Assembly, loop: Loop, configuration: Mapping[int, float]
 ) -> dict[int, Expression] | None:
-    """Return {j: n_j} in the cut joint angle q_cut = sum n_j q_j + c of a planar loop, else None.
+    """Return the multiples {j: n_j} in q_cut = sum_j n_j q_j + c, the cut joint angle of a planar
+    loop; None for another loop.
 
     In a planar loop all hinges have parallel axes, in equal or opposite directions, with or without
     prismatic joints between them. The axes are compared in two configurations of the open tree;
@@ -411,7 +412,9 @@ def _contradiction(
 
 
 def _same(closure: Closure, j: int, row: Mapping[int, Expression], c: Expression) -> bool:
-    """Whether q_j = row q + c equals the relation of joint j in `closure`, up to whole turns."""
+    """Whether q_j = sum_i row_i q_i + c equals the relation of joint j in `closure`, up to whole
+    turns.
+    """
     apart = (c - closure.offset[j]).value(closure.robot.constants)
     if closure.robot.frame(j).sigma == REVOLUTE:
         apart -= 2 * np.pi * round(apart / (2 * np.pi))

@@ -55,7 +55,8 @@ class Entry:
 
 @dataclass(frozen=True)
 class Case:
-    """Entries of a model that are derived with the same inputs replaced, for instance qdd = 0.
+    """Entries of a model that are derived with the same values of some inputs, for instance qdd =
+    0.
 
     `tag` ends the names of the intermediate variables that these replaced inputs change.
     """
@@ -163,7 +164,8 @@ class Model:
 
     @property
     def printed(self) -> bool:
-        """Whether code generators print the entries of the model from the graph.
+        """Whether generated code computes the entries of the model by formulas from the expression
+        graph.
 
         A model of a chosen frame, such as the Jacobian, is computed in generated code from other
         models.
@@ -250,7 +252,8 @@ def equations(d: Derivation) -> tuple[int, ...]:
 
 
 def rewriting(d: Derivation, request: Request) -> Rewrite:
-    """Return a new graph in which parameters, gravity and inputs are replaced as requested.
+    """Return a new graph to which formulas are copied with parameters, gravity and inputs replaced
+    as in `request`.
 
     Standard parameters become the symbols of the request or zero, gravity becomes that of the
     robot, and the inputs of the request become their values.

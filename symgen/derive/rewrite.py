@@ -82,7 +82,8 @@ class Rewrite:
     def copied(
         self, outputs: Sequence[Scalar | int], inputs: Inputs | None = None, tag: str = ""
     ) -> list[Scalar | int]:
-        """Copy `outputs` to the new graph, with further `inputs` replaced for this call only.
+        """Copy the nodes `outputs` of the derivation to the new graph; replace `inputs` in this
+        call only.
 
         These replacements have priority over the general ones. Names of intermediate variables that
         depend on them end in `tag`.

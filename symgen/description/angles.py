@@ -57,10 +57,11 @@ class Angles:
         return None if self.exact else k
 
     def report(self, file: str) -> tuple[str, tuple[str, ...]]:
-        """Describe, for file headers and users, if angles near multiples of pi/12 were rounded.
+        """Write which angles near multiples of pi/12 were rounded: a text for file headers, and
+        notes for the user.
 
-        Return a text for file headers, and notes. If angles were rounded, a note names the largest
-        change, and an AngleWarning is issued. Both results are empty if the file has no such angle.
+        If angles were rounded, a note names the largest change, and an AngleWarning is issued. Both
+        results are empty if the file has no such angle.
         """
         if not self.near:
             return "", ()

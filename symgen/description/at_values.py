@@ -84,7 +84,8 @@ def substituted(e: Expression, values: Mapping[str, Expression]) -> Expression:
 
 
 def mapped(robot: Robot, length: Change, angle: Change = lambda e: e) -> Robot:
-    """Return `robot` with the function `length` applied to its lengths, and `angle` to its angles.
+    """Return a copy of `robot` in which the function `length` is applied to all lengths, and
+    `angle` to all angles.
 
     `length` is also applied to gravity and to the coefficients of elements. A constraint on a
     prismatic joint counts as a length, a constraint on a revolute joint as an angle.

@@ -50,9 +50,8 @@ def khalil_values(robot: Robot) -> dict[str, float]:
 
 
 def _transport(alpha: float, d: float) -> Array:
-    """Build the matrix (10, 10) that converts link parameters from the end frame to Khalil's frame.
-
-    The ten parameters are first given in the frame at the end of the link.
+    """Build the matrix, shape (10, 10), that converts link parameters from the frame at the end of
+    a link to Khalil's frame.
     """
     c, s = np.cos(alpha), np.sin(alpha)
     R = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])

@@ -34,7 +34,7 @@ from symgen.errors import DescriptionError, ExpressionError
 
 @dataclass(frozen=True, config=CONFIG)
 class LawScalar:
-    """A number on which a law depends nonlinearly; it is fixed if its two bounds are equal."""
+    """A nonlinear constant of a law, such as a Stribeck velocity; equal bounds fix its value."""
 
     bounds: Annotated[
         tuple[float, float],
@@ -61,7 +61,9 @@ class LawScalar:
 
 
 def _scalars(table: Mapping[str, Any], declared: Any) -> dict[str, LawScalar]:
-    """Convert the nonlinear constants of a law to LawScalars; a plain number is not fitted."""
+    """Convert the nonlinear constants of a torque law to LawScalars; a plain number becomes a
+    constant that a fit does not change.
+    """
     return {
         name: x if isinstance(x, LawScalar) else LawScalar((float(x), float(x)))
         for name, x in table.items()
@@ -89,7 +91,7 @@ def _scalar(name: str, given: Any) -> LawScalar:
 
 @dataclass(frozen=True, config=CONFIG)
 class Element:
-    """A torque on the joints besides the links: motor inertia, friction, offset, spring, or your own law."""
+    """Joint torques not due to links: motor inertia, friction, offset, spring or your own law."""
 
     family: Annotated[str, *UNWRITTEN]
     kind: Annotated[
@@ -142,7 +144,9 @@ class Element:
 
     @property
     def scalars(self) -> dict[str, LawScalar]:
-        """Nonlinear constants of the law, by name: from the robot file, or defaults of the kind."""
+        """Constants on which the law depends nonlinearly, by name: those of the robot file, or
+        defaults.
+        """
         kind = KINDS.get(self.kind)
         return {name: _scalar(name, x) for name, x in (kind.fit if kind else {}).items()} | {
             **self.fit
@@ -178,12 +182,15 @@ class Element:
         )
 
     def channels(self, j: int) -> list[str]:
-        """List the functions of time (channels), such as temperature, in the law for frame j."""
+        """List the names of the functions of time (channels), such as temperature, in the law for
+        frame j.
+        """
         names = self.law(j).symbols if j in self.along else ()
         return sorted(name.removeprefix(CHANNEL) for name in names if name.startswith(CHANNEL))
 
     def law(self, j: int) -> Expression:
-        """Return the torque of this element in frame j, along s = G q, if its parameter is 1.
+        """Return the torque law of the element for frame j as an expression: the torque along s = G
+        q if the parameter is 1.
 
         It is zero if the law is an energy.
         """
@@ -206,7 +213,8 @@ class Element:
 
     @property
     def is_own(self) -> bool:
-        """Whether the law is other than inertia, viscous or Coulomb friction, offset or spring.
+        """Whether the element has a special law: not inertia, viscous or Coulomb friction, offset
+        or spring.
 
         This includes every law that the user writes, and every law with nonlinear constants.
         """
@@ -305,7 +313,8 @@ def check_law(e: Element, robot: Any) -> None:
 
 
 def _positions(robot: Any, row: Any) -> tuple[float, float]:
-    """Choose two joint positions at which a law is tested, if possible within the joint limits.
+    """Choose two joint positions at which a torque law is tested, if possible within the joint
+    limits.
 
     Without limits, or for several joints, the positions are -0.4 and 0.7.
     """

@@ -34,7 +34,8 @@ Monomial = tuple[tuple[Atom, int], ...]
 
 @dataclass(frozen=True)
 class Call:
-    """A function of an expression as a factor of a polynomial, for instance cos(q1 + q2).
+    """A function of an expression, such as cos(q1 + q2), that is a factor in the terms of a
+    polynomial.
 
     The functions are cos, sin, sqrt, sign, exp, tanh, inv (1/argument) and pow
     (argument**exponent).
@@ -613,7 +614,9 @@ def simplified(e: Expression) -> Expression:
 
 
 def _sine_and_rest(m: Monomial) -> list[tuple[Monomial, Monomial]]:
-    """For each cos(a)**2 in the product m, return m with sin(a)**2 instead, and m without it."""
+    """Return two products for each cos(a)**2 in the product m: m with sin(a)**2 in its place, and m
+    without it.
+    """
     pairs = []
     for a, n in m:
         if isinstance(a, Call) and a.function == "cos" and n >= 2:

@@ -162,9 +162,10 @@ def _beside(path: Path) -> Callable[[str, int], bytes]:
 def write_robot(
     robot: Robot, file: str, *, comments: Sequence[str] = ()
 ) -> tuple[str, tuple[str, ...]]:
-    """Convert `robot` to text in the format of the suffix of `file`, and note data it cannot store.
+    """Return the text of a file that describes `robot`, in the format that the suffix of `file`
+    selects, and notes.
 
-    The notes list what the format cannot store. No file is written.
+    The notes list the data of the robot that the format cannot store. No file is written.
 
     Parameters
     ----------
@@ -191,7 +192,7 @@ def write_robot(
 
 
 def content_of(path: Path) -> bytes:
-    """Read the bytes of a robot file, at most MAX_BYTES + 1.
+    """Return the content of a robot file as bytes, cut off after MAX_BYTES + 1 bytes.
 
     Raises DescriptionError if the file cannot be read.
     """

@@ -209,7 +209,8 @@ def _body(growing: _Growing, b: int) -> None:
 
 
 def _joint(growing: _Growing, k: int, parent: str, child: str, pose: Array) -> tuple[Joint, Array]:
-    """Convert joint k of an MJCF model; return the Joint, and its body's pose in the joint frame.
+    """Convert joint k of an MJCF model; return the Joint, and the pose of the body in the joint
+    frame.
 
     The joint leads from the link `parent` to the link `child`. `pose` is the pose of the body in
     the frame of `parent` at q = ref.

@@ -175,7 +175,7 @@ def _refuse(root: XmlElement) -> None:
 
 
 def _is_finite(word: str) -> bool:
-    """Whether a word is anything but an infinite number or nan."""
+    """Whether a word in an MJCF file is a finite number, or no number at all."""
     try:
         return isfinite(float(word))
     except ValueError:
@@ -205,9 +205,11 @@ def _is_left_out(holder: XmlElement, e: XmlElement) -> bool:
 
 
 def _spec(root: XmlElement) -> tuple[Any, list[int]]:
-    """Build MuJoCo's MjSpec from XML elements, and a list that maps lines of its text to the file.
+    """Build MuJoCo's MjSpec from XML elements; return the MjSpec, and a list of line numbers of the
+    file.
 
-    The list has, for each line of the text that MuJoCo reads, the line of the original file.
+    The list has, for each line of the text that MuJoCo reads, the number of the line in the
+    original file.
     """
     try:
         import mujoco

@@ -181,7 +181,7 @@ def is_label(text: str) -> bool:
 
 
 class Namespace:
-    """The names used in one generated file; prevents two things from having the same name.
+    """The table of names used in one generated file, by which no two quantities get the same name.
 
     Parameters
     ----------

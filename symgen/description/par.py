@@ -105,7 +105,9 @@ class _Par:
     notes: list[str] = field(default_factory=list)
 
     def line(self, path: Path) -> int:
-        """Find the line of the file that defines the Robot field with the key path `path`."""
+        """Find the line of the `.par` file that defines a field of the Robot, given by its path of
+        keys.
+        """
         key = KEYS.get(str(path[-1]).lower() if path else "", "ant")
         items = self.lists.get(key) or [("", 1)]
         j = path[1] if len(path) > 1 and isinstance(path[1], int) else 1
@@ -155,7 +157,7 @@ def _text(content: bytes) -> str:
 
 
 def _scan(text: str, par: _Par) -> None:
-    """Store the comments and entries of the file text in `par`."""
+    """Read the comments and the entries of a `.par` file from its text, and store them in `par`."""
     text = _without_comments(text, par)
     position, end = 0, len(text.rstrip())
     while position < end:
@@ -191,7 +193,8 @@ def _scan(text: str, par: _Par) -> None:
 
 
 def _without_comments(text: str, par: _Par) -> str:
-    """Replace the comments in `text` by blanks, and store their content in `par`.
+    """Replace the comments in the text of a `.par` file by blanks, and store their content in
+    `par`.
 
     The text is scanned once, however many comments it opens.
     """

@@ -46,7 +46,7 @@ def _moved(value: int | None, info: ValidationInfo) -> int:
 
 @dataclass(frozen=True, config=CONFIG)
 class Frame:
-    """One row of the table of Khalil and Kleinfinger."""
+    """One frame: a row of the frame table, with the parameters of Khalil and Kleinfinger."""
 
     j: Annotated[int, *UNWRITTEN]
     ant: Annotated[Whole, Field(description="antecedent frame, 0 for the base")]
@@ -185,7 +185,7 @@ def by_joint(texts: Mapping[str, Any], declared: Declared) -> dict[int, Any]:
 
 @dataclass(frozen=True, config=CONFIG)
 class Loop:
-    """A closed loop: frame `twin`, fixed, coincides with the frame of the cut joint."""
+    """A closed loop of a robot: the fixed frame `twin` coincides with the frame of joint `cut`."""
 
     cut: Annotated[Whole, Field(description="number of the cut joint: passive, without a link")]
     twin: Annotated[
@@ -202,14 +202,16 @@ class Loop:
 
 
 def _of_motors(value: list[float] | float | None, declared: Declared) -> tuple[float, ...]:
-    """Expand a drive setting to one value per actuated joint; a list stays, and None means 0."""
+    """Expand a setting of the drives, such as the offset, to one value per actuated joint; None
+    means 0.
+    """
     if isinstance(value, list):
         return tuple(value)
     return tuple(value or 0.0 for f in declared.frames if f.mu)
 
 
 def _of_motors_if_given(value: Any, declared: Declared) -> tuple[float, ...] | None:
-    """Expand a drive setting to one value per actuated joint; None stays None.
+    """Expand a setting of the drives to one value per actuated joint; None is returned unchanged.
 
     Measured currents are refused if no torque constant is given.
     """
@@ -227,7 +229,7 @@ def _rows(value: list[Any], _: Declared) -> tuple[tuple[float, ...], ...]:
 
 @dataclass(frozen=True, config=CONFIG)
 class Drives:
-    """Relation of motors and joints: qm = ratio (q - offset), tau = ratio' (torque_constant * u)."""
+    """Drives: motor position qm = ratio (q - offset), tau = ratio' (torque_constant * current)."""
 
     ratio: Annotated[
         tuple[tuple[float, ...], ...],

@@ -328,7 +328,9 @@ class Robot:
 
     @cached_property
     def channels(self) -> dict[str, tuple[str, ...]]:
-        """For each channel (function of time, as temperature): parameters whose laws contain it."""
+        """Names of the parameters whose laws contain a channel (a function of time, such as
+        temperature), by channel.
+        """
         read = [(c, parameter(e.family, j)) for e in self.elements for j in e.keys
                 for c in e.channels(j)]  # fmt: skip
         return {c: tuple(name for own, name in read if own == c) for c, _ in read}

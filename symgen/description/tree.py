@@ -224,7 +224,8 @@ def part_of(tree: Tree, part: TreePart) -> Tree:
 
 
 def _beside(tree: Tree, base: str, tip: str) -> dict[str, float]:
-    """Find the moving joints outside the chain `base` to `tip`, and positions to hold them at.
+    """Find the moving joints outside the chain from link `base` to link `tip`, and the positions at
+    which they are held.
 
     The position is zero, or for a joint that follows others its position when these are at zero.
     """

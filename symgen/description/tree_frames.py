@@ -215,7 +215,8 @@ def _angle(x: float) -> tuple[float, Expression]:
 def _row(
     table: Table, ant: int, sigma: int, before: Sequence[float], theta: float = 0.0, r: float = 0.0
 ) -> tuple[Array, int]:
-    """Append a frame to the table; return its pose in its antecedent at q = 0, and its number.
+    """Append a frame to the table; return its pose in the antecedent frame at q = 0, and its
+    number.
 
     The pose has the shape (4, 4).
     """

@@ -114,7 +114,9 @@ def _document(content: bytes, lines: dict[Path, int]) -> Any:
 
 
 def _value(node: Node, path: Path, lines: dict[Path, int], resolver: Any) -> Any:
-    """Convert a YAML node to plain Python data, and store the line of every key path in `lines`."""
+    """Convert a YAML node to plain Python data, and store the line number of every key path in
+    `lines`.
+    """
     line = node.start_mark.line + 1
     lines.setdefault(path, line)
     if len(path) > MAX_NESTING:
@@ -150,7 +152,9 @@ def _value(node: Node, path: Path, lines: dict[Path, int], resolver: Any) -> Any
 
 
 def _scalar(node: ScalarNode, line: int) -> Any:
-    """Convert a plain YAML scalar to None, bool, int or float by the core schema, else to text."""
+    """Convert an unquoted YAML value to None, bool, int or float by the rules of YAML 1.2, else to
+    text.
+    """
     text: str = node.value
     if len(text) > MAX_SCALAR:
         raise DescriptionError(
@@ -167,7 +171,9 @@ def _scalar(node: ScalarNode, line: int) -> Any:
 
 
 def tables_of(robot: Robot) -> dict[str, Any]:
-    """Return the data of a robot file for `robot`, by key, with Expression objects, not texts."""
+    """Return the data of a robot file that describes `robot`, by key, with Expression objects, not
+    texts.
+    """
     drives = robot.drives
     return {
         "symgen": SCHEMA,

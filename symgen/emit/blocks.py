@@ -68,7 +68,7 @@ Call = Callable[[Sequence[str], Sequence[str]], list[str]]
 def blocks_of(
     spec: ModuleSpec, language: Language, component: Callable[[str, int], str] = "{}[{}]".format
 ) -> dict[str, Block]:
-    """Write each function of a robot as complete source text, without code shared by functions.
+    """Write each function of a robot as complete source text; no two functions share code.
 
     `component` gives the text of entry k of a state or of X, such as `q[0]`.
     """
@@ -127,13 +127,16 @@ class FunctionPrinter:
 
     @property
     def motion(self) -> Block:
-        """Source text of the intermediate variables that all functions share: the link motion."""
+        """Source text that computes the intermediate variables common to all functions: the link
+        motion.
+        """
         own = [n for n in self.functions[0].nodes if n.index in self.shared]
         operands = {x.node.index for n in own for x in n.operands}
         return self._block(self.functions[0], own, [n for n in own if n.index in operands], ())
 
     def block(self, f: Function, call: Call = lambda names, arguments: []) -> Block:
-        """Write one function as source text that uses, but does not repeat, the shared link motion.
+        """Write one function as source text; the link motion, which all functions share, is not
+        written again.
 
         `call` writes the lines that get the shared variables from the block `motion`.
         """

@@ -26,7 +26,8 @@ class Part:
 def in_parts(
     inputs: Sequence[str], steps: Sequence[Titled], results: Sequence[Titled], longest: int
 ) -> tuple[list[Part], int]:
-    """Split the steps of a C function into parts of at most `longest` steps.
+    """Split the body of a C function into parts of at most `longest` steps; a step computes one
+    variable.
 
     A result belongs to the part of the last step that it depends on. Each part loads the inputs
     that it uses. Return the parts, and the number of values that must be stored for later parts.

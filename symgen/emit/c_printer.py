@@ -98,7 +98,7 @@ class CText(Text):
 
 
 def _needed(outputs: Iterable[Node]) -> Iterator[int]:
-    """Yield the indices of the graph nodes that a loop over the samples must compute or load.
+    """Yield the indices of the graph nodes that a C loop over the samples must compute or load.
 
     Operands of sines and cosines are left out, because another loop computes them; so are operands
     of values that are computed before the loops.

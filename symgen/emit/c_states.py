@@ -28,7 +28,7 @@ class CStates:
 
     @classmethod
     def of(cls, spec: ModuleSpec) -> CStates:
-        """Make the state arguments of the C functions of the robot that `spec` describes."""
+        """Make the description of the state arguments that all C functions of a robot have."""
         size = spec.sizes
         if not spec.tied:
             return cls(spec.robot.name, dict.fromkeys(STATES, size["n"]), closed=False)

@@ -108,7 +108,7 @@ def grouped(regrouping: Regrouping) -> dict[str, str]:
 
 
 def one_sided_friction_that_absorbs(regrouping: Regrouping) -> list[str]:
-    """List base parameters of one-directional friction that also contain a constant force.
+    """List the base parameters that contain a friction in one direction and a constant force.
 
     D_FSP - D_FSN = 1 in motion, as for a constant force, but 0 at rest.
     """
@@ -178,7 +178,7 @@ def element_lines(robot: Robot) -> list[str]:
 
 
 def channel_lines(robot: Robot) -> list[str]:
-    """Describe which constants of the robot may be functions of time.
+    """Describe, in header lines, which constants of the robot may be functions of time.
 
     Such a constant may be a torque at a joint that the caller computes from the other parameters.
     """
@@ -350,7 +350,9 @@ def by_line(name: str, values: Mapping[str, str]) -> list[str]:
 
 
 def literal(name: str, value: Any) -> list[str]:
-    """Write Python source that assigns a value to a name, broken between entries if long."""
+    """Write Python source that assigns a value to a name; a long value is broken between its
+    entries.
+    """
     return _literal(f"{name} = ", value, "")
 
 

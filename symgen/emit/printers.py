@@ -87,7 +87,9 @@ class Language:
         return re.sub(r"\bpi\b", self.pi, text)
 
     def entries(self, targets: Sequence[str], value: str, remark: str) -> list[str]:
-        """Write the lines that assign a value to array entries, each with a remark after a tab."""
+        """Write the lines that assign a value to array entries, each line with a comment after a
+        tab.
+        """
         targets = [" = ".join(targets)] if self.chained else targets
         return [f"{self.entry.format(target, value)}\t{remark}" for target in targets]
 
@@ -209,7 +211,8 @@ class Text:
                 self.called[node.index] = self._made_of(node) or self._part_of(node, whole)
 
     def _wholes(self, outputs: Sequence[Scalar | int], labels: Sequence[str]) -> dict[int, str]:
-        """Find for each graph node the named quantity that contains the node: N16 for node N16a.
+        """Find, for each graph node, the named quantity that is computed from it, such as N16 for
+        node N16a.
 
         This is the first named quantity that uses the node, or else the first output. An unnamed
         node gets a name from it.

@@ -220,7 +220,9 @@ def _filled_at_once(
 
 
 def _passed_constants(robot: Robot, names: Sequence[str]) -> str:
-    """Write constants as arguments of a call: a tuple, and a second if some vary with time."""
+    """Write the constants that a call passes on: one tuple, and a second for those that vary with
+    time.
+    """
     timed = [c for c in names if c in robot.channels]
     rest = tuple_of([c for c in names if c not in timed])
     return f"{rest}, {tuple_of(timed)}" if timed else rest
@@ -277,7 +279,7 @@ def _loop_tables(spec: ModuleSpec, slides: bool) -> Iterator[str]:
 
 
 class Heads:
-    """Writer of the first lines of public functions: signatures with type hints."""
+    """Writer of the `def` lines of public functions, with type hints."""
 
     def __init__(self, regrouping: Regrouping) -> None:
         channels = regrouping.robot.channels
@@ -307,7 +309,10 @@ class Heads:
 
 
 def hint(kind: str) -> str:
-    """Return a type hint, in quotes if it names arrays, because arrays may be of any package."""
+    """Return a type hint as source text; the hint is in quotes if it contains the name Array.
+
+    The arrays may be of any package.
+    """
     return f'"{kind}"' if "Array" in kind else kind
 
 

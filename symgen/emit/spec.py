@@ -74,7 +74,8 @@ class Function:
         return tuple(name for name in free if name in read)
 
     def places(self, entry: Entry) -> tuple[Place, ...]:
-        """List the indices of an entry in the result array: (i, k) and (k, i) if it is symmetric.
+        """List the indices at which the result array contains an entry: (i, k), and (k, i) if it is
+        symmetric.
 
         In a model that is stored column by column the indices are reversed.
         """
@@ -185,7 +186,8 @@ class ModuleSpec:
 
     @cached_property
     def structure(self) -> tuple[tuple[bool, ...], ...]:
-        """Table of booleans structure[k][row]: whether base parameter k can act on joint `row`.
+        """Table structure[k][i]: whether base parameter k can affect the torque of the joint with
+        index i.
 
         It can act if the entry of the regressor D is not identically zero.
         """
@@ -280,11 +282,13 @@ def spec_of(robot: Robot, options: tuple[str, ...] = ()) -> ModuleSpec:
 
 
 def is_inertial(robot: Robot) -> Callable[[str], bool]:
-    """Return a function that tests whether a parameter is an inertial parameter of a link."""
+    """Return a function that tests if a name belongs to an inertial parameter of a link."""
     return inertial_names(robot).__contains__
 
 
 def is_inertial_or_actuator(robot: Robot) -> Callable[[str], bool]:
-    """Return a function that tests whether a parameter is inertial, of a link or an actuator."""
+    """Return a function that tests if a name belongs to an inertial parameter of a link or an
+    actuator.
+    """
     inertial, elements = inertial_names(robot), element_names(robot)
     return lambda own: own in inertial or elements[own][0].kind == "inertia"

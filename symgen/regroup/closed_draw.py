@@ -50,8 +50,8 @@ ON_BRANCH = 1e-6  # rad
 
 
 class ClosedDraw(Draw):
-    """Random states modulo a prime p that close the loops: `samples` states at each of `count`
-    geometries.
+    """Random joint states modulo a prime p in which the loops close: `samples` states for each of
+    `count` random geometries.
 
     `geometry` gives the values modulo p of the quantities that vary, shape (count, 1). By default
     these are all lengths; with `at_numbers`, lengths that are numbers in the robot file have their
@@ -131,7 +131,7 @@ class ClosedDraw(Draw):
         return closed
 
     def _dyad(self, rows: list[int], u: int, v: int, around: set[int]) -> Array:
-        """Solve the two closure equations of a loop for joint u and hinge v, modulo p.
+        """Solve the two closure equations of a loop for joint u and revolute joint v, modulo p.
 
         Return which samples have a solution in F_p. The equations have the form
 
@@ -161,7 +161,8 @@ class ClosedDraw(Draw):
         R[:, 1:] -= R[:, :1]
 
         def place(x: Array) -> Array:
-            """Set joint u to the half-angle tangent x, or to the stroke x if joint u slides.
+            """Set the position of joint u: x is the tangent of half its angle, or its displacement
+            if joint u is prismatic.
 
             Return y = (1, cos q_u, sin q_u), or (1, x, x**2) if u slides.
             """
@@ -172,7 +173,8 @@ class ClosedDraw(Draw):
             return np.stack([whole, *self._points[u]])
 
         def tip(y: Array) -> tuple[Point, Array]:
-            """Compute cos and sin of hinge v that close the loop, and the equations' determinant.
+            """Compute the cosine and sine of joint v that close the loop, and the determinant of
+            the two linear equations for them.
 
             The point (cos, sin) need not lie on the unit circle.
             """
@@ -212,7 +214,8 @@ class ClosedDraw(Draw):
         return np.asarray(square)
 
     def _branch(self, j: int, first: Point, second: Point, around: set[int]) -> Array:
-        """Whether the first of two solutions has the assembly mode of the robot file, per sample.
+        """Return, for each sample, whether the first of two solutions has the assembly mode of the
+        robot file.
 
         `first` and `second` are the two solutions for hinge j. The test is needed if the closure
         splits into two branches; the result has shape (samples,).
@@ -267,7 +270,9 @@ class ClosedDraw(Draw):
         self.samples = len(places)
 
     def _move(self) -> None:
-        """Compute velocities and accelerations of the dependent joints from the actuated joints."""
+        """Compute velocities and accelerations of the dependent joints from those of the actuated
+        joints, modulo p.
+        """
         joints = self.robot.joints
         n = len(joints)
         named = self.system.derivation.algebra.named

@@ -46,7 +46,8 @@ def rref(M: Array, p: int, *, reduced: bool = True) -> tuple[list[int], Array]:
 
 
 def solve_each(W: Array, p: int, rng: np.random.Generator) -> Array | None:
-    """Solve many linear systems for beta modulo p: W[g, :, -1] = W[g, :, :-1] beta[g], each g.
+    """Solve linear systems modulo p, one for each index g: W[g, :, :-1] beta[g] = W[g, :, -1] for
+    beta.
 
     Return beta, shape (G, columns - 1), or None unless all systems are consistent. Random
     combinations of the rows make pivoting unnecessary. There are three more combinations than

@@ -34,7 +34,8 @@ Relations = dict[str, dict[str, Expression]]  # {dependent: {base column: coeffi
 
 
 def float_relations(robot: Robot, names: Sequence[str]) -> tuple[tuple[str, ...], Relations]:
-    """Find the base columns of the regressor numerically, and express the other columns by them.
+    """Find the base columns of the regressor in floating point, and write the other columns as
+    combinations of base columns.
 
     `names` are the columns in order of preference. Return the base columns and {dependent column:
     {base column: coefficient}}.
@@ -49,7 +50,7 @@ def float_relations(robot: Robot, names: Sequence[str]) -> tuple[tuple[str, ...]
 
 
 def numeric_coefficients(robot: Robot, name: str, support: Sequence[str]) -> list[Expression]:
-    """Express regressor column `name` by the columns `support`, by least squares.
+    """Write regressor column `name` as a combination of the columns `support`, by least squares.
 
     Return beta in D_name = sum_k beta_k D_support,k.
     """
@@ -129,7 +130,8 @@ def sampled_columns(floats: Floats, names: Sequence[str], count: int) -> Array:
 def _columns_near_start(
     system: LoopSystem, names: Sequence[str], count: int, rng: np.random.Generator
 ) -> Array:
-    """Compute regressor columns at random states, near the start, that close the loops.
+    """Compute regressor columns at random states that close the loops, near the start
+    configuration.
 
     `count` states are tried; states that do not close are dropped. The result has shape (joints,
     states, columns).
@@ -178,7 +180,8 @@ def _in_time(robot: Robot, rng: np.random.Generator, count: int) -> Any:
 
 
 def float_base(W: Array) -> tuple[list[int], Array]:
-    """Find the independent columns of W, leftmost first, and express all columns by them.
+    """Find the independent columns of a matrix W, leftmost first, and write all columns of W as
+    combinations of these.
 
     Return the indices of the independent columns, and the coefficients, shape (rank, columns).
     """

@@ -46,7 +46,8 @@ LAST_CHOICE = ("MZ", "M", "YY")
 
 @dataclass(frozen=True)
 class BaseParameter:
-    """One base parameter: the sum X = own + sum_k coefficient_k chi_k of standard parameters.
+    """One base parameter X = own + sum_k coefficient_k chi_k: a standard parameter `own` plus a
+    combination of other standard parameters.
 
     Attributes
     ----------

@@ -92,7 +92,8 @@ class Transfer:
         return total
 
     def _move(self, source: str, image: Combination) -> None:
-        """Remove the column `source`, which equals sum_k image_k D_k of other regressor columns.
+        """Remove the regressor column `source`, which is the sum image_k D_k over other regressor
+        columns.
 
         The other columns then stand for the parameters of `source` too.
         """

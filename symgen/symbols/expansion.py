@@ -124,7 +124,8 @@ class Expansion:
         return names
 
     def _generators(self, node: Node) -> Iterable[tuple[Tree, int]]:
-        """Yield the symbols and functions of a graph node, each with its rank in printed products.
+        """Yield the symbols and functions of a graph node, each with a number for its order in
+        printed products.
 
         Constants are printed first, then positions of prismatic joints, cosines and sines, rates.
         """
@@ -240,7 +241,9 @@ class Expansion:
         return self.ring.from_dict({m: of(c) for m, c in a.items()})
 
     def _shortened(self, a: Polynomial, digits: int) -> Polynomial:
-        """Round the numbers of a polynomial to so many digits; without those that are rounding errors."""
+        """Round the numbers of a polynomial to `digits` digits, and remove terms that are only
+        rounding errors.
+        """
         largest = max((abs(n) for c in a.values() for n in c.values()), default=0)
         kept = {
             m: c.new(
@@ -302,7 +305,7 @@ class Expansion:
 
 
 def shortened(c: Fraction | int, digits: int) -> Fraction:
-    """Round a fraction to a decimal of so many digits."""
+    """Round a fraction to a decimal with `digits` significant digits."""
     decimal = Context(prec=digits).divide(Decimal(c.numerator), Decimal(c.denominator))
     return Fraction(decimal)
 

@@ -105,12 +105,12 @@ def power(a: str | Number | Call, n: int) -> Tree:
 
 
 def function(op: str, operands: list[Tree]) -> Tree:
-    """Apply a function to expressions; `op` is the name of the function in robot files."""
+    """Apply a function to SymPy expressions; `op` is the name of the function in robot files."""
     return getattr(sympy, FUNCTIONS[op].sympy)(*operands, evaluate=False)
 
 
 def formula(f: Formula) -> Tree:
-    """Write the regrouping formula of a base parameter as a SymPy expression.
+    """Convert the regrouping formula of a base parameter to a SymPy expression.
 
     Parameters with the same coefficient share it in brackets, as in eq. (27).
     """
@@ -133,7 +133,9 @@ def formula(f: Formula) -> Tree:
 
 
 def angle(letter: str, e: Expression) -> Tree:
-    """Write the cosine (letter C) or the sine (letter S) of the angle e."""
+    """Return the cosine (letter C) or the sine (letter S) of angle e in SymPy, without evaluating
+    it.
+    """
     return (sympy.cos if letter == "C" else sympy.sin)(expression(e), evaluate=False)
 
 
@@ -178,7 +180,7 @@ def rounded(c: Expression, digits: int = DIGITS) -> Expression:
 
 
 def size(x: Tree) -> int:
-    """Count the terms of an expression as written, not expanded."""
+    """Count the terms of a SymPy expression as it is written, without multiplying out products."""
     if x.is_Add:
         return sum(map(size, x.args))
     return 1 + sum(size(y) - 1 for y in x.args) if x.is_Mul else 1

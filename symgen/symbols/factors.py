@@ -120,7 +120,7 @@ class Factors:
         return number, common, c.new(rest)
 
     def _parts(self, terms: Mapping[Powers, Any], fields: Sequence[int]) -> Iterable[Coefficient]:
-        """Group the terms of a coefficient: equal powers of the variables `fields` go together.
+        """Group the terms of a coefficient by the powers of the variables `fields` in each term.
 
         Each group is a coefficient too.
         """

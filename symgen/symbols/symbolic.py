@@ -126,7 +126,8 @@ class SymbolicRobot:
     def equations(
         self, name: str, *, of: int | None = None, frame: int = 0
     ) -> tuple[list[tuple[Any, Any]], Any]:
-        """Return the recursive equations of a model, and its result in the variables they define.
+        """Return the recursive equations of a model, and the model in terms of the variables that
+        the equations define.
 
         As from `sympy.cse`, an equation is a pair (symbol, expression). The symbols have the names
         of SYMORO.

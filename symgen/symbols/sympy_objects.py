@@ -41,7 +41,8 @@ def of_model(model: SymbolicModel) -> Any:
 
 
 def of_listing(model: SymbolicModel) -> tuple[list[tuple[Any, Any]], Any]:
-    """Return a model in SymPy: recursive equations, and the result in the variables they define.
+    """Return a model in SymPy: its recursive equations, and the model in terms of the variables
+    that the equations define.
 
     As from `sympy.cse`, an equation is a pair (symbol, expression).
     """
@@ -107,7 +108,7 @@ def source_text(name: str, steps: list[tuple[Any, Any]], value: Any) -> str:
 
 
 def _written(e: Any) -> str:
-    """Print an expression; a matrix is printed row by row, without aligned columns."""
+    """Write a SymPy expression as text; a matrix is written row by row, without aligned columns."""
     if not isinstance(e, sympy.MatrixBase):
         return str(sympy.printing.sstr(e))
     rows = (f"[{', '.join(map(sympy.printing.sstr, row))}]" for row in e.tolist())
