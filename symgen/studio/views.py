@@ -30,6 +30,7 @@ from symgen.derive.loops import close
 from symgen.description.files import write_robot
 from symgen.errors import SymgenError
 from symgen.pages.figure import figure
+from symgen.studio.table import cells_of, degrees
 
 FIRST_ROWS = 5  # first ones that are shown
 NAMES_LISTED = 200  # columns that are listed
@@ -67,18 +68,16 @@ def robot(path: str, draft: str) -> dict[str, Any]:
     drawn = figure(described, close(described))
     for joint in drawn["joints"]:
         joint["label"] = described.labels.get(joint["j"], "")
-    degrees = [
-        {name: f"{np.degrees(frame[name]):.6g}°" for name in ("gamma", "alpha", "theta")}
-        for frame in drawn["frames"]
-    ]
+    own = draft or (Path(path).read_text() if path.endswith(".yaml") else "")
+    text = own or write_robot(described, "robot.yaml")[0]
     return {
-        "text": "" if path.endswith(".yaml") else write_robot(described, "robot.yaml")[0],
+        "text": text,
         "name": described.name,
         "title": described.title or described.name,
         "joints": described.joints,
         "labels": [described.labels.get(f.j, "") for f in described.frames],
         "figure": drawn,
-        "degrees": [{name: x for name, x in row.items() if x != "0°"} for row in degrees],
+        "degrees": degrees(cells_of(text)["frames"], described.constants),
         "notes": doubts(described),
     }
 
