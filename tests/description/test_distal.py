@@ -146,6 +146,22 @@ def test_faults(old, new, words):
         parse_robot(table(PUMA).replace(old, new, 1).encode(), "arm.yaml")
 
 
+def test_edits_are_those_of_the_table():
+    rows = ((0, 0.4, 0), (0, 0, 0))
+    before, turned, longer, khalil = (
+        symgen.regrouping(parse_robot(text.encode(), "arm.yaml"))
+        for text in (
+            table(rows),
+            table(((90, 0.4, 0), rows[1])),
+            table((rows[0], (0, 0.3, 0))),
+            table(rows, head=""),
+        )
+    )
+    assert symgen.base_difference(before, turned).edits == ("alpha of frame 1: 0 -> pi/2",)
+    assert symgen.base_difference(before, longer).edits == ("d of frame 2: 0 -> 0.3",)
+    assert symgen.base_difference(khalil, before).edits == ("convention: none -> distal",)
+
+
 def test_doubts_name_the_row_of_the_table():
     rows = PUMA[0], (0, 431.8, 0), *PUMA[2:]
     text = table(rows).replace("90*pi/180", "1.5708", 1)
