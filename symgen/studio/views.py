@@ -27,6 +27,7 @@ from runtime.reporting.result_files import write_all
 from runtime.reporting.series import extremes
 from symgen.derive.doubts import doubts
 from symgen.derive.loops import close
+from symgen.description import AngleWarning
 from symgen.description.files import write_robot
 from symgen.errors import SymgenError
 from symgen.pages.figure import figure
@@ -39,7 +40,7 @@ NAMES_LISTED = 200  # columns that are listed
 def answered(view: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, Any]]:
     """Wrap a function so that an error is returned as a mapping with the keys error and path.
 
-    Warnings of the library are added to the value as notes.
+    Warnings of the library are added to the value as notes; that angles were rounded is a remark.
     """
 
     @wraps(view)
@@ -51,7 +52,10 @@ def answered(view: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, Any
             except (SymgenError, InputError, OSError, MemoryError, ArithmeticError) as e:
                 text = getattr(e, "message", "") or str(e) or type(e).__name__
                 return {"error": text, "path": list(map(str, getattr(e, "path", ())))}
-        return value | {"notes": [str(w.message) for w in caught] + value.get("notes", [])}
+        said: dict[bool, list[str]] = {True: [], False: []}
+        for w in caught:
+            said[issubclass(w.category, AngleWarning)].append(str(w.message))
+        return value | {"remarks": said[True], "notes": said[False] + value.get("notes", [])}
 
     return shown
 

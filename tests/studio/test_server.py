@@ -354,6 +354,16 @@ def test_what_a_classic_table_cannot_have_is_one_sentence(
     assert (studio.path / "robot.yaml").read_text() == CLASSIC
 
 
+def test_an_angle_that_is_rounded_is_no_warning(studio: Any) -> None:
+    joint = '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
+    origin = '<origin rpy="1.5707963269 0 0"/><limit effort="1" velocity="1"/></joint>'
+    urdf = f'<robot name="arm"><link name="a"/><link name="b"/>{joint}{origin}</robot>'
+    studio.upload("robot", "arm.urdf", urdf.encode())
+    text = studio.get("robot").text
+    assert text.count("1 angle near multiples of pi/12 taken as these") == 1
+    assert re.search(r'<p class="note">[^<]*1 angle near multiples', text)
+
+
 def test_comments_after_an_edited_part_stay(studio: Any) -> None:
     studio.post("packaged", {"name": "new"})
     before = (studio.path / "robot.yaml").read_text()
