@@ -4,7 +4,7 @@
 
 // the name space of SVG, which is written as an address: whoever looks for addresses in a report finds none
 const SPACE = Object.assign(document.createElement("template"), { innerHTML: "<svg></svg>" }).content.firstChild.namespaceURI;
-const [LEFT, RIGHT, TOP, GAP, BELOW] = [60, 10, 10, 24, 42];
+const [GAP, BELOW] = [24, 42], NARROW = matchMedia("(max-width: 40rem)"); // there titles are above their panels
 
 function svgNode(tag, attributes, ...inside) {
   const made = document.createElementNS(SPACE, tag);
@@ -71,11 +71,12 @@ class Chart {
     const width = this.plot.clientWidth, [a, b] = this.group.span, t = this.t;
     if (!width) return;
     this.kept = [...t.keys()].filter((k) => t[k] === t[k] && (t[k] < a ? t[k + 1] >= a : t[k] <= b || t[k - 1] <= b)); // one more on either side
-    this.width = Math.max(40, width - LEFT - RIGHT);
+    [this.left, this.top] = NARROW.matches ? [50, GAP] : [60, 10];
+    this.width = Math.max(40, width - this.left - 10);
     this.span = this.over ? this.extent([this.across]) : [a, b];
     this.drawn = [];
-    const root = svgNode("g", { transform: `translate(${LEFT} 0)` }), places = ticks(...this.span, Math.max(2, this.width / 60));
-    let top = TOP;
+    const root = svgNode("g", { transform: `translate(${this.left} 0)` }), places = ticks(...this.span, Math.max(2, this.width / 60));
+    let top = this.top;
     for (const [k, panel] of this.panels.entries()) {
       this.panel(root, panel, top, k ? 84 : 170, places);
       top += (k ? 84 : 170) + GAP;
@@ -99,8 +100,8 @@ class Chart {
       root.append(svgNode("text", { x: -6, y: top + y(value) + 4, "text-anchor": "end" }, label));
     }
     for (const { kind, values } of lines) inside.append(svgNode("path", { class: `line ${kind}`, d: this.path(values, y) }));
-    const middle = top + height / 2;
-    root.append(inside, svgNode("text", { "text-anchor": "middle", transform: `translate(-48 ${middle}) rotate(-90)` }, titled(panel.title, panel.unit)));
+    const place = NARROW.matches ? { y: top - 8 } : { "text-anchor": "middle", transform: `translate(-48 ${top + height / 2}) rotate(-90)` };
+    root.append(inside, svgNode("text", place, titled(panel.title, panel.unit)));
     this.drawn.push({ lines, unit: panel.unit, digits: Math.max(0, Math.min(12, 4 - Math.floor(Math.log10(high - low)))), y: (value) => top + y(value) });
   }
 
@@ -121,7 +122,7 @@ class Chart {
   /** Time under a pointer, s. */
   time(event) {
     const [a, b] = this.group.span, x = event.clientX - this.plot.getBoundingClientRect().left - this.plot.clientLeft;
-    return a + (b - a) * Math.max(0, Math.min(1, (x - LEFT) / this.width));
+    return a + (b - a) * Math.max(0, Math.min(1, (x - this.left) / this.width));
   }
 
   /** The pointer moves the cursor, and chooses a span of time by a drag. */
@@ -136,7 +137,7 @@ class Chart {
     this.plot.addEventListener("pointermove", (event) => {
       const now = this.time(event);
       this.group.moved(now);
-      if (start !== null) this.marks.append(svgNode("rect", { class: "chosen", x: Math.min(this.x(start), this.x(now)), width: Math.abs(this.x(now) - this.x(start)), y: TOP, height: this.bottom - TOP }));
+      if (start !== null) this.marks.append(svgNode("rect", { class: "chosen", x: Math.min(this.x(start), this.x(now)), width: Math.abs(this.x(now) - this.x(start)), y: this.top, height: this.bottom - this.top }));
     });
     this.plot.addEventListener("pointerup", (event) => {
       const end = this.time(event), from = start;
@@ -169,7 +170,7 @@ class Chart {
   mark() {
     if (this.k === undefined || !this.marks) return;
     const k = this.k, x = this.x(this.across[k]), { unit } = this.group, known = (value) => value === value, said = [];
-    this.marks.replaceChildren(...(known(x) ? [svgNode("line", { class: "cursor", x1: x, x2: x, y1: TOP, y2: this.bottom })] : []));
+    this.marks.replaceChildren(...(known(x) ? [svgNode("line", { class: "cursor", x1: x, x2: x, y1: this.top, y2: this.bottom })] : []));
     for (const { lines, unit, digits, y } of this.drawn.filter(({ lines }) => lines.length)) {
       for (const { values } of lines) if (known(x + values[k])) this.marks.append(svgNode("circle", { class: "cursor", r: 3, cx: x, cy: y(values[k]) }));
       const numbers = lines.map(({ name, values }) => `${name} ${known(values[k]) ? minus(values[k].toFixed(digits)) : "–"}`);

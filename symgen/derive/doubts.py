@@ -50,7 +50,7 @@ def nearly_round(robot: Robot, within: float = CLOSE) -> list[str]:
             if k is not None:
                 meant = PI * Fraction(k, 12)
                 notes.append(
-                    f"frame {f.j}: {name} has {angle}, not {meant}: "
+                    f"frame {robot.row(f.j, name)}: {name} has {angle}, not {meant}: "
                     f"another robot, with other formulas; if {meant} is meant, write it (in a URDF "
                     "or MJCF the angles or offsets that give it)"
                 )
@@ -72,8 +72,8 @@ def other_units(robot: Robot) -> list[str]:
     for (j, name), length in lengths.items():
         if length > LONGEST or (length > 1 and length > LOPSIDED * (total - length) > 0):
             notes.append(
-                f"frame {j}: {name.removesuffix('0')} holds a length of {length:g} m; lengths are "
-                "in m, not mm"
+                f"frame {robot.row(j, name)}: {name.removesuffix('0')} holds a length of {length:g} m; "
+                "lengths are in m, not mm"
             )
     turning = [k for k, j in enumerate(robot.joints) if robot.frame(j).sigma == REVOLUTE]
     zeros = robot.drives.offset if robot.drives else ()

@@ -138,13 +138,14 @@ def _check_geometry(robot: Any) -> None:
         _check_expression(component, ("gravity", k), constants)
     for f in robot.frames:
         for name in GEOMETRY:
-            where = ("frames", f.j, name)
+            row = robot.row(f.j, name)
+            where = ("frames", row, name)
             e: Expression = getattr(f, name)
             variable = (name, f.sigma) in {("theta", REVOLUTE), ("r", PRISMATIC)}
             if variable and (e.coefficient(f.q) != ONE or moves(e - Expression.symbol(f.q))):
                 raise DescriptionError(
                     (
-                        f"frame {f.j}: {name} = {e}; expected {f.q} once, as {f.q} or {f.q} + "
+                        f"frame {row}: {name} = {e}; expected {f.q} once, as {f.q} or {f.q} + "
                         f"constant{_other_sigma(f)}"
                     ),
                     path=where,
@@ -152,7 +153,7 @@ def _check_geometry(robot: Any) -> None:
             if not variable and moves(e):
                 raise DescriptionError(
                     (
-                        f"frame {f.j}: {name} = {e}; write the joint position in theta if sigma is "
+                        f"frame {row}: {name} = {e}; write the joint position in theta if sigma is "
                         "0, in r if sigma is 1, and nowhere else"
                     ),
                     path=where,
@@ -161,7 +162,7 @@ def _check_geometry(robot: Any) -> None:
             if name in ANGLES and (
                 advice := degrees_advice(f.theta0 if name == "theta" else e, dict(constants))
             ):
-                raise DescriptionError(f"frame {f.j}: {name} = {e}: {advice}", path=where)
+                raise DescriptionError(f"frame {row}: {name} = {e}: {advice}", path=where)
 
 
 def _check_expression(

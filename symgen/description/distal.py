@@ -33,7 +33,7 @@ def khalil_frames(frames: tuple[Frame, ...]) -> tuple[Frame, ...]:
             if getattr(f, key):
                 raise DescriptionError(
                     f"frame {f.j}: {key} is not part of the distal convention; leave {key} out",
-                    path=("frames", f.j, key),
+                    path=(f.j, key),
                 )
     distal = {f.j: {"alpha": f.alpha, "d": f.d} for f in frames}
     base = {"alpha": ZERO, "d": ZERO}

@@ -24,7 +24,8 @@ constants: {{D2: 0.5, g: 9.81}}      # SI and rad; they stay symbols in all form
 
 # One row per frame, modified Denavit-Hartenberg (Khalil and Kleinfinger 1986), from `ant` to j:
 #     Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r)
-# gamma and b are 0 if left out.
+# gamma and b are 0 if left out. With `convention: distal`, classic Denavit-Hartenberg instead:
+#     Rot(z, theta) Trans(z, r) Trans(x, d) Rot(x, alpha)
 # sigma: 0 revolute (theta: q1, or q1 + constant), 1 prismatic (r: q1), 2 fixed.
 frames:
   1: {{ant: 0, sigma: 0, alpha: 0, d: 0,  theta: q1, r: 0}}

@@ -213,6 +213,7 @@ class Robot:
     angles: Annotated[str, *UNWRITTEN] = ""  # how those of a foreign file were read
     # of links whose inertia no body can have: the frame, and what is wrong
     impossible: Annotated[tuple[tuple[int, str], ...], *UNWRITTEN] = ()
+    distal: Annotated[int, *UNWRITTEN] = 0  # rows of a classic table in the file; 0: Khalil's
     file: Annotated[str, *UNWRITTEN] = ""
     sha256: Annotated[str, *UNWRITTEN] = ""
 
@@ -257,6 +258,13 @@ class Robot:
     def frame(self, j: int) -> Frame:
         """Return the frame with the number j."""
         return self._by_number[j]
+
+    def row(self, j: int, name: str) -> int:
+        """Return the row of the file's table that has the entry `name` of frame j.
+
+        In a classic (distal) table, alpha and d of a frame are in the row of its antecedent.
+        """
+        return self.frame(j).ant if self.distal and name in ("alpha", "d") else j
 
     @cached_property
     def _by_number(self) -> dict[int, Frame]:

@@ -56,6 +56,7 @@ def robot_of(data: Mapping[str, Any], file: str, sha256: str) -> Robot:
             "loops: a distal table cannot describe closed loops; write the table in Khalil's convention",
             path=("loops",),
         )
+    data = {"distal": Given(len(rows) * distal), **data}
     declared = Declared(frozenset(constants), frozenset(joints.union(constants)), len(rows), distal)
     try:
         robot = TypeAdapter(Robot).validate_python(data, context=declared)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from symgen.derive.regressor import inertial_names
-from symgen.description.expression import ONE
+from symgen.description.expression import ONE, ZERO
 from symgen.description.fields import Path, dotted
 from symgen.description.robot import PRISMATIC, REVOLUTE, Robot
 from symgen.description.yaml import flow, tables_of
@@ -158,12 +158,27 @@ def base_difference(before: Regrouping, after: Regrouping) -> BaseDifference:
 
 
 def _edits(before: Robot, after: Robot) -> Iterator[str]:
-    old, new = (_leaves(tables_of(robot)) for robot in (before, after))
+    old, new = (_leaves(_written(robot)) for robot in (before, after))
     for path in {**old, **new}:
         if old.get(path) != new.get(path) and path[0] not in WITHOUT_EFFECT:
             of_frame = path[0] == "frames" and len(path) == 3
             place = f"{path[2]} of frame {path[1]}" if of_frame else dotted(path)
             yield f"{place}: {old.get(path, 'none')} -> {new.get(path, 'none')}"
+
+
+def _written(robot: Robot) -> dict[str, Any]:
+    """Return the data of a robot file by key, with a classic (distal) table as in the file."""
+    tables = tables_of(robot)
+    if not robot.distal:
+        return tables
+    rows = {
+        j: {**tables["frames"][j], "alpha": ZERO, "d": ZERO} for j in range(1, robot.distal + 1)
+    }
+    for f in robot.frames:
+        if f.ant:
+            rows[f.ant] |= {"alpha": f.alpha, "d": f.d}
+    massless = [j for j in tables["massless"] if j in rows]
+    return tables | {"convention": "distal", "frames": rows, "massless": massless}
 
 
 def _leaves(table: Any, path: Path = ()) -> dict[Path, str]:

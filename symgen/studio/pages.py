@@ -129,7 +129,7 @@ class Pages:
             shown=shown,
             place=".".join(shown.get("path", [])[:3]),
             cells=cells if shown.get("text") else None,
-            columns=table.TABLE_COLUMNS,
+            columns=table.columns_of(cells) if cells else [],
             units=table.UNITS_OF_CELLS,
             left_out=self.server.left_out,
             digest=folder.digest,

@@ -7,18 +7,25 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
+
+import numpy as np
 
 from runtime.documents.yaml_text import yaml_values
 from symgen.description import parse_robot
+from symgen.description.grammar import parse
 from symgen.errors import DescriptionError
 
-TABLE_COLUMNS = ("ant", "sigma", "mu", "gamma", "b", "alpha", "d", "theta", "r")
+TABLE_COLUMNS = {  # keys of a row in the order of the page, by convention
+    "proximal": ("ant", "sigma", "mu", "gamma", "b", "alpha", "d", "theta", "r"),
+    "distal": ("ant", "sigma", "mu", "d", "alpha", "r", "theta", "gamma", "b"),
+}
 UNITS_OF_CELLS = {"gamma": "rad", "alpha": "rad", "theta": "rad", "b": "m", "d": "m", "r": "m"}
 EDITED: dict[str, Any] = {
     "name": "",
     "title": "",
+    "convention": "proximal",
     "frames": {},
     "constants": {},
     "gravity": ["0", "0", "-g"],
@@ -32,14 +39,14 @@ CELL = 200  # characters of a cell
 
 
 def cells_of(text: str) -> dict[str, Any]:
-    """Return name, title, frames, constants, gravity and loops of a robot file as texts.
+    """Return name, title, convention, frames, constants, gravity and loops of a robot file as texts.
 
     Values that are not valid for a robot are accepted too.
 
     Returns
     -------
     dict
-        name, title : text; frames : {number: {column: text}}; constants : {name: text};
+        name, title, convention : text; frames : {number: {column: text}}; constants : {name: text};
         gravity : list of text; loops : list of {cut, twin}.
     """
     values = yaml_values(text, file="robot.yaml")[0]
@@ -58,6 +65,29 @@ def _texts(x: Any) -> Any:
     if isinstance(x, list):
         return [_texts(value) for value in x]
     return "" if x is None else str(x)
+
+
+def columns_of(cells: Mapping[str, Any]) -> list[str]:
+    """Return the columns of a table; a classic (distal) one has gamma and b only if they are typed."""
+    convention = cells["convention"]
+    typed = {column for row in cells["frames"].values() for column in row}
+    return [
+        column
+        for column in TABLE_COLUMNS.get(convention, TABLE_COLUMNS["proximal"])
+        if convention != "distal" or column not in ("gamma", "b") or column in typed
+    ]
+
+
+def degrees(
+    frames: Mapping[str, Mapping[str, str]], constants: Mapping[str, float]
+) -> dict[str, dict[str, str]]:
+    """Convert the angles of a valid table, for q = 0, to degrees as texts by frame and column."""
+    values = {f"q{j}": 0.0 for j in frames} | dict(constants)
+    angles = [c for c, unit in UNITS_OF_CELLS.items() if unit == "rad"]
+    return {
+        j: {c: f"{np.degrees(parse(row[c]).value(values)):.6g}°" for c in angles if c in row}
+        for j, row in frames.items()
+    }
 
 
 def with_cells(text: str, asked: str) -> str:
@@ -80,6 +110,7 @@ def with_cells(text: str, asked: str) -> str:
             key: f"{key}: {_quoted(cells[key])}\n" if cells[key] else ""
             for key in ("name", "title")
         },
+        "convention": "convention: distal\n" * (cells["convention"] == "distal"),
         "gravity": f"gravity: [{gravity}]\n",
         "constants": f"constants: {constants}\n",
         "frames": "\n".join(["frames:", *frames, ""]),

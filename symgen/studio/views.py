@@ -27,9 +27,11 @@ from runtime.reporting.result_files import write_all
 from runtime.reporting.series import extremes
 from symgen.derive.doubts import doubts
 from symgen.derive.loops import close
+from symgen.description import AngleWarning
 from symgen.description.files import write_robot
 from symgen.errors import SymgenError
 from symgen.pages.figure import figure
+from symgen.studio.table import cells_of, degrees
 
 FIRST_ROWS = 5  # first ones that are shown
 NAMES_LISTED = 200  # columns that are listed
@@ -38,7 +40,7 @@ NAMES_LISTED = 200  # columns that are listed
 def answered(view: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, Any]]:
     """Wrap a function so that an error is returned as a mapping with the keys error and path.
 
-    Warnings of the library are added to the value as notes.
+    Warnings of the library are added to the value as notes; that angles were rounded is a remark.
     """
 
     @wraps(view)
@@ -50,7 +52,10 @@ def answered(view: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, Any
             except (SymgenError, InputError, OSError, MemoryError, ArithmeticError) as e:
                 text = getattr(e, "message", "") or str(e) or type(e).__name__
                 return {"error": text, "path": list(map(str, getattr(e, "path", ())))}
-        return value | {"notes": [str(w.message) for w in caught] + value.get("notes", [])}
+        said: dict[bool, list[str]] = {True: [], False: []}
+        for w in caught:
+            said[issubclass(w.category, AngleWarning)].append(str(w.message))
+        return value | {"remarks": said[True], "notes": said[False] + value.get("notes", [])}
 
     return shown
 
@@ -67,18 +72,16 @@ def robot(path: str, draft: str) -> dict[str, Any]:
     drawn = figure(described, close(described))
     for joint in drawn["joints"]:
         joint["label"] = described.labels.get(joint["j"], "")
-    degrees = [
-        {name: f"{np.degrees(frame[name]):.6g}°" for name in ("gamma", "alpha", "theta")}
-        for frame in drawn["frames"]
-    ]
+    own = draft or (Path(path).read_text() if path.endswith(".yaml") else "")
+    text = own or write_robot(described, "robot.yaml")[0]
     return {
-        "text": "" if path.endswith(".yaml") else write_robot(described, "robot.yaml")[0],
+        "text": text,
         "name": described.name,
         "title": described.title or described.name,
         "joints": described.joints,
         "labels": [described.labels.get(f.j, "") for f in described.frames],
         "figure": drawn,
-        "degrees": [{name: x for name, x in row.items() if x != "0°"} for row in degrees],
+        "degrees": degrees(cells_of(text)["frames"], described.constants),
         "notes": doubts(described),
     }
 

@@ -8,6 +8,7 @@ import pytest
 import symgen
 from oracles.pinocchio_model import PinocchioModel
 from oracles.random_robots import random_parameters
+from symgen.derive.doubts import doubts
 from symgen.derive.lagrange import Lagrange
 from symgen.description import parse_robot, write_yaml
 from symgen.errors import DescriptionError
@@ -130,7 +131,12 @@ def test_branches_start_at_the_far_end():
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("alpha: 90", "gamma: 1, alpha: 90", "gamma is not part of the distal"),
+        ("alpha: 90*pi/180", "alpha: 90", "^frame 1: alpha = 90: 90 rad are 14.3 turns"),
+        (
+            "alpha: 90",
+            "gamma: 1, alpha: 90",
+            "^frames.1.gamma: frame 1: gamma is not part of the distal",
+        ),
         ("convention: distal", "convention: classic", "'classic'; expected proximal or distal"),
         ("convention: distal", "convention: distal\nloops: [{cut: 2, twin: 3}]", "distal table"),
     ],
@@ -138,6 +144,30 @@ def test_branches_start_at_the_far_end():
 def test_faults(old, new, words):
     with pytest.raises(DescriptionError, match=words):
         parse_robot(table(PUMA).replace(old, new, 1).encode(), "arm.yaml")
+
+
+def test_edits_are_those_of_the_table():
+    rows = ((0, 0.4, 0), (0, 0, 0))
+    before, turned, longer, khalil = (
+        symgen.regrouping(parse_robot(text.encode(), "arm.yaml"))
+        for text in (
+            table(rows),
+            table(((90, 0.4, 0), rows[1])),
+            table((rows[0], (0, 0.3, 0))),
+            table(rows, head=""),
+        )
+    )
+    assert symgen.base_difference(before, turned).edits == ("alpha of frame 1: 0 -> pi/2",)
+    assert symgen.base_difference(before, longer).edits == ("d of frame 2: 0 -> 0.3",)
+    assert symgen.base_difference(khalil, before).edits == ("convention: none -> distal",)
+
+
+def test_doubts_name_the_row_of_the_table():
+    rows = PUMA[0], (0, 431.8, 0), *PUMA[2:]
+    text = table(rows).replace("90*pi/180", "1.5708", 1)
+    angle, length = doubts(parse_robot(text.encode(), "arm.yaml"))
+    assert angle.startswith("frame 1: alpha has 1.5708, not pi/2")
+    assert length.startswith("frame 2: d holds a length of 431.8 m")
 
 
 def energies(rows, values, q, gravity):

@@ -18,6 +18,7 @@ from symgen.description.yaml import write_yaml
 READ_FROM_OTHERS = (
     "angles",
     "impossible",
+    "distal",
     "file",
     "sha256",
 )  # of the file that was read, no keys of it

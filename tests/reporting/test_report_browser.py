@@ -323,6 +323,20 @@ def test_formula_opens_by_key(shown):
     assert shown.run("document.querySelector('details').open")
 
 
+def test_a_figure_on_a_phone_is_as_wide_as_the_page(browser, page):
+    """Its panels take four fifths of the page, and no label is cut."""
+    browser.open(page, 390)
+    lefts = (
+        "[...document.querySelectorAll('.plot text')].map((n) => n.getBoundingClientRect().left)"
+    )
+    assert min(browser.run(lefts)) >= 0
+    panels = (
+        "[...document.querySelectorAll('.plot > svg > g > svg')].map((n) => n.width.baseVal.value)"
+    )
+    assert min(browser.run(panels)) >= 0.8 * 390
+    assert browser.run("document.documentElement.scrollWidth") <= 390
+
+
 def test_targets_of_a_finger(browser, page):
     """At least 24 by 24 (WCAG 2.2 AA); buttons 44."""
     browser.open(page, 390)

@@ -234,6 +234,69 @@ def test_name_and_title_are_fields_of_the_table(page: Browser, running: Callable
     quiet(page)
 
 
+PUMA = (  # classic: a, alpha, d; m and rad
+    ("0", "pi/2", "0"),
+    ("0.4318", "0", "0"),
+    ("0.0203", "-pi/2", "0.15005"),
+)
+
+
+def test_a_classic_table_of_a_textbook_is_typed(page: Browser, running: Callable[..., Any]) -> None:
+    """Typed cell by cell, its formulas are those of the same arm in a table of Khalil's; its cells
+    keep their texts. A loop, which a classic table cannot have, is one sentence.
+    """
+    studio = running()
+    file = studio.work / "robot.yaml"
+    go(page, studio.address + "robot")
+    page.click("button[value='new']")
+    until(page, "!!document.getElementById('f-2-d')")
+    page.click("#cells > .row > [data-act^='add']")
+    until(page, "!!document.getElementById('f-3-d')")
+    heads = "[...document.querySelectorAll('.cells thead th')].map((n) => n.textContent)"
+    assert page.run(heads)[7:10] == ["d, m", "θ, rad", "r, m"]
+    page.run("document.getElementById('r-convention').focus()")
+    page.press("ArrowDown")
+    until(page, "!document.getElementById('f-1-gamma')")
+    assert page.run("document.activeElement.id") == "r-convention"
+    assert page.run(heads)[1:8] == ["ant", "σ", "μ", "a, mfile: d", "α, rad", "d, mfile: r", "θ, rad"]  # fmt: skip
+    for j, texts in enumerate(PUMA, start=1):
+        for column, text in zip(("d", "alpha", "r"), texts, strict=True):
+            page.run(f"document.getElementById('f-{j}-{column}').focus()")
+            type_in(page, f"f-{j}-{column}", text)
+    wait_for(lambda: "0.15005" in file.read_text())
+    until(page, "document.getElementById('f-3-alpha').parentNode.textContent.includes('-90°')")
+    proved(page)
+
+    khalil = symgen.load_robot(file)
+    assert "\nconvention: distal" in file.read_text() and len(khalil.frames) == 4
+    alpha, d, r = ([str(getattr(f, name)) for f in khalil.frames] for name in ("alpha", "d", "r"))
+    assert alpha == ["0", "pi/2", "0", "-pi/2"] and r == ["0", "0", "0.15005", "0"]
+    assert d == ["0", "0", "0.4318", "0.0203"]
+    drawn = json.loads(page.run("document.querySelector('#figure').dataset.figure"))
+    assert [f["d"] for f in drawn["frames"]] == [0, 0, 0.4318, 0.0203]
+
+    page.run("document.querySelector('[data-act=loop]').click()")  # the table may move
+    until(page, "document.querySelector('#table .no')?.textContent.includes('closed loops')")
+    assert page.run("document.querySelectorAll('#table [role=alert]').length") == 1
+    page.run("document.querySelector('[data-act^=unloop]').click()")
+    until(page, "!document.querySelector('#table .no')")
+    typed = page.run("document.getElementById('f-2-d').value")
+    page.run("document.getElementById('r-convention').focus()")
+    page.press("ArrowUp")
+    until(page, "!!document.getElementById('f-1-gamma')")
+    assert page.run("document.getElementById('f-2-d').value") == typed == "0.4318"
+    assert "\nconvention" not in file.read_text() and symgen.load_robot(file) != khalil
+    page.run("window.left = true")
+    page.click("#undo")
+    until(page, "!window.left && document.readyState === 'complete'")
+    assert page.run("document.getElementById('r-convention').value") == "distal"
+    assert symgen.load_robot(file) == khalil
+    assert page.run(WEAK_CONTRAST) == []
+    page.resize(390, 800)
+    assert page.run("document.documentElement.scrollWidth") <= 390
+    quiet(page)
+
+
 COPIED = """navigator.clipboard.writeText = async (text) => { window.copied = text; }"""
 
 

@@ -7,6 +7,7 @@ import gc
 import gzip
 import io
 import json
+import re
 import sys
 import threading
 import warnings
@@ -296,6 +297,71 @@ def test_an_edit_changes_its_line_alone(studio: Any) -> None:
         symgen.load_robot(studio.path / "robot.yaml").frames[1].alpha
         == symgen.load_robot("tx40").frames[3].alpha
     )
+
+
+CLASSIC = """\
+symgen: 1
+name: arm
+gravity: [0, -9.81, 0]
+frames:
+  1: {ant: 0, sigma: 0, alpha: 0, d: 0.4, theta: q1, r: 0}   # as in the textbook
+  2: {ant: 1, sigma: 0, alpha: 0, d: 0.3, theta: q2 + pi/6, r: 0}
+values: {M1: 3, MX1: -0.6, M2: 2, MX2: -0.3}
+"""
+
+
+def test_the_convention_changes_how_a_table_is_read(studio: Any) -> None:
+    """Bars of 3 and 2 kg, of 0.4 and 0.3 m, whose middles are behind the frames of a classic table."""
+    studio.upload("robot", "arm.yaml", CLASSIC.encode())
+    file = studio.path / "robot.yaml"
+    answer = edited(studio, lambda cells: cells.update(convention="distal"))
+    assert file.read_text() == CLASSIC + "convention: distal\n"
+    assert 'aria-label="a of frame 1, m"' in answer.text and "of frame 3" not in answer.text
+    model = symgen.model(file)
+    standard = dict.fromkeys(model.STANDARD_PARAMETERS, 0.0) | model.VALUES
+    torques = model.gravity(np.array([0, -np.pi / 6]), model.base_parameters(standard))
+    by_hand = 9.81 * np.array([3 * 0.2 + 2 * (0.4 + 0.15), 2 * 0.15])
+    np.testing.assert_allclose(torques, by_hand)
+    edited(studio, lambda cells: cells["frames"]["2"].update(alpha="pi/2"))
+    assert "convention: distal" in file.read_text()
+    answer = edited(studio, lambda cells: cells["frames"]["1"].update(alpha="-pi/2"))
+    angles = re.findall(r'id="f-(.-.*?)".*\n<span class="deg">(.*?)<', answer.text)
+    assert angles == [("1-alpha", "-90°"), ("2-alpha", "90°"), ("2-theta", "30°")]
+    for _ in range(2):
+        studio.post("undo", {"digest": studio.server.folder.digest})
+    assert file.read_text() == CLASSIC + "convention: distal\n"
+    edited(studio, lambda cells: cells.update(convention="proximal"))
+    assert file.read_text() == CLASSIC
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place"),
+    [
+        ("values:", "loops: [{cut: 1, twin: 2}]\nvalues:", ""),
+        ("ant: 1", "ant: 1, gamma: 1", 'id="wrong-2">'),
+        ("convention: distal", "convention: classic", 'id="wrong-convention">'),
+    ],
+)
+def test_what_a_classic_table_cannot_have_is_one_sentence(
+    studio: Any, old: str, new: str, place: str
+) -> None:
+    studio.upload("robot", "arm.yaml", CLASSIC.encode())
+    text = (CLASSIC + "convention: distal\n").replace(old, new)
+    answer = studio.post("edit", {"digest": studio.server.folder.digest, "text": text})
+    wrong = table.wrong(text)
+    assert wrong is not None
+    assert answer.text.count(place + wrong.message.replace("'", "&#39;")) == 1, answer.text
+    assert (studio.path / "robot.yaml").read_text() == CLASSIC
+
+
+def test_an_angle_that_is_rounded_is_no_warning(studio: Any) -> None:
+    joint = '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
+    origin = '<origin rpy="1.5707963269 0 0"/><limit effort="1" velocity="1"/></joint>'
+    urdf = f'<robot name="arm"><link name="a"/><link name="b"/>{joint}{origin}</robot>'
+    studio.upload("robot", "arm.urdf", urdf.encode())
+    text = studio.get("robot").text
+    assert text.count("1 angle near multiples of pi/12 taken as these") == 1
+    assert re.search(r'<p class="note">[^<]*1 angle near multiples', text)
 
 
 def test_comments_after_an_edited_part_stay(studio: Any) -> None:

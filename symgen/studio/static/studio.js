@@ -194,7 +194,7 @@ const one = (selector, of = document) => of.querySelector(selector), all = (sele
     while (waiting.length) {
       const [act, j] = waiting.shift(), table = act ? changed(cells(), act, j) : cells();
       const values = { digest: one("#cells").dataset.digest, cells: JSON.stringify(table), ...(act && !act.endsWith("loop") ? { resized: "1" } : {}) };
-      sent = act === "remove" ? {} : Object.fromEntries(all("#cells input").map((input) => [input.id, input.value]));
+      sent = act === "remove" ? {} : Object.fromEntries(all("#cells [data-cell]").map((input) => [input.id, input.value]));
       await htmx.ajax("POST", "do/edit", { target: "#table", swap: "outerHTML", values }).catch(() => {}); // told by htmx:sendError
     }
     busy = moving = false;
@@ -231,14 +231,14 @@ const one = (selector, of = document) => of.querySelector(selector), all = (sele
   let typed = [];
   document.addEventListener("htmx:beforeSwap", ({ detail }) => {
     if (detail.isError) detail.swapOverride = "innerHTML"; // the box of messages stays, however the request would swap
-    typed = all("#cells input").filter(({ id, value }) => id in sent && value !== sent[id]);
+    typed = all("#cells [data-cell]").filter(({ id, value }) => id in sent && value !== sent[id]);
   });
   document.addEventListener("htmx:afterSwap", () => { // at once: a key pressed before it settles is of the new field
     for (const { id, value, selectionStart } of typed) {
       const field = document.getElementById(id);
       if (!field || field.value === value) continue;
       field.value = value;
-      if (field === document.activeElement) field.setSelectionRange(selectionStart, selectionStart);
+      if (field === document.activeElement) field.setSelectionRange?.(selectionStart, selectionStart);
       field.dispatchEvent(new Event("input", { bubbles: true }));
     }
   });
