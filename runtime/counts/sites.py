@@ -87,7 +87,7 @@ class SearchStart(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """The motion estimated from the counts of one encoder, in steps from the count `origin`.
+    """The motion of one encoder, estimated from its counts, in steps from the count `origin`.
 
     said : sentence about the errors of the counts, or empty.
     """
@@ -198,7 +198,7 @@ class Counts:
         return boxes, read
 
     def liveliest(self) -> Counts:
-        """Extract the stretch of LIVELIEST samples in which the count changes most often."""
+        """Extract the LIVELIEST consecutive samples in which the count changes most often."""
         changed = np.zeros(len(self.y))
         changed[self.measured[1:]] = np.diff(self.y[self.measured]) != 0
         total = np.cumsum(changed)
@@ -303,7 +303,7 @@ class Counts:
         return replace(self, y=y)
 
     def leaps(self) -> list[tuple[int, int]]:
-        """Find single changes of the count that are too large for a motion.
+        """Find single changes of the count that are too large for a smooth motion of the encoder.
 
         Returns the sample and the number of counts of each. The change differs from a parabola
         through its neighbours by more than LEAP times as much as these do.

@@ -43,9 +43,10 @@ CONDITION = 1e-9
 
 
 class Basis:
-    """Cubic splines over N samples of sampling period Ts, with a knot every m samples.
+    """Cubic B-splines that represent a position at N samples, with a knot every m samples.
 
-    Samples are padded to whole intervals: M intervals, m M samples, P = M + 3 coefficients.
+    The sampling period is Ts. Samples are padded to whole intervals: M intervals, m M samples, P =
+    M + 3 coefficients.
 
     values : (B, B', B'') at the m samples of an interval, shape (m, 4) each.
     """
@@ -75,7 +76,7 @@ class Basis:
 
     @property
     def least_density(self) -> float:
-        """Least jerk density with which the precision matrix A can be factored in double precision.
+        """Smallest spectral density of the jerk for which the precision matrix A can be factored.
 
         A is that of the spline coefficients. Unit: steps^2/s^5.
 

@@ -190,7 +190,7 @@ def weights_of(
 
 
 def criterion_of(weights: Weights, observation: Observation, criterion: str) -> float:
-    """Compute the criterion of a motion, such as cond(W), from its matrix W; smaller is better.
+    """Compute the criterion that the search minimises, such as cond(W), from the W of one motion.
 
     The value is exact: W has the rows that the identification will use.
     """

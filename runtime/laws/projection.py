@@ -119,9 +119,9 @@ class LawProblem:
 
 
 class Projection:
-    """Least-squares problem of the nonlinear constants alone, on a subset of rows: X is eliminated.
+    """Least-squares problem in the nonlinear constants only: X is optimal for given constants.
 
-    Each row is divided by its scale.
+    A subset of the rows is used; each row is divided by its scale.
     """
 
     def __init__(self, problem: LawProblem, rows: Array, scale: Array) -> None:

@@ -162,7 +162,7 @@ class Loop:
         return self.closed.measured()
 
     def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
-        """Store the closed loop with a system Y = W X + rho computed from perturbed positions.
+        """Add the closed loop with perturbed positions to the system Y = W X + rho made from them.
 
         positions : shape (N, n) per record.
         """
@@ -178,11 +178,11 @@ class Loop:
         )
 
     def rows(self, level: Level, draw: tuple[int, ...]) -> Observation:
-        """Simulate a record with the encoder step of `level`; build its system Y = W X + rho."""
+        """Simulate a record with the encoder step of a study level; build its Y = W X + rho."""
         return self.simulated(level, draw).measured()
 
     def simulated(self, level: Level, draw: tuple[int, ...]) -> ClosedLoop:
-        """Return the control loop that simulates a record with the encoder step of `level`.
+        """Return the control loop that simulates a record with the encoder step of a study level.
 
         If the step level.delta is 0, the encoder is that of the study. draw : numbers of the run;
         the last sets its seed.

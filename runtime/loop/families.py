@@ -214,7 +214,7 @@ class Polyline(Family):
         raise NotImplementedError
 
     def stride(self, speed: float) -> float:
-        """Return the largest distance, rad or m, between successive positions of a random draw."""
+        """Return the largest distance of two successive positions in a random motion, rad or m."""
         raise NotImplementedError
 
     @property

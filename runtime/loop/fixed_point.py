@@ -87,7 +87,7 @@ class Fixed:
 
 
 def full(names: Sequence[str], X: Array, every: Sequence[str]) -> Array:
-    """Extend X, given for the parameters `names`, to all base parameters; the rest are zero."""
+    """Extend the parameters X, called `names`, to all base parameters; missing ones become zero."""
     by_name = dict(zip(names, X, strict=True))
     return np.array([by_name.get(name, 0.0) for name in every])
 

@@ -32,7 +32,8 @@ class SimulationError(InputError):
 
 @dataclass(frozen=True, eq=False)
 class Simulation(Result):
-    """Signals of one closed-loop simulation at N recorded samples: (N, n), joint side, SI.
+    """Signals of one closed-loop simulation at N recorded samples, on the joint side, in SI units.
+    Arrays without a given shape have the shape (N, n).
 
     Attributes
     ----------

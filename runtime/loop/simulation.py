@@ -45,7 +45,7 @@ BLOCK = 250  # ticks in one call
 
 
 class Simulator:
-    """The closed loop of one robot and one controller, ready for many runs.
+    """Simulator of the closed loop of one robot and one controller; it can run many times.
 
     Parameters
     ----------

@@ -399,7 +399,10 @@ def prior_text(physical: PhysicalModel, options: FeasibleOptions, weight: float)
 
 
 def part_factor(part: Observation, system: System) -> Factor:
-    """Compute the QR factor of a part of the record, with the joint weights of the whole record."""
+    """Compute the QR factor of [W Y] of a part of the record, weighted as the whole record.
+
+    The weights of the joints are those of the whole record.
+    """
     chosen = part.columns(system.names)
     return factor(chosen.W, chosen.Y, chosen.rows, chosen.names).weighted(
         1 / np.array(system.scales)

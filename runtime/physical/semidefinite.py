@@ -148,7 +148,7 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
-    """Result of a semidefinite program.
+    """Result of a semidefinite program: standard parameters, and the status of the solver.
 
     Attributes
     ----------
