@@ -72,7 +72,8 @@ class OwnEncoder:
 def own_encoder(record: Record, study: Study, drives: Drives | None) -> OwnEncoder | None:
     """Determine the encoder steps of a record, for a study that simulates coarser encoders.
 
-    The study has the setting `rounding: phase`.
+    The study needs the setting `rounding: phase`. None if the study simulates the closed loop
+    (`place: loop`).
 
     None for other kinds of rounding, which take every position as exact.
 

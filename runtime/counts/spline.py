@@ -138,7 +138,7 @@ class Basis:
         return np.asarray(self.of_samples(tau) + self.of_prior(density))
 
     def of_samples(self, tau: Array) -> Array:
-        """Compute the part of the precision matrix A that comes from the samples, shape (4, P).
+        """Compute how much the samples add to the precision matrix A of the spline, shape (4, P).
 
         It is sum_k tau_k b_k b_k', with tau_k the precision of sample k and b_k the B-splines
         there.
@@ -150,7 +150,7 @@ class Basis:
         return A
 
     def of_prior(self, density: Array) -> Array:
-        """Compute the part of the precision matrix A that comes from the prior, white jerk.
+        """Compute how much the prior, a white jerk, adds to the precision matrix A of the spline.
 
         It is sum_i (h/r_i) d_i d_i', with r_i the density and d_i'c the jerk in interval i.
         """

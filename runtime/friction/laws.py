@@ -104,7 +104,7 @@ def fit_law(terms: Terms, names: Sequence[str], rows: Array) -> dict[str, float]
 
 
 def _excess_velocity(terms: Terms, names: Sequence[str], rows: Array) -> float:
-    """Find the Stribeck velocity VS with which a law has the least sum of squared residuals.
+    """Find the Stribeck velocity VS that gives the least sum of squared residuals of a law.
 
     With e the Stribeck term orthogonal to the other terms, and r the residual of the other terms,
     it reduces the sum of squares by (e'r)^2 / e'e.

@@ -86,7 +86,7 @@ class Loop:
 
     @property
     def options(self) -> Mapping[str, Any]:
-        """The options `around` and `reference` of the control loop, if the study sets them.
+        """The options `around` and `reference` of the closed loop, if the study sets them.
 
         around : s, rows near slow rows are left out. reference : how the reference is known.
         """

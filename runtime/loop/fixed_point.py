@@ -64,7 +64,7 @@ class FixedPointOptions(LoopOptions):
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """Result of one pass of IV or DIDIM: parameters, their covariance, norm of the residual.
+    """Result of one iteration of IV or DIDIM: parameters X, their covariance, residual norm.
 
     X has shape (c,). `result` holds other data that the method needs later.
     """
