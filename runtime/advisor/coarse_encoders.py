@@ -58,7 +58,7 @@ QUADRATURE = 1 << 20  # number of the first stream of the nodes: beyond those of
 
 @dataclass(frozen=True, eq=False)
 class Encoders:
-    """The encoders of one record: their positions, and the states q, qd, qdd computed from them.
+    """Encoder positions of one record, and the joint states q, qd, qdd computed from the positions.
 
     Attributes
     ----------
@@ -189,7 +189,7 @@ class CoarseEncoders:
         return most
 
     def nodes(self, delta: float, moving: Sequence[int], read: int = 0) -> list[list[Array]]:
-        """Compute errors of q, qd and qdd for several offsets (phases) of the encoder lines.
+        """Compute errors of q, qd and qdd for several offsets (phases) of simulated encoder lines.
 
         These phases are the nodes of a quadrature. At first there are PHASES nodes. If `read` nodes
         are known already, as many new ones are computed, in the middle between the known ones.

@@ -125,7 +125,7 @@ class Excitation(Result):
 
     @property
     def usage(self) -> dict[str, list[float]]:
-        """Largest value of each quantity and joint in the motion, as a share of its limit."""
+        """Share of each limit (of q, qd, qdd, torque) that the motion uses, by joint."""
         return usage(self.model, self.motion, self.limits, self.settings.rate, self.known.X)
 
     @property

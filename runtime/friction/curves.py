@@ -68,7 +68,7 @@ OWN = ("viscous", "coulomb", "offset")  # kinds of elements that make the curve
 
 @dataclass(frozen=True)
 class FrictionLaw:
-    """One friction law, fitted to the friction torque of one joint, with its errors and tests.
+    """One friction law fitted to the friction torque of one joint: parameters, errors and tests.
 
     Attributes
     ----------

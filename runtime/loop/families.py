@@ -210,7 +210,7 @@ class Polyline(Family):
 
     @property
     def ramps(self) -> list[tuple[float, float]]:
-        """Start and end time, s, of the move to each next position, before smoothing."""
+        """Start and end time, s, of each move from one position to the next, before smoothing."""
         raise NotImplementedError
 
     def stride(self, speed: float) -> float:

@@ -107,7 +107,7 @@ class Simulation(Result):
         return np.asarray((np.abs(self.qd) <= LIMIT.SLIP_REST).mean(axis=0))
 
     def summary(self) -> dict[str, Any]:
-        """Return tracking error, torque and parameters as JSON values, for simulation.json."""
+        """Return tracking errors, torques and parameters as JSON values, for simulation.json."""
         error = self.q - self.q_r
         return {
             "robot": self.model.NAME,

@@ -71,7 +71,7 @@ def kinetic(direction: SX, plus: SX, minus: SX) -> SX:
 
 
 def _at_rest(D: SX, free: SX, moving: SX, plus: SX, minus: SX) -> tuple[SX, SX]:
-    """Compute forces of friction elements at rest, and the directions in which they start to slip.
+    """Compute the forces of friction elements at rest, and in which direction each starts to slip.
 
     Both have shape (m,); the direction is 0 if the element stays at rest. ds/dt = free - D f.
     """
