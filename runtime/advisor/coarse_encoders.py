@@ -328,7 +328,7 @@ class CoarseEncoders:
 
 
 def mean_change(ratios: Array) -> Array:
-    """Compute the mean change of X, and its standard deviation, over offsets of the encoder lines.
+    """Compute the mean change of X over encoder offsets (phases), and its standard deviation.
 
     Return both in one array, shape (2, b), %. The standard deviation is that of the mean, if the
     phases (nodes) were independent.

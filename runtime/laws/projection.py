@@ -188,7 +188,7 @@ class Projection:
     def fitted(
         self, groups: Sequence[Sequence[int]]
     ) -> tuple[Array, float, dict[int, list[Array]]]:
-        """Find the least sum of squared residuals, starting from grids of the nonlinear constants.
+        """Find the nonlinear constants of least squared residuals, first on grids, then locally.
 
         `groups` lists the scalars of each law. Returns the coordinates u of the minimum, its sum of
         squares, and the other local minima of each law, by the number of the law.

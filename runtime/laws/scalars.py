@@ -253,7 +253,7 @@ def fitted_laws(problem: LawProblem, weights: bool = False) -> FittedLaws:
 
 
 def _joint_deviations(problem: LawProblem, u: Array, scale: Array) -> tuple[Array, Array, Array]:
-    """Compute W and X for nonlinear constants at u, and the standard deviations of X and u.
+    """Compute W and X at the search coordinates u, and the standard deviations of X and of u.
 
     Both standard deviations come from one covariance. Blocks of time are taken as independent.
     """

@@ -108,7 +108,7 @@ class Loop:
 
     @cached_property
     def closed(self) -> ClosedLoop:
-        """Control loop of the measured records; of a simulated record if the setting `place` is "loop".
+        """Closed loop of the measured records, or of a simulated record if `place` is "loop".
 
         The simulated record is made with the encoder of the study.
         """

@@ -77,7 +77,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Fixed:
-    """Result of an IV or DIDIM iteration: last pass, all passes, and how it converged."""
+    """Result of an IV or DIDIM iteration: the last pass, all passes, and the convergence."""
 
     step: Step
     trail: tuple[dict[str, Any], ...]

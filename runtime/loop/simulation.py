@@ -243,7 +243,7 @@ class Simulator:
         return steps
 
     def _ticks(self, substeps: int) -> Any:
-        """Return the CasADi function that simulates BLOCK ticks of `substeps` steps each.
+        """Return the CasADi function that simulates BLOCK ticks, each in `substeps` integrations.
 
         A tick is a sampling period of the controller. Each function is made once.
         """

@@ -89,9 +89,9 @@ class DriveGains(Result, keys="joints constant together sigma alone sigma_alone 
 
     @property
     def refused(self) -> tuple[str, ...]:
-        """Motors whose factor g is not determined, because its standard deviation is too large.
+        """Motors whose factor g is not determined, since the standard deviation of g is too large.
 
-        Its %sigma is LIMIT.GAIN_REFUSED or more. The factor is that of the joint solution
+        The %sigma of g is LIMIT.GAIN_REFUSED or more. The factor is that of the joint solution
         `together`.
         """
         return tuple(
