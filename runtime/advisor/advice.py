@@ -31,7 +31,7 @@ NAMES = {"lowpass": "positions", "counts": "counts"}  # of the readers, in words
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """Mean change of the estimate X in several CESTAC runs with one encoder step, and its interval.
+    """Mean change of X in several CESTAC runs with one encoder step, and its Student interval.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Sampled:
 
 
 def sampled(delta: float, ratios: Array) -> Sampled:
-    """Compute the mean change of the estimate X in several CESTAC runs, and its interval.
+    """Compute the mean change of X in several CESTAC runs, and its Student interval.
 
     The change, in %, and its Student interval follow eqs. (18) and (21). ratios : estimate of each
     run over that of the record, shape (runs, b).
@@ -129,8 +129,8 @@ class EncoderAdvice:
     unit: str = "rad"
 
     def reached(self, percent: float) -> Array:
-        """Find the smallest encoder step that changes a parameter by `percent` %, for each
-        parameter.
+        """Find, for each parameter, the smallest encoder step that changes its value by `percent`
+        %.
 
         Return the steps, shape (b,); nan if the curve does not show this step.
         """

@@ -115,7 +115,7 @@ class GainDoubt(Part):
 
 
 def doubt_of_gains(result: Identification) -> GainDoubt | None:
-    """Return a warning if other velocity gains than kd of the settings fit the records much better.
+    """Return a warning if the records fit much better with other velocity gains than the given.
 
     None if there is no such doubt.
     """
@@ -124,7 +124,7 @@ def doubt_of_gains(result: Identification) -> GainDoubt | None:
 
 
 def gain_doubt(problem: Problem, error: float) -> str:
-    """Write a warning if other velocity gains than kd of the settings fit the records much better.
+    """Write a warning if the records fit much better with other velocity gains kd than the given.
 
     The warning is written if another kd more than halves the error. Otherwise the text is "", also
     if the records do not use the torque of the law.

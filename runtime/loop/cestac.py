@@ -162,7 +162,8 @@ class Loop:
         return self.closed.measured()
 
     def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
-        """Add the closed loop with perturbed positions to the system Y = W X + rho made from them.
+        """Attach the closed loop with perturbed positions to the system Y = W X + rho of these
+        positions.
 
         positions : shape (N, n) per record.
         """

@@ -45,7 +45,7 @@ BLOCK = 250  # ticks in one call
 
 
 class Simulator:
-    """Simulator of the closed loop of one robot and one controller; it can run many times.
+    """Simulator of the closed loop of one robot and one controller, for one or many runs.
 
     Parameters
     ----------
