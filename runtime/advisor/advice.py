@@ -129,8 +129,8 @@ class EncoderAdvice:
     unit: str = "rad"
 
     def reached(self, percent: float) -> Array:
-        """Find, for each parameter, the smallest encoder step that changes its value by `percent`
-        %.
+        """Find, for each parameter, the smallest encoder step at which its value changes by a
+        limit. The limit is `percent` %.
 
         Return the steps, shape (b,); nan if the curve does not show this step.
         """

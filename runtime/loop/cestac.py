@@ -162,8 +162,7 @@ class Loop:
         return self.closed.measured()
 
     def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
-        """Attach the closed loop with perturbed positions to the system Y = W X + rho of these
-        positions.
+        """Attach the closed loop with perturbed positions to a system Y = W X + rho made with them.
 
         positions : shape (N, n) per record.
         """

@@ -87,7 +87,7 @@ class Fixed:
 
 
 def full(names: Sequence[str], X: Array, every: Sequence[str]) -> Array:
-    """Extend X, the values of the parameters `names`, to all base parameters; the others are zero."""
+    """Extend the values X of the parameters `names` to all base parameters; the others are zero."""
     by_name = dict(zip(names, X, strict=True))
     return np.array([by_name.get(name, 0.0) for name in every])
 
