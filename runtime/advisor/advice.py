@@ -31,7 +31,7 @@ NAMES = {"lowpass": "positions", "counts": "counts"}  # of the readers, in words
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """Mean change of the estimate over several CESTAC runs with one encoder step, and its interval.
+    """Mean change of X in several CESTAC runs with one encoder step, and its Student interval.
 
     Attributes
     ----------
@@ -50,9 +50,10 @@ class Sampled:
 
 
 def sampled(delta: float, ratios: Array) -> Sampled:
-    """Compute the mean change of the estimate over several CESTAC runs, eqs. (18) and (21).
+    """Compute the mean change of X in several CESTAC runs, and its Student interval.
 
-    ratios : estimate of each run over that of the record, shape (runs, b).
+    The change, in %, and its Student interval follow eqs. (18) and (21). ratios : estimate of each
+    run over that of the record, shape (runs, b).
     """
     N = len(ratios)
     half = float(stdtrit(N - 1, (1 + LIMIT.STUDENT_PROBABILITY) / 2)) / np.sqrt(N)
@@ -62,7 +63,8 @@ def sampled(delta: float, ratios: Array) -> Sampled:
 
 @dataclass(frozen=True, eq=False)
 class Limit:
-    """Coarsest encoder step that changes no parameter of small %sigma by more than `percent` %.
+    """Coarsest encoder step that keeps the change of every parameter below a limit, such as 1 %.
+    Only parameters of small relative standard deviation %sigma are judged.
 
     Attributes
     ----------
@@ -87,7 +89,7 @@ class Limit:
 
     @property
     def agrees(self) -> bool:
-        """Whether CESTAC runs confirm the predicted change %e of the parameter.
+        """Whether CESTAC runs at the coarsest step confirm the predicted change of the parameter.
 
         The difference may be the Student interval plus 30 % of %e, which is 15 % in Delta. True
         without runs.
@@ -127,7 +129,8 @@ class EncoderAdvice:
     unit: str = "rad"
 
     def reached(self, percent: float) -> Array:
-        """Find, for each parameter, the smallest encoder step at which it changes by `percent` %.
+        """Find, for each parameter, the smallest encoder step at which its value changes by a
+        limit. The limit is `percent` %.
 
         Return the steps, shape (b,); nan if the curve does not show this step.
         """
@@ -136,7 +139,8 @@ class EncoderAdvice:
 
 @dataclass(frozen=True, eq=False)
 class ReaderAdvice:
-    """Coarsest allowed steps of real encoders, read either as positions or as counts of lines.
+    """Coarsest allowed steps of real encoders, for one method that computes the motion. The method
+    is a low-pass filter of the positions, or the estimation from encoder counts.
 
     Attributes
     ----------
@@ -221,20 +225,20 @@ class Advice(Result, Part):
 
     @property
     def deciding(self) -> tuple[str, ...]:
-        """Names of the parameters that decide the verdict: those with a small %sigma (11).
+        """Names of the parameters that decide the verdict: those of small standard deviation.
 
-        Their relative standard deviation %sigma, eq. (11), is at most 10 %.
+        The relative standard deviation %sigma, eq. (11), is at most 10 %.
         """
         return deciding_names(self.reference)
 
     @property
     def ways(self) -> tuple[tuple[str, tuple[EncoderAdvice, ...], Array], ...]:
-        """For each rounding law or way to read encoders: its label, the advice for each encoder,
-        and the changes of the parameters at the requested encoder steps.
+        """Tuples (label, advice for each encoder, changes of parameters), one for each encoder
+        model. The changes are those at the requested encoder steps.
 
-        A way is a rounding law, or a reader of real encoders; there is one advice for each choice
-        of encoders. The chapter's law is first, with an empty label, unless only real encoders were
-        judged. Real encoders follow, once for each reader.
+        An encoder model is a rounding law, or a reader of real encoders; it has one advice for each
+        choice of encoders. The chapter's law is first, with an empty label, unless only real
+        encoders were judged. Real encoders follow, once for each reader.
         """
         real = tuple((NAMES[one.reader], one.encoders, one.steps) for one in self.real)
         if self.real and self.encoders is self.real[0].encoders:
@@ -557,7 +561,8 @@ def _panel(ax: Any, reader: str, encoder: EncoderAdvice, line: str, points: str,
     f"bias below {LIMIT.NEGLIGIBLE:g} % (usable to {LIMIT.BIASED:g} %)",
 )
 def answer(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer:
-    """Judge whether the encoder is fine enough, by the advice or by the steps seen in positions.
+    """Judge whether the encoder step is small enough, from the resolution advice if there is one.
+    Without advice, judge the encoder steps visible in the recorded positions.
 
     steps : without an advice, a sentence on the steps that the positions show.
     share : share of the mean square of an acceleration that these steps make.
@@ -599,7 +604,7 @@ def answer(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer
 
 @dataclass(frozen=True, eq=False)
 class NoAdvice(Part):
-    """Part of a report without resolution advice: judges the encoder steps seen in positions."""
+    """Part of a report without resolution advice: judges the encoder steps visible in positions."""
 
     result: Identification
 
@@ -678,10 +683,10 @@ def limits_of(delta: Array, change: Array, reference: Estimate) -> tuple[Limit, 
 
 
 def crossing(delta: Array, e: Array, percent: float) -> float:
-    """Find the first encoder step at which the change e of a parameter reaches `percent`.
+    """Find the smallest encoder step at which the change e of a parameter, %, reaches `percent`.
 
     Between the points of the curve, lines are straight on logarithmic axes. nan if no point reaches
-    it, or if the first point is already above.
+    `percent`, or if the first point is already above.
     """
     above = np.flatnonzero(e >= percent)
     if not len(above) or (above[0] == 0 and e[0] > percent):

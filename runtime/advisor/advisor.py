@@ -85,7 +85,7 @@ class Predictor:
     def change(self, delta: float, encoders: Sequence[int]) -> Array:
         """Predict the change of the estimate X, in %, if the given encoders have the step `delta`.
 
-        It is 100 (X(v)/X(0) - 1).
+        With v the variance of the encoder errors, the change is 100 (X(v)/X(0) - 1).
         """
         X = solution(self._total(self.share * delta**2, encoders), self.weights)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -97,9 +97,10 @@ class Predictor:
         return solution(self._total(0.0, ()), self.weights)
 
     def rate(self, encoders: Sequence[int]) -> Array:
-        """Compute the derivative of the change of X, in %, by Delta^2 at Delta = 0, shape (b,).
+        """Compute how fast the estimate X changes with the squared encoder step Delta^2, near 0.
 
-        Errors of columns that switch sign are left out.
+        Return the derivative of the change in % by Delta^2 at Delta = 0, shape (b,). Errors of
+        columns that switch sign are left out.
         """
         moved, X = self._total(0.0, ()), self.exact
         added = reduce(add, [part.smooth[i] for part in self.parts for i in encoders])

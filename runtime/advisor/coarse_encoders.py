@@ -58,7 +58,7 @@ QUADRATURE = 1 << 20  # number of the first stream of the nodes: beyond those of
 
 @dataclass(frozen=True, eq=False)
 class Encoders:
-    """The encoders of one record: their positions, and the states q, qd, qdd computed from them.
+    """Encoder positions of one record, and the joint states q, qd, qdd computed from the positions.
 
     Attributes
     ----------
@@ -131,9 +131,9 @@ class CoarseEncoders:
 
     @property
     def coarsest(self) -> Array:
-        """Largest step of each encoder whose effect the records can show, shape (n,), rad or m.
+        """Largest encoder steps that the recorded motion can simulate, shape (n,), rad or m.
 
-        LIMIT.LINES_IN_MOTION steps of this size are in the motion of the encoder; inf for an
+        The motion of the encoder contains LIMIT.LINES_IN_MOTION steps of this size; inf for an
         encoder at rest.
         """
         spans = np.min([np.ptp(part.x, axis=0) for part in self.parts], axis=0)
@@ -141,10 +141,10 @@ class CoarseEncoders:
 
     @property
     def finest(self) -> float:
-        """Smallest encoder step whose effect the records can show, rad or m.
+        """Smallest encoder step that can be simulated with the recorded positions, rad or m.
 
-        It is LIMIT.EXACT_FROM times the largest step of the encoders that made the records, so that
-        the recorded positions are exact in comparison; 0 if those encoders are unknown.
+        The step is LIMIT.EXACT_FROM times the largest step of the encoders that made the records,
+        so that the recorded positions are exact in comparison; 0 if those encoders are unknown.
         """
         own = (part.record.own for part in self.parts)
         steps = (float(encoder.step.max()) for encoder in own if encoder is not None)
@@ -164,7 +164,7 @@ class CoarseEncoders:
         return np.full(len(self.reference), np.nan)
 
     def locking(self, delta: Array) -> Array:
-        """Compute the power of rounding errors after the low-pass filter, relative to white noise.
+        """Compute the power of rounding errors behind the low-pass filter, relative to white noise.
 
         The rounding error is a sawtooth. The result, shape (m,), is the largest power of all
         records and speeds.
@@ -189,7 +189,7 @@ class CoarseEncoders:
         return most
 
     def nodes(self, delta: float, moving: Sequence[int], read: int = 0) -> list[list[Array]]:
-        """Compute errors of q, qd and qdd for several offsets (phases) of the encoder lines.
+        """Compute errors of q, qd and qdd for several offsets (phases) of simulated encoder lines.
 
         These phases are the nodes of a quadrature. At first there are PHASES nodes. If `read` nodes
         are known already, as many new ones are computed, in the middle between the known ones.
@@ -328,7 +328,7 @@ class CoarseEncoders:
 
 
 def mean_change(ratios: Array) -> Array:
-    """Compute the mean change of X, and its standard deviation, over offsets of the encoder lines.
+    """Compute the mean change of X over encoder offsets (phases), and its standard deviation.
 
     Return both in one array, shape (2, b), %. The standard deviation is that of the mean, if the
     phases (nodes) were independent.

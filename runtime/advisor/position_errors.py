@@ -92,9 +92,10 @@ class Perturbation:
         return np.asarray(gram)
 
     def _add_switches(self, gram: Array, variance: float, encoders: list[int]) -> None:
-        """Add to the Gram matrices the effect of encoder errors on columns of W that switch sign.
+        """Add the effect of encoder errors on columns of W such as sign(qd) to the Gram matrices.
 
-        This is the change of their means, covariances and variances.
+        The columns are those that switch sign. The effect is the change of their means, covariances
+        and variances.
         """
         before, after = self.band.before[1, 1], self.band.after[1, 1]
         acting = []
@@ -123,9 +124,10 @@ class Perturbation:
             gram[j][np.ix_(columns, columns)] += shift.T @ shift + both
 
     def _at(self, switch: Switch, sigma: float) -> Switched:
-        """Interpolate the effect of a velocity error on a column of W that switches sign.
+        """Compute the effect of velocity errors on a column of W that contains sign(qd) or similar.
 
-        sigma : standard deviation of the error; the effect is computed at the two nearest nodes.
+        The effect is interpolated. sigma : standard deviation of the error; the effect is computed
+        at the two nearest nodes.
         """
         node = floor(log(sigma) / log(NODE))
         return self._node(switch, node).between(self._node(switch, node + 1), sigma)

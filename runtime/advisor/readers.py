@@ -101,10 +101,11 @@ def curves(
         return float(np.abs(mean_change(known[label][k])[0, decisive]).max(initial=0.0))
 
     def read(k: float, labels: Iterable[str], nodes: int = 0) -> list[str]:
-        """Compute how much the estimate X changes if groups of encoders have the k-th step size.
+        """Compute and store how the estimate X changes at one more encoder step of the curve. The
+        step is start*LIMIT.READER_RATIO^k.
 
-        They are computed at the first phases of the encoder, or at `nodes` more phases. Return the
-        labels of the choices for which this is possible.
+        The changes are computed at the first phases of the encoder, or at `nodes` more phases.
+        Return the labels of the groups of encoders for which this is possible.
         """
         delta = start * LIMIT.READER_RATIO**k
         labels = [label for label in labels if (delta <= coarsest[[*selections[label]]]).all()]
@@ -165,11 +166,12 @@ def curves(
 def vague_steps(
     changes: Mapping[float, Array], decisive: Sequence[int], limit: float
 ) -> list[float]:
-    """Find the encoder steps next to the limit 1 or 5 % at which the change of X is too uncertain.
+    """Find which encoder steps near the limiting step have too uncertain a change of X. At the
+    limiting step, X changes by `limit` %, for instance 1 %.
 
-    The limit is between two steps. A step is returned if the standard deviation of its change moves
-    the limit by more than LIMIT.CURVE_SHARPNESS of it, by straight lines on logarithmic axes. If
-    even the finest step is above the limit, only this step is judged.
+    The limiting step is between two steps. A step is returned if the standard deviation of its
+    change moves the limiting step by more than LIMIT.CURVE_SHARPNESS of it, by straight lines on
+    logarithmic axes. If even the finest step is above the limit, only this step is judged.
 
     changes : change and its standard deviation, shape (2, b), %, by exponent of the step,
         ascending.
@@ -193,7 +195,7 @@ def vague_steps(
 def uncertain(
     reader: ReaderName, advice: EncoderAdvice, error: Array, names: Sequence[str]
 ) -> list[str]:
-    """Warn, for each limit of change (1 or 5 %), if the curve is too flat to give its encoder step.
+    """Write a warning if the curve of the change is too flat to find the step of 1 or 5 % change.
 
     error : standard deviation of the change, shape (m, b), %.
     """

@@ -48,7 +48,8 @@ FAR = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Switched:
-    """Effect of a velocity error of standard deviation sigma on a column of W that switches sign.
+    """Effect of velocity errors on a column of W that switches sign, such as sign(qd). The velocity
+    errors have the standard deviation sigma.
 
     shift : change of the mean, E f - f, after decimation, shape (K,).
     slope : c_1/sigma at the kept instants, shape (K,); it replaces the derivative.
@@ -63,7 +64,7 @@ class Switched:
     variance: Array
 
     def between(self, other: Switched, sigma: float) -> Switched:
-        """Interpolate the effect of a velocity error linearly between two standard deviations.
+        """Interpolate the effect of velocity errors, given for two standard deviations of errors.
 
         The interpolated quantities are shift, slope*sigma and variance/sigma. This is exact if the
         speed rests (slope as 1/sigma, variance as sigma) or passes zero quickly (slope constant,
@@ -116,11 +117,11 @@ def switch_with_error(
 
 
 def _coefficients(switch: Switch, u: Array, m: Array, phi: Array, sigma: float) -> Array:
-    """Compute the Hermite coefficients c_n/sqrt(n!) of a column that switches sign.
+    """Compute the Hermite coefficients of a column of W that switches sign, such as sign(qd).
 
-    Return those of order n = 1 ... ORDERS and one more row, shape (ORDERS + 1, len(u)). This row is
-    for all higher orders: the square root of the variance they contribute, with the sign of the
-    next coefficient.
+    Return c_n/sqrt(n!) of order n = 1 ... ORDERS and one more row, shape (ORDERS + 1, len(u)). This
+    row is for all higher orders: the square root of the variance they contribute, with the sign of
+    the next coefficient.
     """
     He = [np.ones_like(u), -u]
     for n in range(1, ORDERS):

@@ -102,7 +102,7 @@ def law_of_controller(problem: Problem) -> Problem:
 
 @dataclass(frozen=True)
 class GainDoubt(Part):
-    """Warning that another velocity gain kd than the one in the settings fits much better."""
+    """Warning that velocity gains kd other than the given ones fit the records much better."""
 
     sentence: str
 
@@ -115,7 +115,7 @@ class GainDoubt(Part):
 
 
 def doubt_of_gains(result: Identification) -> GainDoubt | None:
-    """Return a warning if other velocity gains kd than those in the settings fit much better.
+    """Return a warning if the records fit much better with other velocity gains than the given.
 
     None if there is no such doubt.
     """
@@ -124,7 +124,7 @@ def doubt_of_gains(result: Identification) -> GainDoubt | None:
 
 
 def gain_doubt(problem: Problem, error: float) -> str:
-    """Write a warning if other velocity gains kd than those in the settings fit much better.
+    """Write a warning if the records fit much better with other velocity gains kd than the given.
 
     The warning is written if another kd more than halves the error. Otherwise the text is "", also
     if the records do not use the torque of the law.
@@ -278,10 +278,10 @@ class TorquesOfLaw:
         return linear_estimate(wide, EstimateSettings("wls", "joint"), model=self.model)
 
     def misfit(self, kd: Array, delay: float) -> float:
-        """Compute the misfit between the model and the torques of the control law (kd, delay).
+        """Compute how badly the model fits the torques of a control law with given kd and delay.
 
-        With N_j rows of joint j it is sum_j N_j log ||Y_j - W_j X||, X the estimate by least
-        squares weighted by joint.
+        With N_j rows of joint j the result is sum_j N_j log ||Y_j - W_j X||, X the estimate by
+        least squares weighted by joint.
         """
         fit = self.fit((), False, kd, delay)
         return float(

@@ -84,7 +84,7 @@ def velocity(q: Array, channels: Mapping[str, Array], rate: float) -> Array:
 
 
 def late(t: Array, x: Array, delay: float) -> Array:
-    """Delay the signal x, shape (N, n), by `delay` s.
+    """Delay a signal, sampled at times t, by `delay` seconds: return x(t - delay), same shape.
 
     A cubic spline interpolates between samples; the end values repeat.
     """

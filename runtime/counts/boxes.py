@@ -66,7 +66,7 @@ determined jerks; the least share of a window's density in that of the record.
 
 @dataclass(frozen=True)
 class Errors:
-    """Root mean square errors of the counts and time stamps of an encoder, besides rounding.
+    """Root mean square errors of counts and time stamps of an encoder, in addition to rounding.
 
     `count` is the error of a count in steps, `time` the error of a time stamp in sampling periods.
     """
@@ -81,7 +81,7 @@ class Errors:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """The motion estimated from encoder counts, with covariances and evidence (log likelihood).
+    """The motion estimated from encoder counts, with covariances and log likelihood of the counts.
 
     At each of the S samples used, a normal law (the site) replaces the bounds.
 
@@ -169,11 +169,12 @@ class Boxes:
         return Posterior(c, used, t, u, Z, factor, errors, likely, without)
 
     def again(self, errors: Errors, start: Posterior) -> Posterior:
-        """Estimate the motion again with other sizes of the count errors, starting from `start`."""
+        """Estimate the motion with other assumed count errors; begin with the motion `start`."""
         return self.posterior(errors, start.c, start.density, start.tau, start.nu)
 
     def promised(self, errors: Errors, read: Posterior) -> float:
-        """Predict how much other assumed errors raise the likelihood of the counts, to first order.
+        """Predict how much other assumed errors raise the log likelihood of the counts. The
+        prediction is of first order.
 
         To this order, settled sites need no change. Only some of the sites are used in the sum.
         """
@@ -227,7 +228,8 @@ class Boxes:
         return begin, boxes, boxes.posterior(read.errors, c, density, *sites)
 
     def jump(self, near: int, read: Posterior) -> tuple[int, float, float]:
-        """Find the sample near `near` from which on all counts are most likely off by a constant.
+        """Find the sample at which a jump of the counts is most likely, near sample number `near`.
+        From this sample on, all counts are wrong by a constant.
 
         Returns the sample, the error in counts, and the rise of the log posterior if it is
         corrected.
@@ -248,7 +250,7 @@ class Boxes:
         return int(self.sites[at[best]]), float(number[best]), float(0.5 * g[best] * number[best])
 
     def later(self, at: int, counts: int, read: Posterior) -> tuple[Boxes, Posterior]:
-        """Add `counts` to all counts from sample `at` on, and estimate the motion again.
+        """Add the number `counts` to all counts from sample `at` on, and estimate the motion again.
 
         Returns the new bounds and the motion.
         """
@@ -258,7 +260,7 @@ class Boxes:
         return boxes, boxes.posterior(read.errors, read.c, read.density, read.tau, nu)
 
     def _tilted(self, m: Array, v: Array, e2: Array) -> tuple[Array, Array, Array]:
-        """Compute anew, for each sample, the normal distribution (site) that approximates its bounds.
+        """Compute, for each sample, a normal distribution (site) that replaces the position bounds.
 
         The other samples give the position m and its variance v. Returns the logarithm of the mass
         of the tilted law, and the precision and precision times mean of the new site.
@@ -276,7 +278,7 @@ class Boxes:
 def of_most_evidence(
     boxes: Boxes, sizes: Sequence[float], start: Posterior, moves: Sequence[tuple[int, int]] = MOVES
 ) -> Posterior:
-    """Find the most likely errors of counts and time stamps, and the motion estimated with them.
+    """Find the most likely size of count and time-stamp errors, and estimate the motion with it.
 
     The search starts from `start` and changes the errors by one element of `sizes` or CLOCK_ERRORS
     at a time, in the directions `moves`, as long as the evidence clearly rises.

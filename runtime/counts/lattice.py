@@ -181,7 +181,7 @@ def to_and_fro(counts: Array) -> Array:
 
 
 def shaken_share(counts: Array) -> float:
-    """Compute which share of the count changes crosses the same line the third time in a row.
+    """Compute the share of count changes that cross the same encoder line the third time in a row.
 
     A large share shows that the motion shakes.
     """

@@ -35,7 +35,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class OwnEncoder:
-    """The encoder of one record: its steps, and the motion estimated from its counts if needed.
+    """The encoder that measured a record: its steps and, if needed, the motion from its counts.
 
     Attributes
     ----------
@@ -58,10 +58,10 @@ class OwnEncoder:
         return self.reading is not None
 
     def positions(self, q: Array, delta: float, rng: np.random.Generator) -> Array:
-        """Return the joint positions that a simulated encoder of step delta quantises.
+        """Return the joint positions, shape (N, n), that a simulated encoder of step delta rounds.
 
-        Shape (N, n). They are the measured positions q if delta is coarse, else a draw from the
-        posterior.
+        The positions are the measured q if delta is coarse, else a random draw from the posterior
+        distribution.
         """
         if self.reading is None or delta >= (1 - 1e-9) * LIMIT.EXACT_FROM * self.step.max():
             return q
@@ -72,7 +72,8 @@ class OwnEncoder:
 def own_encoder(record: Record, study: Study, drives: Drives | None) -> OwnEncoder | None:
     """Determine the encoder steps of a record, for a study that simulates coarser encoders.
 
-    The study has the setting `rounding: phase`.
+    The study needs the setting `rounding: phase`. None if the study simulates the closed loop
+    (`place: loop`).
 
     None for other kinds of rounding, which take every position as exact.
 

@@ -48,7 +48,7 @@ STANDS, LONG = 0.1, 2.0
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """The motion estimated from encoder counts, at the encoder side.
+    """The motion of the encoders of one record, estimated from their counts.
 
     All arrays have shape (N, n), in rad or m, per s, per s^2.
 
@@ -84,7 +84,7 @@ class Reading:
 
     @property
     def motion(self) -> tuple[Array, Array]:
-        """Joint positions q, and the standard deviations of the velocities.
+        """Encoder positions, rad or m, and standard deviations of the velocities, (N, n) each.
 
         The standard deviations are infinite if the state is unknown.
         """
@@ -121,7 +121,7 @@ class Reading:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One stretch of a long record, with the motion of the encoders that move in it.
+    """One stretch of a long record, with the estimated motion of the encoders that move in it.
 
     The stretch starts at sample `begin`; only its samples [first, stop) are used in the result.
     `moving` lists the encoders whose counts change.

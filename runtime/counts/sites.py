@@ -87,7 +87,7 @@ class SearchStart(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """The motion estimated from the counts of one encoder, in steps from the count `origin`.
+    """The motion of one encoder, estimated from its counts, in steps from the count `origin`.
 
     said : sentence about the errors of the counts, or empty.
     """
@@ -157,9 +157,10 @@ def smoothed(
 
 @dataclass(frozen=True, eq=False)
 class Counts:
-    """Counts y of one encoder, shape (N,), and which samples have a count.
+    """Counts y of one encoder, shape (N,); some samples may have no count.
 
-    `measured` lists these samples; `rest` is the small precision given to the other samples.
+    `measured` lists the samples with a count; `rest` is the small precision given to the other
+    samples.
     """
 
     y: Array
@@ -198,7 +199,7 @@ class Counts:
         return boxes, read
 
     def liveliest(self) -> Counts:
-        """Extract the stretch of LIVELIEST samples in which the count changes most often."""
+        """Extract the LIVELIEST consecutive samples in which the count changes most often."""
         changed = np.zeros(len(self.y))
         changed[self.measured[1:]] = np.diff(self.y[self.measured]) != 0
         total = np.cumsum(changed)
@@ -208,7 +209,7 @@ class Counts:
         return Counts(self.y[part], inside, self.rest[part], self.Ts)
 
     def searched(self, sizes: Sequence[float]) -> tuple[Boxes, Posterior]:
-        """Estimate the motion together with the most likely errors of the counts.
+        """Estimate the motion, and the sizes of the count errors that make the counts most likely.
 
         The smallest errors are used unless larger ones have UNEVEN nats more evidence. If the
         errors of the counts are large, errors of the clock are tried too.
@@ -228,7 +229,7 @@ class Counts:
         return boxes, read
 
     def first(self, errors: Errors, start: SearchStart | None = None) -> tuple[Boxes, Posterior]:
-        """Set up the bounds of the positions, and estimate a first motion with the given errors.
+        """Set up the bounds of the positions, and estimate a first motion for given count errors.
 
         The knots of the spline are as far apart as a motion near the changes of the count allows.
         start : a known motion, whose knots and density of the jerk are used.
@@ -303,7 +304,7 @@ class Counts:
         return replace(self, y=y)
 
     def leaps(self) -> list[tuple[int, int]]:
-        """Find single changes of the count that are too large for a motion.
+        """Find single changes of the count that are too large for a smooth motion of the encoder.
 
         Returns the sample and the number of counts of each. The change differs from a parabola
         through its neighbours by more than LEAP times as much as these do.

@@ -43,9 +43,10 @@ CONDITION = 1e-9
 
 
 class Basis:
-    """Cubic splines over N samples of sampling period Ts, with a knot every m samples.
+    """Cubic B-splines that represent a position at N samples, with a knot every m samples.
 
-    Samples are padded to whole intervals: M intervals, m M samples, P = M + 3 coefficients.
+    The sampling period is Ts. Samples are padded to whole intervals: M intervals, m M samples, P =
+    M + 3 coefficients.
 
     values : (B, B', B'') at the m samples of an interval, shape (m, 4) each.
     """
@@ -75,7 +76,7 @@ class Basis:
 
     @property
     def least_density(self) -> float:
-        """Least jerk density with which the precision matrix A can be factored in double precision.
+        """Smallest spectral density of the jerk for which the precision matrix A can be factored.
 
         A is that of the spline coefficients. Unit: steps^2/s^5.
 
@@ -137,7 +138,7 @@ class Basis:
         return np.asarray(self.of_samples(tau) + self.of_prior(density))
 
     def of_samples(self, tau: Array) -> Array:
-        """Compute the part of the precision matrix A that comes from the samples, shape (4, P).
+        """Compute how much the samples add to the precision matrix A of the spline, shape (4, P).
 
         It is sum_k tau_k b_k b_k', with tau_k the precision of sample k and b_k the B-splines
         there.
@@ -149,7 +150,7 @@ class Basis:
         return A
 
     def of_prior(self, density: Array) -> Array:
-        """Compute the part of the precision matrix A that comes from the prior, white jerk.
+        """Compute how much the prior, a white jerk, adds to the precision matrix A of the spline.
 
         It is sum_i (h/r_i) d_i d_i', with r_i the density and d_i'c the jerk in interval i.
         """

@@ -102,7 +102,8 @@ class SetDocument:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SetsDocument(Estimate):
-    """Estimate of all parameters, and of the nested sets essential, feasible and all parameters.
+    """Content of an estimate file: the estimate of all parameters, then one estimate for each set.
+    The sets are the essential, the feasible and all parameters.
 
     Attributes
     ----------
@@ -177,7 +178,7 @@ class IdentificationDocument(SetsDocument):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LevelDocument(LevelResult):
-    """Result, in cestac.json, of a study for one rounding step of positions and one of torques.
+    """Part of cestac.json: results for one pair of rounding steps, of positions and of torques.
 
     Attributes
     ----------
@@ -273,7 +274,7 @@ def load_whole_estimate(path: Path | str) -> Estimate:
 
 
 def load_used_set(path: Path | str) -> tuple[Estimate, Estimate | SetDocument]:
-    """Read from estimate.json the estimate of all parameters, and the set of those that are used.
+    """Read two estimates from estimate.json: that of all parameters, and that of the set in use.
 
     InputError as for `load_estimate`.
     """

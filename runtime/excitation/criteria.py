@@ -190,7 +190,7 @@ def weights_of(
 
 
 def criterion_of(weights: Weights, observation: Observation, criterion: str) -> float:
-    """Compute the criterion of a motion, such as cond(W), from its matrix W; smaller is better.
+    """Compute the criterion that the search minimises, such as cond(W), from the W of one motion.
 
     The value is exact: W has the rows that the identification will use.
     """
@@ -279,7 +279,7 @@ def excesses(
 def usage(
     model: GeneratedModel, motion: Motion, limits: MotionLimits, rate: float, X: Array
 ) -> dict[str, list[float]]:
-    """Compute the largest value of each quantity and joint in a motion, as a share of its limit.
+    """Compute how much of each limit (of q, qd, qdd, torque) a motion uses, as a share, by joint.
 
     A share of 1 is the limit. The motion is sampled at `rate`, Hz. The share of a position range is
     measured from the middle of the range.

@@ -137,9 +137,10 @@ def _logdet(A: Any) -> Any:
 
 
 def _spread(A: Any, criterion: str) -> Any:
-    """Write the log of a smooth bound of cond(W_w)^2 or of the largest variance, W_w weighted W.
+    """Write the log of a smooth upper bound of cond(W)^2, or of the largest variance of parameters.
 
-    For criterion sigma or record the bound is that of the variance, else that of cond(W_w)^2.
+    W is the weighted observation matrix. For criterion sigma or record the bound is that of the
+    variance, else that of cond(W)^2.
     """
     C = ca.solve(A, ca.DM.eye(A.shape[0]), "qr")
     if criterion in ("sigma", "record"):

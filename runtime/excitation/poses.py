@@ -197,7 +197,7 @@ def _sum(A: Array, M: Array, chosen: Array) -> Array:
 
 
 def _exchanged(A: Array, M: Array, chosen: Array) -> Array:
-    """Exchange poses while this raises det M of the information matrix; return pose indices."""
+    """Exchange poses while this raises det M of the information matrix M; return pose numbers."""
     chosen, before = chosen.copy(), np.empty(0)
     while not np.array_equal(chosen, before):
         before = chosen.copy()

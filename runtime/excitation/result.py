@@ -125,7 +125,7 @@ class Excitation(Result):
 
     @property
     def usage(self) -> dict[str, list[float]]:
-        """Largest value of each quantity and joint in the motion, as a share of its limit."""
+        """Share of each limit (of q, qd, qdd, torque) that the motion uses, by joint."""
         return usage(self.model, self.motion, self.limits, self.settings.rate, self.known.X)
 
     @property
@@ -215,7 +215,7 @@ class Excitation(Result):
         )
 
     def summary(self) -> dict[str, Any]:
-        """Return all figures as JSON values, for the file excitation.json."""
+        """Return all numbers of the result as JSON values, for the file excitation.json."""
         return {
             "robot": self.model.NAME,
             "parameters_from": self.known.source,
@@ -241,7 +241,8 @@ class Excitation(Result):
         }
 
     def sigma_table(self, most: int | None = None) -> Table:
-        """Make a table of the predicted %sigma of the `most` least certain parameters.
+        """Make a table of the predicted %sigma of the least certain parameters. The table has at
+        most `most` parameters.
 
         If there is a record, a second column gives the %sigma of the recorded motion.
         """

@@ -152,9 +152,9 @@ def _within(
 
 
 def _known_estimate(problem: Problem, settings: ExcitationSettings) -> Known:
-    """Collect parameter values for the search, and the precision that recorded motions give.
+    """Collect parameter values X for the search, and the precision that recorded motions give.
 
-    They come from an estimate with the records; without records, the values come from the robot
+    The values come from an estimate with the records; without records, they are those of the robot
     file.
     """
     model, records, study = problem.model, problem.records, problem.settings

@@ -68,7 +68,7 @@ OWN = ("viscous", "coulomb", "offset")  # kinds of elements that make the curve
 
 @dataclass(frozen=True)
 class FrictionLaw:
-    """One friction law, fitted to the friction torque of one joint, with its errors and tests.
+    """One friction law fitted to the friction torque of one joint: parameters, errors and tests.
 
     Attributes
     ----------
@@ -321,7 +321,9 @@ def own_friction(model: GeneratedModel, j: int) -> list[int]:
 
 
 def _terms(model: GeneratedModel, record: Prepared, fit: Estimate, number: int) -> list[Terms]:
-    """Compute, for each joint of one record, the friction torque and the terms of its laws."""
+    """Compute the friction torque and the terms of the friction laws, for each joint of one record.
+    A term is, for instance, the velocity or its sign.
+    """
     selection = record.certain(model)
     observation = record.observation(model)
     window = record.states[selection.samples]
@@ -413,10 +415,10 @@ def _curve(joint: str, terms: Terms) -> FrictionCurve:
 
 
 def _predicting(laws: Sequence[FrictionLaw]) -> str:
-    """Choose, of the significant laws, the one with least error on data not used in its fit.
+    """Choose the significant friction law that best predicts data not used in its fit.
 
-    A law must also predict clearly better than the first law. If no law does, the first law is
-    chosen.
+    Return the name of the law. The law must also predict clearly better than the first law. If no
+    law does, the first law is chosen.
     """
     first, *others = laws
     worth = [
@@ -428,7 +430,7 @@ def _predicting(laws: Sequence[FrictionLaw]) -> str:
 
 
 def _bins(terms: Terms) -> tuple[Array, Array, Array, Callable[[Array], Array]]:
-    """Average the friction torque over bins of velocity that hold about equal numbers of rows.
+    """Average the friction torque in intervals (bins) of velocity with about equally many samples.
 
     No bin contains both directions of motion. Returns the centres, the means, the half widths of
     the 95 % intervals, and the function that averages any signal over the bins.

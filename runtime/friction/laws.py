@@ -48,10 +48,7 @@ class Terms:
 
     @cached_property
     def grid(self) -> tuple[Array, Array]:
-        """Grid of Stribeck velocities, as log VS, and the Stribeck term for each velocity.
-
-        Their shapes are (k,) and (k, N).
-        """
+        """Logarithms of trial Stribeck velocities, shape (k,), and the Stribeck terms, (k, N)."""
         x = np.log(
             np.abs(self.v).max()
             * np.geomspace(LIMIT.STRIBECK_SLOWEST, LIMIT.STRIBECK_FASTEST, LIMIT.STRIBECK_GRID)
@@ -107,7 +104,7 @@ def fit_law(terms: Terms, names: Sequence[str], rows: Array) -> dict[str, float]
 
 
 def _excess_velocity(terms: Terms, names: Sequence[str], rows: Array) -> float:
-    """Find the Stribeck velocity VS with which a law has the least sum of squared residuals.
+    """Find the Stribeck velocity VS that gives the least sum of squared residuals of a law.
 
     With e the Stribeck term orthogonal to the other terms, and r the residual of the other terms,
     it reduces the sum of squares by (e'r)^2 / e'e.
@@ -118,7 +115,7 @@ def _excess_velocity(terms: Terms, names: Sequence[str], rows: Array) -> float:
     r = terms.f[rows] - Q @ (Q.T @ terms.f[rows])
 
     def left(excess: Array) -> Array:
-        """Return the change of the sum of squared residuals by adding the Stribeck term.
+        """Return the change of the sum of squared residuals if the Stribeck term is added.
 
         The change is zero or negative.
 

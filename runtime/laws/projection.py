@@ -68,7 +68,7 @@ class LawProblem:
         return np.where(self.log, np.exp(np.where(self.log, u, 0.0)), u)
 
     def bound(self, u: Array) -> Any:
-        """Return the model, with its nonlinear constants computed from search coordinates u."""
+        """Return the model with its nonlinear constants set to those of search coordinates u."""
         return BoundModel(self.model, dict(zip(self.scalars, self.values(u).tolist(), strict=True)))
 
     def _varying(self) -> list[list[int]]:
@@ -108,7 +108,10 @@ class LawProblem:
         return self._columns[key]
 
     def slope(self, k: int, u: Array, X: Array) -> Array:
-        """Compute the derivative of W X with respect to coordinate u_k, by a central difference."""
+        """Compute the derivative of W X with respect to the search coordinate u_k, shape (r,).
+
+        A central difference is used.
+        """
         h = SLOPE_STEP if self.log[k] else SLOPE_STEP * (self.upper[k] - self.lower[k])
         ahead, behind = u.copy(), u.copy()
         ahead[k], behind[k] = u[k] + h, u[k] - h
@@ -119,9 +122,9 @@ class LawProblem:
 
 
 class Projection:
-    """Least-squares problem of the nonlinear constants alone, on a subset of rows: X is eliminated.
+    """Least-squares problem in the nonlinear constants only: X is optimal for given constants.
 
-    Each row is divided by its scale.
+    A subset of the rows is used; each row is divided by its scale.
     """
 
     def __init__(self, problem: LawProblem, rows: Array, scale: Array) -> None:
@@ -135,7 +138,7 @@ class Projection:
         return np.asarray(A - self.Q @ (self.Q.T @ A))
 
     def parts(self, u: Array) -> tuple[Array, Array, Array]:
-        """Compute the residual of the best X at the search coordinates u.
+        """Compute the residual that the best parameters X leave at the search coordinates u.
 
         Returns P Y, an orthonormal basis of these columns (projected orthogonally to the fixed
         columns), and their coefficients in X.
@@ -164,7 +167,7 @@ class Projection:
         return np.asarray(B @ (B.T @ S) - S)
 
     def polished(self, u: Array) -> tuple[Array, float]:
-        """Find the local minimum of the sum of squared residuals near the nonlinear constants u.
+        """Find the local minimum of the sum of squared residuals near the search coordinates u.
 
         Returns the coordinates of the minimum and the sum of squares there.
         """
@@ -185,7 +188,7 @@ class Projection:
     def fitted(
         self, groups: Sequence[Sequence[int]]
     ) -> tuple[Array, float, dict[int, list[Array]]]:
-        """Find the least sum of squared residuals, starting from grids of the nonlinear constants.
+        """Find the nonlinear constants of least squared residuals, first on grids, then locally.
 
         `groups` lists the scalars of each law. Returns the coordinates u of the minimum, its sum of
         squares, and the other local minima of each law, by the number of the law.

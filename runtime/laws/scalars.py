@@ -67,7 +67,7 @@ class FittedScalar:
 
 @dataclass(frozen=True)
 class LawTest:
-    """Test of a law, which gives a column of W: whether it improves the prediction of torques.
+    """Test of a law, such as Stribeck friction: whether the law improves the prediction of torques.
 
     Attributes
     ----------
@@ -253,7 +253,7 @@ def fitted_laws(problem: LawProblem, weights: bool = False) -> FittedLaws:
 
 
 def _joint_deviations(problem: LawProblem, u: Array, scale: Array) -> tuple[Array, Array, Array]:
-    """Compute W and X for nonlinear constants at u, and the standard deviations of X and u.
+    """Compute W and X at the search coordinates u, and the standard deviations of X and of u.
 
     Both standard deviations come from one covariance. Blocks of time are taken as independent.
     """
@@ -273,7 +273,7 @@ def _joint_deviations(problem: LawProblem, u: Array, scale: Array) -> tuple[Arra
 def _half(
     problem: LawProblem, rows: Array, scale: Array, members: Sequence[Sequence[int]], u: Array
 ) -> Array:
-    """Fit the nonlinear constants of the laws to a subset of the rows; u: starting values."""
+    """Fit the nonlinear constants of laws to a subset of the rows, starting from the values u."""
     return Projection(problem, rows, scale).polished(u)[0]
 
 

@@ -86,7 +86,7 @@ class Loop:
 
     @property
     def options(self) -> Mapping[str, Any]:
-        """The options `around` and `reference` of the control loop, if the study sets them.
+        """The options `around` and `reference` of the closed loop, if the study sets them.
 
         around : s, rows near slow rows are left out. reference : how the reference is known.
         """
@@ -108,7 +108,7 @@ class Loop:
 
     @cached_property
     def closed(self) -> ClosedLoop:
-        """Control loop of the measured records; of a simulated record if the setting `place` is "loop".
+        """Closed loop of the measured records, or of a simulated record if `place` is "loop".
 
         The simulated record is made with the encoder of the study.
         """
@@ -162,7 +162,7 @@ class Loop:
         return self.closed.measured()
 
     def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
-        """Store the closed loop with a system Y = W X + rho computed from perturbed positions.
+        """Attach the closed loop with perturbed positions to a system Y = W X + rho made with them.
 
         positions : shape (N, n) per record.
         """
@@ -178,11 +178,11 @@ class Loop:
         )
 
     def rows(self, level: Level, draw: tuple[int, ...]) -> Observation:
-        """Simulate a record with the encoder step of `level`; build its system Y = W X + rho."""
+        """Simulate a record with the encoder step of a study level; build its Y = W X + rho."""
         return self.simulated(level, draw).measured()
 
     def simulated(self, level: Level, draw: tuple[int, ...]) -> ClosedLoop:
-        """Return the control loop that simulates a record with the encoder step of `level`.
+        """Return the control loop that simulates a record with the encoder step of a study level.
 
         If the step level.delta is 0, the encoder is that of the study. draw : numbers of the run;
         the last sets its seed.

@@ -365,10 +365,10 @@ def _reference(
 
 
 def slips(qd: Array, G: Array) -> Array:
-    """Compute for each joint j the smallest of |qd_j| and the slip speeds of its dry friction.
+    """Compute the smallest sliding speed at each joint: of the joint and its friction elements.
 
-    The result has shape (N, n), like qd. G : shape (elements, n); G qd are the slips of the
-    friction elements.
+    The speeds are |qd_j| and the slips of the friction elements that act on joint j. The result has
+    shape (N, n), like qd. G : shape (elements, n); G qd are the slips of the friction elements.
     """
     speed: Array = np.abs(qd)
     for element in G:

@@ -102,7 +102,7 @@ class ControlLaw:
         )
 
     def shown(self, q: Array) -> Array:
-        """Compute the quantised positions, shape (n,), that the encoders report at positions q."""
+        """Round joint positions q, shape (n,), as the encoders do; return the rounded positions."""
         step = np.where(self.encoder_step > 0, self.encoder_step, 1.0)
         qm = self.R @ (q - self.offset)
         return np.asarray(

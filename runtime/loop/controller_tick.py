@@ -82,7 +82,7 @@ class LoopInputs:
 
 
 def blocks(rows: Array, size: int) -> Iterator[tuple[Array, int]]:
-    """Split input samples into blocks of `size` rows; yield each with its number of real rows.
+    """Yield input samples in blocks of `size` rows, each with its number of rows before padding.
 
     The last block is filled up with copies of its last row.
     """
@@ -213,7 +213,7 @@ def sliding_friction(friction: DryFriction, qd: MX, plus: MX, minus: MX) -> tupl
 
 
 def keeps_sliding(friction: DryFriction, direction: MX, qd: MX, end: MX) -> MX:
-    """Whether every friction element slips, in the same direction at velocities qd and `end`."""
+    """Whether every friction element slips in the same direction at the velocities qd and `end`."""
     G = ca.DM(friction.G)
     return ca.mmin(ca.vertcat(ca.fabs(G @ qd), direction * (G @ end))) > LIMIT.SLIP_REST
 
@@ -264,7 +264,7 @@ def round_function(
     *,
     whole: int,
 ) -> Any:
-    """Make the CasADi function that moves the arm until a friction element stops, or over all of h.
+    """Make the CasADi function that moves the arm over a time h, or until a friction element stops.
 
     whole : 1 for the whole of h. Results: q, qd, the remaining part of h, qdd, f, direction, Y, and
     which slips stopped.

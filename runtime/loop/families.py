@@ -210,11 +210,11 @@ class Polyline(Family):
 
     @property
     def ramps(self) -> list[tuple[float, float]]:
-        """Start and end time, s, of the move to each next position, before smoothing."""
+        """Start and end time, s, of each move from one position to the next, before smoothing."""
         raise NotImplementedError
 
     def stride(self, speed: float) -> float:
-        """Return the largest distance, rad or m, between successive positions of a random draw."""
+        """Return the largest distance of two successive positions in a random motion, rad or m."""
         raise NotImplementedError
 
     @property

@@ -64,7 +64,7 @@ class FixedPointOptions(LoopOptions):
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """Result of one pass of IV or DIDIM: parameters, their covariance, norm of the residual.
+    """Result of one iteration of IV or DIDIM: parameters X, their covariance, residual norm.
 
     X has shape (c,). `result` holds other data that the method needs later.
     """
@@ -77,7 +77,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Fixed:
-    """Result of an IV or DIDIM iteration: last pass, all passes, and how it converged."""
+    """Result of an IV or DIDIM iteration: the last pass, all passes, and the convergence."""
 
     step: Step
     trail: tuple[dict[str, Any], ...]
@@ -87,7 +87,7 @@ class Fixed:
 
 
 def full(names: Sequence[str], X: Array, every: Sequence[str]) -> Array:
-    """Extend X, given for the parameters `names`, to all base parameters; the rest are zero."""
+    """Extend the values X of the parameters `names` to all base parameters; the others are zero."""
     by_name = dict(zip(names, X, strict=True))
     return np.array([by_name.get(name, 0.0) for name in every])
 

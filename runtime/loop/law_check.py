@@ -140,7 +140,7 @@ def law_text(fits: Sequence[LawFit]) -> str:
 
 
 def _share(y: Array, x: Array) -> tuple[float, float, float]:
-    """Compute the share of signal y, %, that x explains, and that the best multiple of x explains.
+    """Compute the share of a signal y, %, that the signal x explains, without and with a factor.
 
     Returns the share, %; the best factor of x; and the share with this factor, %.
     """

@@ -32,7 +32,8 @@ class SimulationError(InputError):
 
 @dataclass(frozen=True, eq=False)
 class Simulation(Result):
-    """Signals of one closed-loop simulation at N recorded samples: (N, n), joint side, SI.
+    """Signals of one closed-loop simulation at N recorded samples, on the joint side, in SI units.
+    Arrays without a given shape have the shape (N, n).
 
     Attributes
     ----------
@@ -106,7 +107,7 @@ class Simulation(Result):
         return np.asarray((np.abs(self.qd) <= LIMIT.SLIP_REST).mean(axis=0))
 
     def summary(self) -> dict[str, Any]:
-        """Return tracking error, torque and parameters as JSON values, for simulation.json."""
+        """Return tracking errors, torques and parameters as JSON values, for simulation.json."""
         error = self.q - self.q_r
         return {
             "robot": self.model.NAME,

@@ -45,7 +45,7 @@ BLOCK = 250  # ticks in one call
 
 
 class Simulator:
-    """The closed loop of one robot and one controller, ready for many runs.
+    """Simulator of the closed loop of one robot and one controller, for one or many runs.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ class Simulator:
         return steps
 
     def _ticks(self, substeps: int) -> Any:
-        """Return the CasADi function that simulates BLOCK ticks of `substeps` steps each.
+        """Return the CasADi function that simulates BLOCK ticks, each in `substeps` integrations.
 
         A tick is a sampling period of the controller. Each function is made once.
         """

@@ -71,7 +71,7 @@ def kinetic(direction: SX, plus: SX, minus: SX) -> SX:
 
 
 def _at_rest(D: SX, free: SX, moving: SX, plus: SX, minus: SX) -> tuple[SX, SX]:
-    """Compute forces of friction elements at rest, and the directions in which they start to slip.
+    """Compute the forces of friction elements at rest, and in which direction each starts to slip.
 
     Both have shape (m,); the direction is 0 if the element stays at rest. ds/dt = free - D f.
     """
@@ -92,7 +92,7 @@ def _at_rest(D: SX, free: SX, moving: SX, plus: SX, minus: SX) -> tuple[SX, SX]:
 
 
 def _masked(D: SX, rows: SX) -> SX:
-    """Replace rows and columns of D by those of the identity matrix, except where `rows` is 1.
+    """Replace the rows and columns of D that `rows` does not mark by those of the identity matrix.
 
     The diagonal becomes slightly larger, since rows of G may depend on each other.
     """

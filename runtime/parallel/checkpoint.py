@@ -29,7 +29,10 @@ UNFINISHED = ".unfinished"
 
 
 class Checkpoint:
-    """The file of the finished runs of a study, written every `every` seconds and by `flush`."""
+    """The file that stores the finished runs of a study, so that the study can continue later.
+
+    The file is written every `every` seconds and by `flush`.
+    """
 
     def __init__(self, folder: str | Path, *, every: float = LIMIT.ARCHIVE_PERIOD) -> None:
         self.file = Path(folder) / FILE

@@ -56,7 +56,7 @@ def cluster(scheduler: str, timeout: float = TIMEOUT) -> Iterator[Callable[..., 
 
 
 def _mapped(client: Any, function: Callable[..., Any], keys: Any) -> Iterator[Any]:
-    """Call the function on the workers with each of `keys`; yield results in the same order."""
+    """Call a function on the workers with each of `keys`; yield the results in the same order."""
     sent = client.scatter(packed(function), broadcast=True, hash=False)
     for future in [client.submit(there, sent, key, pure=False) for key in keys]:
         yield future.result()

@@ -60,7 +60,7 @@ def packed(function: Callable[[Any], Any]) -> bytes:
 
 
 def there(sent: bytes, key: Any) -> Any:
-    """Unpickle a function in a worker process, and call it with the argument `key`."""
+    """Unpickle a function in a worker process, and return the result of the function for `key`."""
     return _unpacked(sent)(key)
 
 

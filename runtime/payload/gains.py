@@ -89,9 +89,9 @@ class DriveGains(Result, keys="joints constant together sigma alone sigma_alone 
 
     @property
     def refused(self) -> tuple[str, ...]:
-        """Motors whose factor g is not determined, because its standard deviation is too large.
+        """Motors whose factor g is not determined, since the standard deviation of g is too large.
 
-        Its %sigma is LIMIT.GAIN_REFUSED or more. The factor is that of the joint solution
+        The %sigma of g is LIMIT.GAIN_REFUSED or more. The factor is that of the joint solution
         `together`.
         """
         return tuple(
@@ -201,7 +201,7 @@ def _drives(model: GeneratedModel) -> Drives:
 
 
 def _with_motors(model: GeneratedModel, record: Prepared, drives: Drives) -> Observation:
-    """Add one column per motor to W of a record: the torque of this motor on each joint."""
+    """Extend W of a record by one column per motor: the torque of this motor on each joint."""
     selection = record.certain(model)
     observation = record.observation(model)
     motor = drives.motor_command(record.record.torque) * drives.torque_constant
@@ -241,7 +241,7 @@ def _with_load(
 def _alone(
     observation: Observation, exact: Array, load: Array, drives: Drives
 ) -> tuple[Array, Array, Array]:
-    """Estimate the factor g of each motor by least squares on the rows of its own joint.
+    """Estimate the correction factor g of each motor by least squares on the rows of its joint.
 
     Returns the standard deviation of the torque residual of every joint, g, and the standard
     deviation of g. g is 1/(coefficient of the known load), and nan if motors are coupled.
@@ -285,11 +285,11 @@ def _together(
     drives: Drives,
     seed: int,
 ) -> tuple[Array, Array]:
-    """Estimate g, X and the load by total least squares, with errors in motor torques only.
+    """Estimate motor factors g, X and the load by total least squares, over all joints together.
 
-    g : factors of the torque constants. Returns the values and their standard deviations over
-    resampled blocks of time, for g, X and the load in this order; nan for columns that depend on
-    others.
+    Only the motor torques have errors. g : factors of the torque constants. Returns the values and
+    their standard deviations over resampled blocks of time, for g, X and the load in this order;
+    nan for columns that depend on others.
     """
     weight = np.repeat(
         1 / np.maximum(deviation, 1e-12 * np.abs(observation.Y).max()), observation.rows
@@ -310,7 +310,7 @@ def _together(
 
 
 def _gains(R: Array, D: Array) -> Array:
-    """Compute the factors g, X and the load from the QR factor R of all columns.
+    """Compute the motor factors g, X and the load from the QR factor R of the extended W.
 
     Columns of R: columns without errors (of X and the load), known load, motor torques V. D :
     standard deviations of the errors in V.

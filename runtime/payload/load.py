@@ -193,7 +193,7 @@ def friction_columns(model: GeneratedModel, physical: PhysicalModel) -> list[int
 
 @dataclass(frozen=True, eq=False)
 class LoadColumns:
-    """Derivatives of the base parameters with respect to the parameters of a load, as columns.
+    """Derivatives of the base parameters with respect to the load parameters, one column each.
 
     Attributes
     ----------

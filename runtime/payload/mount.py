@@ -26,7 +26,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Mount:
-    """The link to which a load is fixed, and the frame in which its parameters are given.
+    """The link to which a load is fixed, and the frame in which the load parameters are given.
 
     Attributes
     ----------

@@ -12,7 +12,7 @@ LOAD = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 
 
 class PayloadSettings(Settings):
-    """Settings of a load that is fixed to a link in some records: its place, known parameters.
+    """Settings of a load fixed to a link in some records: the link, and known load parameters.
 
     All other records of the study are without the load.
 

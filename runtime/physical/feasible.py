@@ -233,7 +233,7 @@ def solve_with_weight(
     options: FeasibleOptions,
     without_prior: Array | None = None,
 ) -> tuple[Array, float]:
-    """Find the standard parameters chi, and the weight of the prior (values of the robot file).
+    """Find the standard parameters chi, and the weight with which robot file values act as prior.
 
     rows : the factored system. without_prior : chi of weight 0, if it is known. Returns chi, shape
     (p,), and the weight.
@@ -264,11 +264,12 @@ def solve_with_weight(
 def held_out_weight(
     observation: Observation, system: System, physical: PhysicalModel, options: FeasibleOptions
 ) -> float:
-    """Choose the prior weight with which four fifths of the record predict the other fifth best.
+    """Choose the weight of the prior with which a fit best predicts data not used in this fit.
 
-    The squared errors of the five predictions are added; if two weights are equally good, the
-    larger is chosen. A weight is abandoned as soon as it cannot be the best, since no prediction
-    error is below the error of least squares on the same fifth.
+    Four fifths of the record predict the other fifth, five times; the squared errors of the
+    predictions are added. If two weights are equally good, the larger is chosen. A weight is
+    abandoned as soon as it cannot be the best, since no prediction error is below the error of
+    least squares on the same fifth.
     """
     number = observation.equal_parts(LIMIT.HELD_OUT_PARTS)
     parts = [part_factor(observation.where(number == p), system) for p in np.unique(number)]
@@ -309,7 +310,7 @@ def held_out_weight(
 def decide_options(
     options: FeasibleOptions, model: GeneratedModel, physical: PhysicalModel
 ) -> FeasibleOptions:
-    """Replace "auto" in the options by values for this robot: the prior and the bounds.
+    """Replace the value "auto" of the prior and of the bounds by settings for this robot.
 
     The size of the robot gives two bounds: no centre of mass lies further from the origin of its
     frame, along any axis, and all links together weigh less than a fifth of the water in a cube of
@@ -344,7 +345,7 @@ def decide_options(
 
 
 def reach_text(options: FeasibleOptions) -> str:
-    """Write a sentence on the mass and centre bounds guessed from the robot size, if any."""
+    """Write a sentence on bounds of mass and centre of mass that the robot size gives, if any."""
     if options.reach is None or options.reach == "auto":
         return ""
     mass = options.total_mass[1] if isinstance(options.total_mass, tuple) else np.inf
@@ -376,10 +377,10 @@ def by_reach(
 def bounds_contradict(
     rows: Factor, physical: PhysicalModel, unbounded: Array | None, bounded: Array | None
 ) -> bool:
-    """Whether the mass and centre bounds guessed from the robot size contradict the record.
+    """Whether mass and centre-of-mass bounds guessed from the robot size contradict the record.
 
-    They do if they raise the residual norm by more than the factor LIMIT.WEIGHT_INCREASE, or if no
-    robot is within them.
+    The bounds contradict the record if they raise the residual norm by more than the factor
+    LIMIT.WEIGHT_INCREASE, or if no robot is within the bounds.
     """
     if unbounded is None or bounded is None:
         return unbounded is not None
@@ -399,7 +400,10 @@ def prior_text(physical: PhysicalModel, options: FeasibleOptions, weight: float)
 
 
 def part_factor(part: Observation, system: System) -> Factor:
-    """Compute the QR factor of a part of the record, with the joint weights of the whole record."""
+    """Compute the QR factor of [W Y] of a part of the record, weighted as the whole record.
+
+    The weights of the joints are those of the whole record.
+    """
     chosen = part.columns(system.names)
     return factor(chosen.W, chosen.Y, chosen.rows, chosen.names).weighted(
         1 / np.array(system.scales)

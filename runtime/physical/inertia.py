@@ -84,7 +84,7 @@ class Condition:
 
 @dataclass(frozen=True, eq=False)
 class PhysicalModel:
-    """Standard parameters of a model, their map to base parameters, and their physical conditions.
+    """Standard parameters chi of a robot model, their physical conditions, and K in X = K chi.
 
     Attributes
     ----------

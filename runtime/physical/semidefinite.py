@@ -78,7 +78,7 @@ class LinearBounds:
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Affine set of standard parameters: all chi = origin + basis w, with w any vector.
+    """Set of vectors of standard parameters: all chi = origin + basis w, with any vector w.
 
     origin has shape (p,), basis (p, m).
     """
@@ -88,12 +88,12 @@ class Space:
 
 
 def everything(scale: Array) -> Space:
-    """Return the set of all standard parameters chi, shape (p,), each in units of `scale`."""
+    """Return the set (Space) of all vectors chi of p standard parameters, in units of `scale`."""
     return Space(np.zeros(len(scale)), np.diag(scale))
 
 
 def solutions(K: Array, X: Array, scale: Array) -> Space:
-    """Return the set of all standard parameters chi with the base parameters X: K chi = X.
+    """Return the set (Space) of all standard parameters chi with given base parameters X = K chi.
 
     K has full row rank. scale : units of the unknowns, shape (p,).
     """
@@ -148,7 +148,7 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
-    """Result of a semidefinite program.
+    """Result of a semidefinite program: standard parameters, and the status of the solver.
 
     Attributes
     ----------
@@ -175,9 +175,9 @@ class Optimum:
 
 
 class Program:
-    """A cone program for standard parameters chi = origin + basis w, with the unknowns w.
+    """A cone program whose solution is the vector of standard parameters chi = origin + basis w.
 
-    It is built constraint by constraint.
+    The unknowns are w. The program is built constraint by constraint.
 
     It starts with the constraint P >= least S of every condition, or P >= t S with an unknown t,
     and with the linear rows. The criterion may add further unknowns.
@@ -416,7 +416,7 @@ def _cone(n: int) -> Any:
 
 
 def triangle(B: Array) -> Array:
-    """Write symmetric matrices, shape (k, n, n), as columns: their upper triangles.
+    """Convert symmetric matrices, shape (k, n, n), to columns that hold their upper triangles.
 
     Entries off the diagonal are multiplied by sqrt(2). The result has shape (n (n + 1)/2, k).
     """
@@ -444,7 +444,7 @@ def trace(z: Array) -> float:
 
 
 def on_standard(M: Array, numbers: Sequence[int], p: int) -> Array:
-    """Put the columns of M at the indices `numbers` of a matrix with p columns, shape (k, p).
+    """Build a matrix with p columns, shape (k, p), from M: column i of M is at index numbers[i].
 
     The other columns are zero.
     """
