@@ -58,8 +58,6 @@ class Reading:
         Means of the posterior.
     s_q, s_qd, s_qdd : ndarray, shape (N, n)
         Standard deviations of the posterior.
-    jerk_density : ndarray, shape (n,), rad/s^3/sqrt(Hz) or m/s^3/sqrt(Hz)
-        Root of the mean density r of the white jerk.
     unknown : ndarray of bool, shape (N, n)
         Gaps in which the counts around do not determine the state, and the samples near these gaps
         that filters spoil.
@@ -76,7 +74,6 @@ class Reading:
     s_qd: Array
     s_qdd: Array
     unknown: Array
-    jerk_density: Array
     step: Array
     phase: Array
     findings: tuple[str, ...]
@@ -123,14 +120,13 @@ class Reading:
 class Part:
     """One stretch of a long record, with the motion of the encoders that move in it.
 
-    The stretch starts at sample `begin`; only its samples [first, stop) are used in the result.
+    The stretch starts at sample `begin`; only its samples from `first` on are used in the result.
     `moving` lists the encoders whose counts change.
     """
 
     smoothed: tuple[Smoothed, ...]
     begin: int
     first: int
-    stop: int
     moving: Array
 
     @property
@@ -197,7 +193,7 @@ def _reading(
 ) -> Reading:
     N, n = counts.shape
     states, unknown = [np.empty((N, n)) for _ in range(6)], np.empty((N, n), dtype=bool)
-    density, parts, found, gaps = np.zeros(n), [], dict.fromkeys((*known.findings, *said)), Gaps(n)
+    parts, found, gaps = [], dict.fromkeys((*known.findings, *said)), Gaps(n)
     for begin, first, stop, end in stretches(N):
         kept = slice(first - begin, stop - begin)
         ahead = {j: starts[begin, j] for j in range(n) if (begin, j) in starts}
@@ -207,8 +203,7 @@ def _reading(
         for x, own in zip(states, read, strict=True):
             x[first:stop] = own[kept]
         if part is not None:
-            part = replace(part, begin=begin, first=first, stop=stop)
-            density[part.moving] += [x.density * (stop - first) / N for x in part.smoothed]
+            part = replace(part, begin=begin, first=first)
             parts.append(part)
             found.update(dict.fromkeys(part.findings))
     for i, x in enumerate(states):
@@ -216,9 +211,9 @@ def _reading(
         if i == 0:
             x += known.phase
     q, qd, qdd, s_q, s_qd, s_qdd = states
-    jerk, findings = np.sqrt(density) * known.step, (*found, *gaps.findings(rate))
+    findings = (*found, *gaps.findings(rate))
     return Reading(
-        q, qd, qdd, s_q, s_qd, s_qdd, unknown, jerk, known.step, known.phase, findings, tuple(parts)
+        q, qd, qdd, s_q, s_qd, s_qdd, unknown, known.step, known.phase, findings, tuple(parts)
     )
 
 
@@ -280,7 +275,7 @@ def _positions_of_counts(
     )
     uneven = ANYWHERE if shaken else uneven
     channels = tuple(smoothed(k[j], 1 / rate, uneven=uneven, start=starts.get(j)) for j in moving)
-    part = Part(channels, 0, 0, N, moving)
+    part = Part(channels, 0, 0, moving)
     for order in range(3):
         for j, each in zip(moving, channels, strict=True):
             states[order][:, j], states[order + 3][:, j] = each.state(order)

@@ -188,7 +188,7 @@ def plant_function(
     n, m = friction.G.shape[1], len(friction.G)
     inputs = plant_inputs(model, friction)
     q, qd, tau, X, plus, minus, h = inputs
-    flow = flow_function(model, constants, integrator)
+    flow = (_cvodes if integrator == "cvodes" else _runge_kutta)(model, constants)
     if not m:
         return ca.Function("plant", inputs, list(flow(q, qd, tau, X, h)))
     f, direction = sliding_friction(friction, qd, plus, minus)
@@ -216,16 +216,6 @@ def keeps_sliding(friction: DryFriction, direction: MX, qd: MX, end: MX) -> MX:
     """Whether every friction element slips, in the same direction at velocities qd and `end`."""
     G = ca.DM(friction.G)
     return ca.mmin(ca.vertcat(ca.fabs(G @ qd), direction * (G @ end))) > LIMIT.SLIP_REST
-
-
-def flow_function(model: GeneratedModel, constants: dict[str, float], integrator: str) -> Any:
-    """Make the CasADi function that moves the arm without dry friction over a step h.
-
-    The torque is constant over the step.
-
-    (q, qd, tau, Xs, h) -> q, qd after h, and qdd at the start.
-    """
-    return (_cvodes if integrator == "cvodes" else _runge_kutta)(model, constants)
 
 
 def _rounds(

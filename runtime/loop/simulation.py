@@ -53,8 +53,6 @@ class Simulator:
     controller : Controller
     constants : mapping, optional
         Geometry and gravity that replace those of the robot file.
-    in_c : bool
-        Whether to compile to C if there is a compiler.
     """
 
     def __init__(
@@ -63,7 +61,6 @@ class Simulator:
         controller: Controller,
         *,
         constants: Mapping[str, float] | None = None,
-        in_c: bool = True,
     ) -> None:
         require_no_channels(model, "a simulated motion")
         constants_of(model, constants or {})
@@ -71,7 +68,7 @@ class Simulator:
         self.law: ControlLaw = control_law(controller, model)
         require(model, "casadi")
         self.friction: DryFriction = dry_friction(model)
-        self._in_c = in_c and controller.integrator == "rk4"  # CVODES has no C of its own
+        self._in_c = controller.integrator == "rk4"  # CVODES has no C of its own
         self._compiled: dict[int, Any] = {}
         self._bias = _rest_functions(self.model, self.constants)
 

@@ -103,15 +103,14 @@ def _masked(D: SX, rows: SX) -> SX:
     )
 
 
-def rest_function(friction: DryFriction, columns: int = 1) -> Any:
+def rest_function(friction: DryFriction) -> Any:
     """Make the CasADi function that stops marked friction elements: their slips G qd become zero.
 
     (qd, Y, at_rest) -> the nearest velocity with these slips zero. The metric is A, so that kinetic
     energy only falls. If a displacement replaces qd, elements that rest over the step do not creep.
-    qd : (n, columns).
     """
     m, n = friction.G.shape
-    qd, Y, rows = ca.SX.sym("qd", n, columns), ca.SX.sym("Y", n, m), ca.SX.sym("rows", m)
+    qd, Y, rows = ca.SX.sym("qd", n), ca.SX.sym("Y", n, m), ca.SX.sym("rows", m)
     G = ca.DM(friction.G)
     impulse = solve(_masked(G @ Y, rows), ca.diag(rows) @ G @ qd)
     return ca.Function(
