@@ -144,7 +144,6 @@ def read_counts(
     rate: float,
     step: Array | Sequence[float] | float | None = None,
     *,
-    uneven: float | None = None,
     name: str = "record",
     starts: Starts | None = None,
 ) -> Reading:
@@ -158,9 +157,6 @@ def read_counts(
         Sampling rate.
     step : float or ndarray, shape (n,), rad or m, optional
         Step of the encoders; default: from the record.
-    uneven : float, optional, steps
-        Standard deviation of the encoder lines from even spacing, by which bounds are widened;
-        default: estimated.
     name : str
         Name of the record in error messages.
     starts : mapping, optional
@@ -180,14 +176,13 @@ def read_counts(
         lattice, or counts jump.
     """
     known, counts, wraps = unwrapped_counts(position, step, name=name)
-    return _reading(counts, rate, known, uneven, wraps, starts or {})
+    return _reading(counts, rate, known, wraps, starts or {})
 
 
 def _reading(
     counts: Array,
     rate: float,
     known: Lattice,
-    uneven: float | None,
     said: Sequence[str],
     starts: Starts,
 ) -> Reading:
@@ -197,7 +192,7 @@ def _reading(
     for begin, first, stop, end in stretches(N):
         kept = slice(first - begin, stop - begin)
         ahead = {j: starts[begin, j] for j in range(n) if (begin, j) in starts}
-        part, read, left = read_stretch(counts[begin:end], rate, uneven, gaps.rest(counts), ahead)
+        part, read, left = read_stretch(counts[begin:end], rate, gaps.rest(counts), ahead)
         unknown[first:stop] = left[kept]
         gaps.take(counts[first:stop], left[kept])
         for x, own in zip(states, read, strict=True):
@@ -220,7 +215,6 @@ def _reading(
 def read_stretch(
     counts: Array,
     rate: float,
-    uneven: float | None,
     rest: Array,
     starts: Mapping[int, SearchStart] | None = None,
 ) -> tuple[Part | None, list[Array], Array]:
@@ -240,9 +234,7 @@ def read_stretch(
     moving = np.flatnonzero(most > least)
     states = [np.full((N, n), value) for value in (0.0, 0.0, 0.0, 12**-0.5, 0.0, 0.0)]
     states[0][:] = np.where(np.isfinite(least), least, rest)
-    part = (
-        _positions_of_counts(k, moving, states, rate, uneven, starts or {}) if len(moving) else None
-    )
+    part = _positions_of_counts(k, moving, states, rate, starts or {}) if len(moving) else None
     missing = np.isnan(counts)
     unknown = missing & (states[3] > UNKNOWN)
     for j in np.flatnonzero(missing.any(axis=0)):
@@ -260,7 +252,6 @@ def _positions_of_counts(
     moving: Array,
     states: Sequence[Array],
     rate: float,
-    uneven: float | None,
     starts: Mapping[int, SearchStart],
 ) -> Part:
     """Estimate the motion of the encoders that move, from counts k, shape (n, N).
@@ -269,11 +260,8 @@ def _positions_of_counts(
     """
     N = k.shape[1]
     known = [np.flatnonzero(np.isfinite(k[j])) for j in moving]
-    shaken = (
-        uneven is None
-        and max(shaken_share(k[j, at]) for j, at in zip(moving, known, strict=True)) > SHAKEN
-    )
-    uneven = ANYWHERE if shaken else uneven
+    shaken = max(shaken_share(k[j, at]) for j, at in zip(moving, known, strict=True)) > SHAKEN
+    uneven = ANYWHERE if shaken else None
     channels = tuple(smoothed(k[j], 1 / rate, uneven=uneven, start=starts.get(j)) for j in moving)
     part = Part(channels, 0, 0, moving)
     for order in range(3):

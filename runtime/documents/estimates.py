@@ -277,8 +277,9 @@ def load_used_set(path: Path | str) -> tuple[Estimate, Estimate | SetDocument]:
     InputError as for `load_estimate`.
     """
     fit, document = _fit_and_sets(path)
-    sets = () if document is None else document.sets
-    return fit, next((one for one in sets if one.name == document.model_columns), fit)
+    if document is None:
+        return fit, fit
+    return fit, next((one for one in document.sets if one.name == document.model_columns), fit)
 
 
 def _fit_and_sets(path: Path | str) -> tuple[Estimate, SetsDocument | None]:

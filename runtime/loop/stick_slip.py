@@ -27,9 +27,7 @@ from runtime.loop.dry_friction import DryFriction
 SX = Any  # casadi.SX
 
 
-def friction_function(
-    model: GeneratedModel, friction: DryFriction, constants: dict[str, float]
-) -> Any:
+def friction_function(model: GeneratedModel, friction: DryFriction) -> Any:
     """Make the CasADi function that computes the dry friction forces f from the state of the arm.
 
     (q, qd, tau, Xs, c_plus, c_minus) -> f, direction of every element (-1, 0 stuck, 1), qdd, and
@@ -46,8 +44,8 @@ def friction_function(
     )
     plus, minus = ca.SX.sym("plus", m), ca.SX.sym("minus", m)
     G = ca.DM(friction.G)
-    A = model.casadi("inertia_matrix")(q=q, X=X, **constants)["A"]
-    h = model.casadi("bias")(q=q, qd=qd, X=X, **constants)["GAM"]
+    A = model.casadi("inertia_matrix")(q=q, X=X)["A"]
+    h = model.casadi("bias")(q=q, qd=qd, X=X)["GAM"]
     solved = solve(A, ca.horzcat(tau - h, G.T))
     Y = solved[:, 1:]
     slip = G @ qd
