@@ -12,7 +12,7 @@ from typing import Any
 
 from runtime.core.errors import InputError
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.model import GeneratedModel
+from runtime.core.model import GeneratedModel, joint_units
 from runtime.core.problem import Problem
 
 INERTIAS = {"kg*m**2": "*s**2/rad", "kg*m": "*s**2/m", "kg": "*s**2/m"}
@@ -32,15 +32,16 @@ class CommandModel:
     """
 
     def __init__(self, model: GeneratedModel, unit: str) -> None:
-        self.of_torques, self.TORQUE_UNIT, self.VALUES = model, unit, dict[str, float]()
+        self._model, self.TORQUE_UNIT, self.VALUES = model, unit, dict[str, float]()
+        self.JOINT_UNITS = joint_units(model)
         self.LIMITS = {name: x for name, x in model.LIMITS.items() if name != "tau"}
         units = getattr(model, "UNITS", {})
         self.UNITS = {name: in_commands(text, unit) for name, text in units.items()}
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("__") or name == "of_torques":  # pickle asks before there is a model
+        if name.startswith("__") or name == "_model":  # pickle asks before there is a model
             raise AttributeError(name)
-        return getattr(self.of_torques, name)
+        return getattr(self._model, name)
 
 
 def in_commands(text: str, unit: str) -> str:

@@ -178,7 +178,9 @@ class WrenchModel:
         units = {name.removesuffix("R"): unit for name, unit in units.items()}
         units |= {f"{p}{j}": u for p, u in zip(INERTIAL, TEN_UNITS, strict=True) for j in frames}
         units |= {f"B{row}": "N" if row[0] == "F" else "N*m" for row in rows}
-        slides = dict(zip(model.JOINTS, joint_units(model), strict=True))
+        of_axes = ("m" if row[0] == "F" else "rad" for row in rows)
+        self.JOINT_UNITS = (*joint_units(model), *of_axes)
+        slides = dict(zip(self.JOINTS, self.JOINT_UNITS, strict=True))
         rotors = {  # which a base parameter of joint torques may hold
             name: "kg" if all(slides.get(j) == "m" for j in along) else "kg*m**2"
             for name, (kind, _, along) in elements_of(model).items()

@@ -7,6 +7,7 @@ For each limit, the table gives the value, the unit, the meaning, and where it w
 
 import tomllib
 from importlib.resources import files
+from types import SimpleNamespace
 from typing import Any
 
 ENTRIES: dict[str, dict[str, Any]] = {
@@ -16,16 +17,5 @@ ENTRIES: dict[str, dict[str, Any]] = {
     ).values()
     for name, limit in module.items()
 }
-
-
-class LimitValues:
-    """Numerical thresholds of all verdicts and checks, as attributes, for instance LIMIT.DECISIVE."""
-
-    def __init__(self) -> None:
-        self.__dict__.update({name: limit["value"] for name, limit in ENTRIES.items()})
-
-    def __getattr__(self, name: str) -> Any:
-        raise AttributeError(f"no limit {name} in runtime/core/limits.toml")
-
-
-LIMIT = LimitValues()
+LIMIT: Any = SimpleNamespace(**{name: limit["value"] for name, limit in ENTRIES.items()})
+"""Values of the limits, as attributes, for instance LIMIT.DECISIVE."""

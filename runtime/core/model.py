@@ -227,20 +227,6 @@ def drives_of(model: GeneratedModel) -> Drives | None:
     return None if model.DRIVES is None else Drives.from_mapping(model.DRIVES)
 
 
-def constants_of(model: GeneratedModel, constants: Mapping[str, float]) -> dict[str, float]:
-    """Return the constants of a model (geometry and gravity) with new values for some of them.
-
-    Constants that are not in `constants` have the value of the robot file. Raise InputError for a
-    name that the model does not have.
-    """
-    if unknown := sorted(constants.keys() - model.CONSTANTS.keys()):
-        raise InputError(
-            f"{model.NAME} has no constant {', '.join(unknown)}; there are "
-            f"{', '.join(model.CONSTANTS) or 'none'}"
-        )
-    return {**model.CONSTANTS, **constants}
-
-
 def channels_of(model: GeneratedModel) -> Mapping[str, tuple[str, ...]]:
     """Return, for each measured signal such as a temperature, the parameters that depend on it.
 
@@ -348,7 +334,8 @@ def joint_units(model: GeneratedModel) -> tuple[str, ...]:
     acts on it, since a force depends on masses and first moments only. Units of user-defined
     columns are not used.
     """
-    model = getattr(model, "of_torques", model)  # of a CommandModel: UNITS in N m
+    if stated := getattr(model, "JOINT_UNITS", ()):  # of a model that is not emitted
+        return cast(tuple[str, ...], stated)
     units, elements = getattr(model, "UNITS", {}), getattr(model, "ELEMENTS", {})
     result = []
     for row, joint in enumerate(model.JOINTS):

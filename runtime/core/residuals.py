@@ -84,13 +84,13 @@ def whiteness(comparison: Sequence[JointComparison], rate: float) -> tuple[White
     return tuple(joint_whiteness(joint, rate) for joint in comparison if len(joint.t))
 
 
-def joint_whiteness(joint: JointComparison, rate: float, lags: int = LIMIT.LAGS) -> Whiteness:
+def joint_whiteness(joint: JointComparison, rate: float) -> Whiteness:
     """Compute the correlation, the Ljung-Box test and the spectrum of the residuals of one joint.
 
-    rate : rows per second, Hz. lags : largest number of correlations.
+    rate : rows per second, Hz.
     """
     N = len(joint.t)
-    m = max(1, min(lags, N // 5))
+    m = max(1, min(LIMIT.LAGS, N // 5))
     error = joint.error - joint.error.mean()
     steps = np.rint(np.diff(joint.t) * rate).astype(np.intp)
     apart = (steps <= 0) | (steps > LIMIT.SEPARATE)  # other records: time goes back, or much later

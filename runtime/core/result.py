@@ -18,7 +18,7 @@ from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.method import LINEAR
 from runtime.core.limits import LIMIT
 from runtime.core.markup import number
-from runtime.core.model import GeneratedModel, joint_labels
+from runtime.core.model import GeneratedModel, joint_labels, joint_torque_units
 from runtime.core.parameter_sets import (
     ORDER,
     SetName,
@@ -234,10 +234,8 @@ class Identification:
 
         The joints are judged by the units of the parameters.
         """
-        if command := getattr(self.model, "TORQUE_UNIT", ""):
-            return str(command)
-        units = set(dict(getattr(self.model, "UNITS", {})).values())
-        return "N" if "N" in units and "N*m" not in units else "N m"
+        units = {*joint_torque_units(self.model)}
+        return units.pop() if len(units) == 1 else "N m"
 
     @cached_property
     def record_errors(self) -> tuple[RecordError, ...]:
@@ -455,7 +453,7 @@ class Identification:
         ]
         records = [
             f"error in {one.name}: {one.relative_error:.2f} % in total, per joint "
-            + _percents(one.per_joint)
+            + " ".join(f"{error:.2f}" for error in one.per_joint)
             for one in self.record_errors
         ]
         weak = [
@@ -558,7 +556,3 @@ class Identification:
         for part in self.parts:
             summary |= part.entries()
         return summary
-
-
-def _percents(errors: tuple[float, ...]) -> str:
-    return " ".join(f"{error:.2f}" for error in errors)

@@ -58,8 +58,6 @@ class Reading:
         Means of the posterior.
     s_q, s_qd, s_qdd : ndarray, shape (N, n)
         Standard deviations of the posterior.
-    jerk_density : ndarray, shape (n,), rad/s^3/sqrt(Hz) or m/s^3/sqrt(Hz)
-        Root of the mean density r of the white jerk.
     unknown : ndarray of bool, shape (N, n)
         Gaps in which the counts around do not determine the state, and the samples near these gaps
         that filters spoil.
@@ -76,7 +74,6 @@ class Reading:
     s_qd: Array
     s_qdd: Array
     unknown: Array
-    jerk_density: Array
     step: Array
     phase: Array
     findings: tuple[str, ...]
@@ -123,14 +120,13 @@ class Reading:
 class Part:
     """One stretch of a long record, with the estimated motion of the encoders that move in it.
 
-    The stretch starts at sample `begin`; only its samples [first, stop) are used in the result.
+    The stretch starts at sample `begin`; only its samples from `first` on are used in the result.
     `moving` lists the encoders whose counts change.
     """
 
     smoothed: tuple[Smoothed, ...]
     begin: int
     first: int
-    stop: int
     moving: Array
 
     @property
@@ -148,7 +144,6 @@ def read_counts(
     rate: float,
     step: Array | Sequence[float] | float | None = None,
     *,
-    uneven: float | None = None,
     name: str = "record",
     starts: Starts | None = None,
 ) -> Reading:
@@ -162,9 +157,6 @@ def read_counts(
         Sampling rate.
     step : float or ndarray, shape (n,), rad or m, optional
         Step of the encoders; default: from the record.
-    uneven : float, optional, steps
-        Standard deviation of the encoder lines from even spacing, by which bounds are widened;
-        default: estimated.
     name : str
         Name of the record in error messages.
     starts : mapping, optional
@@ -184,31 +176,29 @@ def read_counts(
         lattice, or counts jump.
     """
     known, counts, wraps = unwrapped_counts(position, step, name=name)
-    return _reading(counts, rate, known, uneven, wraps, starts or {})
+    return _reading(counts, rate, known, wraps, starts or {})
 
 
 def _reading(
     counts: Array,
     rate: float,
     known: Lattice,
-    uneven: float | None,
     said: Sequence[str],
     starts: Starts,
 ) -> Reading:
     N, n = counts.shape
     states, unknown = [np.empty((N, n)) for _ in range(6)], np.empty((N, n), dtype=bool)
-    density, parts, found, gaps = np.zeros(n), [], dict.fromkeys((*known.findings, *said)), Gaps(n)
+    parts, found, gaps = [], dict.fromkeys((*known.findings, *said)), Gaps(n)
     for begin, first, stop, end in stretches(N):
         kept = slice(first - begin, stop - begin)
         ahead = {j: starts[begin, j] for j in range(n) if (begin, j) in starts}
-        part, read, left = read_stretch(counts[begin:end], rate, uneven, gaps.rest(counts), ahead)
+        part, read, left = read_stretch(counts[begin:end], rate, gaps.rest(counts), ahead)
         unknown[first:stop] = left[kept]
         gaps.take(counts[first:stop], left[kept])
         for x, own in zip(states, read, strict=True):
             x[first:stop] = own[kept]
         if part is not None:
-            part = replace(part, begin=begin, first=first, stop=stop)
-            density[part.moving] += [x.density * (stop - first) / N for x in part.smoothed]
+            part = replace(part, begin=begin, first=first)
             parts.append(part)
             found.update(dict.fromkeys(part.findings))
     for i, x in enumerate(states):
@@ -216,16 +206,15 @@ def _reading(
         if i == 0:
             x += known.phase
     q, qd, qdd, s_q, s_qd, s_qdd = states
-    jerk, findings = np.sqrt(density) * known.step, (*found, *gaps.findings(rate))
+    findings = (*found, *gaps.findings(rate))
     return Reading(
-        q, qd, qdd, s_q, s_qd, s_qdd, unknown, jerk, known.step, known.phase, findings, tuple(parts)
+        q, qd, qdd, s_q, s_qd, s_qdd, unknown, known.step, known.phase, findings, tuple(parts)
     )
 
 
 def read_stretch(
     counts: Array,
     rate: float,
-    uneven: float | None,
     rest: Array,
     starts: Mapping[int, SearchStart] | None = None,
 ) -> tuple[Part | None, list[Array], Array]:
@@ -245,9 +234,7 @@ def read_stretch(
     moving = np.flatnonzero(most > least)
     states = [np.full((N, n), value) for value in (0.0, 0.0, 0.0, 12**-0.5, 0.0, 0.0)]
     states[0][:] = np.where(np.isfinite(least), least, rest)
-    part = (
-        _positions_of_counts(k, moving, states, rate, uneven, starts or {}) if len(moving) else None
-    )
+    part = _positions_of_counts(k, moving, states, rate, starts or {}) if len(moving) else None
     missing = np.isnan(counts)
     unknown = missing & (states[3] > UNKNOWN)
     for j in np.flatnonzero(missing.any(axis=0)):
@@ -265,7 +252,6 @@ def _positions_of_counts(
     moving: Array,
     states: Sequence[Array],
     rate: float,
-    uneven: float | None,
     starts: Mapping[int, SearchStart],
 ) -> Part:
     """Estimate the motion of the encoders that move, from counts k, shape (n, N).
@@ -274,13 +260,10 @@ def _positions_of_counts(
     """
     N = k.shape[1]
     known = [np.flatnonzero(np.isfinite(k[j])) for j in moving]
-    shaken = (
-        uneven is None
-        and max(shaken_share(k[j, at]) for j, at in zip(moving, known, strict=True)) > SHAKEN
-    )
-    uneven = ANYWHERE if shaken else uneven
+    shaken = max(shaken_share(k[j, at]) for j, at in zip(moving, known, strict=True)) > SHAKEN
+    uneven = ANYWHERE if shaken else None
     channels = tuple(smoothed(k[j], 1 / rate, uneven=uneven, start=starts.get(j)) for j in moving)
-    part = Part(channels, 0, 0, N, moving)
+    part = Part(channels, 0, 0, moving)
     for order in range(3):
         for j, each in zip(moving, channels, strict=True):
             states[order][:, j], states[order + 3][:, j] = each.state(order)

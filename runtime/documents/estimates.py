@@ -248,10 +248,9 @@ def load_whole_estimate(path: Path | str) -> Estimate:
     (`whole_set`). The other fields, for instance the covariance, are those of least squares.
     InputError as for `load_estimate`.
     """
-    fit, text = load_estimate(path), result_text(path)
-    if not json.loads(text).get("sets"):
+    fit, document = _fit_and_sets(path)
+    if document is None:
         return fit
-    document = from_text(SetsDocument, text, ESTIMATE, str(path))
     sets = {one.name: one for one in document.sets}
     whole = sets.get(whole_set(sets, document.model_columns))
     if (
@@ -278,11 +277,18 @@ def load_used_set(path: Path | str) -> tuple[Estimate, Estimate | SetDocument]:
 
     InputError as for `load_estimate`.
     """
-    fit, text = load_estimate(path), result_text(path)
-    if not json.loads(text).get("sets"):
+    fit, document = _fit_and_sets(path)
+    if document is None:
         return fit, fit
-    document = from_text(SetsDocument, text, ESTIMATE, str(path))
     return fit, next((one for one in document.sets if one.name == document.model_columns), fit)
+
+
+def _fit_and_sets(path: Path | str) -> tuple[Estimate, SetsDocument | None]:
+    """Read estimate.json as a plain estimate, and, if the file has several sets, with these."""
+    text = result_text(path)
+    fit = from_text(Estimate, text, ESTIMATE, str(path))
+    has_sets = json.loads(text).get("sets")
+    return fit, from_text(SetsDocument, text, ESTIMATE, str(path)) if has_sets else None
 
 
 class ResultSchema(GenerateJsonSchema):

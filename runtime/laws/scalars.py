@@ -214,11 +214,7 @@ def fit_laws(
     weights : bool
         Whether the rows of each joint are divided by the standard deviation of its residual.
     """
-    return fitted_laws(LawProblem(model, records, columns or model.BASE_PARAMETERS), weights)
-
-
-def fitted_laws(problem: LawProblem, weights: bool = False) -> FittedLaws:
-    """Fit the nonlinear constants of laws to the W and Y of all records; see `fit_laws`."""
+    problem = LawProblem(model, records, columns or model.BASE_PARAMETERS)
     every, scale = np.ones(len(problem.Y), dtype=bool), np.ones(len(problem.Y))
     groups: dict[str, list[int]] = {}
     for k, name in enumerate(problem.scalars):

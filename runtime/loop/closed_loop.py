@@ -44,7 +44,6 @@ from runtime.core.rows.prepared import Prepared, decimated_torque, observation_f
 from runtime.core.rows.selection import Selection, certain_rows, select_rows
 from runtime.core.settings import NotNegative, Settings, structure
 from runtime.core.signals.filters import States, decimated, filtered_states
-from runtime.core.study import Study
 from runtime.counts.reading import REACH
 from runtime.loop.law_check import LawFit, law_fits, law_text
 from runtime.loop.reference import Reference, of_record, reference_of, require_rate
@@ -136,7 +135,6 @@ class ClosedLoop:
     """
 
     model: GeneratedModel
-    study: Study
     simulator: Simulator
     parts: tuple[LoopPart, ...]
     assumption: str = ""
@@ -311,10 +309,10 @@ def closed_loop(
         torque = decimated_torque(record.torque, selection)
         parts.append(LoopPart(own, followed, selection, torque, *torques))
     if asked.reference == "measured":
-        return ClosedLoop(model, study, simulator, tuple(parts), ASSUMED)
+        return ClosedLoop(model, simulator, tuple(parts), ASSUMED)
     fits = law_fits(simulator.law, parts, controller, joint_labels(model))
     at(law_text(fits))
-    return ClosedLoop(model, study, simulator, tuple(parts), "", fits)
+    return ClosedLoop(model, simulator, tuple(parts), "", fits)
 
 
 def _at_ticks(x: Array, every: int, ticks: int) -> Array:

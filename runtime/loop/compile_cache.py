@@ -118,18 +118,7 @@ def _compiled(
     with TemporaryDirectory(dir=folder, prefix=".compiling-") as scratch:
         source, target = Path(scratch) / path.name, Path(scratch) / f"{path.stem}.so"
         source.write_bytes(text)
-        try:
-            done = subprocess.run(
-                [*command, *flags, source.name, "-o", target.name, *LIBRARIES],
-                cwd=scratch,
-                capture_output=True,
-                text=True,
-                errors="replace",
-                timeout=LIMIT.COMPILE_TIME,
-                check=False,
-            )
-        except (OSError, subprocess.TimeoutExpired) as e:
-            raise NotCompiledError(f"{' '.join(command)} did not run: {e}") from e
+        done = _ran([*command, *flags, source.name, "-o", target.name, *LIBRARIES], scratch)
         if done.returncode or not target.is_file():
             first = next(iter(done.stderr.strip().splitlines()), "no message")
             raise NotCompiledError(f"{' '.join(command)} failed with {done.returncode}: {first}")
@@ -159,9 +148,15 @@ def compiler() -> tuple[tuple[str, ...], str]:
             f"CC contains {', '.join(unsafe)}, which changes the arithmetic of the whole process; remove this flag"
         )
     command = (program, *given[1:])
+    return command, _ran([*command, "--version"]).stdout
+
+
+def _ran(words: Sequence[str], folder: str | None = None) -> subprocess.CompletedProcess[str]:
+    """Run the compiler in a folder; NotCompiledError if the compiler does not run or not end."""
     try:
-        done = subprocess.run(
-            [*command, "--version"],
+        return subprocess.run(
+            words,
+            cwd=folder,
             capture_output=True,
             text=True,
             errors="replace",
@@ -169,5 +164,4 @@ def compiler() -> tuple[tuple[str, ...], str]:
             check=False,
         )
     except (OSError, subprocess.TimeoutExpired) as e:
-        raise NotCompiledError(f"{program} did not run: {e}") from e
-    return command, done.stdout
+        raise NotCompiledError(f"{words[0]} did not run: {e}") from e

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import ctypes
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -94,7 +94,6 @@ def blocks(rows: Array, size: int) -> Iterator[tuple[Array, int]]:
 def tick_function(
     model: GeneratedModel,
     friction: DryFriction,
-    constants: Mapping[str, float],
     substeps: int,
     integrator: str,
 ) -> Any:
@@ -117,7 +116,7 @@ def tick_function(
         q, ca.vertcat(y1, y2), I, u1, ca.vertcat(*wanted), noise, law, flags
     )
     plus, minus = ca.DM(friction.plus) @ X, ca.DM(friction.minus) @ X
-    plant = plant_function(model, friction, dict(constants), integrator)
+    plant = plant_function(model, friction, integrator)
     starts: list[MX] = []  # qdd at the start of every substep
     for _ in range(substeps):
         q, qd, qdd = plant(
@@ -175,9 +174,7 @@ def _steps(x: MX, step: MX) -> MX:
     return ca.if_else(step > 0, step * ca.floor(x / step + 0.5), x)
 
 
-def plant_function(
-    model: GeneratedModel, friction: DryFriction, constants: dict[str, float], integrator: str
-) -> Any:
+def plant_function(model: GeneratedModel, friction: DryFriction, integrator: str) -> Any:
     """Make the CasADi function that moves the arm with dry friction over an integration step h.
 
     (q, qd, tau, Xs, plus, minus, h) -> q, qd after h, and qdd at its start.
@@ -188,7 +185,7 @@ def plant_function(
     n, m = friction.G.shape[1], len(friction.G)
     inputs = plant_inputs(model, friction)
     q, qd, tau, X, plus, minus, h = inputs
-    flow = flow_function(model, constants, integrator)
+    flow = (_cvodes if integrator == "cvodes" else _runge_kutta)(model)
     if not m:
         return ca.Function("plant", inputs, list(flow(q, qd, tau, X, h)))
     f, direction = sliding_friction(friction, qd, plus, minus)
@@ -196,9 +193,7 @@ def plant_function(
     calm = keeps_sliding(friction, direction, qd, sliding[1])
     given = [*inputs, *(ca.MX.sym(name, n) for name in ("q1", "qd1", "qdd"))]
     done = ca.Function("sliding", given, given[7:])
-    stopping = ca.Function(
-        "stopping", given, list(_rounds(model, friction, constants, flow)(*inputs))
-    )
+    stopping = ca.Function("stopping", given, list(_rounds(model, friction, flow)(*inputs)))
     return ca.Function(
         "plant",
         inputs,
@@ -218,25 +213,13 @@ def keeps_sliding(friction: DryFriction, direction: MX, qd: MX, end: MX) -> MX:
     return ca.mmin(ca.vertcat(ca.fabs(G @ qd), direction * (G @ end))) > LIMIT.SLIP_REST
 
 
-def flow_function(model: GeneratedModel, constants: dict[str, float], integrator: str) -> Any:
-    """Make the CasADi function that moves the arm without dry friction over a step h.
-
-    The torque is constant over the step.
-
-    (q, qd, tau, Xs, h) -> q, qd after h, and qdd at the start.
-    """
-    return (_cvodes if integrator == "cvodes" else _runge_kutta)(model, constants)
-
-
-def _rounds(
-    model: GeneratedModel, friction: DryFriction, constants: dict[str, float], flow: Any
-) -> Any:
+def _rounds(model: GeneratedModel, friction: DryFriction, flow: Any) -> Any:
     """Make the CasADi function that moves the arm over a step in which friction elements stop.
 
     The step h is divided into rounds; each round lasts until the next slip stops.
     """
     inputs = plant_inputs(model, friction)
-    cut, whole = (round_function(model, friction, constants, flow, whole=k) for k in (0, 1))
+    cut, whole = (round_function(model, friction, flow, whole=k) for k in (0, 1))
 
     # a switch gives only what is used: in C, CasADi crashes on a result of one that nobody takes
     q, qd, *fixed, h = inputs
@@ -259,7 +242,6 @@ def _rounds(
 def round_function(
     model: GeneratedModel,
     friction: DryFriction,
-    constants: dict[str, float],
     flow: Any,
     *,
     whole: int,
@@ -271,7 +253,7 @@ def round_function(
     """
     inputs = plant_inputs(model, friction)
     q, qd, tau, X, plus, minus, h = inputs
-    f, direction, qdd, Y = friction_function(model, friction, constants)(q, qd, tau, X, plus, minus)
+    f, direction, qdd, Y = friction_function(model, friction)(q, qd, tau, X, plus, minus)
     q1, qd1, _ = flow(q, qd, tau - ca.DM(friction.G).T @ f, X, h)
     qx, qdx, left, at_rest = event_function(friction)(q, qd, qdd, q1, qd1, h, direction, whole)
     rest, held = rest_function(friction), direction == 0
@@ -320,7 +302,7 @@ def runge_kutta(
     return moved(h / 6, [a + 2 * b + 2 * c + d for a, b, c, d in slopes]), k1
 
 
-def _runge_kutta(model: GeneratedModel, constants: dict[str, float]) -> Any:
+def _runge_kutta(model: GeneratedModel) -> Any:
     """Make the CasADi function that moves the arm over a step h by Runge-Kutta of order 4.
 
     (q, qd, tau, Xs, h) -> q, qd after h at constant torque, and qdd at the start.
@@ -328,13 +310,13 @@ def _runge_kutta(model: GeneratedModel, constants: dict[str, float]) -> Any:
     q, qd, tau, X, _, _, h = plant_inputs(model)
 
     def rates(q: MX, qd: MX) -> tuple[MX, MX]:
-        return qd, model.casadi("forward_dynamics")(q=q, qd=qd, tau=tau, X=X, **constants)["qdd"]
+        return qd, model.casadi("forward_dynamics")(q=q, qd=qd, tau=tau, X=X)["qdd"]
 
     end, start = runge_kutta(rates, [q, qd], h)
     return ca.Function("runge_kutta", [q, qd, tau, X, h], [*end, start[1]])
 
 
-def _cvodes(model: GeneratedModel, constants: dict[str, float]) -> Any:
+def _cvodes(model: GeneratedModel) -> Any:
     """Make the CasADi function that moves the arm over a step h by CVODES.
 
     Inputs and results are those of `_runge_kutta`.
@@ -342,12 +324,12 @@ def _cvodes(model: GeneratedModel, constants: dict[str, float]) -> Any:
     q, qd, tau, X, _, _, h = plant_inputs(model)
     n = len(model.JOINTS)
     x = ca.MX.sym("x", 2 * n)
-    a = model.casadi("forward_dynamics")(q=x[:n], qd=x[n:], tau=tau, X=X, **constants)["qdd"]
+    a = model.casadi("forward_dynamics")(q=x[:n], qd=x[n:], tau=tau, X=X)["qdd"]
     problem = {"x": x, "p": ca.vertcat(tau, X, h), "ode": h * ca.vertcat(x[n:], a)}
     end = ca.integrator("cvodes", "cvodes", problem, 0, 1, CVODES)(
         x0=ca.vertcat(q, qd), p=ca.vertcat(tau, X, h)
     )["xf"]
-    start = model.casadi("forward_dynamics")(q=q, qd=qd, tau=tau, X=X, **constants)["qdd"]
+    start = model.casadi("forward_dynamics")(q=q, qd=qd, tau=tau, X=X)["qdd"]
     return ca.Function("flow", [q, qd, tau, X, h], [end[:n], end[n:], start])
 
 

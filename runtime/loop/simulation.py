@@ -13,7 +13,7 @@ names the place and what to try.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from scipy.signal import butter, lfilter
 
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.limits import LIMIT
-from runtime.core.model import GeneratedModel, constants_of, require, require_no_channels
+from runtime.core.model import GeneratedModel, require, require_no_channels
 from runtime.core.record import Record
 from runtime.loop.control_law import (
     ControlLaw,
@@ -51,29 +51,21 @@ class Simulator:
     ----------
     model : GeneratedModel
     controller : Controller
-    constants : mapping, optional
-        Geometry and gravity that replace those of the robot file.
-    in_c : bool
-        Whether to compile to C if there is a compiler.
     """
 
     def __init__(
         self,
         model: GeneratedModel,
         controller: Controller,
-        *,
-        constants: Mapping[str, float] | None = None,
-        in_c: bool = True,
     ) -> None:
         require_no_channels(model, "a simulated motion")
-        constants_of(model, constants or {})
-        self.model, self.controller, self.constants = model, controller, dict(constants or {})
+        self.model, self.controller = model, controller
         self.law: ControlLaw = control_law(controller, model)
         require(model, "casadi")
         self.friction: DryFriction = dry_friction(model)
-        self._in_c = in_c and controller.integrator == "rk4"  # CVODES has no C of its own
+        self._in_c = controller.integrator == "rk4"  # CVODES has no C of its own
         self._compiled: dict[int, Any] = {}
-        self._bias = _rest_functions(self.model, self.constants)
+        self._bias = _rest_functions(self.model)
 
     def run(
         self,
@@ -155,9 +147,7 @@ class Simulator:
         )
         if feedforward is None and self.controller.feedforward == "values":
             X_file = parameters_of(self.model, self.controller)
-            known = self.model.inverse_dynamics(
-                reference.q, reference.qd, reference.qdd, X_file, **self.constants
-            )
+            known = self.model.inverse_dynamics(reference.q, reference.qd, reference.qdd, X_file)
         signals = np.hstack(
             [reference.q, reference.qd, known + self.law.ca * reference.qdd, noise, pushed]
         )
@@ -248,9 +238,7 @@ class Simulator:
         A tick is a sampling period of the controller. Each function is made once.
         """
         if substeps not in self._compiled:
-            tick = tick_function(
-                self.model, self.friction, self.constants, substeps, self.controller.integrator
-            )
+            tick = tick_function(self.model, self.friction, substeps, self.controller.integrator)
             self._compiled[substeps] = (compiled(tick) if self._in_c else tick).mapaccum(BLOCK)
         return self._compiled[substeps]
 
@@ -327,16 +315,16 @@ def simulate(
     )
 
 
-def _rest_functions(model: GeneratedModel, constants: Mapping[str, float]) -> Any:
+def _rest_functions(model: GeneratedModel) -> Any:
     """Make the CasADi function that computes inertia matrix A and viscous friction B at rest.
 
     (q, Xs) -> A, B = dGamma/dqd.
     """
     n = len(model.JOINTS)
     q, qd, X = ca.SX.sym("q", n), ca.SX.sym("qd", n), ca.SX.sym("X", len(model.BASE_PARAMETERS))
-    A = model.casadi("inertia_matrix")(q=q, X=X, **constants)["A"]
+    A = model.casadi("inertia_matrix")(q=q, X=X)["A"]
     B = ca.substitute(
-        ca.jacobian(model.casadi("bias")(q=q, qd=qd, X=X, **constants)["GAM"], qd),
+        ca.jacobian(model.casadi("bias")(q=q, qd=qd, X=X)["GAM"], qd),
         qd,
         ca.DM.zeros(n),
     )

@@ -27,9 +27,7 @@ from runtime.loop.dry_friction import DryFriction
 SX = Any  # casadi.SX
 
 
-def friction_function(
-    model: GeneratedModel, friction: DryFriction, constants: dict[str, float]
-) -> Any:
+def friction_function(model: GeneratedModel, friction: DryFriction) -> Any:
     """Make the CasADi function that computes the dry friction forces f from the state of the arm.
 
     (q, qd, tau, Xs, c_plus, c_minus) -> f, direction of every element (-1, 0 stuck, 1), qdd, and
@@ -46,8 +44,8 @@ def friction_function(
     )
     plus, minus = ca.SX.sym("plus", m), ca.SX.sym("minus", m)
     G = ca.DM(friction.G)
-    A = model.casadi("inertia_matrix")(q=q, X=X, **constants)["A"]
-    h = model.casadi("bias")(q=q, qd=qd, X=X, **constants)["GAM"]
+    A = model.casadi("inertia_matrix")(q=q, X=X)["A"]
+    h = model.casadi("bias")(q=q, qd=qd, X=X)["GAM"]
     solved = solve(A, ca.horzcat(tau - h, G.T))
     Y = solved[:, 1:]
     slip = G @ qd
@@ -103,15 +101,14 @@ def _masked(D: SX, rows: SX) -> SX:
     )
 
 
-def rest_function(friction: DryFriction, columns: int = 1) -> Any:
+def rest_function(friction: DryFriction) -> Any:
     """Make the CasADi function that stops marked friction elements: their slips G qd become zero.
 
     (qd, Y, at_rest) -> the nearest velocity with these slips zero. The metric is A, so that kinetic
     energy only falls. If a displacement replaces qd, elements that rest over the step do not creep.
-    qd : (n, columns).
     """
     m, n = friction.G.shape
-    qd, Y, rows = ca.SX.sym("qd", n, columns), ca.SX.sym("Y", n, m), ca.SX.sym("rows", m)
+    qd, Y, rows = ca.SX.sym("qd", n), ca.SX.sym("Y", n, m), ca.SX.sym("rows", m)
     G = ca.DM(friction.G)
     impulse = solve(_masked(G @ Y, rows), ca.diag(rows) @ G @ qd)
     return ca.Function(

@@ -671,18 +671,14 @@ def helps(trial: Trial, baseline: Baseline, other: Baseline) -> bool:
     """
 
     def misfit(cause: Cause, X: Array) -> float:
-        rows = other.rows(cause)
-        return np.inf if rows is None else _misfit(other.standard(Grams.of(*rows, other.tau)), X)
+        if (rows := other.rows(cause)) is None:
+            return np.inf
+        return fit_of(other.standard(Grams.of(*rows, other.tau)), X, 1.0).score
 
     assert trial.fit is not None
     given = unchanged_study(other.samples.n)
     after = min(misfit(cause, trial.fit.X) for cause in (given, trial.cause))
     return bool(misfit(given, baseline.given.X) - after > np.log(LIMIT.VISIBLE) / 2)
-
-
-def _misfit(grams: Grams, X: Array) -> float:
-    """Sum the logarithms of the root mean square residuals of all joints, for parameters X."""
-    return fit_of(grams, X, 1.0).score
 
 
 def loads(baseline: Baseline) -> list[Trial]:

@@ -179,7 +179,7 @@ def correlation_section(result: Identification) -> Section:
     )
 
 
-def correlation_matrix(fit: Estimate, most: int = LIMIT.CORRELATIONS_SHOWN) -> Matrix | None:
+def correlation_matrix(fit: Estimate) -> Matrix | None:
     """Select the most correlated parameters, and make a table of their correlations.
 
     None for a single parameter, or if the estimate has no covariance.
@@ -187,7 +187,7 @@ def correlation_matrix(fit: Estimate, most: int = LIMIT.CORRELATIONS_SHOWN) -> M
     deviation = np.sqrt(np.diag(fit.covariance))
     if len(fit.names) < 2 or not np.all(deviation > 0):
         return None
-    correlation = fit.covariance / np.outer(deviation, deviation)
+    correlation, most = fit.covariance / np.outer(deviation, deviation), LIMIT.CORRELATIONS_SHOWN
     strongest = np.abs(correlation - np.diag(np.diag(correlation))).max(axis=1)
     shown = np.sort(np.argsort(-strongest, kind="stable")[:most])
     caption = "Correlation of the estimates of the parameters that are used" + (

@@ -482,7 +482,7 @@ def independent(robot: Robot) -> Sample:
     return sampled(in_one_mode(robot), count, seed=5, in_time=bool(robot.channels))
 
 
-def numeric_rank(W: Array, *, tolerance: float = 1e-9, proved: int = 0) -> tuple[int, float]:
+def numeric_rank(W: Array, *, proved: int = 0) -> tuple[int, float]:
     """Compute the rank of a matrix by SVD of its scaled columns, and the ratio s_rank / s_(rank+1)
     of singular values.
 
@@ -496,7 +496,7 @@ def numeric_rank(W: Array, *, tolerance: float = 1e-9, proved: int = 0) -> tuple
     ):  # below the median (np.median loads numpy.ma): rounding of a column without effect
         acts = norms > 1e-12 * np.sort(norms[acts])[acts.sum() // 2]
     s = np.linalg.svd(W[:, acts] / norms[acts], compute_uv=False)
-    rank = int(np.sum(s > tolerance * s[0]))
+    rank = int(np.sum(s > 1e-9 * s[0]))
     if rank < proved < s.size and s[proved - 1] > SEEN * s[proved]:
         rank = proved
     gap = float(s[rank - 1] / max(s[rank], np.finfo(float).tiny)) if rank < s.size else float("inf")

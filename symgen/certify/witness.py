@@ -241,9 +241,6 @@ class Witness:
         if not self.tied:  # more samples than a block of the NumPy module has
             rows = np.arange(BLOCKS) % N
             checks["gravity"].append(Check((q[rows], X), self.rest[rows], largest))
-        return self._kept(checks)
-
-    def _kept(self, checks: dict[str, list[Check]]) -> dict[str, list[Check]]:
         return {name: check for name, check in checks.items() if name not in self.left_out}
 
     def value(

@@ -25,16 +25,18 @@ def schema(
     ] = "robot",
 ) -> None:
     """Print the JSON Schema of one kind of file. A file of `symgen new` names, in its first line,
-    the installed copy of the schema of robot files.
+    robot.schema.json, the schema of robot files, in the folder of this file.
     """
     if of not in KINDS:
         fail(f"--of {of}; expected one of {', '.join(KINDS)}")
+    from runtime.core.documents import json_text
+
     if of == "robot":
-        from symgen.description.schema import schema_text
+        from symgen.description import json_schema
 
-        typer.echo(schema_text(), nl=False)
+        schema = json_schema()
     else:
-        from runtime.compose import json_schema
-        from runtime.core.documents import json_text
+        from runtime import compose
 
-        typer.echo(json_text(json_schema(of)), nl=False)
+        schema = compose.json_schema(of)
+    typer.echo(json_text(schema), nl=False)

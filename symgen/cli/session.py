@@ -369,10 +369,10 @@ def stopped(checkpoint: Checkpoint | None) -> NoReturn:
 
 
 @contextmanager
-def progress_lines(after: float = 2.0) -> Iterator[None]:
+def progress_lines() -> Iterator[None]:
     """Print one line for each stage of long work for the duration of the block.
 
-    Lines are printed on the error stream, after the first `after` seconds.
+    Lines are printed on the error stream, after the first two seconds.
     """
     import logging
     from time import monotonic
@@ -382,7 +382,7 @@ def progress_lines(after: float = 2.0) -> Iterator[None]:
     start, level = monotonic(), LOGGER.level
     handler = logging.StreamHandler()
     handler.setFormatter(logging.Formatter("  %(message)s"))
-    handler.addFilter(lambda record: monotonic() - start > after)
+    handler.addFilter(lambda record: monotonic() - start > 2.0)
     LOGGER.addHandler(handler)
     LOGGER.setLevel(logging.INFO)
     try:

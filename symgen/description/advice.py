@@ -11,6 +11,7 @@ from collections.abc import Iterable
 
 from symgen.description.expression import PI, Expression
 
+ANCHORS = "anchors and aliases (& and *) are not supported; write the value itself"
 FULL_TURN = 2 * math.pi  # rad: a larger constant in an angle, pi aside, was meant in degrees
 
 _YAML = {  # what the scanner says: what to change
@@ -27,7 +28,7 @@ _YAML = {  # what the scanner says: what to change
         "with the same indent"
     ),
     "found another document": "a second document starts here; a robot file holds one",
-    "found undefined alias": "anchors and aliases (& and *) are not read; write the value out",
+    "found undefined alias": ANCHORS,
     "expected ',' or '}'": "look here, or at the end of the row above, for a missing , or }",
     "expected ',' or ']'": "look here, or at the end of the row above, for a missing , or ]",
 }

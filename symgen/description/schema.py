@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import difflib
 import json
-import pathlib
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -121,16 +120,6 @@ def json_schema() -> dict[str, Any]:
         },
         "required": ["symgen", *schema["required"]],
     }
-
-
-def schema_text() -> str:
-    """Return the text of robot.schema.json, the schema file that is installed in this folder."""
-    return json.dumps(json_schema(), indent=2, ensure_ascii=False) + "\n"
-
-
-def schema_file() -> pathlib.Path:
-    """Return the path of the installed file robot.schema.json."""
-    return pathlib.Path(__file__).with_name("robot.schema.json")
 
 
 _EXPECTED = {

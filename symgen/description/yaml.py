@@ -18,7 +18,7 @@ from typing import Any
 from ruamel.yaml import YAML, MappingNode, Node, ScalarNode
 from ruamel.yaml.error import MarkedYAMLError
 
-from symgen.description.advice import yaml_advice
+from symgen.description.advice import ANCHORS, yaml_advice
 from symgen.description.element import Element
 from symgen.description.expression import ONE
 from symgen.description.fields import Path, located
@@ -28,7 +28,6 @@ from symgen.description.schema import SCHEMA, robot_of
 from symgen.errors import DescriptionError
 
 MAX_BYTES, MAX_NESTING, MAX_SCALAR = 200_000, 12, 4000
-ANCHORS = "anchors and aliases (& and *) are not read; write the value out"
 
 INTEGER = re.compile(r"[-+]?[0-9]{1,15}\Z")
 DECIMAL = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]{1,3})?\Z")

@@ -65,24 +65,6 @@ Call = Callable[[Sequence[str], Sequence[str]], list[str]]
 """Lines that give names to what a function of some arguments gives, _ to what is not read."""
 
 
-def blocks_of(
-    spec: ModuleSpec, language: Language, component: Callable[[str, int], str] = "{}[{}]".format
-) -> dict[str, Block]:
-    """Write each function of a robot as complete source text; no two functions share code.
-
-    `component` gives the text of entry k of a state or of X, such as `q[0]`.
-    """
-
-    def inputs(source: str, wanted: Sequence[tuple[int, str]], count: int) -> list[str]:
-        return [language.step.format(name, component(source, k)) for k, name in wanted]
-
-    names = spec.names(language.is_word)
-    return {
-        name: FunctionPrinter(spec, [f], names.inner(), language, inputs).block(f)
-        for name, f in spec.functions.items()
-    }
-
-
 class FunctionPrinter:
     """Printer of several functions of a robot that are computed from one common expression graph.
 

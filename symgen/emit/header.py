@@ -377,8 +377,9 @@ def plain(text: str) -> str:
     )
 
 
-def packed(entries: Sequence[str], indent: str = "    ") -> list[str]:
+def packed(entries: Sequence[str]) -> list[str]:
     """Write entries separated by commas, as many on each line as fit."""
+    indent = "    "
     lines, line = [], indent
     for entry in entries:
         if len(line) + len(entry) + 1 > WIDTH - 4 and line.strip():

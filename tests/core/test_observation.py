@@ -101,12 +101,12 @@ def test_zero_entries_stay_zero(record):
 
 def test_equal_signals_are_filtered_once():
     entries = distinct_entries(planar)
-    assert len(entries.k) == planar.STRUCTURE.sum() == 13
-    assert len(entries.source) == 12  # ZZ2 acts alike on both joints
+    assert len(entries.row) == planar.STRUCTURE.sum() == 13
+    assert len(entries.place) == 12  # ZZ2 acts alike on both joints
     states = States(*(x[:100] for x in motion(T)))
     ((_, signals),) = Columns(planar).signals(states, None)
     D = planar.regressor(states.q, states.qd, states.qdd)
-    for k, j, which, sign in zip(entries.k, entries.j, entries.which, entries.sign, strict=True):
+    for k, j, which, sign in zip(entries.row, entries.j, entries.which, entries.sign, strict=True):
         np.testing.assert_array_equal(sign * signals[which], D[:, j, k])
 
 
@@ -125,7 +125,7 @@ def test_opposite_and_constant_signals():
         regressor=regressor,
     )
     entries = distinct_entries(model)
-    assert len(entries.source) == 3  # qd1, 1 and sign(qd1)
+    assert len(entries.place) == 3  # qd1, 1 and sign(qd1)
     qd = np.random.default_rng(0).normal(size=(300, 2))
     columns = Columns(model).decimated(States(qd, qd, qd), decimation_plan(300, 2, Decimate()))
     np.testing.assert_array_equal(columns[0, 1], -columns[0, 0])
@@ -150,14 +150,14 @@ def test_states_out_of_reach_are_not_merged():
         store=lambda N: np.zeros((2, 1, N)),
         regressor=regressor,
     )
-    assert len(distinct_entries(model).source) == 2
+    assert len(distinct_entries(model).place) == 2
 
 
 def test_loops_that_do_not_close_at_random_states():
     """The five-bar raises there; its identification treats every entry by itself."""
     model = load_model(Path(__file__).parents[2] / "generated" / "five_bar.py")
     entries = distinct_entries(model)
-    assert len(entries.source) == len(entries.k) == np.count_nonzero(model.STRUCTURE)
+    assert len(entries.place) == len(entries.row) == np.count_nonzero(model.STRUCTURE)
 
 
 def test_signals_are_those_found_over_a_finite_field():
@@ -169,13 +169,13 @@ def test_signals_are_those_found_over_a_finite_field():
     exact = {place: (s, sign) for place, s, sign in places}
     folder = Path(__file__).parents[2] / "generated"
     e = distinct_entries(load_model(folder / "tx40.py", trust=True))
-    assert set(exact) == set(zip(e.k.tolist(), e.j.tolist(), strict=True))
+    assert set(exact) == set(zip(e.row.tolist(), e.j.tolist(), strict=True))
     pairs = {
         (w, *exact[k, j][:1], s * exact[k, j][1])
-        for k, j, w, s in zip(e.k.tolist(), e.j.tolist(), e.which.tolist(), e.sign, strict=True)
+        for k, j, w, s in zip(e.row.tolist(), e.j.tolist(), e.which.tolist(), e.sign, strict=True)
     }
     assert (
-        len(pairs) == len(e.source) == len({s for s, _ in exact.values()})
+        len(pairs) == len(e.place) == len({s for s, _ in exact.values()})
     )  # one to one, the sign of each signal apart
 
 
@@ -183,7 +183,7 @@ def test_pieces_of_the_regressor_equal_the_whole():
     entries = distinct_entries(planar)
     states = States(*motion(np.arange(10000) / RATE))  # longer than two pieces
     D = planar.regressor(states.q, states.qd, states.qdd).transpose(2, 1, 0)
-    expected = D[entries.k[entries.source], entries.j[entries.source]]
+    expected = D.reshape(-1, len(states))[entries.place]
     end = 0
     for part, signals in Columns(planar).signals(states, None):
         assert part.start == end

@@ -143,13 +143,10 @@ def test_a_motion_that_answers_its_counts_is_told_and_read_as_smooth():
         speeds.append(v)
         x, v = x + v / RATE + a / 2 / RATE**2, v + a / RATE
     counts = step * np.round(np.array(positions)[:, None] / step)
-    inner, off = slice(400, -400), {}
-    for uneven in (0.01, None):
-        reading = read_counts(counts, RATE, step, uneven=uneven)
-        off[uneven] = np.sqrt(
-            np.mean(((reading.q[:, 0] - positions) / reading.s_q[:, 0])[inner] ** 2)
-        )
-    assert off[None] < 2 and off[0.01] < 3, off
+    inner = slice(400, -400)
+    reading = read_counts(counts, RATE, step)
+    off = np.sqrt(np.mean(((reading.q[:, 0] - positions) / reading.s_q[:, 0])[inner] ** 2))
+    assert off < 2
     assert any("cross one line to and fro" in text for text in reading.findings)
     certain = reading.s_qd[:, 0] < np.abs(reading.qd[:, 0])
     assert (
@@ -330,33 +327,29 @@ def test_uneven_lines_are_detected():
     numbers = np.arange(-200, 200)
     edges = np.sort(numbers + 0.5 + shift[numbers % 4])
     position = step * (-200 + np.searchsorted(edges, q / step))
-    for uneven in (0.01, None):
-        reading = read_counts(position, RATE, step, uneven=uneven)
-        assert any("by 0.12 steps (rms)" in text for text in reading.findings), uneven
+    reading = read_counts(position, RATE, step)
+    assert any("by 0.12 steps (rms)" in text for text in reading.findings)
     assert not read_counts(counted(q, step), RATE, step).findings
 
 
-@pytest.mark.parametrize("uneven", [None, 0.2])
 @pytest.mark.parametrize("per_turn", [2000, 200])
-def test_another_phase_is_read_from_what_the_first_told(per_turn, uneven):
-    """The same motion within a twentieth of its deviations, whatever is known of the lines; counts
-    that contradict what is given are read anew.
+def test_another_phase_is_read_from_what_the_first_told(per_turn):
+    """The same motion within a twentieth of its deviations; counts that contradict what is given are
+    read anew.
     """
     q, _, _ = moved()
     step = 2 * np.pi / per_turn
-    starts = read_counts(counted(q, step), RATE, step, uneven=uneven).starts
+    starts = read_counts(counted(q, step), RATE, step).starts
     assert [*starts] == [(0, 0), (0, 1)]
     other = counted(q, step, seed=4)
-    reading = read_counts(other, RATE, step, uneven=uneven, starts=starts)
-    alone = read_counts(other, RATE, step, uneven=uneven)
+    reading = read_counts(other, RATE, step, starts=starts)
+    alone = read_counts(other, RATE, step)
     for x, right, s in ((reading.q, alone.q, alone.s_q), (reading.qd, alone.qd, alone.s_qd)):
         assert np.sqrt(np.mean(((x - right) / s) ** 2)) < 0.05
     np.testing.assert_allclose(reading.s_qd.mean(axis=0), alone.s_qd.mean(axis=0), rtol=0.05)
     off = other + step * np.random.default_rng(5).integers(-1, 2, other.shape)
-    if uneven is None:
-        found = read_counts(off, RATE, step, starts=starts)
-        right = read_counts(off, RATE, step)
-        np.testing.assert_array_equal(found.q, right.q)
+    found, right = read_counts(off, RATE, step, starts=starts), read_counts(off, RATE, step)
+    np.testing.assert_array_equal(found.q, right.q)
 
 
 @pytest.fixture(scope="module")

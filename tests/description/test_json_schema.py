@@ -12,7 +12,6 @@ from typer.testing import CliRunner
 
 from symgen.cli.main import app
 from symgen.description import json_schema, packaged_robots, skeleton
-from symgen.description.schema import schema_file, schema_text
 
 
 def plain(text):
@@ -25,13 +24,7 @@ def faults(data):
     return [error.message for error in validator.iter_errors(data)]
 
 
-def test_checked_in_file_is_current():
-    """After a change: symgen schema > symgen/description/robot.schema.json."""
-    assert (
-        json.loads(schema_file().read_text(encoding="utf-8"))
-        == json.loads(schema_text())
-        == json_schema()
-    )
+def test_it_is_a_schema():
     jsonschema.Draft202012Validator.check_schema(json_schema())
 
 
@@ -76,5 +69,3 @@ def test_first_line_of_a_new_file_leads_to_it(tmp_path):
     first, second = file.read_text(encoding="utf-8").splitlines()[:2]
     assert first == "# yaml-language-server: $schema=robot.schema.json"
     assert "symgen schema > robot.schema.json" in second
-    written = CliRunner().invoke(app, ["schema"]).stdout
-    assert written == schema_file().read_text(encoding="utf-8")

@@ -196,8 +196,8 @@ WRONG = [
     ("title: Test arm", "title: Arm: test", 3, ["between quotes"]),
     ("  2: {ant", "  - {ant", 8, ["every row as `1: {...}`"]),
     # YAML that says more than it shows
-    ("[0, -g, 0]", "&a [0, -g, 0]", 4, ["anchors", "write the value out"]),
-    ("[0, -g, 0]", "*a", 4, ["aliases", "write the value out"]),
+    ("[0, -g, 0]", "&a [0, -g, 0]", 4, ["anchors", "write the value itself"]),
+    ("[0, -g, 0]", "*a", 4, ["aliases", "write the value itself"]),
     ("[0, -g, 0]", "!!python/object/apply:os.system [echo]", 4, ["tags", "plain value"]),
     ("[0, -g, 0]", "[" * 40 + "]" * 40, 4, ["nested more than"]),
     ("values:", "<<: {M1: 1}\nvalues:", 14, ["'<<'", "expected a name"]),

@@ -14,9 +14,7 @@ from symgen.derive.derivation import derive
 from symgen.derive.graph import ADD, CONST, INV, MUL, POS, SYM
 from symgen.derive.models import OPTIONS
 from symgen.description import load_robot, packaged_robots
-from symgen.emit.blocks import blocks_of
 from symgen.emit.generate import generate_module
-from symgen.emit.printers import PYTHON
 from symgen.emit.spec import (
     SHARING,
     Function,
@@ -135,16 +133,12 @@ def test_names_come_from_structure(name: str) -> None:
     """No temporaries, no running numbers: every local is a family with indices, a product of names,
     or a constant.
     """
-    spec = module_spec(regroup(load_robot(name)))
-    for block in blocks_of(spec, PYTHON).values():
-        lines = [line for section in block.sections for line in section.lines]
-        names = [
-            line.split(" = ")[0]
-            for line in lines
-            if "[" not in line.split(" = ")[0] and " = " in line
-        ]
-        assert not [n for n in names if re.fullmatch(r"(tmp|t|x|K)\d+", n)]
-        assert len(set(names)) == len(names)
+    for block in ast.parse(generate_module(load_robot(name))).body:
+        if isinstance(block, ast.FunctionDef) and block.name.endswith(("_block", "_motion")):
+            targets = [t for s in block.body if isinstance(s, ast.Assign) for t in s.targets]
+            names = [t.id for t in targets if isinstance(t, ast.Name)]
+            assert not [n for n in names if re.fullmatch(r"(tmp|t|x|K)\d+", n)]
+            assert len(set(names)) == len(names)
 
 
 def distinct_operations(f: Function) -> set[tuple[float, ...]]:

@@ -175,7 +175,7 @@ def test_energy_of_a_falling_arm_only_falls(tx40, step):
     )
     values = {name: 0.0 if name.startswith("OFFSET") else x for name, x in tx40.VALUES.items()}
     X = tx40.base_parameters(values)
-    plant = plant_function(tx40, friction, {}, "rk4")
+    plant = plant_function(tx40, friction, "rk4")
     rng = np.random.default_rng(0)
     N, rested = round(1.0 / step), 0
     for _ in range(2):
@@ -211,7 +211,7 @@ def test_forces_at_rest_are_those_of_the_quadratic_program(tx40, truth):
     from scipy.optimize import lsq_linear
 
     friction = dry_friction(tx40)
-    function = friction_function(tx40, friction, {})
+    function = friction_function(tx40, friction)
     G, plus = friction.G, friction.plus @ truth
     rng, size = np.random.default_rng(0), np.array([7, 8, 6, 2.4, 5, 3.5])
     sticking = 0
@@ -244,7 +244,7 @@ def test_held_by_friction_alone(tx40, truth):
     carries joints 5 and 6 together.
     """
     friction = dry_friction(tx40)
-    plant = plant_function(tx40, friction, {}, "rk4")
+    plant = plant_function(tx40, friction, "rk4")
     column = {name: k for k, name in enumerate(tx40.BASE_PARAMETERS)}
     X = truth.copy()
     X[[column["FS5"], column["FS6"], column["FSM6"]]] = 2.0, 1.0, 1.5
@@ -442,8 +442,6 @@ def test_parameters_that_cannot_be_simulated(tx40, truth):
         simulator.run(truth, replace(reference, rate=1000.0))
     with pytest.raises(InputError, match="torques of shape"):
         simulator.run(truth, reference, disturbance=np.zeros((3, 6)))
-    with pytest.raises(InputError, match="no constant D9"):
-        Simulator(tx40, settings, constants={"D9": 1.0})
 
 
 def test_a_loop_that_is_lost(tx40, truth):

@@ -111,12 +111,5 @@ def signs(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
 def bits(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
     """Draw random numbers 1 or 0, with probability 1/2 each, in an array of the given shape."""
     size = int(np.prod(shape))
-    return np.unpackbits(packed_bits(size, rng), count=size).reshape(shape)
-
-
-def packed_bits(size: int, rng: np.random.Generator) -> Array:
-    """Draw at least `size` random bits, packed eight to a byte.
-
-    High bits are first; there is one byte more than needed.
-    """
-    return np.frombuffer(rng.bytes(-(-size // 8) + 1), dtype=np.uint8)
+    packed = np.frombuffer(rng.bytes(-(-size // 8) + 1), dtype=np.uint8)
+    return np.unpackbits(packed, count=size).reshape(shape)

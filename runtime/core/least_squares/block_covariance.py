@@ -85,12 +85,10 @@ def band_variances(bands: Iterable[Array], X: Array, T: Array) -> Array:
     """
     squares, independent = np.zeros(len(T)), np.zeros(len(T))
     for rows in bands:
-        P = rows[:, :-1] @ T
-        share, V = np.linalg.eigh(P.T @ P)
+        share, V, g = _directions(rows, X, T)
         others = (1 - share).clip(LIMIT.BLOCK_ALONE)  # what the other bands know
         directions = T @ V
-        u = directions @ (V.T @ (P.T @ (rows[:, -1] - rows[:, :-1] @ X)) / others)
-        squares += u**2
+        squares += (directions @ (g / others)) ** 2
         independent += directions**2 @ (share / others)
     scale = np.sum(T**2, axis=1) / np.where(independent > 0, independent, 1.0)
     return np.asarray(squares * scale)
@@ -106,32 +104,23 @@ def deletions(blocks: Iterable[Array], X: Array, T: Array, into: Array) -> Array
     size = np.linalg.norm(into, axis=1, keepdims=True)
     changes = []
     for rows in blocks:
-        P = rows[:, :-1] @ T
-        G, g = P.T @ P, P.T @ (rows[:, -1] - rows[:, :-1] @ X)
-        others = np.eye(len(G)) - G
-        try:
-            np.linalg.cholesky(
-                others - LIMIT.BLOCK_ALONE * np.eye(len(G))
-            )  # exists where no direction is known by this block alone
-            changes.append(into @ np.linalg.solve(others, g))
-        except np.linalg.LinAlgError:
-            changes.append(_without_its_own(G, g, into, size))
+        share, V, g = _directions(rows, X, T)
+        others = share < 1 - LIMIT.BLOCK_ALONE
+        directions = into @ V
+        u = directions[:, others] @ (g[others] / (1 - share[others]))
+        alone = np.abs(directions[:, ~others]) > LIMIT.BLOCK_PARTICIPATION * size
+        u[alone.any(axis=1)] = np.nan  # a parameter that only this block determines
+        changes.append(u)
     return np.asarray(
         np.sqrt(1 - 1 / max(len(changes), 1)) * np.array(changes).reshape(-1, len(into))
     )
 
 
-def _without_its_own(G: Array, g: Array, into: Array, size: Array) -> Array:
-    """Compute the change of X without one block; nan where only this block determines a parameter.
-
-    The change is into (1 - G)^-1 g, in the directions that other blocks determine too.
-    """
-    share, V = np.linalg.eigh(G)
-    others = share < 1 - LIMIT.BLOCK_ALONE
-    directions = into @ V
-    u = directions[:, others] @ ((V.T @ g)[others] / (1 - share[others]))
-    u[(np.abs(directions[:, ~others]) > LIMIT.BLOCK_PARTICIPATION * size).any(axis=1)] = np.nan
-    return np.asarray(u)
+def _directions(rows: Array, X: Array, T: Array) -> tuple[Array, Array, Array]:
+    """Decompose the share G_k = V diag(share) V' of a block; return share, V and V'T' g_k."""
+    P = rows[:, :-1] @ T
+    share, V = np.linalg.eigh(P.T @ P)
+    return share, V, V.T @ (P.T @ (rows[:, -1] - rows[:, :-1] @ X))
 
 
 def drawn_again(

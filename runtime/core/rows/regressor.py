@@ -31,18 +31,15 @@ PROBES = 64  # random states that tell signals apart
 class Entries:
     """Table of the nonzero entries of the regressor, which marks entries that are equal up to sign.
 
-    Model store[k[m], j[m]] = sign[m] * signal[which[m]]. Signal s first occurs at entry source[s].
+    Wanted store[row[m], j[m]] = sign[m] * signal[which[m]].
 
-    row : row of each entry in the wanted store; row = k if every column is wanted.
     place : row of each signal in the store, shape (b n, N).
     """
 
     row: Array
-    k: Array
     j: Array
     which: Array
     sign: Array
-    source: Array
     place: Array
 
 
@@ -108,7 +105,7 @@ class Columns:
         """
         if plan is not None:
             yield from decimated_parts(
-                lambda t0, t1: self._evaluated(states[t0:t1]), len(self.entries.source), plan
+                lambda t0, t1: self._evaluated(states[t0:t1]), len(self.entries.place), plan
             )
             return
         for t0 in range(0, len(states), PIECE):
@@ -172,14 +169,13 @@ def distinct_entries(model: GeneratedModel, columns: Array | None = None) -> Ent
     place = k * len(model.JOINTS) + j
     values = _probed(model)[k, j]
     if not np.isfinite(values).all():
-        every = np.arange(len(k))
-        return Entries(row, k, j, every, np.ones(len(k)), every, place)
+        return Entries(row, j, np.arange(len(k)), np.ones(len(k)), place)
     sign = np.where(values[:, 0] < 0, -1.0, 1.0)
     _, source, which = np.unique(
         sign[:, None] * values + 0.0, axis=0, return_index=True, return_inverse=True
     )
     which = which.reshape(-1)
-    return Entries(row, k, j, which, sign * sign[source][which], source, place[source])
+    return Entries(row, j, which, sign * sign[source][which], place[source])
 
 
 def _probed(model: GeneratedModel) -> Array:
