@@ -38,7 +38,8 @@ def yaml_values(text: str, *, file: str) -> tuple[Any, dict[Path, int]]:
     """
     if len(text) > LIMIT.YAML_CHARACTERS:
         raise InputError(
-            f"{len(text)} characters; expected at most {LIMIT.YAML_CHARACTERS}", file=file
+            f"the file has {len(text)} characters; expected at most {LIMIT.YAML_CHARACTERS}",
+            file=file,
         )
     from ruamel.yaml.error import MarkedYAMLError
 
@@ -52,7 +53,7 @@ def yaml_values(text: str, *, file: str) -> tuple[Any, dict[Path, int]]:
     except MarkedYAMLError as e:
         mark = e.problem_mark or e.context_mark
         raise SettingsError(
-            f"not YAML: {e.problem or e.context}",
+            f"this is not valid YAML: {e.problem or e.context}",
             file=file,
             line=None if mark is None else mark.line + 1,
         ) from None

@@ -217,14 +217,14 @@ def _local(name: str, file: str, cache: Path | None) -> tuple[Path | None, list[
 
 def _dataset(name: str) -> Dataset:
     if name not in DATASETS:
-        raise InputError(f"no dataset {name!r}; there are {', '.join(DATASETS)}")
+        raise InputError(f"there is no dataset {name!r}; expected one of {', '.join(DATASETS)}")
     return DATASETS[name]
 
 
 def _digest(name: str, file: str) -> str:
     files = _dataset(name).files
     if file not in files:
-        raise InputError(f"dataset {name} has no file {file!r}; it has {', '.join(files)}")
+        raise InputError(f"dataset {name} has no file {file!r}; its files are {', '.join(files)}")
     return files[file]
 
 

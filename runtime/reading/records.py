@@ -209,7 +209,7 @@ def _require_shapes(
         width = signal.values.shape[1] + absent.get(key, 0)
         if width != n:
             raise InputError(
-                f"{width} {title} ({', '.join(signal.names)}); expected {n}, one per joint",
+                f"found {width} {title} ({', '.join(signal.names)}); expected {n}, one per joint",
                 file=first.file,
             )
     for signal in signals.values():

@@ -95,7 +95,7 @@ def test_states_at_the_border():
 
 def test_a_file_that_fails_says_so(tmp_path):
     (tmp_path / "a.py").write_text(HEAD + "x = [][1]\n", encoding="utf-8")
-    with pytest.raises(ModelError, match="fails on import with IndexError"):
+    with pytest.raises(ModelError, match="the import of the module fails with IndexError"):
         load_model(tmp_path / "a.py", trust=True)
 
 

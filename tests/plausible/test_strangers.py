@@ -160,7 +160,7 @@ def test_clipped_friction_is_told() -> None:
     bound = np.quantile(np.abs(tau[:, 0]), 0.7)
     tau[:, 0] = np.clip(tau[:, 0], -bound, bound)
     check = judged(model, t, q, tau)[FULL]
-    assert check.state == "no" and "goes beyond it by" in check.finding
+    assert check.state == "no" and "exceeds the value by" in check.finding
 
 
 @pytest.mark.parametrize("unit", ["N*mm"])
@@ -476,7 +476,7 @@ def test_values_in_g_mm_are_told_of_links_with_fewer_than_ten(given, link) -> No
     values = ", ".join(f"{name}: {x}" for name, x in given.items())
     bare = text[: text.index("values:")] + f"values: {{{values}}}\n"
     check = judged(symgen.model(parse_robot(bare.encode(), "bare.yaml")), t, q, tau)[
-        "Can bodies have the values of the robot file?"
+        "Can real links have the inertial values of the robot file?"
     ]
     assert check.state == ("doubtful" if link else "good")
     assert f"The values of link {link} put its mass" in check.finding or not link
@@ -503,7 +503,7 @@ def test_a_yes_is_followed_by_what_to_do_with_the_values() -> None:
     assert "do not use these values one by one" not in right.brief()
     wrong = runtime.Record(*motion(model, noise=0.0, values=20.0), name="run")
     said_so = runtime.identify(model, wrong, plausible=True).checklist
-    assert said_so.answer == "No" and "A small error alone says little" in said_so.use
+    assert said_so.answer == "No" and "A small error does not prove" in said_so.use
     assert "16 times the limits" in said_so.doubt
 
 
