@@ -86,7 +86,10 @@ def rate_of(stamps: Stamps, t: Array) -> float:
         tolerance = RATE_TOLERANCE + 2 * stamps.jitter / (N - 1)
         off_grid = np.abs(t - t[0] - np.arange(N) / rate).max() * rate
         if stamps.rate is not None and abs(rate / stamps.rate - 1) > tolerance:
-            message = f"time runs at {rate:g} Hz, but record.rate is {stamps.rate:g} Hz; correct record.rate, the time or the unit of time"
+            message = (
+                f"the time stamps have the rate {rate:g} Hz, but record.rate is "
+                f"{stamps.rate:g} Hz; correct record.rate, the time or the unit of time"
+            )
         elif off_grid > stamps.jitter:
             place = int(np.argmax(np.abs(step * rate - 1))) + 1
             message = f"time is not uniform: up to {off_grid:.3g} sampling periods off the uniform grid; the step is {step[place - 1]:g} s here and {1 / rate:g} s on average"

@@ -25,7 +25,7 @@ class LimitValues:
         self.__dict__.update({name: limit["value"] for name, limit in ENTRIES.items()})
 
     def __getattr__(self, name: str) -> Any:
-        raise AttributeError(f"no limit {name} in runtime/core/limits.toml")
+        raise AttributeError(f"the file runtime/core/limits.toml has no limit {name}")
 
 
 LIMIT = LimitValues()

@@ -123,8 +123,9 @@ def load_model(
             else []
         )
         raise ModelError(
-            f"no generated model {path}; {path.parent} contains {', '.join(present) or 'none'}: "
-            f"generate it with `symgen generate {path.stem}`"
+            f"there is no generated model {path} ({path.parent} contains "
+            f"{', '.join(present) or 'none'}); generate the model with "
+            f"`symgen generate {path.stem}`"
         )
     return checked_model(module_of(path, trust=trust))
 

@@ -53,7 +53,7 @@ def yaml_values(text: str, *, file: str) -> tuple[Any, dict[Path, int]]:
     except MarkedYAMLError as e:
         mark = e.problem_mark or e.context_mark
         raise SettingsError(
-            f"this is not valid YAML: {e.problem or e.context}",
+            f"not YAML: {e.problem or e.context}",
             file=file,
             line=None if mark is None else mark.line + 1,
         ) from None

@@ -131,7 +131,7 @@ def limits_of(model: GeneratedModel, given: Mapping[str, Any]) -> MotionLimits:
                 name == "tau"
             )
             raise SettingsError(
-                f"{name}: {largest[name].tolist()}; expected limits above 0{motor}",
+                f"{name}: {largest[name].tolist()}; expected more than 0{motor}",
                 path=("limits", name),
             )
     ranges = [

@@ -132,9 +132,7 @@ def _compiled(
             raise NotCompiledError(f"{' '.join(command)} did not run: {e}") from e
         if done.returncode or not target.is_file():
             first = next(iter(done.stderr.strip().splitlines()), "no message")
-            raise NotCompiledError(
-                f"{' '.join(command)} failed with exit code {done.returncode}: {first}"
-            )
+            raise NotCompiledError(f"{' '.join(command)} failed with {done.returncode}: {first}")
         final = folder / f"{key}-{hashlib.sha256(target.read_bytes()).hexdigest()[:32]}.so"
         target.replace(final)
     return final

@@ -170,7 +170,7 @@ def unexcited_shares(observation: Observation, signals: Signals, rate: float) ->
         raise InputError("the torque of a joint is zero throughout; leave this joint out")
     columns = np.linalg.norm(observation.W / s[observation.joints][:, None], axis=0)
     if not columns.all():
-        raise np.linalg.LinAlgError("a column is zero")
+        raise np.linalg.LinAlgError("a column of the observation matrix is zero")
     weights = Weights(
         observation.names, s, float(np.linalg.norm(observation.Y / s[observation.joints])) / columns
     )

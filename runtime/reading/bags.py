@@ -188,7 +188,7 @@ def stored_files(folder: Path) -> list[Path]:
     try:
         text = (folder / "metadata.yaml").open("rb").read(4 * LIMIT.YAML_CHARACTERS + 1).decode()
     except (OSError, UnicodeDecodeError) as e:
-        raise InputError(f"cannot be read: {e}", file=where) from e
+        raise InputError(f"the bag cannot be read: {e}", file=where) from e
     values, _ = yaml_values(text, file=where)
     bag = values.get("rosbag2_bagfile_information") if isinstance(values, Mapping) else None
     if not isinstance(bag, Mapping):
@@ -200,7 +200,7 @@ def stored_files(folder: Path) -> list[Path]:
     names = bag.get("relative_file_paths")
     if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
         raise InputError(
-            "the list relative_file_paths is empty; expected the files of the bag", file=where
+            "relative_file_paths lists no file; expected a list of the files of the bag", file=where
         )
     return [_inside(folder, name, where) for name in names]
 

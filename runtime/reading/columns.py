@@ -75,7 +75,7 @@ def column_names(
         tau = _meant(last, "tau", "effort", given.tau or (given.q if as_q else ()), joints)
     if given.q == BY_NAME and first is last and set(q) & set(tau):
         raise InputError(
-            f"the columns {', '.join(q)} would be read as positions and as torques; give the "
+            f"the columns {', '.join(q)} would be read as both positions and torques; give the "
             "columns of the torques in record.columns.tau",
             file=first.file,
         )
@@ -170,7 +170,7 @@ def _of_joint(table: Table, key: str, joint: str) -> str:
         return hits[0]
     what = f"no column {joint}, {key}_{joint} or the like among {', '.join(table.names)}"
     if hits:
-        what = f"columns {', '.join(hits)}"
+        what = f"found the columns {', '.join(hits)}"
     raise InputError(
         f"{what}; expected one column for joint {joint}, give the columns in record.columns.{key}",
         file=table.file,

@@ -201,7 +201,8 @@ def _local(name: str, file: str, cache: Path | None) -> tuple[Path | None, list[
                 digest = sha256_of(path)
                 if digest != expected:
                     raise InputError(
-                        f"SHA-256 {digest}; expected {expected}, the hash of the public record: replace or remove the file",
+                        f"the file has the SHA-256 hash {digest}; expected {expected}, the hash of "
+                        "the public record: replace or remove the file",
                         file=str(path),
                     )
                 return path, tried

@@ -36,7 +36,7 @@ def read_text(path: Path, options: Options) -> Table:
     decimal = options.decimal
     _, first = next(_lines(path), (0, ""))
     if not first:
-        raise InputError("no line of numbers", file=file)
+        raise InputError("no line of numbers; expected one line of numbers per sample", file=file)
     delimiter = next((mark for mark in ";\t," if mark in first and mark != decimal), None)
     if _width(first, delimiter) > WIDEST:
         raise InputError(
@@ -163,7 +163,7 @@ def _by_fields(
             raise InputError(message, file=file, row=row)
         if width != len(names):
             raise InputError(
-                f"the line has {width} fields; expected {len(names)} ({', '.join(names)}); "
+                f"{width} fields; expected {len(names)} ({', '.join(names)}); "
                 f"{_width_hint(delimiter, width > len(names))}",
                 file=file,
                 row=row,

@@ -49,7 +49,7 @@ class XmlElement(ElementTree.Element):
         value = self.attrib.get(name, default)
         if value is None:
             raise DescriptionError(
-                f"<{self.tag}> has no attribute {name}; add this attribute", line=self.line
+                f"<{self.tag}> has no {name}; add this attribute", line=self.line
             )
         return value
 

@@ -424,6 +424,6 @@ def test_units_are_those_of_each_encoder(tmp_path):
         assert line.startswith(label) and ("2*pi/" in line) == turn, line
     assert (
         "Of single encoders in rad, that of joint" in advice.verdict
-        and "Of single encoders in m, that of joint 4 asks most" in advice.verdict
+        and "Of single encoders in m, that of joint 4 must be the finest" in advice.verdict
     )
     assert [encoder["unit"] for encoder in json.loads(advice.to_json())["encoders"]][-1] == "m"

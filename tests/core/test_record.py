@@ -114,8 +114,8 @@ def late(t):
 @pytest.mark.parametrize(
     ("t", "rate", "said"),
     [
-        (T, 10 * RATE, "time runs at 200 Hz, but record.rate is 2000 Hz"),
-        (T / 10, RATE, "time runs at 2000 Hz, but record.rate is 200 Hz"),
+        (T, 10 * RATE, "the time stamps have the rate 200 Hz, but record.rate is 2000 Hz"),
+        (T / 10, RATE, "the time stamps have the rate 2000 Hz, but record.rate is 200 Hz"),
         (T[::-1], None, "sample 2: time goes from 0.295 s to 0.29 s; expected increasing time"),
         (shuffled(T), None, "sample 32: time goes from 0.295 s to 0.29 s"),
         (np.repeat(T[::2], 2), None, "sample 2: time goes from 0 s to 0 s"),
@@ -644,7 +644,10 @@ def test_bad_csv(tmp_path, rows, said):
         ({"columns": {"q": ["q1", "q3"]}}, "no column q3; the file has t, q1, q2, tau1, tau2"),
         ({"columns": {"q": ["q1"]}}, "1 columns of positions (q1), 2 of torques (tau1, tau2)"),
         ({"columns": {"t": "time"}}, "no column time"),
-        ({"rate": 100, "columns": {"t": "t"}}, "time runs at 200 Hz, but record.rate is 100 Hz"),
+        (
+            {"rate": 100, "columns": {"t": "t"}},
+            "the time stamps have the rate 200 Hz, but record.rate is 100 Hz",
+        ),
         ({"scale": {"tau": "gtau"}}, "a text file contains no number 'gtau'"),
         (
             {"scale": {"q": [1, 2, 3]}},

@@ -280,7 +280,7 @@ def test_errors_tell_all_irregularities(tmp_path):
         ({"resample": {}}, "set record.resample.gaps: split"),
         (
             {"resample": {"gaps": "split"}, "rate": 1000},
-            "time runs at 500 Hz, but record.rate is 1000 Hz",
+            "the time stamps have the rate 500 Hz, but record.rate is 1000 Hz",
         ),
     ):
         with pytest.raises(InputError) as e:

@@ -165,8 +165,8 @@ def butterworth(rate: float, low: Lowpass) -> tuple[Array, int]:
     """
     if low.hertz >= rate / 2:
         raise InputError(
-            f"the low-pass has the cut-off frequency {low.hertz:g} Hz, but must be below "
-            f"{rate / 2:g} Hz, half the rate of the record (Nyquist frequency); lower "
+            f"the low-pass has the cut-off frequency {low.hertz:g} Hz, but must be below the "
+            f"Nyquist frequency {rate / 2:g} Hz, half the rate of the record; lower "
             f"signals.lowpass.cutoff, or correct record.units.t if the rate {rate:g} Hz is wrong"
         )
     sos = butter(low.order, low.hertz, fs=rate, output="sos")
