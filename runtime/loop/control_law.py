@@ -147,8 +147,8 @@ def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
     )
     if drives is None:
         raise SettingsError(
-            f"side: motor needs drives, but {model.NAME} has none; set side: joint, or give drives "
-            "in the robot file",
+            f"side: motor needs drives, but {model.NAME} has no drives; set side: joint, or give "
+            "drives in the robot file",
             path=("controller", "encoder", "side"),
         )
     weights = (0.0, 0.5) if controller.velocity == "averaged" else (1.0, 0.0)

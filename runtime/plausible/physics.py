@@ -132,7 +132,8 @@ def size(case: Case) -> Answer | None:
     "Do the values of the robot file agree with the record?",
     "gravity and inertia torques between a third and three times those computed from the values",
     "check ratio, torque constant, unit and sign of this joint, and its load; give the torque of "
-    "a counterbalance or cable as record.columns.tau_known; or the values belong to another robot",
+    "a counterbalance or cable as record.columns.tau_known; or the values are those "
+    "of another robot",
 )
 def values(case: Case) -> Answer | None:
     """Compare the torques computed from the robot file's values with the measured ones, by joint.

@@ -77,7 +77,7 @@ def _joint_names(case: Case, still: Array) -> list[tuple[int, str]]:
 @Question(
     "Are the positions those of this robot?",
     remedy="check zero and sign of these joints (theta, drives.offset, ratio), the order of the "
-    "columns, and the unit and the side (joint or motor) of the positions",
+    "columns, and the unit and the side of the positions (joint or motor)",
 )
 def positions(case: Case) -> Answer:
     """Compare the positions of each joint with limits.q of the robot file, or with usual ranges."""
@@ -132,7 +132,7 @@ def _against(case: Case, key: str, values: Array, sane: dict[str, tuple[float, f
 @Question(
     "Are the speeds those of this robot?",
     remedy="check the sampling rate and the unit of time (record.rate, units.t), then the unit "
-    "and the side (joint or motor) of the positions",
+    "and the side of the positions (joint or motor)",
 )
 def speeds(case: Case) -> Answer:
     """Check whether the largest speed of every joint is plausible for this robot.
@@ -162,7 +162,7 @@ def accelerations(case: Case) -> Answer:
 @Question(
     "Are the torques those of this robot?",
     "limits.tau of the robot file",
-    "check the unit, the side (joint or motor) and the columns of the torques "
+    "check the unit, the side and the columns of the torques "
     "(record.units.tau, torque_side, columns.tau)",
 )
 def torques(case: Case) -> Answer:

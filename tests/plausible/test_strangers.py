@@ -233,7 +233,7 @@ def test_a_wrap_is_a_wrap_with_resample_too(tmp_path, resample) -> None:
     (check,) = (
         c for c in runtime.plausibility(model, record).checks() if "those of a motion" in c.question
     )
-    assert check.state == "no" and check.remedy.startswith("it starts anew"), check
+    assert check.state == "no" and check.remedy.startswith("the position starts anew"), check
 
 
 def test_physical_parameters_that_did_not_converge_are_not_printed(tmp_path, monkeypatch) -> None:
@@ -444,7 +444,7 @@ def test_currents_read_as_torques_are_no_wrong_rate() -> None:
         model, runtime.Record(t, q, tau / [11.7, 6.4], name="run"), variants=free
     )
     assert not any(trial.cause.kind == "rate" for trial in found.trials)
-    assert found.robot_values.heavy and "gravity torque of joint 1 0.0" in found.to_text()
+    assert found.robot_values.heavy and "gravity torque of joint 1 is 0.0" in found.to_text()
 
 
 def test_motor_inertias_of_zero_do_not_contradict_the_record(tmp_path) -> None:

@@ -114,8 +114,8 @@ def cestac(
     if settings.side == "motor" and drives is None:
         raise SettingsError(
             (
-                f"side: motor needs drives, but {model.NAME} has none; set side: joint, or give "
-                "drives in the robot file"
+                f"side: motor needs drives, but {model.NAME} has no drives; set side: joint, or "
+                "give drives in the robot file"
             ),
             path=("cestac", "side"),
         )
