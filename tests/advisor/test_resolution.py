@@ -319,7 +319,7 @@ def test_what_no_prediction_goes_through_is_refused(emps):
         )
     with pytest.raises(SettingsError, match="no drives"):
         encoder_drives("motor", None, "cestac")
-    with pytest.raises(InputError, match="no encoder 7"):
+    with pytest.raises(InputError, match="no encoder is called 7"):
         advise(model, record, study, encoders=("7",))
     with pytest.raises(ModelError, match="ELEMENTS"):
         switches(__import__("planar_2r_model"), ("FS1",))
