@@ -143,8 +143,8 @@ class Simulated:
             Slip(19, "frozen encoder of joint 4", r"froze", frozen),
             Slip(20, "torque of joint 3 20 ms late", r"torques? of joints? 3 (is|are) late", lambda c: replace(c, tau=lag(c.tau, late // 2, at(n) == 2))),
             Slip(21, "the same without friction", r"No joint shows friction", lambda c: target(c, False)),
-            Slip(22, "position of joint 3 times 1.1", r"position of joint 3 is to be multiplied by 0\.9[01]", lambda c: replace(c, q=c.q * np.where(at(n) == 2, 1.1, 1.0))),
-            Slip(23, "position of joint 4 times 0.5", r"position of joint 4 is to be multiplied by (2|1\.9|2\.0)", lambda c: replace(c, q=c.q * np.where(at(n) == 3, 0.5, 1.0))),
+            Slip(22, "position of joint 3 times 1.1", r"position of joint 3 must be multiplied by 0\.9[01]", lambda c: replace(c, q=c.q * np.where(at(n) == 2, 1.1, 1.0))),
+            Slip(23, "position of joint 4 times 0.5", r"position of joint 4 must be multiplied by (2|1\.9|2\.0)", lambda c: replace(c, q=c.q * np.where(at(n) == 3, 0.5, 1.0))),
             Slip(24, "a length 10 % too long", r"[dr] of frame [35] is", longer),
         )  # fmt: skip
 

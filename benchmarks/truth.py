@@ -451,7 +451,7 @@ WRONG = (
     Wrong("sign of a torque", r"torque of joint {j} has the wrong sign", lambda w, m, q, y, j, r: (q, _column(y, j, -y[:, j]))),
     Wrong("sign of a ratio", r"joint {j} counts in the other sense|position of joint {j} has the wrong sign", lambda w, m, q, y, j, r: (_column(q, j, -q[:, j]), _column(y, j, -y[:, j]))),
     Wrong("two torque columns exchanged", r"torque columns of joints ({j} and {i}|{i} and {j})", lambda w, m, q, y, j, r: (q, _swapped(y, j, (j + 1) % y.shape[1]))),
-    Wrong("ratio of a joint 1.4 times", r"torque of joint {j} is", lambda w, m, q, y, j, r: (q, _column(y, j, 1.4 * y[:, j]))),
+    Wrong("ratio of a joint 1.4 times", r"torque of joint {j} (is|must)", lambda w, m, q, y, j, r: (q, _column(y, j, 1.4 * y[:, j]))),
     Wrong("all torques 10 ms late", r"late|delay|same instants|shift", lambda w, m, q, y, j, r: (q, np.concatenate([np.repeat(y[:1], 10, axis=0), y[:-10]]))),
 )  # fmt: skip
 ONE_OF = 3

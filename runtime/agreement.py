@@ -158,9 +158,10 @@ class Homogeneity(Result, Part, keys="records parameters agree disagreements unt
 
 @Question(
     "Do the records agree?",
-    f"no parameter apart by {LIMIT.DIFFERS:g} deviations and {LIMIT.RELEVANT_DIFFERENCE:g} %",
-    "look at the record that differs: load, temperature, time since the last one; or its "
-    "motion shows what the model leaves out",
+    f"no parameter differs by {LIMIT.DIFFERS:g} standard deviations "
+    f"and {LIMIT.RELEVANT_DIFFERENCE:g} %",
+    "check the load and the temperature of the record that differs; its motion may also show an "
+    "effect that the model lacks",
 )
 def agreeing(found: Homogeneity) -> Answer:
     """Judge whether several records give the same parameters."""

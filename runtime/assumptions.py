@@ -46,7 +46,7 @@ class Assumption:
     def text(self) -> str:
         """Sentence that says whether the record contradicts the assumed value zero."""
         if np.isnan(self.p_value):
-            return f"{self.name} = 0 cannot be tested: its torque is one of other parameters"
+            return f"{self.name} = 0 cannot be tested: other parameters cause the same torque"
         said = f"{self.value:.3g} ± {1.96 * self.sigma:.2g} (p = {self.p_value:.2g})"
         if self.p_value < CONTRADICTED:
             return f"the record contradicts {self.name} = 0: it says {said}"

@@ -71,8 +71,8 @@ class Expected(NamedTuple):
 @Question(
     "How far off are predictions of other motions?",
     f"{LIMIT.EXPECTED_ERROR:g} % (usable where it may be less)",
-    "record a motion over the range and the speeds that the model is for, longer, or with finer "
-    "positions (symgen excite; signals: {reader: counts})",
+    "record a motion over the range and speeds for which you need the model, for a longer time, "
+    "or with finer positions (symgen excite; signals: {reader: counts})",
 )
 def expected_off(likely: Expected) -> Answer | None:
     """Judge whether the expected error of predicted torques is small enough; None if unknown."""
@@ -81,7 +81,7 @@ def expected_off(likely: Expected) -> Answer | None:
     limit = LIMIT.EXPECTED_ERROR
     return Answer(
         "good" if likely.high <= limit else "no" if likely.low > limit else "doubtful",
-        f"{likely.error:.2g} % of the torques are expected to be off"
+        f"The expected error is {likely.error:.2g} % of the torques"
         + (
             f", {likely.low:.2g} to {likely.high:.2g} % likely if the model is right,"
             if likely.low < likely.high

@@ -70,7 +70,11 @@ def torque_median(problem: Problem) -> Problem:
     if np.max(shares, initial=0.0) <= LIMIT.MEDIAN_TAKES:
         return problem.changed(settings=_with_window(problem, signals.median))
     worst = np.max(shares, axis=0)
-    text = f"Torques without a median (torque_median: auto): it would take {100 * worst.max():.2g} % of the torque of joint {1 + worst.argmax()} in time with the motion, as from a controller that answers every count of its encoder."
+    text = (
+        "No median filter of the torques (torque_median: auto): this filter would remove "
+        f"{100 * worst.max():.2g} % of the torque of joint {1 + worst.argmax()} together with "
+        "the motion, as if a controller answers every count of its encoder."
+    )
     return problem.changed(Note(SIGNALS, text), settings=_with_window(problem, 1))
 
 

@@ -175,7 +175,8 @@ def study_of(record: str | Path) -> tuple[Study, Path]:
     if is_measured(path):
         return Study(record=(RecordSettings(files=(path.name,)),)), path.parent
     raise InputError(
-        f"no record {str(record)!r}; expected a dataset ({', '.join(DATASETS)}), a study file (.yaml) or a measured file ({', '.join(endings())}, the folder of a ROS 2 bag)"
+        f"there is no record {str(record)!r}; expected a dataset ({', '.join(DATASETS)}), a study "
+        f"file (.yaml) or a measured file ({', '.join(endings())}, the folder of a ROS 2 bag)"
     )
 
 
@@ -221,7 +222,8 @@ def read_record(
     if len(records) != 1:
         names = ", ".join(record.name for record in records)
         raise InputError(
-            f"{len(records)} records or pieces between gaps, but one is expected; use read_records, which returns all of them: {names}"
+            f"the study has {len(records)} records (or pieces between gaps), but this function "
+            f"returns only one; use read_records, which returns all: {names}"
         )
     return records[0]
 

@@ -74,7 +74,9 @@ def force_sensors(problem: Problem) -> Problem:
         for c in channels:
             if record.channels.get(c, np.empty((0, 0))).shape[1] != 6:
                 raise InputError(
-                    f"no signal {c} of three forces and three moments; give its six columns in every record that is fitted or predicted, record.columns: {{wrench: {{{c.removeprefix(WRENCH)}: [...]}}}}",
+                    f"the record has no signal {c} of three forces and three moments; give the six "
+                    "columns of this sensor in every record that is fitted or predicted, "
+                    f"record.columns: {{wrench: {{{c.removeprefix(WRENCH)}: [...]}}}}",
                     file=record.file,
                 )
     settings = problem.settings

@@ -97,7 +97,7 @@ def test_a_delay_is_in_seconds_whatever_the_unit_of_the_velocity(gain):
 def test_good_velocities_are_told_so():
     told = plausibility(planar, record(), STUDY)
     (check,) = (c for c in told.checks() if "recorded velocities" in c.question)
-    assert check.state == "good" and "1.000 of that" in check.finding
+    assert check.state == "good" and "1.000 times the derivative" in check.finding
 
 
 def test_without_recorded_velocities_nothing_changes():

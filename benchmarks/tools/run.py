@@ -265,7 +265,7 @@ def spread(fits: list[dict[str, list[float]]]) -> float | None:
 
 CAUSES = (
     r"joint 2\b.*(twice|half|2\.0|0\.50|factor of 2)|(twice|half|2\.0|0\.50).*joint 2\b"
-    r"|joint 2 is to be multiplied by 0\.[45]",
+    r"|joint 2 must be multiplied by 0\.[45]",
     r"degree|\bdeg\b",
     r"(joints|columns|torques)( of)?( joints)? (1 and 2|2 and 1)|swapped|exchanged",
     r"(sign|axis|turns|direction).*joint 2\b|joint 2\b.*(sign|axis|turns|direction|wrong way)",

@@ -325,9 +325,9 @@ class Advice(Result, Part):
             hardest = min(known, key=lambda advice: advice.limits[0].delta)
             limit, kind = hardest.limits[0], "" if unit == self.unit else f" in {unit}"
             parts.append(
-                f"Of single encoders{kind}, that of joint {hardest.label} asks most: "
-                f"{step_text(limit.delta, unit)} for "
-                f"{limit.percent:g} % ({limit.parameter or 'no parameter'})."
+                f"Of single encoders{kind}, that of joint {hardest.label} must be the finest: "
+                f"{step_text(limit.delta, unit)} for a change of {limit.percent:g} % "
+                f"({limit.parameter or 'no parameter'})."
             )
         doubted = [
             f"{advice.label} at {limit.percent:g} %"
@@ -337,8 +337,8 @@ class Advice(Result, Part):
         ]
         if doubted:
             parts.append(
-                f"Sampling does not confirm the prediction for: {', '.join(doubted)}; trust the "
-                "runs."
+                f"Random runs do not confirm the prediction for {', '.join(doubted)}; use the "
+                "result of the runs."
             )
         return parts
 
@@ -573,7 +573,7 @@ def answer(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer
             return Answer("open", "Not asked", ask)
         text = f"{steps}, which make {100 * share:.2g} % of the mean square of an acceleration"
         if 100 * share <= LIMIT.NEGLIGIBLE:
-            return Answer("open", f"{text}; what that does to each value was not asked", ask)
+            return Answer("open", f"{text}; the effect on each value was not computed", ask)
         return Answer(
             "doubtful",
             f"{text}, and inertias too small",
@@ -585,13 +585,13 @@ def answer(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer
         f"{step_text(one.delta, advice.unit) if np.isfinite(one.delta) else 'any step'}"
         for one in advice.encoders[0].limits
     )
-    text = f"Least squares stays within {steps} {advice.place}"
+    text = f"Values by least squares change by at most {steps} {advice.place}"
     if not advice.asked:
         return Answer(
             "open",
             text,
-            "say which step your encoder has (symgen report --encoder STEP, --side motor "
-            "where it sits there)",
+            "give the step of your encoder: symgen report --encoder STEP (with --side motor for "
+            "an encoder on the motor)",
         )
     name, error = max((advice.worst(k) for k in range(len(advice.asked))), key=lambda item: item[1])
     labels = ", ".join(Level(step).label for step in advice.asked)

@@ -260,7 +260,8 @@ def _selections(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str
     unknown = [label for label in labels if label not in every]
     if unknown or not labels:
         raise InputError(
-            f"no encoder {', '.join(unknown) or 'given'}; expected some of {', '.join(every)}"
+            f"no encoder is called {', '.join(unknown) or '(empty list)'}; expected some "
+            f"of {', '.join(every)}"
         )
     names = dict(zip(list(every)[1:], joint_labels(model), strict=True))
     return {names.get(label, label): every[label] for label in labels}
@@ -413,12 +414,14 @@ def assumptions(
 def _refuse(study: Study) -> None:
     if study.estimate.method not in ("ols", "wls"):
         raise SettingsError(
-            f"{study.estimate.method!r}; the advisor predicts only estimates by least squares: use ols or wls",
+            f"the advisor cannot predict estimates by {study.estimate.method!r}; set method: "
+            "ols or wls",
             path=("estimate", "method"),
         )
     if study.estimate.weights == "covariance":
         raise SettingsError(
-            "'covariance'; the advisor supports only one weight per joint: use joint or iterated",
+            "the advisor does not support weights: covariance, because it needs one weight per "
+            "joint; set weights: joint or iterated",
             path=("estimate", "weights"),
         )
 

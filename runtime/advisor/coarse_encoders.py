@@ -304,7 +304,9 @@ class CoarseEncoders:
             coarse.append((states, certain))
             exact.append((own, certain))
         if not any(mask.any() for _, mask in exact):
-            raise np.linalg.LinAlgError("no direction of dry friction is certain")
+            raise np.linalg.LinAlgError(
+                "the direction of the dry friction is uncertain at every sample"
+            )
         every = all(np.array_equal(x[1], y[1]) for x, y in zip(self.exact, exact, strict=True))
         return np.asarray(self._solved(coarse) / (self.reference if every else self._solved(exact)))
 

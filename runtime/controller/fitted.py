@@ -142,11 +142,15 @@ def gain_doubt(problem: Problem, error: float) -> str:
         return ""
     stated = laws[0].gains(problem.records[0].n)["Vm"]
     each = ", ".join(
-        f"{x + dx:.4g} in place of {x:g} of joint {j}"
+        f"{x + dx:.4g} instead of {x:g} for joint {j}"
         for j, x, dx in zip(estimate.joints, stated, estimate.kd, strict=True)
         if np.isfinite(dx)
     )
-    return f"With kd {each} the law leaves {estimate.error:.1f} % unexplained in place of {error:.1f} %: are the gains in other units, or of the motor side?"
+    return (
+        f"With kd {each}, the control law leaves {estimate.error:.1f} % of the torques "
+        f"unexplained instead of {error:.1f} %: are the gains in other units, or of "
+        "the motor side?"
+    )
 
 
 def law_estimate(problem: Problem, law: Law, saturation: Array) -> LawEstimate:

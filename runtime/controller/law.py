@@ -106,21 +106,22 @@ def torque_law(controller: Controller | None, n: int, limits: Mapping[str, Any])
     gains = law.gains(n)
     if np.any(gains["K"]):
         raise SettingsError(
-            f"{law.ki} is not supported here: a record does not contain the state of the integrator, so "
-            "the torque can be computed only from kp and kd; remove ki",
+            f"an integral gain ki ({law.ki}) is not supported here: a record does not contain the "
+            "state of the integrator, so the torque can be computed only from kp and "
+            "kd; remove ki",
             path=("controller", "law", "ki"),
         )
     if np.any(law.ca):
         raise SettingsError(
-            f"{law.ca} is not supported here; remove ca, and give the column of the feed-forward "
-            "torque in record.columns.tau_ff",
+            f"a feed-forward gain ca ({law.ca}) is not supported here; remove ca, and give the "
+            "column of the feed-forward torque in record.columns.tau_ff",
             path=("controller", "law", "ca"),
         )
     largest = None if controller is None else controller.torque.largest(limits)
     bound = np.atleast_1d(np.asarray(np.inf if largest is None else largest, dtype=float))
     if len(bound) not in (1, n):
         raise SettingsError(
-            f"{len(bound)} values; expected one or {n}, one per joint",
+            f"{len(bound)} values are given; expected one value, or {n} values (one per joint)",
             path=("controller", "torque", "saturation"),
         )
     saturation = np.broadcast_to(bound, (n,)).copy()

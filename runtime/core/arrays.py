@@ -52,9 +52,9 @@ def real(x: Any, label: str, file: str | None = None) -> Array:
     if isinstance(x, np.ma.MaskedArray) and np.ma.is_masked(x):
         count = int(np.ma.getmaskarray(x).sum())
         raise InputError(
-            f"{label} masks {count} of its values, but a record needs every value: cut the masked "
-            "samples, or fill the masked values (x.filled(np.nan) and missing=np.isnan(q) where q is "
-            "read as counts)",
+            f"{label} has {count} masked values, but a record needs every value: cut the masked "
+            "samples, or fill the masked values (x.filled(np.nan) and missing=np.isnan(q) where q "
+            "is read as counts)",
             file=file,
         )
     try:

@@ -205,7 +205,8 @@ def checklist_of(
     wrong = any(check.state == "no" and check is not rank for check in record)
     if wrong and fit.relative_error <= LIMIT.TOTAL_ERROR[0]:
         use += (
-            " A small error alone says little: wrong units, signs and sides move into the values."
+            " A small error does not prove that the values are right: wrong units, signs or sides "
+            "may change the values instead."
         )
     return Checklist(tuple(check for check in checks if check is not None), use, expected_error)
 
@@ -218,7 +219,7 @@ def remark(check: Check, counts: bool) -> Check:
     """
     if counts or check.state == "good":
         return check
-    finding = f"Single values are not asked for. {check.finding}; {check.remedy}"
+    finding = f"Single values do not count in this verdict. {check.finding}; {check.remedy}"
     return replace(check, state="open", finding=finding, remedy="")
 
 
@@ -249,18 +250,20 @@ def rank_and_condition(estimate: Estimate, fit: Estimate) -> Answer:
     text = f"All {len(fit.names)}, condition number {rounded(fit.cond_unit)} with unit columns"
     if fit.cond_unit <= LIMIT.CONDITION:
         return Answer("good", text, "")
-    return Answer("doubtful", f"{text}: some of their combinations it hardly does")
+    return Answer(
+        "doubtful", f"{text}: the record hardly determines some combinations of the parameters"
+    )
 
 
 @Question(
     "Does the model explain the torques?",
     f"{LIMIT.TOTAL_ERROR[0]:g} % (usable to {LIMIT.TOTAL_ERROR[1]:g} %)",
-    "look at the joints below: units, signs and ratios of the drives first, then friction "
-    "(--friction)",
+    "check the joints named below: first units, signs and ratios of the drives, "
+    "then friction (--friction)",
 )
 def total_error(fit: Estimate) -> Answer:
     """Check the relative error 100 ||Y - W X|| / ||Y|| of the fit over all joints, in %."""
-    text = f"{fit.relative_error:.1f} % of them stay unexplained"
+    text = f"{fit.relative_error:.1f} % of the torques stay unexplained"
     return Answer(state_of(fit.relative_error, *LIMIT.TOTAL_ERROR), text)
 
 
@@ -281,7 +284,7 @@ def explained_by_joint(
         "doubtful" if state == "no" and expected <= LIMIT.EXPECTED_ERROR else state,
         f"Worst is joint {worst.joint}, {worst.relative_error:.1f} % unexplained",
         lost_joints(estimate, fit)
-        or f"look at the torque of joint {worst.joint}: coupling of the drives, friction, offset, "
+        or f"check the torque of joint {worst.joint}: coupling of the drives, friction, offset, "
         "time shift between position and torque",
     )
 
@@ -351,7 +354,7 @@ def predicted(
     if "standard" not in fit.details:
         remedy = f"fewer parameters (a larger essential.threshold), {remedy}"
     if halves:
-        remedy = f"name a record that it has to predict (validate.record); {remedy}"
+        remedy = f"name a record that the model must predict (validate.record); {remedy}"
     if differ:
         remedy = (
             "see in which parameters the records differ: another robot, load or wiring, or a "
@@ -368,8 +371,8 @@ def predicted(
 @Question(
     "Have friction and motor inertia the right sign?",
     f"not below zero by {LIMIT.CERTAIN_SIGN:g} deviations",
-    "look at the sign of ratio, torque constant and columns of that joint, then at its "
-    "coupling, units and frame; fit again",
+    "check the sign of ratio, torque constant and columns of this joint, then its coupling, units "
+    "and frame; then identify again",
 )
 def signs(negative: Sequence[str]) -> Answer:
     """Check that no friction parameter and no motor inertia is certainly below zero.
@@ -426,7 +429,7 @@ def separate(fit: Estimate) -> Answer:
         for i, k in zip(*np.nonzero(above), strict=True)
     ]
     if not pairs:
-        return Answer("good", "No two of them trade against each other")
+        return Answer("good", "No two values are strongly correlated")
     more = ", ..." if len(pairs) > 4 else ""
     return Answer("doubtful", f"These trade: {', '.join(pairs[:4])}{more}")
 

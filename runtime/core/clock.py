@@ -75,7 +75,7 @@ def rate_of(stamps: Stamps, t: Array) -> float:
     """
     N = len(t)
     if N < 2:
-        raise InputError(f"{N} samples; a record needs at least 2", file=stamps.file)
+        raise InputError(f"the record has {N} samples; at least 2 are needed", file=stamps.file)
     step = np.diff(t)
     place: int | None = None
     if (step <= 0).any():
@@ -86,7 +86,10 @@ def rate_of(stamps: Stamps, t: Array) -> float:
         tolerance = RATE_TOLERANCE + 2 * stamps.jitter / (N - 1)
         off_grid = np.abs(t - t[0] - np.arange(N) / rate).max() * rate
         if stamps.rate is not None and abs(rate / stamps.rate - 1) > tolerance:
-            message = f"time runs at {rate:g} Hz, but record.rate is {stamps.rate:g} Hz; correct record.rate, the time or the unit of time"
+            message = (
+                f"the time stamps have the rate {rate:g} Hz, but record.rate is "
+                f"{stamps.rate:g} Hz; correct record.rate, the time or the unit of time"
+            )
         elif off_grid > stamps.jitter:
             place = int(np.argmax(np.abs(step * rate - 1))) + 1
             message = f"time is not uniform: up to {off_grid:.3g} sampling periods off the uniform grid; the step is {step[place - 1]:g} s here and {1 / rate:g} s on average"
@@ -134,7 +137,10 @@ def remedy_text(t: Array, stamps: TimeStamps, *, arrays: bool = False) -> str:
     step = np.diff(t)
     taken = step[(step > 0) & (step <= max(BRIDGED, BRIDGED_PERIODS * stamps.period))]
     rate = len(taken) / float(taken.sum())
-    count = f"{len(taken) + 1} samples in {taken.sum():.6g} s, pauses aside, are {rate:.6g} Hz, 1/median step is {1 / stamps.period:.6g} Hz. Remedy:"
+    count = (
+        f"{len(taken) + 1} samples in {taken.sum():.6g} s (without pauses) give {rate:.6g} Hz; "
+        f"the median step gives {1 / stamps.period:.6g} Hz. Remedy:"
+    )
     if arrays and "gaps" in settings:
         return f"{count} one Record for each piece"
     if arrays:
@@ -250,7 +256,7 @@ def time_stamps(t: Array, *, gap: float = GAP, file: str = "record") -> TimeStam
     step = np.diff(t)
     forward = step[step > 0]
     if not len(forward):
-        raise InputError("time never goes forward; expected increasing time", file=file)
+        raise InputError("the time stamps never increase; correct the time column", file=file)
     period = float(np.median(forward))
     rounding = (gap + 2) * np.spacing(np.abs(t).max())  # of the step and of the median
     longest = gap * period * (1 + DIGITS) + rounding

@@ -162,7 +162,8 @@ def encoder_drives(side: str, drives: Drives | None, section: str = "signals") -
         return None
     if drives is None:
         raise SettingsError(
-            "motor, but the robot has no drives; use side: joint or give drives in the robot file",
+            "side: motor needs drives, but the robot has no drives; set side: joint, or give "
+            "drives in the robot file",
             path=(section, "side"),
         )
     return drives

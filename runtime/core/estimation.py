@@ -144,7 +144,8 @@ def method_of(settings: EstimateSettings, methods: Mapping[str, Method]) -> Meth
     """Return the method of estimation that `settings` names; SettingsError if it is unknown."""
     if settings.method not in methods:
         raise SettingsError(
-            f"{settings.method!r}; expected {' or '.join(methods)}", path=("estimate", "method")
+            f"unknown method {settings.method!r}; expected {' or '.join(methods)}",
+            path=("estimate", "method"),
         )
     return methods[settings.method]
 

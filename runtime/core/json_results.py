@@ -98,7 +98,8 @@ def from_text(kind: type[T], text: str, schema: str, file: str) -> T:
         )
     if missing := [f.name for f in fields(kind) if f.name not in data]:  # type: ignore[arg-type]
         raise InputError(
-            f"no {missing[0]!r}, so the file is incomplete; write the file again", file=file
+            f"the key {missing[0]!r} is missing, so the file is incomplete; write the file again",
+            file=file,
         )
     try:
         result: T = TypeAdapter(kind).validate_python(data)

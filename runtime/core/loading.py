@@ -90,7 +90,7 @@ def module_of(path: Path, *, trust: bool = False) -> ModuleType:
         data = path.read_bytes()
         text = data.decode("utf-8")
     except (OSError, UnicodeDecodeError) as e:
-        raise ModelError(f"cannot be read: {e}", file=str(path)) from e
+        raise ModelError(f"the module cannot be read: {e}", file=str(path)) from e
     if not (trust or is_emitted(data)):
         raise ModelError(UNTRUSTED, file=str(path))
     return run(text, path)
@@ -106,12 +106,13 @@ def run(text: str, path: Path) -> ModuleType:
         loader.exec_module(module)
     except ModuleNotFoundError as e:
         raise ModelError(
-            f"needs the package {e.name}, which is not installed; install this package",
+            f"the module needs the package {e.name}, which is not installed; install this package",
             file=str(path),
         ) from e
     except Exception as e:  # whatever a broken file raises becomes one kind of error
         raise ModelError(
-            f"fails on import with {type(e).__name__}: {e}; generate the module again (symgen generate)",
+            f"the import of the module fails with {type(e).__name__}: {e}; generate the module "
+            "again (symgen generate)",
             file=str(path),
         ) from e
     return module

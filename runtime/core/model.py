@@ -123,8 +123,9 @@ def load_model(
             else []
         )
         raise ModelError(
-            f"no generated model {path}; {path.parent} contains {', '.join(present) or 'none'}: "
-            f"generate it with `symgen generate {path.stem}`"
+            f"there is no generated model {path} ({path.parent} contains "
+            f"{', '.join(present) or 'none'}); generate the model with "
+            f"`symgen generate {path.stem}`"
         )
     return checked_model(module_of(path, trust=trust))
 
@@ -171,7 +172,8 @@ def checked_model(module: ModuleType) -> GeneratedModel:
     missing = [name for name in (*CONSTANTS, *FUNCTIONS) if not hasattr(module, name)]
     if missing:
         raise ModelError(
-            f"no {', '.join(missing)}; expected a module that symgen generated; generate it again",
+            f"the module has no {', '.join(missing)}; generate the module again "
+            "with symgen generate",
             file=label,
         )
     model = cast(GeneratedModel, module)
@@ -191,13 +193,16 @@ def checked_model(module: ModuleType) -> GeneratedModel:
         raise ModelError(
             (
                 f"STRUCTURE is {structure.dtype} {structure.shape}; expected bool {(b, n)}, base "
-                "parameters by joints"
+                "parameters by joints; generate the module again"
             ),
             file=label,
         )
     drives = drives_of(model)
     if drives is not None and drives.n != n:
-        raise ModelError(f"DRIVES of {drives.n} joints; expected {n}", file=label)
+        raise ModelError(
+            f"DRIVES is for {drives.n} joints, but the model has {n}; generate the module again",
+            file=label,
+        )
     _check_store(model, b, n, label)
     return model
 
@@ -207,17 +212,22 @@ def require(model: GeneratedModel, *functions: str) -> None:
     missing = [name for name in functions if not callable(getattr(model, name, None))]
     if "forward_dynamics" in missing and any(c.startswith(TRANSMITTED) for c in channels_of(model)):
         raise ModelError(
-            "no forward_dynamics: friction laws depend on tau_model, which depends on the accelerations; remove these laws from the robot file",
+            "the model has no function forward_dynamics, because friction laws depend on the "
+            "torque tau_model and hence on the accelerations; remove these laws from "
+            "the robot file",
             file=model.NAME,
         )
     if missing == ["casadi"]:
         raise ModelError(
-            "no casadi(): the loops of this robot are closed by iteration, which CasADi cannot express, or another version of symgen generated the model; in this case generate the module again",
+            "the model has no function casadi(). If the loops of this robot are closed by "
+            "iteration, CasADi cannot express the model; otherwise generate the module again with "
+            "this version of symgen",
             file=model.NAME,
         )
     if missing:
         raise ModelError(
-            f"no function {', '.join(missing)}; generate the module again, with --target or --with for these functions",
+            f"the module has no function {', '.join(missing)}; generate the module again, with "
+            "--target or --with for these functions",
             file=model.NAME,
         )
 
@@ -293,8 +303,8 @@ def elements_of(
     if not hasattr(model, table):
         raise ModelError(
             (
-                f"no {table}, the directions along which friction acts; generate the module again with this "
-                "version of symgen"
+                f"the module has no table {table} of the directions along which friction acts; "
+                "generate the module again with this version of symgen"
             ),
             file=model.NAME,
         )
@@ -371,7 +381,9 @@ def _check_names(model: GeneratedModel, label: str) -> None:
         if not (isinstance(name, str) and re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII))
     ]:
         raise ModelError(
-            f"NAME or BASE_PARAMETERS contain {wrong[0]!r:.60}; expected identifiers", file=label
+            f"NAME or BASE_PARAMETERS contain {wrong[0]!r:.60}; expected names of letters, digits "
+            "and _, with a letter first",
+            file=label,
         )
     if strange := [j for j in model.JOINTS if type(j) is not int or j < 1]:
         raise ModelError(
@@ -396,7 +408,8 @@ def _check_store(model: GeneratedModel, b: int, n: int, label: str) -> None:
             )
     except Exception as e:  # whatever a broken file raises becomes one kind of error
         raise ModelError(
-            f"fails on two samples at rest with {type(e).__name__}: {e}; generate the module again",
+            f"the regressor fails at two samples at rest with {type(e).__name__}: {e}; generate "
+            "the module again",
             file=label,
         ) from e
     if shape != (b, n, N):

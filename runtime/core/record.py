@@ -163,15 +163,19 @@ class Record:
         N = len(given["t"]) if given["t"].ndim == 1 else -1
         if given["q"].ndim != 2 or given["q"].shape != given["tau"].shape or len(given["q"]) != N:
             text = ", ".join(f"{label} {shapes[label]}" for label in ("t", "q", "tau"))
-            raise InputError(f"{text}; expected the shapes (N,), (N, n), (N, n)", file=file)
+            raise InputError(
+                f"{text}; expected the shapes (N,), (N, n), (N, n) for N samples of n joints",
+                file=file,
+            )
         if N < LIMIT.FEWEST_SAMPLES:
             raise InputError(
-                f"{N} samples; a record needs at least {LIMIT.FEWEST_SAMPLES}", file=file
+                f"the record has {N} samples; expected at least {LIMIT.FEWEST_SAMPLES}", file=file
             )
         for label, x in given.items():
             if label != "t" and x.shape != given["q"].shape:
                 raise InputError(
-                    f"{label} {shapes[label]}, q {given['q'].shape}; expected the same shape",
+                    f"{label} has shape {shapes[label]}, but q has shape {given['q'].shape}; "
+                    "expected the same shape",
                     file=file,
                 )
         others = {**(channels or {}), **named}
@@ -277,7 +281,10 @@ def _channel(label: str, x: ArrayLike, shape: tuple[int, ...], file: str) -> Arr
     array = array[:, None] if array.ndim == 1 else array
     expected = shape if label in JOINT_CHANNELS else (shape[0], *array.shape[1:2])
     if array.shape != expected:
-        raise InputError(f"{label} {array.shape}, q {shape}; expected {expected}", file=file)
+        raise InputError(
+            f"{label} has shape {array.shape}, but q has shape {shape}; expected {expected}",
+            file=file,
+        )
     held = array[:, ~np.isnan(array).all(axis=0)] if label == "q_link" else array
     require_finite(held, [f"{label}{k + 1}" for k in range(held.shape[1])], file)
     array.setflags(write=False)
@@ -298,7 +305,8 @@ def _missing(
         missing = Missing(samples[:, None] if samples.ndim == 1 else samples)
     if missing.samples.shape != shape or missing.samples.dtype != np.bool_:
         raise InputError(
-            f"missing {missing.samples.dtype} {missing.samples.shape}; expected bool {shape}, the shape of q",
+            f"`missing` has dtype {missing.samples.dtype} and shape {missing.samples.shape}; "
+            f"expected bool {shape}, the shape of q",
             file=file,
         )
     return missing if missing.samples.any() else None
@@ -347,8 +355,8 @@ def require_finite(
         numbers = f"numbers up to {largest:g} (SI)" if np.isfinite(x[i, j]) else "finite numbers"
         column = names[j] if len(names) == x.shape[1] else f"{', '.join(names)} ({j + 1})"
         raise InputError(
-            f"{x[i, j]} ({len(bad)} such values in all); expected {numbers}, repair or cut "
-            f"the record{f'; {hint}' if hint and np.isnan(x[i, j]) else ''}",
+            f"{x[i, j]} ({len(bad)} such values in all); expected {numbers}, repair or cut the "
+            f"record{f'; {hint}' if hint and np.isnan(x[i, j]) else ''}",
             file=file,
             column=column,
             row=row(int(i)),

@@ -360,10 +360,10 @@ class Identification:
         """
         by_law = any(record.origin.by_law for record in self.records)
         signs = (
-            f"{', '.join(self.negative)} below zero, which no friction and no motor inertia is: "
-            f"{'kd of the law is larger than that of the drive, or ' * by_law}a "
-            "sign of the joint is wrong (ratio, torque constant or "
-            "column), or its coupling, unit or frame."
+            f"{', '.join(self.negative)} below zero, but friction and motor inertia cannot be "
+            f"negative: {'kd of the law is larger than that of the drive, or ' * by_law}a sign of "
+            "the joint is wrong (ratio, torque constant or column), or its coupling, "
+            "unit or frame."
         )
         lost = lost_joints(self.estimate, self.model_estimate)
         joints = joint_labels(self.model)
@@ -449,7 +449,8 @@ class Identification:
         """Write a long text: parameters, validation, correlations, uncertainty, verdict."""
         fit = self.model_estimate if self.determined else self.estimate
         trade = [f"warning: {sentence}" for sentence in self.warnings] or [
-            f"no two parameters trade: no |correlation| above {self.correlations.threshold:g}"
+            "no two parameters are strongly correlated: no "
+            f"|correlation| above {self.correlations.threshold:g}"
         ]
         records = [
             f"error in {one.name}: {one.relative_error:.2f} % in total, per joint "

@@ -85,7 +85,7 @@ def _whole(value: Any) -> Any:
 
 def not_tiny(value: float) -> float:
     if 0 < value < 1 / LARGEST:
-        raise SettingsError(f"{value:g}; expected at least {1 / LARGEST:g}")
+        raise SettingsError(f"{value:g} is too small; expected at least {1 / LARGEST:g}")
     return value
 
 

@@ -182,10 +182,10 @@ class Uncertainty(Result):
     def too_short(self) -> str:
         """Sentence, with a remedy, on residuals that are correlated for longer than a block."""
         return (
-            f"The residuals remember {self.memory:.2g} s, the blocks last "
-            f"{self.bootstrap.length:.2g} s: the corrected deviations may be too small. Find what "
-            "errs so slowly (friction, temperature, an offset), record for longer, or set longer "
-            "blocks: estimate: {options: {block: ...}}, s."
+            f"The residuals are correlated over {self.memory:.2g} s, but the blocks last "
+            f"{self.bootstrap.length:.2g} s, so the corrected deviations may be too small. Find "
+            "the cause of such slow errors (friction, temperature, an offset), record longer, or "
+            "set longer blocks: estimate: {options: {block: ...}}, s."
         )
 
     def to_table(self) -> str:

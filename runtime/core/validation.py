@@ -71,8 +71,8 @@ def direct_comparison(observation: Observation, fit: Estimate) -> tuple[JointCom
     missing = [name for name in fit.names if name not in observation.names]
     if missing:
         raise InputError(
-            f"the observation has no columns {', '.join(missing)}; it has "
-            f"{', '.join(observation.names)}"
+            f"the observation has no columns {', '.join(missing)}; its columns "
+            f"are {', '.join(observation.names)}"
         )
     columns = [observation.names.index(name) for name in fit.names]
     predicted = observation.W[:, columns] @ fit.X
@@ -275,8 +275,8 @@ def split_validation(
     """Fit the first time window, s, of the records, and predict the other windows."""
     if len(windows) < 2:
         raise InputError(
-            f"{len(windows)} window; expected at least two, the first to fit, the others to "
-            "predict (validate.split)"
+            f"{len(windows)} window is given; expected at least two: the first to fit, the others "
+            "to predict (validate.split)"
         )
     labels = [
         f"[{', '.join('' if t is None else instant(t) for t in window)}] s" for window in windows
@@ -336,10 +336,10 @@ class WeakDirections(Result, keys="threshold pairs groups directions", schema=1)
             strongest = max(pairs, key=lambda p: abs(p.correlation))
             between = f"{strongest.first}, {strongest.second} " if len(group) > 2 else ""
             sentences.append(
-                f"{', '.join(group[:-1])} and {group[-1]} trade against each other on this record "
-                f"(correlation {between}{strongest.correlation:+.2f}): their combined "
-                "effect is more certain than each value. Set one of them to a value from another "
-                "source, or record a motion that separates them (symgen excite)."
+                f"{', '.join(group[:-1])} and {group[-1]} are strongly correlated on this record "
+                f"(correlation {between}{strongest.correlation:+.2f}): their combined effect is "
+                "more certain than each value. Set one of them to a value from another source, or "
+                "record a motion that separates them (symgen excite)."
             )
         return tuple(sentences)
 

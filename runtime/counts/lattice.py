@@ -93,8 +93,8 @@ def lattice(
         if given.shape not in {(1,), (n,)} or not (np.isfinite(given).all() and (given > 0).all()):
             raise InputError(
                 (
-                    f"step {step}; expected a positive number of rad or m, or {n}, one for each "
-                    "encoder"
+                    f"step {step}; expected a positive number (rad or m), or {n} such numbers, one "
+                    "for each encoder"
                 ),
                 file=name,
             )
@@ -133,10 +133,10 @@ def lattice(
     if shares.max() > SHAKEN:
         findings.append(
             f"encoder {np.argmax(shares) + 1}: {100 * shares.max():.0f} % of its changes cross one "
-            "line to and fro; the motion shakes, as under a controller "
-            "that answers single counts. Counts do not show that: what is read, and its stated "
-            "deviations, are those of the smooth motion alone. Compare with signals: "
-            "{reader: lowpass}: neither is always nearer to the truth there"
+            "line to and fro; the joint shakes, as if the controller answers single counts. The "
+            "counts do not show this shaking: the estimated motion and its deviations are those "
+            "of the smooth motion alone. Compare the result with signals: {reader: lowpass}, "
+            "since either may be nearer to the truth"
         )
     if step is None:
         moving = sum(bool(np.nanmax(x) > np.nanmin(x)) for x in position.T)
@@ -227,8 +227,9 @@ def unwrapped_counts(
         turns[jumps + 1] = -np.sign(size) * wrap
         counts[known, j] = k + np.cumsum(turns)
         findings.append(
-            f"encoder {j + 1}: the count wraps at 2^{periods[wrap]} {len(jumps)} times; it was "
-            "unwrapped from the first sample on, whose turn the zero of the joint must suit"
+            f"encoder {j + 1}: the count wraps at 2^{periods[wrap]} {len(jumps)} times; symgen "
+            "made the count continuous from the first sample on, so the zero of the joint must "
+            "belong to the turn of this sample"
         )
     return lattice_of_all, counts, tuple(findings)
 
@@ -305,15 +306,15 @@ def _speed(change: Array, label: str) -> list[str]:
     if 0 < len(moving) < FEW:
         return [
             (
-                f"{label}: the count changes {len(moving)} times only; the motion is known at "
-                "these instants alone, move further or use a finer encoder"
+                f"{label}: the count changes {len(moving)} times only, so the motion is known only "
+                "at these times; move further or use a finer encoder"
             )
         ]
     if len(moving) and (fast := float(np.median(moving))) > FAST:
         return [
             (
-                f"{label}: the count changes by {fast:.0f} a sample; no single edge is visible, "
-                "so counts say no more than positions here; log faster"
+                f"{label}: the count changes by {fast:.0f} a sample; single changes are not "
+                "visible, so counts contain no more than positions; log at a higher rate"
             )
         ]
     return []

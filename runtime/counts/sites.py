@@ -148,7 +148,7 @@ def smoothed(
         given = given.without(*jump)
         boxes, read = given.read(sizes, start)
     said = [
-        f"counts jump by {by} at {at * Ts:.4g} s, as if some were lost; taken out"
+        f"counts jump by {by} at {at * Ts:.4g} s, as if counts were lost; symgen removed the jump"
         for at, by in jumps
     ]
     said += _error_notes(read.errors, sizes[0], len(boxes.sites))

@@ -259,7 +259,8 @@ def load_whole_estimate(path: Path | str) -> Estimate:
         or not len(whole.X) == len(whole.sigma_corrected) == len(fit.X)
     ):
         raise InputError(
-            "the sets and the parameters in the file do not match, so the file was edited; write the file again with symgen identify",
+            "the parameters in the list `sets` differ from the other parameters of the file, so "
+            "the file was edited; write the file again with symgen identify",
             file=str(path),
         )
     return replace(

@@ -27,7 +27,7 @@ def require_file(path: Path) -> int:
         status = path.stat()
     except (OSError, ValueError) as e:
         raise InputError(
-            f"cannot be read: {getattr(e, 'strerror', None) or e}", file=str(path)
+            f"the file cannot be read: {getattr(e, 'strerror', None) or e}", file=str(path)
         ) from e
     if not S_ISREG(status.st_mode):
         what = "a folder" if S_ISDIR(status.st_mode) else "a pipe or a device"
@@ -41,12 +41,13 @@ def result_text(path: str | Path) -> str:
     try:
         if require_file(path) > LARGEST:
             raise InputError(
-                f"more than {LARGEST} bytes; expected a result of symgen", file=str(path)
+                f"the file has more than {LARGEST} bytes; expected a result of symgen",
+                file=str(path),
             )
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as e:
         raise InputError(
-            f"cannot be read: {getattr(e, 'strerror', None) or e}", file=str(path)
+            f"the file cannot be read: {getattr(e, 'strerror', None) or e}", file=str(path)
         ) from e
 
 
@@ -55,7 +56,8 @@ def text_of(path: str | Path) -> str:
     path = Path(path)
     if require_file(path) > 4 * LIMIT.YAML_CHARACTERS:  # bytes of so many characters
         raise InputError(
-            f"more than {4 * LIMIT.YAML_CHARACTERS} bytes; a settings file has a few thousand bytes",
+            f"the file has more than {4 * LIMIT.YAML_CHARACTERS} bytes; a settings file has a "
+            "few thousand bytes",
             file=str(path),
         )
     try:
@@ -65,7 +67,7 @@ def text_of(path: str | Path) -> str:
             f"byte {e.start} is not UTF-8; save the file as UTF-8", file=str(path)
         ) from e
     except OSError as e:
-        raise InputError(f"cannot be read: {e.strerror or e}", file=str(path)) from e
+        raise InputError(f"the file cannot be read: {e.strerror or e}", file=str(path)) from e
 
 
 def settings_from_text(kind: type[T], text: str, *, file: str) -> T:

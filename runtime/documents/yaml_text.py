@@ -38,7 +38,8 @@ def yaml_values(text: str, *, file: str) -> tuple[Any, dict[Path, int]]:
     """
     if len(text) > LIMIT.YAML_CHARACTERS:
         raise InputError(
-            f"{len(text)} characters; expected at most {LIMIT.YAML_CHARACTERS}", file=file
+            f"the file has {len(text)} characters; expected at most {LIMIT.YAML_CHARACTERS}",
+            file=file,
         )
     from ruamel.yaml.error import MarkedYAMLError
 

@@ -139,7 +139,8 @@ def limits_of(model: GeneratedModel, given: Mapping[str, Any]) -> MotionLimits:
     ]
     if len(ranges) != n or any(len(x) != 2 or not x[0] < x[1] for x in ranges):
         raise SettingsError(
-            f"{known['q']}; expected {n} numbers or pairs (lower, upper)", path=("limits", "q")
+            f"q: {known['q']}; expected {n} limits, each a number or a pair (lower, upper)",
+            path=("limits", "q"),
         )
     lower, upper = np.array(ranges).T
     return MotionLimits(lower, upper, **largest)
@@ -166,7 +167,9 @@ def weights_of(
     deviation = np.array(settings.torque_sigma or tuple(s) or (1.0,) * n, dtype=float)
     if deviation.shape != (n,) or not np.all(deviation > 0):
         raise SettingsError(
-            f"{deviation.tolist()}; expected {n} numbers above 0", path=("torque_sigma",)
+            f"standard deviations of the torques {deviation.tolist()}; expected {n} numbers above "
+            "0, one per joint",
+            path=("torque_sigma",),
         )
     units = dict(getattr(model, "UNITS", {}))
     largest: dict[str, float] = {}

@@ -258,7 +258,7 @@ def _distances(
     ]
     if unknown:
         raise InputError(
-            f"no frame {unknown[0]} for a sphere; expected one of the frames 0, "
+            f"the frame {unknown[0]} of a sphere does not exist; expected one of the frames 0, "
             f"{', '.join(name[1:] for name in poses)}"
         )
     poses["T0"] = ca.SX.eye(4)

@@ -85,12 +85,10 @@ class StaticPoses(Result, keys="poses condition sigma compared s taken_in"):
         return (
             f"{len(self.poses)} static poses determine {len(self.sigma)} parameters of "
             f"{self.model.NAME}: cond(W) {self.condition[0]:.1f}, by {self.compared} "
-            f"{self.condition[1]:.1f}."
-            f"{f' Not estimated, because at rest they cannot be separated from others: {lost}.' if lost else ''}\n\n"
-            f"{sigma.to_text()}\n\n{poses.to_text()}\n\n"
-            f"SI units, for torque deviations of {', '.join(f'{x:.3g}' for x in self.s)}. "
-            "Ranges of the joints are kept; collisions and limits of torque were not looked at. "
-            "Approach every pose from both sides and record the mean torque."
+            f"{self.condition[1]:.1f}.{f' Not estimated, because at rest they cannot be separated from others: {lost}.' if lost else ''}\n\n{sigma.to_text()}\n\n{poses.to_text()}\n\nSI "
+            f"units, for torque deviations of {', '.join(f'{x:.3g}' for x in self.s)}. The poses "
+            "are within the ranges of the joints; collisions and limits of torque were not "
+            "checked. Approach every pose from both sides and record the mean torque."
         )
 
 

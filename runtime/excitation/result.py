@@ -156,8 +156,8 @@ class Excitation(Result):
             return ""
         if not worse:
             return (
-                f" It determines each of these {len(before)} parameters better than the motion of "
-                "the record."
+                f" This motion determines each of these {len(before)} parameters better than the "
+                "motion of the record."
             )
         named = ", ".join(
             f"{name} {self.relative_sigma[name]:.2g} % (record {before[name]:.2g} %)"
@@ -169,8 +169,8 @@ class Excitation(Result):
             else ""
         )
         return (
-            f" It tells {len(before) - len(worse)} of {len(before)} parameters better than the "
-            f"motion of the record, and WORSE: {named}{more}."
+            f" This motion determines {len(before) - len(worse)} of {len(before)} parameters "
+            f"better than the motion of the record, and WORSE: {named}{more}."
         )
 
     @property
@@ -186,8 +186,9 @@ class Excitation(Result):
         largest = np.abs(self.sampled()[-1]).max(axis=0)
         values = ", ".join(f"{x:.3g}" for x in largest)
         return (
-            f" Torque limits of joint {', '.join(free)} are unknown and were not kept: it asks "
-            f"for up to {values}; compare with the data sheet (limits: {{tau: [...]}})."
+            f" Torque limits of joint {', '.join(free)} are unknown, so the search ignored these "
+            f"limits: the motion needs up to {values}; compare with the data sheet "
+            "(limits: {tau: [...]})."
         )
 
     @property

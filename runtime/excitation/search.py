@@ -112,8 +112,9 @@ def excite(
     if not candidates:
         exceeded = excesses(model, motion_from_mapping(kept[0].motion), limits, settings, known.X)
         raise InputError(
-            "the best motions exceed a limit between the points of the time grid, also with larger safety margins: "
-            f"{'; '.join(map(str, exceeded[:3]))}. Raise `grid`, which is {settings.grid:g} Hz"
+            "the best motions exceed a limit between the points of the time grid, also with "
+            f"larger safety margins: {'; '.join(map(str, exceeded[:3]))}. Raise the rate of this "
+            f"grid, the setting `grid`, which is {settings.grid:g} Hz"
         )
     _, motion, margin, observation = min(candidates, key=lambda candidate: candidate[0])
     sigma = _relative_sigma(known.weights, observation, study, settings.rate)

@@ -309,7 +309,7 @@ def _scalar(
     if test.p_value > SURE:
         doubt = f"not determined: the record does not show the law (p = {test.p_value:.2g})"
     elif not loose < LOOSE:
-        doubt = "not determined: its deviation is as large as itself"
+        doubt = "not determined: its standard deviation is as large as its value"
     elif end:
         doubt = f"not determined: it ends at its bound, {a:.3g}"
     minima = tuple(float(problem.values(o)[k]) for o in others)

@@ -61,7 +61,10 @@ def transmitted_torque(problem: Problem) -> Problem:
         raise InputError(
             f"{parameters}: the torque of the model does not converge in {PASSES} passes; check in the robot file whether the friction is larger than the torque that causes the friction"
         )
-    text = f"{parameters}: {TRANSMITTED} is the torque of the other parameters at the states of the rows, not the measured one; it settled in {k + 1} passes."
+    text = (
+        f"{parameters}: {TRANSMITTED} is the torque of the other parameters at the states of "
+        f"the rows, not the measured torque; it converged in {k + 1} passes."
+    )
     unseen = [torque.given(record, X) for record in problem.prepared_unseen]
     others = tuple(note for note in problem.notes if note.kind != KIND)
     return replace(problem, notes=others).changed(

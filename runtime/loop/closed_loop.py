@@ -352,7 +352,8 @@ def _reference(
         )
     if len(records) > 1 and given.record is None:
         raise SettingsError(
-            f"one reference for {len(records)} records; give the reference columns qr1 ... in each record",
+            f"the setting controller.reference is one reference, but the study has {len(records)} "
+            "records; give the reference columns qr1 ... in each record",
             path=("controller", "reference"),
         )
     return reference_of(

@@ -124,14 +124,16 @@ def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
         x = np.atleast_1d(np.asarray(absent if value is None else value, dtype=float))
         if len(x) not in (1, n):
             raise SettingsError(
-                f"{len(x)} values; expected one or {n}, one per joint of {model.NAME}",
+                f"{len(x)} values are given; expected one value, or {n} values (one per "
+                f"joint of {model.NAME})",
                 path=("controller", *path.split(".")),
             )
         return np.broadcast_to(x, (n,)).copy()
 
     if "fit" in (law.kd, law.delay):
         raise SettingsError(
-            "fit, but a simulation needs numbers; identify the record first, and give the fitted numbers here",
+            "the setting `fit` has no number, which a simulation needs; identify the record "
+            "first, and write the fitted numbers here",
             path=("controller", "law"),
         )
     gains = law.gains(n)
@@ -145,7 +147,8 @@ def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
     )
     if drives is None:
         raise SettingsError(
-            f"motor, but {model.NAME} has no drives; use side: joint or give drives in the robot file",
+            f"side: motor needs drives, but {model.NAME} has no drives; set side: joint, or give "
+            "drives in the robot file",
             path=("controller", "encoder", "side"),
         )
     weights = (0.0, 0.5) if controller.velocity == "averaged" else (1.0, 0.0)
@@ -183,10 +186,14 @@ def parameters_of(model: GeneratedModel, controller: Controller | None = None) -
             raise InputError(
                 f"{message} (0 for a parameter that is zero), or give a record from which the values are estimated"
             )
-        raise SettingsError(f"{message} or here, 0 for a parameter that is zero", path=where)
+        raise SettingsError(
+            f"{message} or in controller.values (0 for a parameter that is zero)", path=where
+        )
     if unknown := sorted(set(changed) - set(emitted.STANDARD_PARAMETERS)):
         raise SettingsError(
-            f"{model.NAME} has no standard parameter {', '.join(unknown)}", path=where
+            f"{model.NAME} has no standard parameter {', '.join(unknown)}; correct the "
+            "names in controller.values",
+            path=where,
         )
     return np.asarray(emitted.base_parameters(values), dtype=float)
 

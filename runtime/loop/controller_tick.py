@@ -346,7 +346,7 @@ def compiled(function: Any, cache: Path | None = None) -> Any:
     def opened(path: Path) -> ctypes.CDLL:
         library = ctypes.CDLL(str(path))
         if not hasattr(library, function.name()):
-            raise NotCompiledError(f"no function {function.name()} in {path}")
+            raise NotCompiledError(f"the compiled file {path} has no function {function.name()}")
         objects.append(path)
         return library
 

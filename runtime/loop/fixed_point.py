@@ -102,7 +102,7 @@ def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]
     if not isinstance(which, str):
         if unknown := [name for name in which if name not in names]:
             raise SettingsError(
-                f"no parameter {', '.join(unknown)}; there are {', '.join(names)}",
+                f"no parameter {', '.join(unknown)}; expected some of {', '.join(names)}",
                 path=("estimate", "options", "start"),
             )
         return np.array([which.get(name, 0.0) for name in names])
@@ -153,7 +153,7 @@ def iterate(
         )
     remedy = _physical_start(loop, start)
     if options.start not in ("ols", "unit") and np.all(loop.inertia(full(names, X, every)) > 0):
-        remedy = "look at the controller of the study: law, gains, rate, delay, reference"
+        remedy = "check the controller of the study: law, gains, rate, delay, reference"
     trail: list[dict[str, Any]] = []
     step: Step | None = None
     converged = False
@@ -253,7 +253,7 @@ def _simulated(
         X,
         g,
         (),
-        f"The simulation cannot be made, also after {LIMIT.HALVINGS} halved steps: {reason}",
+        f"The simulation fails, also after {LIMIT.HALVINGS} halved steps: {reason}",
     )
 
 
@@ -301,8 +301,8 @@ def outcome_of(loop: ClosedLoop, fixed: Fixed, method: str) -> tuple[Status, str
             )
     elif fixed.contraction > LIMIT.SLOW_CONTRACTION:
         parts.append(
-            f"The passes hardly contract (ratio {fixed.contraction:.2f}): the answer depends on "
-            "where it stopped."
+            "The changes of the parameters hardly decrease from pass to pass (ratio "
+            f"{fixed.contraction:.2f}): the result depends on the number of passes."
         )
     passes = [{"X": own["next"], **{k: own[k] for k in PASS}} for own in fixed.trail]
     details = {"trail": passes, "contraction": fixed.contraction}

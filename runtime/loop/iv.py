@@ -64,10 +64,10 @@ def fit(start: Beginning) -> Fitted:
     if quality["cond"] > LIMIT.WEAK_CONDITION or quality["correlation"] < LIMIT.WEAK_CORRELATION:
         status = "weak-instruments" if status == "ok" else status
         weak = (
-            f"The instruments do not explain W: condition {quality['cond']:.2g} of Z'VW, smallest "
-            f"correlation {quality['correlation']:.2g}. Likely causes: another time base, "
-            "reference or controller than those of the record; slow rows; parameters without "
-            "excitation."
+            "The instruments Z (regressor of the simulated motion) do not explain the regressor W "
+            f"of the record: condition {quality['cond']:.2g} of Z'VW, smallest correlation "
+            f"{quality['correlation']:.2g}. Likely causes: another time base, reference or "
+            "controller than those of the record; slow rows; parameters without excitation."
         )
         message = f"{weak} {message}".strip()
     system = replace(
@@ -121,8 +121,9 @@ def _solve(W: Array, Z: Array, Y: Array) -> tuple[Array, Array, Array]:
         A = np.linalg.inv(Z.T @ W)
     except LinAlgError:
         raise InputError(
-            "the instruments do not explain W: Z'VW is singular; the simulated motion excites less "
-            "than the measured one. Check controller and reference"
+            "Z'VW is singular (Z: regressor of the simulated motion, W: of the record, V: "
+            "weights), since the simulated motion excites less than the measured one; check "
+            "controller and reference"
         ) from None
     X = A @ (Z.T @ Y)
     X += A @ (Z.T @ (Y - W @ X))

@@ -152,7 +152,8 @@ def reference_of(
 def _check_length(duration: float, rate: float, key: str) -> None:
     if duration * rate > LIMIT.LONGEST_REFERENCE:
         raise SettingsError(
-            f"{duration:g} s at {rate:g} Hz; expected at most {LIMIT.LONGEST_REFERENCE:,} ticks of the controller",
+            f"the reference lasts {duration:g} s at {rate:g} Hz; expected at most "
+            f"{LIMIT.LONGEST_REFERENCE:,} ticks of the controller, so shorten the reference",
             path=("controller", "reference", key),
         )
 
@@ -175,8 +176,8 @@ def read_reference(path: Path, rate: float, n: int) -> Reference:
         if abs(own / rate - 1) > LIMIT.RATE_TOLERANCE:
             raise InputError(
                 (
-                    f"time runs at {own:g} Hz, but the controller at {rate:g} Hz; resample the reference, "
-                    "or correct controller.rate"
+                    f"the time column of the reference has the rate {own:g} Hz, but the controller "
+                    f"runs at {rate:g} Hz; resample the reference, or correct controller.rate"
                 ),
                 file=path.name,
             )
@@ -260,7 +261,8 @@ def point_to_point(model: GeneratedModel, settings: Points, rate: float) -> Refe
     """
     if missing := [key for key in ("q", "qd", "qdd") if key not in model.LIMITS]:
         raise SettingsError(
-            f"{model.NAME} has no limits of {', '.join(missing)}; add them to the robot file",
+            f"{model.NAME} has no limits of {', '.join(missing)}; add these limits to "
+            "the robot file",
             path=("controller", "reference", "points"),
         )
     rng = np.random.default_rng(settings.seed)

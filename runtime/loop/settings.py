@@ -102,7 +102,9 @@ class Law(Settings):
         def each(key: str) -> np.ndarray:
             value = getattr(self, key)
             x = np.atleast_1d(np.asarray(0.0 if value == "fit" else value, dtype=float))
-            message = f"{len(x)} values; expected one or {n}, one per joint of the robot"
+            message = (
+                f"{len(x)} values are given; expected one value, or {n} values (one per joint)"
+            )
             require(len(x) in (1, n), message, "controller", "law", key)
             return np.broadcast_to(x, (n,)).copy()
 

@@ -134,7 +134,8 @@ class Simulator:
         X, g = np.asarray(X, dtype=float), np.broadcast_to(np.asarray(g, dtype=float), (n,)).copy()
         if X.shape != (b,) or not np.isfinite(X).all():
             raise InputError(
-                f"X of shape {X.shape}; expected {b} finite base parameters of {self.model.NAME}"
+                f"X has shape {X.shape}; expected the {b} base parameters, finite "
+                f"numbers, of {self.model.NAME}"
             )
         _check_shapes(reference, self.controller.rate, n, N, disturbance, feedforward)
         substeps = self.substeps(X, reference, g)
@@ -280,7 +281,8 @@ class Simulator:
         if size.any():
             if torque.bandwidth >= rate / 2:
                 raise SettingsError(
-                    f"{torque.bandwidth} Hz is too fast a disturbance; expected less than half the controller's rate",
+                    f"the disturbance of the torque has a bandwidth of {torque.bandwidth} Hz; "
+                    "expected less than half the rate of the controller",
                     path=("controller", "torque", "bandwidth"),
                 )
             pushed = lfilter(*butter(2, torque.bandwidth, fs=rate), pushed, axis=0)
@@ -356,8 +358,8 @@ def _check_motion(q: Array, reference: Reference) -> None:
     if lost.any():
         k, j = np.argwhere(lost)[0]
         raise SimulationError(
-            f"the motion leaves its reference at {(k + 1) / reference.rate:g} s, position {j + 1} "
-            "first: the loop is unstable there; lower the gains, "
-            "raise the rate, or slow down the reference",
+            f"the simulated motion leaves its reference at {(k + 1) / reference.rate:g} s, "
+            f"position {j + 1} first: the loop is unstable there; lower the gains, raise the rate, "
+            "or slow down the reference",
             time=(k + 1) / reference.rate,
         )

@@ -107,7 +107,8 @@ def motion_from_mapping(mapping: Mapping[str, Any]) -> Motion:
     parts = mapping.get("parts")
     if not isinstance(parts, list | tuple):
         raise SettingsError(
-            "no `parts` in this trajectory; expected a list of motion families (fourier, trapezoid, ...), each with its coefficients `p`"
+            "the trajectory has no `parts`; expected a list of motion families (fourier, "
+            "trapezoid, ...), each with its coefficients `p`"
         )
     require(
         len(parts) <= LIMIT.CHAIN_PARTS,

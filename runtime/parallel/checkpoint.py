@@ -86,7 +86,8 @@ class Checkpoint:
             except OSError as e:
                 unfinished.unlink(missing_ok=True)
                 raise InputError(
-                    f"cannot be written: {e.strerror or e}; {self.written} runs are saved, make room on the disk and repeat the command to continue",
+                    f"the file cannot be written: {e.strerror or e}; {self.written} runs are "
+                    "saved: free space on the disk, and repeat the command to continue",
                     file=str(self.file),
                 ) from e
             self.written = len(runs)
@@ -118,7 +119,7 @@ class Checkpoint:
             BadZipFile,
         ) as e:
             raise InputError(
-                f"damaged ({e}); delete this file, and the runs are computed again",
+                f"the file is damaged ({e}); delete this file, and the runs are computed again",
                 file=str(self.file),
             ) from e
         identity = json.loads(self._study)
@@ -126,13 +127,15 @@ class Checkpoint:
         other = [key for key in keys if earlier.get(key) != identity.get(key)]
         if other:
             raise InputError(
-                f"contains runs of another study (different: {', '.join(other)}); use another folder, or delete this file",
+                f"the file contains runs of another study (different: {', '.join(other)}); use "
+                "another folder, or delete this file",
                 file=str(self.file),
             )
         R = len(runs.run)
         if [x.shape for x in vars(runs).values()] != [(R,), (R,), (R, b), (R,)]:
             raise InputError(
-                f"contains arrays that do not fit {R} runs of {b} parameters; delete this file, and the runs are computed again",
+                f"the file contains arrays that do not fit {R} runs of {b} parameters; delete this "
+                "file, and the runs are computed again",
                 file=str(self.file),
             )
         return runs

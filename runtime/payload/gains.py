@@ -105,8 +105,9 @@ class DriveGains(Result, keys="joints constant together sigma alone sigma_alone 
         """Sentence that says which torque constants the load does not determine, if any."""
         if not self.refused:
             return (
-                "every gain is determined by the load, whose parameters are those with them; "
-                "those of the robot are not: set record.torque_constant to these constants"
+                "the load determines every gain. The parameters of the load use these gains, but "
+                "those of the robot do not: set record.torque_constant to these constants and "
+                "identify the robot again"
             )
         return (
             "REFUSED, the load does not change their torque enough (%sigma from "

@@ -101,7 +101,9 @@ def mount(
     links = physical_model(model).links
     link = links[-1] if link is None and frame is None else link
     if link is not None and link not in links:
-        raise InputError(f"no link {link} with inertia; links are {', '.join(map(str, links))}")
+        raise InputError(
+            f"no link {link} with inertia; such links are {', '.join(map(str, links))}"
+        )
     if frame is None or frame == link:
         assert link is not None  # one of both is given
         return Mount(link, link, np.eye(4))
@@ -122,7 +124,7 @@ def mount(
         )
     if not carrying:
         raise InputError(
-            f"frame {frame} is fixed to no link with inertia; links are "
+            f"frame {frame} is not fixed to a link with inertia; such links are "
             f"{', '.join(map(str, links))}"
         )
     link = link or (frame if frame in carrying else carrying[-1])

@@ -107,7 +107,8 @@ def payload_study(problem: Problem, loaded: Sequence[Record]) -> PayloadStudy:
     model, settings = problem.model, study.payload
     if settings is None or not loaded:
         raise SettingsError(
-            "no record with the load; name it in payload.record", path=("payload", "record")
+            "no record with the load is given; name this record in payload.record",
+            path=("payload", "record"),
         )
     method = linear_companion(study.estimate)
     if method.columns != "all":

@@ -118,9 +118,9 @@ def physical(part: Consistency) -> Answer:
     blocking = ", ".join(name for name, _ in judged.blocking)
     return Answer(
         "doubtful",
-        f"No: no body has what the fit of all parameters gives {blocking}",
+        f"No: no body can have the values that the fit of all parameters gives {blocking}",
         "before you simulate or control with them, fit under these conditions (estimate: "
-        "{method: feasible}); torque prediction is not concerned",
+        "{method: feasible}); predicted torques are not affected",
     )
 
 

@@ -204,7 +204,8 @@ def standard_parameters(
     answer = feasibility(physical, names, X, limits)
     if not answer.feasible:
         raise InputError(
-            f"no standard parameters: {answer.text}; identify with estimate.method: feasible"
+            f"the estimate has no standard parameters: {answer.text}; identify "
+            "with estimate.method: feasible"
         )
     return nearest_standard(physical, names, X, answer.chi, limits)
 

@@ -136,7 +136,7 @@ def fit(start: Beginning) -> Fitted:
         if bounds_contradict(system.weighted, physical, unbounded, bounded):
             options = open_options
             without_prior = unbounded
-            guess += " The record contradicts them: they are left out."
+            guess += " The record contradicts these values, so they are not used."
     unconstrained = None
     if options.explain or options.prior == "none":
         unconstrained = within_limits(physical, system.names, free.X, options)

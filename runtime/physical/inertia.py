@@ -114,7 +114,8 @@ class PhysicalModel:
         """
         if j not in self.links:
             raise InputError(
-                f"link {j} has no inertial parameters; links are {', '.join(map(str, self.links))}"
+                f"link {j} has no inertial parameters; links with them are "
+                f"{', '.join(map(str, self.links))}"
             )
         return [self.standard.index(f"{family}{j}") for family in INERTIAL]
 
@@ -154,7 +155,8 @@ def physical_model(
     elements = elements_of(model, constants)
     if missing := [name for name in ("STANDARD_PARAMETERS", "LINKS") if not hasattr(model, name)]:
         raise ModelError(
-            f"no {', '.join(missing)}; generate the module again with this version of symgen",
+            f"the module has no {', '.join(missing)}; generate the module again with this "
+            "version of symgen",
             file=model.NAME,
         )
     emitted = cast(Any, model)

@@ -102,14 +102,14 @@ class Case:
         return ", ".join(self.labels[j] for j in np.flatnonzero(chosen))
 
     def reaching(self, values: Array, units: Sequence[str], chosen: Array) -> str:
-        """Write the values that the selected joints reach, such as "They reach 3.1 rad (joint 2)".
+        """Write the values that the selected joints reach, such as "Largest values: 3 rad (joint 2)".
 
         At most four joints are named. If the mask selects none, the joint with the largest value is
         named.
         """
         shown = np.flatnonzero(chosen)[:4] if chosen.any() else [int(np.argmax(values))]
         each = (f"{values[j]:.3g} {units[j]} (joint {self.labels[j]})" for j in shown)
-        return f"They reach {', '.join(each)}"
+        return f"Largest values: {', '.join(each)}"
 
     @cached_property
     def observation(self) -> Observation | None:

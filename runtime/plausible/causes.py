@@ -748,7 +748,7 @@ CAUSES = (
         "sign",
         senses,
         "the torque of joint {joint} has the wrong sign",
-        "turn the sign of the torque of joint {joint}: ratio, torque constant or column",
+        "change the sign of the torque of joint {joint}: of its ratio, torque constant or column",
         in_torques,
         change=turned("tau"),
     ),
@@ -756,7 +756,7 @@ CAUSES = (
         "sign",
         senses,
         "the position of joint {joint} has the wrong sign",
-        "turn the sign of the position of joint {joint}, or its axis in the robot file",
+        "change the sign of the position of joint {joint}, or turn its axis in the robot file",
         in_positions,
         change=turned("q"),
     ),
@@ -764,7 +764,7 @@ CAUSES = (
         "sign",
         senses,
         "joint {joint} counts in the other sense, position and torque",
-        "turn the sign of the ratio of joint {joint}, or alpha and theta of its frame",
+        "change the sign of the ratio of joint {joint}, or alpha and theta of its frame",
         in_both,
         change=turned("q", "tau"),
     ),
@@ -772,7 +772,7 @@ CAUSES = (
         "sign",
         several_joints,
         "all torques have the wrong sign",
-        "turn the sign of the torques",
+        "change the sign of all torques",
         lambda robot, item: {"T": -np.eye(robot.n)},
         change=turned("tau"),
     ),
@@ -780,7 +780,7 @@ CAUSES = (
         "sign",
         several_joints,
         "all positions have the wrong sign",
-        "turn the sign of the positions",
+        "change the sign of all positions",
         lambda robot, item: {"P": -np.eye(robot.n)},
         change=turned("q"),
     ),
@@ -853,21 +853,24 @@ CAUSES = (
     Row(
         "coupling",
         neighbours,
-        f"{MISSING} positions and torques: position {{other}} is to be taken {{sense}} position {{one}}",
+        f"{MISSING} positions and torques: position {{other}} must be replaced by position "
+        "{other} {sense} position {one}",
         COUPLING,
         lambda robot, item: coupled(robot, item, positions=True, torques=True),
     ),
     Row(
         "coupling",
         neighbours,
-        f"{MISSING} positions: position {{other}} is to be taken {{sense}} position {{one}}",
+        f"{MISSING} positions: position {{other}} must be replaced by position {{other}} "
+        "{sense} position {one}",
         COUPLING,
         lambda robot, item: coupled(robot, item, positions=True, torques=False),
     ),
     Row(
         "coupling",
         neighbours,
-        f"{MISSING} torques: torque {{one}} is to be taken {{back}} torque {{other}}",
+        f"{MISSING} torques: torque {{one}} must be replaced by torque {{one}} "
+        "{back} torque {other}",
         COUPLING,
         lambda robot, item: coupled(robot, item, positions=False, torques=True),
     ),
@@ -875,7 +878,8 @@ CAUSES = (
         "zero",
         turns,
         "theta of joint {joint} is wrong by {turn}",
-        "look at theta of the frame of joint {joint} and at its zero (drives.offset): {turn} are missing",
+        "check theta of the frame of joint {joint} and its zero (drives.offset): "
+        "{turn} are missing",
         lambda robot, item: {"p": robot.one(item["j"], item["angle"], 0.0)},
         "the zero of joint {joint}",
     ),
@@ -883,13 +887,13 @@ CAUSES = (
         "known",
         known_torques,
         "the known torque of joint {joint} has the wrong sign",
-        "turn the sign of the known torque of joint {joint} (record.columns.tau_known)",
+        "change the sign of the known torque of joint {joint} (record.columns.tau_known)",
         lambda robot, item: {"known_factor": robot.one(item["j"], -1)},
     ),
     Row(
         "known",
         known_torques,
-        "the known torque of joint {joint} is not in the measured one",
+        "the known torque of joint {joint} is not part of the measured torque",
         "do not subtract the known torque of joint {joint} (record.columns.tau_known)",
         lambda robot, item: {"known_factor": robot.one(item["j"], 0)},
     ),
@@ -959,7 +963,7 @@ CAUSES = (
         "zero",
         with_offsets,
         "the offsets of the drives are used twice or with the wrong sign",
-        "look at the sign of drives.offset",
+        "check the sign of drives.offset",
         lambda robot, item: {"p": -2 * robot.offset},
     ),
     Row(
@@ -973,8 +977,8 @@ CAUSES = (
     Row(
         "zero",
         with_offsets,
-        "the offsets of the drives are added to positions that have them",
-        "leave drives.offset out",
+        "the offsets of the drives are added to positions that already contain them",
+        "remove drives.offset from the robot file",
         lambda robot, item: {"p": -robot.offset},
     ),
     Row(
@@ -1019,7 +1023,7 @@ CAUSES = (
     Row(
         "length",
         odd_lengths,
-        "{entry} of frame {frame} is to be taken {times} times: mm and m",
+        "{entry} of frame {frame} must be multiplied by {times}: mm and m are confused",
         "give {entry} of frame {frame} in m",
         lambda robot, item: {
             "constants": {f"free_{item['entry']}{item['frame']}": item["factor"] * item["length"]}
@@ -1038,7 +1042,7 @@ CAUSES = (
     Row(
         "length",
         odd_tables,
-        "all lengths are to be taken {times} times: mm and m",
+        "all lengths must be multiplied by {times}: mm and m are confused",
         "give lengths in m",
         lambda robot, item: {"constants": item["constants"]},
     ),
@@ -1055,7 +1059,7 @@ CAUSES = (
 def factor_words(robot: Robot, item: Item, xi: float) -> Item:
     """Write a fitted factor exp(xi) of a signal in words, and a mistake that may explain it."""
     near = [text for value, text in GUESSES.items() if abs(abs(xi) - np.log(value)) < 0.05]
-    guess = near[0] if near else "they are right when this factor is 1"
+    guess = near[0] if near else "all three are right if this factor is 1"
     return {"factor": f"{np.exp(xi):.3g}", "times": times(float(np.exp(xi))), "guess": guess}
 
 
@@ -1095,7 +1099,7 @@ NUMBERS = (
     Row(
         "factor",
         study,
-        "all torques are to be multiplied by {factor}",
+        "all torques must be multiplied by {factor}",
         "look at unit, torque constants and side of the torques ({guess})",
         lambda robot, item, xi: {"T": np.exp(xi) * np.eye(robot.n)},
         "a common factor of all torques",
@@ -1105,8 +1109,9 @@ NUMBERS = (
     Row(
         "scale",
         joints,
-        "the position of joint {joint} is to be multiplied by {factor}",
-        "look at the counts per turn of the encoder of joint {joint}, at its ratio (drives.ratio) and at its unit (record.units.q)",
+        "the position of joint {joint} must be multiplied by {factor}",
+        "check the counts per turn of the encoder of joint {joint}, its ratio (drives.ratio) and "
+        "its unit (record.units.q)",
         lambda robot, item, xi: robot.positions(np.diag(robot.one(item["j"], np.exp(xi)))),
         "the scale of the position of joint {joint}",
         1.2,
@@ -1115,8 +1120,9 @@ NUMBERS = (
     Row(
         "offset",
         joints,
-        "the torque of joint {joint} is off by {offset}",
-        "look at the zero of the torque of joint {joint}, or give it as a known torque (record.columns.tau_known)",
+        "the torque of joint {joint} has a constant error of {offset}",
+        "check the zero of the torque of joint {joint}, or give this constant as a "
+        "known torque (record.columns.tau_known)",
         lambda robot, item, xi: {
             "unmodelled": np.outer(
                 robot.one(item["j"], xi * size_of_torque(robot, item["j"]), 0.0), (1.0, 0.0)
@@ -1129,7 +1135,7 @@ NUMBERS = (
     Row(
         "factor",
         joints_of_several,
-        "the torque of joint {joint} is to be multiplied by {factor}",
+        "the torque of joint {joint} must be multiplied by {factor}",
         "look at ratio, torque constant and unit of joint {joint} ({guess})",
         lambda robot, item, xi: robot.torques(np.diag(robot.one(item["j"], np.exp(xi)))),
         "a factor of the torque of joint {joint}",
@@ -1140,7 +1146,8 @@ NUMBERS = (
         "zero",
         turning_joints,
         "the zero of joint {joint} is off by {degrees} degrees",
-        "look at theta of the frame of joint {joint}, at drives.offset and at the calibration of its encoder",
+        "check theta of the frame of joint {joint}, drives.offset and the calibration "
+        "of its encoder",
         lambda robot, item, xi: {"p": robot.one(item["j"], xi, 0.0)},
         "the zero of joint {joint}",
         1.2,
@@ -1149,7 +1156,8 @@ NUMBERS = (
     Row(
         "friction",
         slow_joints,
-        "the friction of joint {joints} at low speed is not that of the model; columns of kind stribeck have it",
+        "the friction of joint {joints} at low speed is not that of the model; elements of kind "
+        "stribeck describe such friction",
         "add such columns",
         lambda robot, item, xi: {"unmodelled": xi * np.outer(item["friction"], (0.0, 1.0))},
         "the friction of joint {joints} at low speed",

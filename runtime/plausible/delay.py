@@ -109,7 +109,8 @@ def delay_of(model: GeneratedModel, through: Filtered, longest: float) -> Delay:
     duration = float(record.t[-1] - record.t[0])
     if not 0 < longest <= duration / 10:
         raise InputError(
-            f"delays up to {longest:g} s in a record of {duration:g} s; expected at most a tenth of the record",
+            f"the longest delay is {longest:g} s; expected more than 0 and at most a tenth of the "
+            f"record, which lasts {duration:g} s",
             file=record.name,
         )
     shifts = Shifts(model, through, longest)
@@ -164,7 +165,8 @@ class Shifts:
         self.alike = max(1.0, record.rate / (LIMIT.NOISE_BAND * cutoff) / step)
         if len(kept) * self.n <= 2 * self.b:
             raise InputError(
-                f"{len(kept)} instants for {self.b} parameters and {self.n} delays; use a longer record",
+                f"{len(kept)} samples are too few for {self.b} parameters and {self.n} delays; use "
+                "a longer record",
                 file=record.name,
             )
         self.t, self.longest = record.t[kept], longest

@@ -31,8 +31,8 @@ Array = np.ndarray
 
 @Question(
     "Are the positions those of a motion?",
-    f"steps that differ by less than {LIMIT.JUMP:g} times what is usual, or than any robot "
-    "accelerates",
+    f"steps between samples that differ by less than {LIMIT.JUMP:g} times the usual change, or by "
+    "less than the largest acceleration of a robot allows",
 )
 def jumps(case: Case) -> Answer:
     """Check whether a joint position jumps, freezes, or is the same as that of another joint."""
@@ -66,10 +66,10 @@ def jumps(case: Case) -> Answer:
             packets = int(np.count_nonzero(np.diff(held, prepend=False) & held))
             return Answer(
                 "good" if held.mean() < LIMIT.HELD_SHARE else "doubtful",
-                f"The controller held the positions at {packets} instants, {int(held.sum())} samples "
-                f"of {len(held)}, and caught up",
+                f"The controller held the positions at {packets} instants ({int(held.sum())} of "
+                f"{len(held)} samples), then jumped to the new positions",
                 "log without lost packets, or leave these times out (rows.window); signals: "
-                "{reader: counts} takes held samples as missing",
+                "{reader: counts} treats these samples as missing",
             )
         frozen = np.array([_frozen(x, own) for x, own in zip(steps.T, sharp.T, strict=True)])
         if frozen.any():
@@ -77,8 +77,8 @@ def jumps(case: Case) -> Answer:
             k = int(np.flatnonzero(frozen.any(axis=0))[0])
             return Answer(
                 "no",
-                f"Joint {case.joints(still)} moves, and holds one value from one sample to the "
-                f"next at {instant(record.t[k])} s",
+                f"Joint {case.joints(still)} moves, but its position suddenly stays at one value "
+                f"at {instant(record.t[k])} s",
                 "an encoder froze: leave this time out (rows.window), or repair the record",
             )
         if not high.any():
@@ -95,8 +95,8 @@ def jumps(case: Case) -> Answer:
             text += f", and at {more} more {'instant' if more == 1 else 'instants'}"
         if _wrap(q, high, usual, median):
             remedy = (
-                "it starts anew: an angle at a full turn is continued by record: {unwrap: true}, a "
-                "counter by signals: {reader: counts}"
+                "the position starts anew: for an angle at a full turn set record: "
+                "{unwrap: true}, for a counter set signals: {reader: counts}"
             )
         elif len(joints) > 1 or len(units) == 1:
             remedy = (
@@ -105,8 +105,8 @@ def jumps(case: Case) -> Answer:
             )
         else:
             remedy = (
-                "an encoder dropped out, froze or was set anew: leave this time out "
-                "(rows.window), or repair the record"
+                "an encoder failed, froze or was reset: leave this time out (rows.window), or "
+                "repair the record"
             )
         return Answer("no", text, remedy)
     return Answer("good", "No joint jumps between two samples")
@@ -164,9 +164,10 @@ def _wrap(q: Array, high: Array, usual: Array, median: int) -> bool:
 @Question(
     "Are the torques recorded in full?",
     f"less than {100 * LIMIT.CUT:g} % of the samples at the largest torque, or a model of the "
-    f"others that goes beyond it by less than {LIMIT.BEYOND_BOUND:g} times their residual",
-    "the signal is clipped: raise the range of the logger, or record a motion that asks "
-    "for less torque",
+    f"other samples that exceeds this torque by less than {LIMIT.BEYOND_BOUND:g} "
+    "times their residual",
+    "the signal is clipped: raise the range of the logger, or record a motion that "
+    "needs less torque",
 )
 def cut_torques(case: Case) -> Answer | None:
     """Check whether torques were clipped at their largest or smallest value.
@@ -223,9 +224,9 @@ def cut_torques(case: Case) -> Answer | None:
         )
     return Answer(
         "no" if clipped[j] else "good",
-        f"{text}; fitted to the others, the model goes beyond it by {missing[j]:.2g} "
-        f"{joint_torque_units(case.model)[j]} on average, {beyond[j]:.1f} times the residual "
-        "elsewhere",
+        f"{text}; there, a model of the other samples exceeds the value by {missing[j]:.2g} "
+        f"{joint_torque_units(case.model)[j]} on average, {beyond[j]:.1f} times "
+        "the residual elsewhere",
     )
 
 

@@ -105,13 +105,14 @@ class KnownValues(Result):
                 if np.isfinite(ratio) and not LIMIT.CAD_RATIOS[0] <= ratio <= LIMIT.CAD_RATIOS[1]:
                     doubtful.add(joint)
                     texts.append(
-                        f"{name} torque of joint {joint} {ratio:.2f} times that of the values"
+                        f"the measured {name} torque of joint {joint} is {ratio:.2f} times that "
+                        "computed from the values"
                     )
         for joint, error in zip(self.joints, self.error, strict=True):
             if self.complete and error > LIMIT.CAD_ERROR and joint not in doubtful:
                 texts.append(
-                    f"they leave {error:.0f} % of the torque of joint {joint} unexplained, "
-                    "friction fitted"
+                    f"the values leave {error:.0f} % of the torque of joint {joint} unexplained "
+                    "(with fitted friction)"
                 )
         return tuple(texts)
 
@@ -223,7 +224,7 @@ def torque_unit_doubt(model: GeneratedModel, observation: Observation, by_law: b
     cause = (
         "are the gains of controller.law in N m/deg (gain: 180/pi), or those of the motor side?"
         if by_law
-        else "are they currents, or of the motor side? Say record.units.tau: A with "
+        else "are they currents, or of the motor side? Set record.units.tau: A with "
         "record.torque_constant, or record.torque_side: motor"
     )
     return (

@@ -39,7 +39,7 @@ Array = np.ndarray
 
 @Question(
     "Do the joints move while they are used?",
-    f"standing at most {100 * LIMIT.REST_SHARE:g} % of the rows that are used",
+    f"at rest in at most {100 * LIMIT.REST_SHARE:g} % of the rows that are used",
 )
 def rest(case: Case) -> Answer:
     """Check how long each joint rests, and how the fit changes without the samples at rest."""
@@ -66,7 +66,7 @@ def rest(case: Case) -> Answer:
         estimate_of(rows, EstimateSettings(), LINEAR, model=model).relative_error
         for rows in (case.observation, without)
     )
-    text += f"; without these rows the fit leaves {after:.1f} % in place of {before:.1f} %"
+    text += f"; without these rows, the error of the fit is {after:.1f} % instead of {before:.1f} %"
     state: State = "doubtful" if after < 0.8 * before else "good"
     if after < 0.5 * before and before > LIMIT.TOTAL_ERROR[0]:  # else friction of that joint alone
         state = "no"
@@ -121,8 +121,8 @@ def _rounded_up(x: float) -> float:
     "Does the motion excite every parameter?",
     f"predicted deviation below {LIMIT.UNEXCITED:g} % of the largest possible value, with "
     f"{100 * LIMIT.TORQUE_NOISE:g} % of torque noise",
-    "move the joints behind these parameters more, further or faster (symgen excite finds "
-    "a motion), or leave them out (estimate.columns)",
+    "move the joints of these parameters further or faster (symgen excite finds a motion), or "
+    "leave them out (estimate.columns)",
 )
 def motion_excites(case: Case) -> Answer | None:
     """Check whether the motion determines every parameter.
@@ -147,7 +147,8 @@ def excited(observation: Observation, signals: Signals, rate: float) -> Answer |
     unseen = [name for name in order if shares[name] > LIMIT.UNEXCITED]
     if unseen:
         return Answer(
-            "doubtful", f"It does not determine {first_names(unseen)}, whatever their values"
+            "doubtful",
+            f"The motion cannot determine {first_names(unseen)}, whatever values they have",
         )
     text = f"Least excited is {order[0]}, {shares[order[0]]:.2g} %"
     if weak := [name for name in order if shares[name] > LIMIT.LARGE_DEVIATION]:
@@ -174,7 +175,7 @@ def unexcited_shares(observation: Observation, signals: Signals, rate: float) ->
         raise InputError("the torque of a joint is zero throughout; leave this joint out")
     columns = np.linalg.norm(observation.W / s[observation.joints][:, None], axis=0)
     if not columns.all():
-        raise np.linalg.LinAlgError("a column is zero")
+        raise np.linalg.LinAlgError("a column of the observation matrix is zero")
     weights = Weights(
         observation.names, s, float(np.linalg.norm(observation.Y / s[observation.joints])) / columns
     )
@@ -187,8 +188,8 @@ def unexcited_shares(observation: Observation, signals: Signals, rate: float) ->
 @Question(
     "Do recorded velocities agree with the positions?",
     f"gain and lag take at most {100 * LIMIT.SPEED_DISAGREES:g} %",
-    "look at unit, side and sense of record.columns.qd, and at the filter of the drive; those "
-    "joints take differences of the positions",
+    "check unit, side and sign of record.columns.qd, and the filter of the drive; for such joints "
+    "symgen uses differences of the positions",
 )
 def recorded_speeds(case: Case) -> Answer | None:
     """Compare recorded velocities with the derivatives of the positions: gain and time lag.
@@ -202,7 +203,7 @@ def recorded_speeds(case: Case) -> Answer | None:
     found = agreement(record.q, record.channels["qd"], record.rate, signals)
     worst = int(np.argmax(found.share))
     text = (
-        f"The velocity of joint {case.labels[worst]} is {found.gain[worst]:.3f} of that of "
-        f"its positions and {1e3 * found.lag[worst]:.1f} ms late"
+        f"The recorded velocity of joint {case.labels[worst]} is {found.gain[worst]:.3f} times the "
+        f"derivative of its position, and {1e3 * found.lag[worst]:.1f} ms late"
     )
     return Answer("good" if found.agrees.all() else "doubtful", text)

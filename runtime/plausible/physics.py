@@ -21,7 +21,9 @@ Array = np.ndarray
 
 
 @Question(
-    "Does physics agree?", "", "record a longer motion, or give a higher signals.lowpass.cutoff"
+    "Can symgen check signs, units and columns?",
+    "",
+    "record a longer motion, or give a higher signals.lowpass.cutoff",
 )
 def not_asked(case: Case) -> Answer | None:
     """Report why a search for possible errors of the study is not made; None if it is made.
@@ -32,14 +34,13 @@ def not_asked(case: Case) -> Answer | None:
         return None
     state: State = "open" if case.unfit else "doubtful"
     text = "" if case.unfit else ", so wrong signs, units and columns are not looked for"
-    return Answer(state, f"Not asked: {case.silent}{text}")
+    return Answer(state, f"Not checked: {case.silent}{text}")
 
 
 @Question(
     "Can a physical robot explain the record?",
     "about the same error",
-    "a sign, an axis, a length or the order of the columns is wrong: look at the "
-    "alternatives below",
+    "a sign, an axis, a length or the order of the columns is wrong: see the alternatives below",
 )
 def physics(case: Case) -> Answer | None:
     """Compare, for each joint, the torque error of a physical robot with that of free parameters.
@@ -59,8 +60,8 @@ def physics(case: Case) -> Answer | None:
     )
     return Answer(
         "doubtful" if worse else "good",
-        f"A physical robot leaves {given.errors[j]:.1f} % of the torque of joint "
-        f"{case.labels[j]}, free parameters {free.errors[j]:.1f} %",
+        f"The best physical robot leaves {given.errors[j]:.1f} % of the torque of joint "
+        f"{case.labels[j]} unexplained, parameters without physical limits {free.errors[j]:.1f} %",
     )
 
 
@@ -86,8 +87,9 @@ def measured(case: Case) -> Answer | None:
     if chosen.any() and share < LIMIT.LEAST_FRICTION:
         return Answer(
             "doubtful",
-            f"No joint shows friction (at most {100 * share:.1f} % of its torque), as where a "
-            "controller or a simulation computes torques, or sensors sit behind the gears",
+            f"No joint shows friction (at most {100 * share:.1f} % of its torque), as if a "
+            "controller or a simulation computed the torques, or sensors measured them "
+            "behind the gears",
         )
     fifth = [np.quantile(np.abs(np.diff(one.tau, 5, axis=0)), 0.8, axis=0) for one in case.records]
     size = [np.sqrt((one.tau**2).mean(axis=0)).clip(1e-300) for one in case.records]
@@ -95,17 +97,17 @@ def measured(case: Case) -> Answer | None:
     if 0 < noise < LIMIT.LEAST_NOISE:  # 0 of a drive that knows few levels
         return Answer(
             "doubtful",
-            f"They have no noise ({noise:.0e} of their size), as where a controller, a simulation "
-            "or a filter makes them",
+            f"The torques have almost no noise ({noise:.0e} of their size), as if a controller, a "
+            "simulation or a filter computed them",
         )
     return Answer("good", f"Friction is up to {100 * share:.0f} % of the torque of a joint")
 
 
 @Question(
-    "Do the torques suit the size of the robot?",
-    f"{LIMIT.DENSITY[0]:g} to {LIMIT.DENSITY[1]:g} kg per cubic metre of reach",
-    "look at side, unit and gear of the torques (record.torque_side, units.tau, "
-    "drives.ratio, torque_constant)",
+    "Do the torques agree with the size of the robot?",
+    f"{LIMIT.DENSITY[0]:g} to {LIMIT.DENSITY[1]:g} kg per cubic metre (mass over the reach cubed)",
+    "check side (joint or motor), unit and gear ratio of the torques (record.torque_side, "
+    "units.tau, drives.ratio, torque_constant)",
 )
 def size(case: Case) -> Answer | None:
     """Check whether the fitted total mass of the links suits the reach of the robot.
@@ -122,16 +124,16 @@ def size(case: Case) -> Answer | None:
     low, high = LIMIT.DENSITY
     return Answer(
         "good" if low <= masses / length**3 <= high else "doubtful",
-        f"They ask for a robot of about {masses:.2g} kg with a reach of {length:.2g} m",
+        f"The torques belong to a robot of about {masses:.2g} kg with a reach of {length:.2g} m",
     )
 
 
 @Question(
     "Do the values of the robot file agree with the record?",
-    "gravity and inertia torques a third to three times those of the values",
-    "look at ratio, torque constant, unit and sign of that joint, at the load, and at what the "
-    "model leaves out: a counterbalance or a cable is "
-    "subtracted as record.columns.tau_known; or the values are those of another robot",
+    "gravity and inertia torques between a third and three times those computed from the values",
+    "check ratio, torque constant, unit and sign of this joint, and its load; give the torque of "
+    "a counterbalance or cable as record.columns.tau_known; or the values are those "
+    "of another robot",
 )
 def values(case: Case) -> Answer | None:
     """Compare the torques computed from the robot file's values with the measured ones, by joint.
@@ -148,7 +150,9 @@ def values(case: Case) -> Answer | None:
             "good", "Gravity and inertia torques are too small compared with friction to judge"
         )
     return Answer(
-        "good", f"Ratios of gravity and inertia torques from {min(ratios):.2f} to {max(ratios):.2f}"
+        "good",
+        "Measured over computed torques of gravity and inertia: "
+        f"{min(ratios):.2f} to {max(ratios):.2f}",
     )
 
 
@@ -190,10 +194,10 @@ def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
             late.before[j],
             late.after[j],
         ),
-        "find the time from the log to the torque: controller.law.delay: fit"
+        "set controller.law.delay: fit, which identifies the delay between the log and the torque"
         if case.sides[1] == "law"
         else f"shift the torques by {', '.join(f'{-1e3 * x:+.1f}' for x in shift)} ms against the "
-        "positions before reading the record, or mend the logger",
+        "positions before reading the record, or repair the logger",
     )
 
 
@@ -260,7 +264,7 @@ def certain_joints(case: Case) -> Array:
 
 @Question(
     "Is the study the best explanation of the record?",
-    f"no single change explains it decisively better ({LIMIT.DECISIVE:g} nats)",
+    f"no single change explains it decisively better (log-likelihood gain of {LIMIT.DECISIVE:g})",
 )
 def better(case: Case, named: Sequence[Trial]) -> Answer:
     """Report the corrections that explain the record decisively better than the study as given.
@@ -271,7 +275,7 @@ def better(case: Case, named: Sequence[Trial]) -> Answer:
     if not named:
         return Answer(
             "good",
-            "No single change of signs, columns, units, angles or lengths explains it better",
+            "No single change of a sign, column, unit, angle or length explains the record better",
         )
     assert case.baseline is not None and named[0].fit is not None
     before, after = case.baseline.given.errors, named[0].fit.errors
@@ -284,7 +288,7 @@ def better(case: Case, named: Sequence[Trial]) -> Answer:
     fit = f"the error that a physical robot leaves of joint {case.labels[j]}"
     fit += f" through a low-pass of {case.samples.cutoff:.2g} Hz goes"
     text += _from_to(fit, before[j], after[j]) or (
-        "; the errors stay, the parameters come nearer to the values of the robot file"
+        "; the errors do not change, but the parameters are nearer to the values of the robot file"
     )
     first = named[0].cause
     return Answer("good" if friction else "no", text, first.remedy, change=first.change)

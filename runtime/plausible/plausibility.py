@@ -151,7 +151,7 @@ class Plausibility(
         """Write the findings that are not good, then the errors that no fit can reveal."""
         lines = [f"{c.state}: {c.sentence}" for c in self.answers if c.state in WORST[:2]]
         told = "\n".join(filter(None, [*lines, self.text()]))
-        return told or "Record, study and robot file suit each other, as far as judged."
+        return told or "Record, study and robot file agree, as far as symgen can judge."
 
     def tables(self) -> list[Table]:
         """Make the tables of the corrections tried, of delays, and of the robot file's values."""
@@ -223,7 +223,7 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
     for check, text in ((jumps, "the positions jump"), (cut_torques, "torques are cut off")):
         # what explains a broken record better is no cause
         if (broken := answers[check]) is not None and broken.state == "no":
-            checks.append(Check(question, "open", f"Not asked: {text}"))
+            checks.append(Check(question, "open", f"Not checked: {text}"))
             return Plausibility(tuple(checks))
     trials: list[Trial] = []
     if variants is not None or worst_of(checks) is not None:
@@ -232,7 +232,10 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
         if case.robot_values is not None and case.robot_values.heavy:
             trials = [t for t in trials if t.cause.kind != "rate"]
         if variants is not None and "free_alpha" not in " ".join(variants.CONSTANTS):
-            text = "Not asked: the loops of the robot file would not close with others"
+            text = (
+                "Not checked: with other angles or lengths the loops of the robot file "
+                "would not close"
+            )
             question = "Are angles and lengths of the table of frames right?"
             checks.append(Check(question, "open", text))
     named = [
@@ -268,8 +271,8 @@ def _case(problem: Problem, variants: GeneratedModel | None) -> Case | Check:
         through = [filtered(one, study) for one in straight]
         samples = samples_of(through, study)
     except InputError as e:
-        question = "Do record and robot file suit each other?"
-        return Check(question, "open", f"Not asked: {e.message}")
+        question = "Do record and robot file agree?"
+        return Check(question, "open", f"Not checked: {e.message}")
     try:
         D = regressor(model, (samples.q, samples.qd, samples.qdd))
     except ValueError as e:
@@ -278,8 +281,8 @@ def _case(problem: Problem, variants: GeneratedModel | None) -> Case | Check:
             "no",
             f"No: {e}",
             "every instant",
-            "look at sign, zero and order of the positions, at their unit, and at the lengths and "
-            "the start of the loop",
+            "check sign, zero, order and unit of the positions, and the lengths and the start "
+            "of the loop",
         )
     unseen = problem.prepared_unseen
     return Case(model, own, straight, study, through, samples, D, variants, unseen)

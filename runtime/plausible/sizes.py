@@ -25,9 +25,9 @@ Array = np.ndarray
 
 
 @Question(
-    "Are the times those of a log?",
+    "Is the sampling rate plausible?",
     f"{LIMIT.LOG_RATES[0]:g} Hz to {LIMIT.LOG_RATES[1] / 1e3:g} kHz",
-    "look at the unit of the time column (record.units.t: ms, us) and at record.rate",
+    "check the unit of the time column (record.units.t: ms, us) and record.rate",
 )
 def times(records: Sequence[Record]) -> Answer:
     """Check whether the sampling rate of every record is plausible."""
@@ -62,9 +62,8 @@ def standing(case: Case) -> Answer | None:
         "doubtful",
         f"Joint{'s' * (not one)} {case.joints(still)} {move} not move ({rms:.1g} "
         f"{case.units[int(np.argmax(still))]} rms): hold {them} with --lock",
-        f"symgen convert ROBOT held.yaml {held}, with a study that reads the columns of "
-        f"the others (record.columns: {{{columns}}}); where {it} {move} move, "
-        "look at record.columns.q",
+        f"symgen convert ROBOT held.yaml {held}, with a study that reads the columns of the others "
+        f"(record.columns: {{{columns}}}); if {it} {move} move, check record.columns.q",
     )
 
 
@@ -77,8 +76,8 @@ def _joint_names(case: Case, still: Array) -> list[tuple[int, str]]:
 
 @Question(
     "Are the positions those of this robot?",
-    remedy="look at zero and sign of these joints (theta, drives.offset, ratio), the order of "
-    "the columns, the unit and the side of the positions",
+    remedy="check zero and sign of these joints (theta, drives.offset, ratio), the order of the "
+    "columns, and the unit and the side of the positions (joint or motor)",
 )
 def positions(case: Case) -> Answer:
     """Compare the positions of each joint with limits.q of the robot file, or with usual ranges."""
@@ -132,8 +131,8 @@ def _against(case: Case, key: str, values: Array, sane: dict[str, tuple[float, f
 
 @Question(
     "Are the speeds those of this robot?",
-    remedy="look at the sampling rate and the unit of time (record.rate, units.t), then at the "
-    "unit and the side of the positions",
+    remedy="check the sampling rate and the unit of time (record.rate, units.t), then the unit "
+    "and the side of the positions (joint or motor)",
 )
 def speeds(case: Case) -> Answer:
     """Check whether the largest speed of every joint is plausible for this robot.
@@ -149,8 +148,8 @@ def speeds(case: Case) -> Answer:
 
 @Question(
     "Are the accelerations those of this robot?",
-    remedy="look at the sampling rate and the unit of time; noise of the positions asks for a "
-    "lower signals.lowpass.cutoff",
+    remedy="check the sampling rate and the unit of time; if the positions are "
+    "noisy, lower signals.lowpass.cutoff",
 )
 def accelerations(case: Case) -> Answer:
     """Check whether the largest acceleration of every joint is plausible for this robot."""
@@ -163,8 +162,8 @@ def accelerations(case: Case) -> Answer:
 @Question(
     "Are the torques those of this robot?",
     "limits.tau of the robot file",
-    "look at the unit, the side and the columns of the torques (record.units.tau, "
-    "torque_side, columns.tau)",
+    "check the unit, the side and the columns of the torques "
+    "(record.units.tau, torque_side, columns.tau)",
 )
 def torques(case: Case) -> Answer:
     """Check that every torque changes, and compare the largest torques with limits.tau.
@@ -176,21 +175,27 @@ def torques(case: Case) -> Answer:
         text = f"The torque of joint {case.joints(flat)} is constant"
         return Answer("no", text, limit="torques that change")
     if limits is None:
-        return Answer("good", "They change on every joint; the robot file gives no limits.tau", "")
+        return Answer(
+            "good", "The torque of every joint changes; the robot file gives no limits.tau", ""
+        )
     limits = np.where(limits > 0, limits, np.inf)  # a joint without a motor reaches none
     largest = np.abs(case.samples.tau).max(axis=0)
     if (out := largest > 1.5 * limits).any():
-        text = f"{case.reaching(largest, joint_torque_units(case.model), out)}, {(largest / limits).max():.3g} times the limits"
+        text = (
+            f"{case.reaching(largest, joint_torque_units(case.model), out)}, up to "
+            f"{(largest / limits).max():.3g} times the limits"
+        )
         return Answer("no", text)
     share = 100 * float((largest / limits).max())
     if share < 1:
-        return Answer("doubtful", f"They reach {share:.2g} % of limits.tau at most")
-    return Answer("good", f"They reach {share:.0f} % of limits.tau", "")
+        return Answer("doubtful", f"The torques reach {share:.2g} % of limits.tau at most")
+    return Answer("good", f"The torques reach {share:.0f} % of limits.tau", "")
 
 
 @Question(
-    "Are the lengths those of an arm?",
-    f"links up to {LIMIT.LONGEST_LINK:g} m, none {LIMIT.LOPSIDED:g} times the others",
+    "Are the lengths plausible for an arm?",
+    f"links up to {LIMIT.LONGEST_LINK:g} m, none longer than {LIMIT.LOPSIDED:g} times "
+    "all others together",
     "give d and r of the robot file in m",
 )
 def lengths(case: Case) -> Answer | None:
@@ -216,7 +221,7 @@ def lengths(case: Case) -> Answer | None:
 
 
 @Question(
-    "Can bodies have the values of the robot file?",
+    "Can real links have the inertial values of the robot file?",
     "pseudo-inertia of every link not negative; inertia about the origin of the link frame",
     "give inertias about the origin of the link frame, not about the centre of mass; XY = "
     "-integral x y dm; kg m^2",
@@ -233,8 +238,8 @@ def inertias(case: Case) -> Answer | None:
         return Answer("doubtful", "; ".join(far), "give values in kg, kg m, kg m^2, not g and mm")
     wrong = list(_wrong_links(case.physical))
     if not wrong:
-        return Answer("good", "Every link with ten values can exist", "")
-    return Answer("doubtful", f"No body has those of link {', '.join(wrong)}")
+        return Answer("good", "A real link can have the values of every link that has all ten", "")
+    return Answer("doubtful", f"No real link has the values of link {', '.join(wrong)}")
 
 
 def _far_bodies(physical: PhysicalModel, length: float) -> Iterator[str]:
@@ -254,8 +259,8 @@ def _far_bodies(physical: PhysicalModel, length: float) -> Iterator[str]:
             length, LIMIT.LEAST_EXTENT
         ):
             yield (
-                f"The values of link {j} put its mass {distance:.3g} m from its frame, the robot "
-                f"reaches {length:.2g} m"
+                f"The values of link {j} put its mass {distance:.3g} m from its frame, but the "
+                f"robot reaches {length:.2g} m"
             )
 
 

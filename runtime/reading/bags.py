@@ -188,18 +188,19 @@ def stored_files(folder: Path) -> list[Path]:
     try:
         text = (folder / "metadata.yaml").open("rb").read(4 * LIMIT.YAML_CHARACTERS + 1).decode()
     except (OSError, UnicodeDecodeError) as e:
-        raise InputError(f"cannot be read: {e}", file=where) from e
+        raise InputError(f"the bag cannot be read: {e}", file=where) from e
     values, _ = yaml_values(text, file=where)
     bag = values.get("rosbag2_bagfile_information") if isinstance(values, Mapping) else None
     if not isinstance(bag, Mapping):
         raise InputError(
-            "no mapping rosbag2_bagfile_information; expected the description of a ROS 2 bag",
+            "the key rosbag2_bagfile_information is missing; expected the description of a "
+            "ROS 2 bag",
             file=where,
         )
     names = bag.get("relative_file_paths")
     if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
         raise InputError(
-            "relative_file_paths lists no file; expected the files of the bag", file=where
+            "relative_file_paths lists no file; expected a list of the files of the bag", file=where
         )
     return [_inside(folder, name, where) for name in names]
 
@@ -236,20 +237,27 @@ def _topic(connections: list[Any], wanted: str | None, file: str) -> str:
     others = sorted({f"{c.topic} ({c.msgtype})" for c in connections if c.msgtype != MESSAGE})
     if wanted is None and len(topics) > 1:
         raise InputError(
-            f"several topics of {MESSAGE}: {', '.join(topics)}; choose one by record.topic",
+            f"several topics have the type {MESSAGE}: {', '.join(topics)}; choose "
+            "one by record.topic",
             file=file,
         )
     if not topics or (wanted is not None and wanted not in topics):
-        what = f"no topic {wanted} of {MESSAGE}" if wanted else f"no topic of {MESSAGE}"
+        what = (
+            f"the bag has no topic {wanted} of type {MESSAGE}"
+            if wanted
+            else (f"the bag has no topic of type {MESSAGE}")
+        )
         raise InputError(
-            f"{what}; the topics of the bag are {', '.join([*topics, *others][:20]) or 'none'}",
+            f"{what}; set record.topic to one of the topics of the bag: "
+            f"{', '.join([*topics, *others][:20]) or 'none'}",
             file=file,
         )
     name = wanted or topics[0]
     for c in connections:
         if c.topic == name and (c.digest not in HASHES or not _as_defined(c.msgdef)):
             raise InputError(
-                f"the messages on {name} are called {MESSAGE}, but their definition is different; record messages with the definition of ROS",
+                f"the messages on {name} have the type {MESSAGE}, but not the definition of this "
+                "type in ROS; record messages with this definition",
                 file=file,
             )
     return name

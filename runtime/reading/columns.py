@@ -75,7 +75,8 @@ def column_names(
         tau = _meant(last, "tau", "effort", given.tau or (given.q if as_q else ()), joints)
     if given.q == BY_NAME and first is last and set(q) & set(tau):
         raise InputError(
-            f"columns {', '.join(q)} would be both positions and torques; give the columns of the torques in record.columns.tau",
+            f"the columns {', '.join(q)} would be read as both positions and torques; give the "
+            "columns of the torques in record.columns.tau",
             file=first.file,
         )
     if not {*q} <= {*first.names} and {*q} <= {*last.names} and {*tau} <= {*first.names}:
@@ -170,7 +171,7 @@ def _of_joint(table: Table, key: str, joint: str) -> str:
         return hits[0]
     what = f"no column {joint}, {key}_{joint} or the like among {', '.join(table.names)}"
     if hits:
-        what = f"columns {', '.join(hits)}"
+        what = f"found the columns {', '.join(hits)}"
     raise InputError(
         f"{what}; expected one column for joint {joint}, give the columns in record.columns.{key}",
         file=table.file,
@@ -300,7 +301,9 @@ def require_alike(
         and {*names.q} <= {*last.names}
     ):
         raise InputError(
-            f"{first.file} and {last.file} both contain positions and torques, but two record.files are the positions and the torques of one record; list a further record in `also: [{last.file}]`"
+            f"{first.file} and {last.file} both contain positions and torques, but two files in "
+            "record.files must be the positions and the torques of one record; give a further "
+            f"record as `also: [{last.file}]`"
         )
     if q[1:] != tau[1:]:
         raise InputError(
@@ -309,7 +312,8 @@ def require_alike(
         )
     if q != tau:
         raise InputError(
-            f"{q[0]} samples of positions in {first.file}, {tau[0]} of torques in {last.file}; cut them to the same instants"
+            f"{q[0]} samples of positions in {first.file}, {tau[0]} of torques in {last.file}; cut "
+            "both files to the same time"
         )
 
 
@@ -319,7 +323,7 @@ def _per_joint(
     x = np.atleast_1d(np.asarray(value, dtype=float))
     if len(x) not in (1, n):
         raise InputError(
-            f"record.{key} has {len(x)} values; expected one or {n}, one per joint",
+            f"record.{key} has {len(x)} values; expected one value, or {n} values (one per joint)",
             file=None if table is None else table.file,
         )
     return np.broadcast_to(x, (n,))
@@ -332,7 +336,9 @@ def _scale(scale: float | tuple[float, ...] | str, table: Table, n: int, key: st
 def _units(units: str | tuple[str, ...], n: int, key: str) -> tuple[str, ...]:
     each = units if isinstance(units, tuple) else (units,) * n
     if len(each) != n:
-        raise InputError(f"record.{key} has {len(each)} units; expected one or {n}, one per joint")
+        raise InputError(
+            f"record.{key} has {len(each)} units; expected one unit, or {n} units (one per joint)"
+        )
     return each
 
 

@@ -201,7 +201,8 @@ def _local(name: str, file: str, cache: Path | None) -> tuple[Path | None, list[
                 digest = sha256_of(path)
                 if digest != expected:
                     raise InputError(
-                        f"SHA-256 {digest}; expected {expected}, the hash of the public record: replace or remove the file",
+                        f"the file has the SHA-256 hash {digest}; expected {expected}, the hash of "
+                        "the public record: replace or remove the file",
                         file=str(path),
                     )
                 return path, tried
@@ -217,14 +218,14 @@ def _local(name: str, file: str, cache: Path | None) -> tuple[Path | None, list[
 
 def _dataset(name: str) -> Dataset:
     if name not in DATASETS:
-        raise InputError(f"no dataset {name!r}; there are {', '.join(DATASETS)}")
+        raise InputError(f"there is no dataset {name!r}; expected one of {', '.join(DATASETS)}")
     return DATASETS[name]
 
 
 def _digest(name: str, file: str) -> str:
     files = _dataset(name).files
     if file not in files:
-        raise InputError(f"dataset {name} has no file {file!r}; it has {', '.join(files)}")
+        raise InputError(f"dataset {name} has no file {file!r}; its files are {', '.join(files)}")
     return files[file]
 
 

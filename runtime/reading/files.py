@@ -33,7 +33,9 @@ def require_size(unpacked: int, size: int, file: str) -> None:
     """Raise InputError if a compressed file unpacks to more bytes than a record may have."""
     if unpacked > max(ALWAYS, RATIO * size):
         raise InputError(
-            f"unpacks to {unpacked / 2**20:.0f} MiB or more from {size / 2**20:.3g} MiB; the limit is the larger of {ALWAYS // 2**20} MiB and {RATIO} times the file size: store the record without compression if the file is genuine",
+            f"the file unpacks to {unpacked / 2**20:.0f} MiB or more from {size / 2**20:.3g} MiB; "
+            f"the limit is the larger of {ALWAYS // 2**20} MiB and {RATIO} times the file size: "
+            "store the record without compression if the file is genuine",
             file=file,
         )
 
@@ -52,7 +54,7 @@ def opened(path: Path) -> Iterator[BinaryIO]:
     except (gzip.BadGzipFile, EOFError, zlib.error) as e:
         raise InputError(f"damaged gzip file ({e}); copy the file again", file=str(path)) from e
     except OSError as e:
-        raise InputError(f"cannot be read: {e.strerror or e}", file=str(path)) from e
+        raise InputError(f"the file cannot be read: {e.strerror or e}", file=str(path)) from e
 
 
 def unpacked(path: Path) -> Path | BytesIO:
@@ -69,7 +71,8 @@ def read_bytes(path: Path) -> bytes:
     """Read the uncompressed bytes of a file."""
     if require_file(path) > WHOLE:
         raise InputError(
-            f"more than {WHOLE // 2**30} GiB; cut the file into shorter records", file=str(path)
+            f"the file has more than {WHOLE // 2**30} GiB; cut the file into shorter records",
+            file=str(path),
         )
     return b"".join(_parts(path))
 

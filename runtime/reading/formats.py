@@ -74,12 +74,18 @@ def read_table(path: Path, topic: str | None = None, decimal: str = ".") -> Tabl
     """
     format_ = format_of(path)
     if path.suffix.lower() == ".gz" and not format_.packed:
-        raise InputError("a bag within .gz is not supported; uncompress the file", file=str(path))
+        raise InputError(
+            "a bag compressed as .gz is not supported; uncompress the file", file=str(path)
+        )
     if not path.exists():
-        raise InputError("cannot be read: no such file", file=str(path))
+        raise InputError(
+            "the file cannot be read, because there is no such file; check its name and folder",
+            file=str(path),
+        )
     if path.is_dir() and not (path / "metadata.yaml").is_file():
         raise InputError(
-            "a folder without metadata.yaml, hence no ROS 2 bag; give a measured file or study file in this folder",
+            "this folder has no metadata.yaml, so it is no ROS 2 bag; give a measured file or "
+            "study file in this folder",
             file=str(path),
         )
     digest = format_.digest(path)

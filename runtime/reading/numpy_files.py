@@ -30,7 +30,8 @@ def read_npy(path: Path, options: Options) -> Table:
             raise ValueError("an archive")
     if not is_numeric(x) or x.ndim not in (1, 2) or not x.size or min(x.shape) > WIDEST:
         raise InputError(
-            f"{x.dtype} of shape {x.shape}; expected numbers of shape (N,), (N, k) or (k, N), at most {WIDEST} columns",
+            f"the array has dtype {x.dtype} and shape {x.shape}; expected numbers of shape (N,), "
+            f"(N, k) or (k, N), at most {WIDEST} columns",
             file=path.name,
         )
     columns = np.atleast_2d(x) if x.ndim == 1 or x.shape[0] < x.shape[1] else x.T
@@ -52,10 +53,12 @@ def archive_of(path: Path) -> dict[str, Array]:
             held = sum(member.file_size for member in archive.infolist())
         require_size(held, path.stat().st_size, file)
         if len(members) > WIDEST:
-            raise InputError(f"{len(members)} arrays; expected at most {WIDEST}", file=file)
+            raise InputError(
+                f"the file has {len(members)} arrays; expected at most {WIDEST}", file=file
+            )
         if len({name.removesuffix(".npy") for name in members}) < len(members):
             raise InputError(
-                "contains two arrays of the same name; store each name once", file=file
+                "the file contains two arrays of the same name; store each name once", file=file
             )
         with np.load(stream, allow_pickle=False) as arrays:
             return {

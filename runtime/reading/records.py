@@ -209,7 +209,7 @@ def _require_shapes(
         width = signal.values.shape[1] + absent.get(key, 0)
         if width != n:
             raise InputError(
-                f"{width} {title} ({', '.join(signal.names)}); expected {n}, one per joint",
+                f"found {width} {title} ({', '.join(signal.names)}); expected {n}, one per joint",
                 file=first.file,
             )
     for signal in signals.values():
@@ -300,7 +300,8 @@ def _uniform(
     regularity = time_stamps(t, gap=settings.resample.longest, file=table.file)
     if settings.rate is not None and abs(1 / regularity.period / settings.rate - 1) > IRREGULAR:
         raise InputError(
-            f"time runs at {1 / regularity.period:g} Hz, but record.rate is {settings.rate:g} Hz; correct record.rate, the time or the unit of time",
+            f"the time stamps have the rate {1 / regularity.period:g} Hz, but record.rate is "
+            f"{settings.rate:g} Hz; correct record.rate, the time or the unit of time",
             file=table.file,
         )
     try:

@@ -89,17 +89,17 @@ def resample(
     t, x = real(t, "t"), real(x, "x")
     if t.ndim != 1 or x.ndim not in (1, 2) or len(x) != len(t) or len(t) < LIMIT.FEWEST_SAMPLES:
         raise InputError(
-            f"t {t.shape}, x {x.shape}; expected (N,) and (N,) or (N, n), N at "
-            f"least {LIMIT.FEWEST_SAMPLES}"
+            f"t has shape {t.shape}, x has shape {x.shape}; expected (N,) for t and (N,) or (N, n) "
+            f"for x, with N at least {LIMIT.FEWEST_SAMPLES}"
         )
     if not (np.isfinite(t).all() and np.isfinite(x).all()):
-        raise InputError("t or x holds nan or infinity; repair or cut the record")
+        raise InputError("t or x contains nan or infinity; repair or cut the record")
     settings = structure(
         Resample, {"rate": rate, "method": method, "longest": longest, "shortest": 0.0}, ()
     )
     stamps = time_stamps(t, gap=settings.longest)
     if method not in ("cubic", "linear"):
-        raise InputError(f"method {method!r}; expected cubic or linear")
+        raise InputError(f"unknown method {method!r}; expected cubic or linear")
     if stamps.gaps or stamps.resets:
         raise InputError(
             f"time has gaps of more than {settings.longest:g} periods, or goes back. "
@@ -148,7 +148,9 @@ def resampled(
     wanted = settings.rate or rate or mean_rate
     if wanted < LOWEST * mean_rate:
         raise InputError(
-            f"record.resample.rate {wanted:g} Hz, below the {mean_rate:g} Hz of the record: frequencies above {wanted / 2:g} Hz would be aliased; resample at the rate of the record or above, and lower the rate afterwards by signals.decimate",
+            f"record.resample.rate {wanted:g} Hz is below the rate of the record, {mean_rate:g} "
+            f"Hz: frequencies above {wanted / 2:g} Hz would be aliased; resample at the rate of "
+            "the record or above, and lower the rate afterwards by signals.decimate",
             file=file,
         )
     cuts = [0, *sorted(s.sample for s in (*stamps.gaps, *stamps.resets)), len(t)]
@@ -190,7 +192,10 @@ def _counted(t: Array, signals: Sequence[Array], rate: float, file: str) -> Stre
     last = float(t[-1] - t[0])
     if abs(last * rate - (N - 1)) > 1 + DRIFT * N:
         raise InputError(
-            f"{N} samples from t = {t[0]:g} s on last {(N - 1) / rate:.6g} s at {rate:.6g} Hz, but their time stamps span {last:.6g} s: the rate is different, or samples are missing; set record.rate, or cut the record at shorter gaps by record.resample.longest",
+            f"the {N} samples after t = {t[0]:g} s last {(N - 1) / rate:.6g} s at the rate "
+            f"{rate:.6g} Hz, but {last:.6g} s by their time stamps: the rate is different, or "
+            "samples are missing; set record.rate, or cut the record at shorter "
+            "gaps by record.resample.longest",
             file=file,
         )
     return Stretch(t[0] + np.arange(N) / rate, tuple(signals))

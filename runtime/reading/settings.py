@@ -39,7 +39,7 @@ def _one_by_one(names: Any) -> Any:
 def _distinct(names: tuple[str, ...]) -> tuple[str, ...]:
     double = next((name for name in names if names.count(name) > 1 and name != NONE), None)
     if double is not None:
-        raise ValueError(f"{double!r} twice; expected one column per joint")
+        raise ValueError(f"column {double!r} is given twice; expected one column per joint")
     return names
 
 

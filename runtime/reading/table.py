@@ -150,13 +150,15 @@ class Table:
             raise self.refused[name]
         if name not in self.columns:
             raise InputError(
-                f"no single number {name!r} in {self.what}; write the number itself in the settings",
+                f"{self.what} contains no number {name!r}; write the number itself in the settings",
                 file=self.file,
             )
         x = self.columns[name]
         if x.size != 1:
             raise InputError(
-                f"{x.shape} values; expected a single number", file=self.file, column=name
+                f"the array has shape {x.shape}; expected a single number",
+                file=self.file,
+                column=name,
             )
         return float(x.reshape(()))
 

@@ -36,11 +36,12 @@ def read_text(path: Path, options: Options) -> Table:
     decimal = options.decimal
     _, first = next(_lines(path), (0, ""))
     if not first:
-        raise InputError("no line of numbers", file=file)
+        raise InputError("no line of numbers; expected one line of numbers per sample", file=file)
     delimiter = next((mark for mark in ";\t," if mark in first and mark != decimal), None)
     if _width(first, delimiter) > WIDEST:
         raise InputError(
-            f"{_width(first, delimiter)} columns; expected at most {WIDEST}, write the needed columns into a separate file",
+            f"the file has {_width(first, delimiter)} columns; expected at most {WIDEST}, so write "
+            "the needed columns into a separate file",
             file=file,
         )
     header = _fields(first, delimiter)
@@ -49,7 +50,8 @@ def read_text(path: Path, options: Options) -> Table:
     double = sorted(name for name, count in Counter(names).items() if count > 1)
     if double:
         raise InputError(
-            f"header names {', '.join(double)} more than once; rename the columns", file=file
+            f"the header contains {', '.join(double)} more than once; rename these columns",
+            file=file,
         )
     refused: dict[str, InputError] = {}
     empty: dict[str, str] = {}
@@ -58,7 +60,9 @@ def read_text(path: Path, options: Options) -> Table:
         lines = islice(_lines(path), has_header, None)
         values = _by_fields(file, lines, names, delimiter, decimal, refused, empty)
     if not len(values):
-        raise InputError(f"no line of numbers under the header {', '.join(names)}", file=file)
+        raise InputError(
+            f"the file has no line of numbers under the header {', '.join(names)}", file=file
+        )
     return Table(
         file=file,
         columns=dict(zip(names, values.T, strict=True)),
@@ -130,7 +134,10 @@ def _with_point(line: str, decimal: str) -> str:
     Raise ValueError if the line has points already, since 1.234 may mean a thousand.
     """
     if "." in line:
-        raise ValueError("a decimal point in a file with decimal commas")
+        raise ValueError(
+            "found a decimal point in a file with decimal commas; write all numbers "
+            "with the same decimal sign"
+        )
     return line.replace(decimal, ".")
 
 
@@ -156,7 +163,8 @@ def _by_fields(
             raise InputError(message, file=file, row=row)
         if width != len(names):
             raise InputError(
-                f"{width} fields; expected {len(names)} ({', '.join(names)}); {_width_hint(delimiter, width > len(names))}",
+                f"{width} fields; expected {len(names)} ({', '.join(names)}); "
+                f"{_width_hint(delimiter, width > len(names))}",
                 file=file,
                 row=row,
             )

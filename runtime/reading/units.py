@@ -131,8 +131,9 @@ def _unit(text: str, kinds: tuple[str, ...]) -> Unit:
         )
     if kinds == TORQUES and text.strip() in ("%", "percent", "per cent"):
         raise InputError(
-            f"{text!r} does not say the rated quantity; write the unit of the rated value, such as A "
-            "or N*m, and a hundredth of the rated value of each joint in record.scale"
+            f"{text!r} of an unknown rated value; write the unit of the rated value (such as A or "
+            "N*m) in record.units.tau, and a hundredth of the rated value of each "
+            "joint in record.scale"
         )
     kind, factor = TABLE[text] if text in TABLE else _of_pint(text)
     if kind not in kinds:
@@ -143,8 +144,8 @@ def _unit(text: str, kinds: tuple[str, ...]) -> Unit:
         )
     if factor > LARGEST:
         raise InputError(
-            f"one {text!r} is {factor:g} {SI[kind]}, far too large a unit for a robot; expected units "
-            f"such as {EXAMPLES[kinds]}"
+            f"one {text!r} is {factor:g} {SI[kind]}, which is too large a unit for a robot; "
+            f"expected units such as {EXAMPLES[kinds]}"
         )
     return kind, factor
 

@@ -79,7 +79,10 @@ class Results:
                 shutil.rmtree(unfinished, ignore_errors=True)
         finished = self.folder / FINISHED
         if finished.is_symlink() or (finished.exists() and not finished.is_dir()):
-            raise OutputError(f"{finished}: not a folder of symgen; remove or rename this file")
+            raise OutputError(
+                f"{finished}: symgen needs this name for a folder of its own; remove "
+                "or rename this file"
+            )
         if finished.is_dir():
             with suppress(FileNotFoundError):  # moved by another command
                 for path in sorted(finished.iterdir()):

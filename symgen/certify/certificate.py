@@ -59,7 +59,7 @@ Sampler = Callable[[Draw, tuple[str, ...]], Array]
 LOST = 1e12  # sums of numbers as large keep less than three decimals of numbers of size 1
 ROUNDED = 1e-7  # of the largest entry: columns by coefficients that are numbers
 ZERO_BELOW = 1e-9  # rad, m or a cosine: a denominator that is zero but for rounding
-AT_VALUES = "say --at-values for the regrouping that does"
+AT_VALUES = "use --at-values to regroup for these numbers"
 SURE, MOST_DRAWS = (
     1e-12,
     8,
@@ -313,9 +313,10 @@ def _special(robot: Robot, gap: float, W: Array) -> str:
     """
     if roots := independent_roots(robot):
         return (
-            f"{', '.join(roots)} {'count' if len(roots) > 1 else 'counts'} as any number: the rank "
-            "is smaller where it is one that other roots, cosines or constants make up; write it "
-            f"by them{f', or {AT_VALUES}' if robot.constants else ''}"
+            f"{', '.join(roots)} {'count' if len(roots) > 1 else 'counts'} as any number in the "
+            "proof, but the rank is smaller if such a root is a combination of other roots, "
+            "cosines or constants; write it as this "
+            f"combination{f', or {AT_VALUES}' if robot.constants else ''}"
         )
     if gap > CLEAR and robot.constants and not nearly_round(robot, WITHIN):
         rank, generic = numeric_rank(W)[0], W.shape[1]
@@ -352,9 +353,9 @@ def hair_off(robot: Robot, what: str) -> str:
     """
     angles = "; ".join(nearly_round(robot, WITHIN)) or "round the numbers that are meant round"
     return (
-        f"the file is a hair off a special geometry: {what} of it act by less than 1e-9 of the "
-        f"others, which no record can show; {angles}; --at-values takes angles within 1e-6 rad of "
-        "a multiple of pi/12 as that"
+        f"the geometry of the file is almost a special one: {what} have less than 1e-9 of the "
+        f"effect of the others, which no record can show; {angles}; --at-values replaces angles "
+        "within 1e-6 rad of a multiple of pi/12 by this multiple"
     )
 
 

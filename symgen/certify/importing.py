@@ -100,7 +100,7 @@ def imported(path: Path) -> ModuleType:
     name = f"generated_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path, loader=_TextLoader(name, str(path)))
     if spec is None or spec.loader is None:
-        raise SymgenError(f"{path} cannot be imported")
+        raise SymgenError(f"{path} cannot be imported as a module; expected a file ROBOT.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

@@ -101,7 +101,8 @@ def require_valid(certificate: Certificate) -> None:
         wrong = [text for holds, text in certificate.checks if not holds]
         reasons = [t for t in certificate.failures if not t.startswith(("column", "rank"))]
         raise CertificateError(
-            f"{certificate.name}: the certificate does not hold ({[*reasons, *wrong][0]}); nothing is written; `symgen check` prints every check",
+            f"{certificate.name}: a check of the generated module failed "
+            f"({[*reasons, *wrong][0]}), so nothing is written; `symgen check` prints every check",
             certificate,
         )
 

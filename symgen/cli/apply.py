@@ -75,6 +75,7 @@ def apply(
         typer.echo(f"written: {path.name if output is None else output}", err=True)
         if path.parent != model.resolve().parent and applied.names_files:
             typer.echo(
-                f"note: {output} lies in another folder than {model.name}; paths of meshes in it are as they were",
+                f"note: {output} lies in another folder than {model.name}; mesh paths in it "
+                "did not change",
                 err=True,
             )

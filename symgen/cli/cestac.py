@@ -19,12 +19,16 @@ def cestac(
     ] = None,
     delta: Annotated[
         list[str] | None,
-        typer.Option(help="Position step, rad or m, such as 2*pi/5000; repeat for several."),
+        typer.Option(
+            help="Encoder step to test, rad or m, such as 2*pi/5000. Repeat the option "
+            "for several steps."
+        ),
     ] = None,
     torque: Annotated[
         list[str] | None,
         typer.Option(
-            help="Resolution of the torques of the motors, N m or N, such as 0.02; repeat for several."
+            help="Step to which the torques of the motors are rounded, N m or N, such as 0.02. "
+            "Repeat the option for several steps."
         ),
     ] = None,
     runs: Annotated[

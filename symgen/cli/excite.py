@@ -16,8 +16,9 @@ def excite(
     record: Annotated[
         str | None,
         typer.Argument(
-            help="Dataset, study file or measured file. Parameters and torque noise are identified from it first; "
-            "its motion is compared with the new one."
+            help="Dataset, study file or measured file. symgen first identifies parameters and "
+            "torque noise from this record, and then compares the new motion with "
+            "the recorded one."
         ),
     ] = None,
     output: Annotated[
@@ -36,8 +37,10 @@ def excite(
     criterion: Annotated[
         str | None,
         typer.Option(
-            help="What the motion optimises: cond (condition number of W), logdet (determinant of W'W), sigma (largest "
-            "standard deviation), or record (as sigma, relative to that of RECORD). Default: record if one is given, else cond."
+            help="Criterion of the motion: cond minimises the condition number of the observation "
+            "matrix W, logdet maximises the determinant of W'W, sigma minimises the largest "
+            "standard deviation of a parameter, record does so relative to RECORD. Default: "
+            "record if one is given, else cond."
         ),
     ] = None,
     columns: options.Columns = None,

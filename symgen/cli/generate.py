@@ -114,15 +114,18 @@ def emitted(
         for name in targets:
             target = TARGETS[name]
             if tied and not target.iterates:
-                said = f"no {name} target, its loops are closed by iteration; NumPy and C have it"
+                said = (
+                    f"the target {name} is not possible, because the loops of this robot are "
+                    "closed by iteration; use numpy or c"
+                )
                 typer.echo(f"{robot.name}: {said}", err=True)
             elif target.use:
                 file = target.file.format(robot.name)
                 typer.echo(f"{file}: {target.use.format(robot.name)}", err=True)
         if robot.loaded:
             typer.echo(
-                f"{robot.name}: no forward_dynamics: laws of {', '.join(robot.loaded)} read "
-                "tau_model, which depends on the acceleration that it would give",
+                f"{robot.name}: no forward_dynamics: laws of {', '.join(robot.loaded)} use "
+                "tau_model, which depends on the acceleration that forward_dynamics computes",
                 err=True,
             )
         modules |= files

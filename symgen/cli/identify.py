@@ -45,7 +45,8 @@ def identify(
         bool,
         typer.Option(
             "--verbose",
-            help="Also print how parameters were removed, the validation, standard deviations and residuals.",
+            help="Also print which parameters were removed and why, the validation, standard "
+            "deviations and residuals.",
         ),
     ] = False,
     suggest: Annotated[

@@ -51,7 +51,8 @@ MAIN_PATH = (
 )
 
 WENT = {
-    "fleet": "symgen fleet went; docs/examples/dask_many_robots.py is a loop over files on several cores or a cluster",
+    "fleet": "symgen fleet was removed; use docs/examples/dask_many_robots.py, which identifies "
+    "many files on several cores or a cluster",
 }
 """Verbs of earlier versions, with the sentence that names what to use instead."""
 

@@ -49,7 +49,8 @@ Trust = Annotated[
     bool,
     typer.Option(
         "--trust",
-        help="Run a generated module (.py) that was not made on this machine. It is code: use it only if you trust its author.",
+        help="Run a generated module (.py) that was not made on this machine. Such a module is a "
+        "program: use this option only if you trust its author.",
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
@@ -62,7 +63,8 @@ Workers = Annotated[
     int,
     typer.Option(
         min=0,
-        help="Number of worker processes; 0 or 1 runs in this process. The results do not depend on it.",
+        help="Number of worker processes; 0 or 1 runs in this process. The results do not depend "
+        "on this number.",
     ),
 ]
 Scheduler = Annotated[
@@ -120,7 +122,8 @@ Advise = Annotated[
 Lock = Annotated[
     list[str] | None,
     typer.Option(
-        help="URDF or MJCF only: lock a joint at a position, e.g. elbow=pi/2 (rad or m); repeat for several."
+        help="URDF or MJCF only: lock a joint at a position, e.g. elbow=pi/2 (rad or m). Repeat "
+        "the option for several joints."
     ),
 ]
 Chain = Annotated[

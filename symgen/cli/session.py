@@ -308,7 +308,7 @@ def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
             raise InputError(f"{e}; {hint}") from e
         raise
     write_all(folder, {path.name: study_text(study, folder, defaults=False)})
-    for text in (*told, f"suggested study: {path}; look at it before you trust the values"):
+    for text in (*told, f"suggested study: {path}; check this file before you trust the values"):
         say(text)
     return study
 
@@ -360,7 +360,7 @@ def map_of(workers: int, scheduler: str | None = None) -> Iterator[Any]:
 def stopped(checkpoint: Checkpoint | None) -> NoReturn:
     """End the command after Ctrl-C with exit code 130; say how many runs of a study are saved."""
     rest = (
-        f"{checkpoint.written} runs are in {checkpoint.file}: the same command goes on"
+        f"{checkpoint.written} runs are in {checkpoint.file}: repeat the command to continue"
         if checkpoint and checkpoint.written
         else "nothing is kept"
     )

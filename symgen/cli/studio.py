@@ -28,7 +28,7 @@ def studio(
     output: Annotated[
         Path,
         typer.Option(
-            "-o", "--output", help="Work folder. It holds ordinary files and can be opened again."
+            "-o", "--output", help="Work folder of ordinary files, which the studio can open again."
         ),
     ] = Path("symgen-studio"),
     port: Annotated[

@@ -81,7 +81,8 @@ class Closure:
                 )
                 raise DescriptionError(
                     f"constraints.q{j}: the ratio of {theirs} to {other} is {g}; the ratio of two "
-                    f"angles must be a number, so write {g.value(self.robot.constants):.12g}",
+                    "angles must be a number without symbols, "
+                    f"so write {g.value(self.robot.constants):.12g}",
                     path=("constraints", f"q{j}"),
                     file=self.robot.file or None,
                 )

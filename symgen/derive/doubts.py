@@ -119,10 +119,10 @@ def equal_sides(robot: Robot) -> list[str]:
         ]
         if pairs:
             notes.append(
-                f"the loop of frames {loop.cut} and {loop.twin} is taken for a general one, which "
-                "is slow and has the NumPy target only; "
-                f"{', '.join(pairs)} are equal: if by construction, write one name for both, and a "
-                "parallelogram is seen as one"
+                f"symgen treats the loop of frames {loop.cut} and {loop.twin} as a general loop, "
+                f"which is slow and has fewer targets; {', '.join(pairs)} are equal: if they are "
+                "equal by construction, write one name for both, so that symgen can "
+                "recognise a parallelogram"
             )
     return notes
 

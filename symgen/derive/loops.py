@@ -71,7 +71,7 @@ def find_relations(robot: Robot) -> Closure:
         if j not in in_loops:
             raise DescriptionError(
                 f"passive joint {j} is in no loop, so no equation gives its position; declare q{j} "
-                "under constraints or set mu: 1",
+                "under constraints, or set mu: 1 (actuated)",
                 path=("frames", j, "mu"),
                 file=robot.file or None,
             )
@@ -350,7 +350,7 @@ def _wrong_mobility(robot: Robot, freedoms: int, left: int) -> DescriptionError:
         if freedoms < expected
         else "under-constrained; set mu: 1 for more joints, or add relations under constraints"
     )
-    held = f"; if these joints are held, {left} freedoms remain" if left else ""
+    held = f"; if these joints are fixed, {left} degrees of freedom remain" if left else ""
     return DescriptionError(
         f"mobility is {freedoms}, but {expected} joints are actuated ({list(robot.joints)}){held}; "
         f"the mechanism is {what}",

@@ -123,7 +123,9 @@ def _check_tree(frames: Sequence[Frame], massless: Collection[int]) -> None:
         )
     if not any(f.mu for f in frames):
         raise DescriptionError(
-            "no actuated joint; set mu: 1 on a revolute or prismatic frame", path=("frames",)
+            "the robot has no actuated joint; set mu: 1 (actuated) for a revolute "
+            "or prismatic joint",
+            path=("frames",),
         )
 
 
@@ -349,15 +351,16 @@ def _check_loops(robot: Any) -> None:
         place = ("constraints", f"q{j}")
         if j not in passive:
             raise DescriptionError(
-                f"constraint on q{j}: joint {j} is not a passive joint (passive joints: {passive}); remove the constraint or set mu: 0",
+                f"constraint on q{j}: joint {j} is not a passive joint (passive joints: "
+                f"{passive}); remove the constraint, or set mu: 0 (passive)",
                 path=place,
             )
         _check_declared(e, place, [*robot.constants, *(f"q{i}" for i in robot.moving)])
         _check_finite(e, place, robot.constants)
     if passive and not robot.loops and not robot.constraints:
         raise DescriptionError(
-            f"joints {passive} are passive but there is no loop and no constraint; set mu: 1, or "
-            "add a loop or a constraint",
+            f"joints {passive} are passive, but there is no loop and no constraint; set mu: 1 "
+            "(actuated), or add a loop or a constraint",
             path=("frames", passive[0], "mu"),
         )
 

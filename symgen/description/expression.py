@@ -260,7 +260,10 @@ class Expression:
                     rest = rest * _atom(b) ** l
                 result = result + rest * _slope(a, name)
                 if len(result.terms) > LONGEST_SLOPE:
-                    raise ValueError(f"a derivative has more than {LONGEST_SLOPE} terms")
+                    raise ValueError(
+                        f"the derivative has more than {LONGEST_SLOPE} terms; "
+                        "shorten the expression"
+                    )
         return result
 
     def evaluate(

@@ -88,7 +88,7 @@ class _Parser:
         if len(e.terms) > MAX_TERMS or any(abs(n) > MAX_EXPONENT for m in e.terms for _, n in m):
             raise self.error(
                 (
-                    f"expression expands to more than {MAX_TERMS} terms or powers above "
+                    f"the expression expands to more than {MAX_TERMS} terms or powers above "
                     f"{MAX_EXPONENT}; replace a part by a constant"
                 ),
                 self.tokens[self.position][2],

@@ -307,8 +307,8 @@ def _relations(growing: _Growing) -> dict[str, Expression]:
         free = [name for name in names if name in equation.atoms - growing.mjcf.driven]
         if not free:
             raise DescriptionError(
-                f"equality {model.equality(e).name!r}: the relation ties driven joints only, or follows "
-                "from the other relations; remove the equality",
+                f"equality {model.equality(e).name!r}: this relation contains only actuated "
+                "joints, or follows from the other relations; remove the equality",
                 line=line,
             )
         of_joint = int(model.eq_type[e]) == JOINT_RELATION
@@ -330,8 +330,9 @@ def _equation(model: Any, names: list[str], e: int, line: int) -> Expression:
     a0, a1, *higher = (ratio(float(x)) for x in model.eq_data[e][:5])
     if any(higher):
         raise DescriptionError(
-            f"equality {name!r}: polycoef {[float(x) for x in model.eq_data[e][:5]]}; expected "
-            "a linear relation a0 + a1 y",
+            f"equality {name!r}: polycoef {[float(x) for x in model.eq_data[e][:5]]} is not "
+            "linear; only a0 + a1*y is supported, where y is the position of the other joint or "
+            "the length of the other tendon",
             line=line,
         )
     first, second = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])

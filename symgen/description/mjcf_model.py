@@ -160,7 +160,10 @@ def _refuse(root: XmlElement) -> None:
                     f"<{e.tag} {key}={value[:60]!r}>: expected finite numbers", line=e.line
                 )
     if unknown := sorted({e.tag for e in root} - {*SECTIONS, *IGNORED}):
-        raise DescriptionError(f"<{unknown[0][:40]}> is no part of an MJCF file", line=root.line)
+        raise DescriptionError(
+            f"<{unknown[0][:40]}> is no element of MJCF; remove this element or correct its name",
+            line=root.line,
+        )
     for k, e in enumerate(e for world in root.own("worldbody") for e in world.iter("body")):
         if k >= MAX_BODIES:
             raise DescriptionError(f"the file has more than {MAX_BODIES} bodies", line=e.line)
@@ -214,7 +217,9 @@ def _spec(root: XmlElement) -> tuple[Any, list[int]]:
     try:
         import mujoco
     except ImportError as error:
-        raise DescriptionError("MJCF is read by MuJoCo: pip install symgen[mjcf]") from error
+        raise DescriptionError(
+            "MuJoCo is needed to read MJCF files; install it: pip install symgen[mjcf]"
+        ) from error
     ElementTree.indent(root, "")  # each tag on a line of its own
     text = ElementTree.tostring(root, "unicode")
     elements = root.iter()

@@ -78,7 +78,7 @@ def check_identifier(name: str, path: Path) -> None:
     if not IDENTIFIER.match(name) or keyword.iskeyword(name):
         what = "is a keyword of Python; choose another name"
         if not keyword.iskeyword(name):
-            what = "is no identifier; use a letter followed by letters, digits or _ (at most 40)"
+            what = "is not a valid name; use a letter followed by letters, digits or _ (at most 40)"
         raise DescriptionError(f"{dotted(path[:-1] or path)}: {name!r} {what}", path=path)
 
 

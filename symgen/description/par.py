@@ -148,7 +148,7 @@ def read_par(
 def _text(content: bytes) -> str:
     if len(content) > MAX_BYTES:
         raise DescriptionError(
-            f"more than {MAX_BYTES} bytes; a .par file has a few thousand", line=1
+            f"the file has more than {MAX_BYTES} bytes; a .par file has a few thousand", line=1
         )
     try:
         return content.decode("utf-8-sig")

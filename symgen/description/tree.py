@@ -232,7 +232,8 @@ def _beside(tree: Tree, base: str, tip: str) -> dict[str, float]:
     for link in (base, tip):
         if link not in tree.links:
             raise DescriptionError(
-                f"no link {link!a:.60} for the chain; the file has {_names(list(tree.links))}"
+                f"the file has no link {link!a:.60} for the chain; its "
+                f"links are {_names(list(tree.links))}"
             )
     holding = {joint.child: joint for joint in tree.joints}
     between: list[Joint] = []
@@ -242,8 +243,8 @@ def _beside(tree: Tree, base: str, tip: str) -> dict[str, float]:
         link = holding[link].parent
     if link != base or all(joint.kind == FIXED_TYPE for joint in between):
         raise DescriptionError(
-            f"link {tip!a:.60} is not connected to {base!a:.60} by a moving joint; give "
-            "first the base link of the chain, then the tip link, outward"
+            f"link {tip!a:.60} is not connected to {base!a:.60} by a moving joint; give the base "
+            "link of the chain first, then the tip link"
         )
     kept = {joint.name for joint in between}
     others = [j.name for j in tree.joints if j.kind != FIXED_TYPE and j.name not in kept]
@@ -256,8 +257,8 @@ def _require_independent(tree: Tree, name: str) -> None:
     if kinds.get(name, FIXED_TYPE) == FIXED_TYPE:
         moving = [joint for joint, kind in kinds.items() if kind != FIXED_TYPE]
         raise DescriptionError(
-            f"joint {name!a:.60} to lock: no moving joint of that name; the file has "
-            f"{_names(moving)}"
+            f"the file has no moving joint {name!a:.60} to lock; its moving "
+            f"joints are {_names(moving)}"
         )
     if name in tree.relations:
         leaders = [leader for leader in kinds if leader in tree.relations[name].atoms]

@@ -140,7 +140,9 @@ def _robot(table: Table, file: str, sha256: str) -> Robot:
     constraints = _constraints(table)
     actuated = [j for j in table.joint if j not in constraints]
     if not actuated:
-        raise DescriptionError("no joint that moves; a robot needs at least one moving joint")
+        raise DescriptionError(
+            "the file has no joint that moves; a robot needs at least one moving joint"
+        )
     frames = tuple(Frame(**{**vars(f), "mu": int(f.j in actuated)}) for f in table.frames)
     values, massless = _values(table, actuated)
     gravity, constants = _gravity(table.tree.gravity)

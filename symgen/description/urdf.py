@@ -205,7 +205,8 @@ def _joint(e: XmlElement, angles: Angles) -> Joint:
     kind, name = e.word("type"), e.word("name")
     if kind not in (*MOVING, FIXED_TYPE, *FREE):
         raise DescriptionError(
-            f"joint {name!r} is {kind[:30]!r}; expected {', '.join(MOVING)} or {FIXED_TYPE}",
+            f"joint {name!r} has the type {kind[:30]!r}; expected {', '.join(MOVING)} "
+            f"or {FIXED_TYPE}",
             line=e.line,
         )
     kind = FREE_TYPE if kind in FREE else kind

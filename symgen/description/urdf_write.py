@@ -169,7 +169,8 @@ def _follows(robot: Robot, j: int) -> tuple[int, float, float]:
         f"q{leaders[0]}"
     }:
         raise DescriptionError(
-            f"{robot.name}: q{j} = {e} has no place in a URDF, where a joint follows one other joint with multiplier and offset"
+            f"{robot.name}: q{j} = {e} cannot be written in a URDF, where a joint follows one "
+            "other joint with multiplier and offset"
         )
     rest = e - factor * Expression.symbol(f"q{leaders[0]}")
     return leaders[0], factor.value(robot.constants), rest.value(robot.constants)

@@ -56,7 +56,7 @@ def values_of_csv(content: bytes, file: str) -> dict[str, float]:
                 f"{file}, line {line}: {name[:60]} is {value[:60]}; expected a finite number"
             )
     if not values:
-        raise DescriptionError(f"{file}: no values; expected lines of name,value")
+        raise DescriptionError(f"{file} contains no values; expected lines of name,value")
     return values
 
 
@@ -82,8 +82,8 @@ def with_estimate(robot: Robot, standard: object, file: str) -> Robot:
     """
     if not isinstance(standard, dict):
         raise DescriptionError(
-            f"{file}: has only base parameters, but standard parameters are needed; set estimate: "
-            f"{{method: feasible}} in the study and identify again"
+            f"{file} has only base parameters, but standard parameters are needed; set estimate: "
+            "{method: feasible} in the study and identify again"
         )
     for name, x in standard.items():
         if isinstance(x, bool) or not isinstance(x, int | float) or not abs(x) < 1e300:
@@ -92,7 +92,7 @@ def with_estimate(robot: Robot, standard: object, file: str) -> Robot:
             )
     if unknown := sorted(set(standard) - set(robot.parameters)):
         raise DescriptionError(
-            f"{file}: {', '.join(unknown[:12])} are no parameters of {robot.name}; is it the "
-            "estimate of another robot?"
+            f"{file}: {', '.join(unknown[:12])} are no parameters of {robot.name}; give the "
+            "estimate of this robot"
         )
     return with_values(robot, {name: float(x) for name, x in standard.items()})

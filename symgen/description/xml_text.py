@@ -48,7 +48,9 @@ class XmlElement(ElementTree.Element):
         """
         value = self.attrib.get(name, default)
         if value is None:
-            raise DescriptionError(f"<{self.tag}> has no {name}; add it", line=self.line)
+            raise DescriptionError(
+                f"<{self.tag}> has no {name}; add this attribute", line=self.line
+            )
         return value
 
     def numbers(
@@ -80,7 +82,7 @@ def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> XmlElement:
     """
     if len(content) > MAX_BYTES:
         raise DescriptionError(
-            f"more than {MAX_BYTES} bytes; put meshes into separate files", line=1
+            f"the file has more than {MAX_BYTES} bytes; put meshes into separate files", line=1
         )
     parser = expat.ParserCreate()
     top = XmlElement("", {}, 0, 0)

@@ -84,7 +84,9 @@ def _document(content: bytes, lines: dict[Path, int]) -> Any:
     `lines` receives the line number of every key path.
     """
     if len(content) > MAX_BYTES:
-        raise DescriptionError(f"more than {MAX_BYTES} bytes; a robot file has a few thousand")
+        raise DescriptionError(
+            f"the file has more than {MAX_BYTES} bytes; a robot file has a few thousand"
+        )
     try:
         yaml = YAML(typ="safe", pure=True)
         node = yaml.compose(content.decode("utf-8-sig"))

@@ -94,7 +94,7 @@ def printed(model: SymbolicModel, form: str, language: str) -> str:
     """
     for what, given, known in (("form", form, FORMS), ("format", language, FORMATS)):
         if given not in known:
-            raise SymgenError(f"{what} {given!r}; expected one of {', '.join(known)}")
+            raise SymgenError(f"unknown {what} {given!r}; expected one of {', '.join(known)}")
     writers = (text, latex_document, latex_fragment, sympy_lines, json_text)
     return dict(zip(FORMATS, writers, strict=True))[language](model, form)
 

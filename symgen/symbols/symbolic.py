@@ -103,7 +103,9 @@ class SymbolicRobot:
                 f"{', '.join(name for name, m in SYMBOLIC.items() if m.of_frames)})"
             )
         if rows is not None and name != "determinant":
-            raise SymgenError(f"only the model `determinant` has `rows`; leave them out for {name}")
+            raise SymgenError(
+                f"only the model `determinant` has `rows`; leave `rows` out for {name}"
+            )
         of = robot.frames[-1].j if of is None else of
         for j in (of, frame):
             if j != 0 and j not in {f.j for f in robot.frames}:

@@ -206,8 +206,8 @@ class SymbolicModel:
         robot, n, of = self.source.robot, len(self.source.robot.joints), self.request.of
         if n > 6:
             raise SymgenError(
-                f"the Jacobian of {robot.name} is 6 x {n}, so its rows make no square matrix; "
-                "use the model jacobian and det(J*J.T) in SymPy"
+                f"the Jacobian of {robot.name} is 6 x {n}, so no selection of its rows is a square "
+                "matrix; use the model jacobian and det(J*J.T) in SymPy"
             )
         requests = [self.request]
         if n == 6 and self.rows is None and of:
@@ -288,7 +288,7 @@ class SymbolicModel:
         Raises SymgenError if the model has no recursion.
         """
         if self.model.cases is None:
-            raise SymgenError(f"{self.model.name} has no recursion; use {self.model.instead}")
+            raise SymgenError(f"{self.model.name} has no recursive form; use {self.model.instead}")
         values = self.model.values(self.source.derivation, self.request)
         by_place = {entry.place: entry.value for entry in values.entries}
         outputs = {place: by_place[place] for place in self.places if place in by_place}

@@ -321,8 +321,8 @@ def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple
             f"{name} = {x:.4g}" for name, x, out in zip(names, X, missed, strict=True) if out
         )
         raise DescriptionError(
-            f"no values in this file can give {lost}, because a moving link has no <inertial>; add "
-            "<inertial> to this link"
+            f"no inertial values in this file can give the identified {lost}, because a moving "
+            "link has no <inertial>; add <inertial> to this link"
         )
     u = _solve(part, K, rest, part.u0, ~part.masses)
     if u is None or _violated(part, u):

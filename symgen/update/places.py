@@ -145,7 +145,8 @@ class LinkPlace:
             return np.zeros(10)
         if ten[-1] <= 0:
             raise DescriptionError(
-                f"a mass of {ten[-1]:.4g} kg would result, which no link can have"
+                f"the mass of a link would be {ten[-1]:.4g} kg, but must be positive; identify "
+                "with method feasible"
             )
         own, R = inertial_of(ten), self.X[:3, :3]
         turned = R @ (self.axes if self.principal or self.attributes is URDF else np.eye(3))

@@ -137,5 +137,6 @@ class Writing:
                 )
         if len(again.links) != len(self.nearest.links):
             raise DescriptionError(
-                "no file is written: a link would get the mass zero, and would be read without inertia"
+                "no file is written, because the mass of a link would be zero, and a program that "
+                "reads the file would ignore the inertia of this link"
             )

@@ -132,7 +132,7 @@ class XmlEdits:
         match = TAG.match(self.content, e.byte)
         if match is None or match["tag"] != e.tag.encode():
             raise DescriptionError(
-                f"<{e.tag[:40]}> is not found in the bytes of the file; save the file as UTF-8",
+                f"<{e.tag[:40]}> is not found in the text of the file; save the file as UTF-8",
                 line=e.line,
             )
         return match

@@ -319,7 +319,7 @@ def test_what_no_prediction_goes_through_is_refused(emps):
         )
     with pytest.raises(SettingsError, match="no drives"):
         encoder_drives("motor", None, "cestac")
-    with pytest.raises(InputError, match="no encoder 7"):
+    with pytest.raises(InputError, match="no encoder is called 7"):
         advise(model, record, study, encoders=("7",))
     with pytest.raises(ModelError, match="ELEMENTS"):
         switches(__import__("planar_2r_model"), ("FS1",))
@@ -424,6 +424,6 @@ def test_units_are_those_of_each_encoder(tmp_path):
         assert line.startswith(label) and ("2*pi/" in line) == turn, line
     assert (
         "Of single encoders in rad, that of joint" in advice.verdict
-        and "Of single encoders in m, that of joint 4 asks most" in advice.verdict
+        and "Of single encoders in m, that of joint 4 must be the finest" in advice.verdict
     )
     assert [encoder["unit"] for encoder in json.loads(advice.to_json())["encoders"]][-1] == "m"

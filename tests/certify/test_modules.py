@@ -130,7 +130,7 @@ def test_nothing_is_generated_where_the_module_is_wrong(monkeypatch, cache) -> N
         with pytest.raises(
             CertificateError,
             match=(
-                r"^scara: the certificate does not hold \(regressor of scara.py .*\); "
+                r"^scara: a check of the generated module failed \(regressor of scara.py .*\), so "
                 r"nothing is written"
             ),
         ) as error:

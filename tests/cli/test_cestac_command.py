@@ -165,7 +165,7 @@ def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(emps_data, tmp_p
         stopped = run(*arguments)
     assert stopped.exit_code == 130
     assert (
-        f"stopped; 6 runs are in {tmp_path / 'runs.npz'}: the same command goes on"
+        f"stopped; 6 runs are in {tmp_path / 'runs.npz'}: repeat the command to continue"
         in stopped.stderr
     )
     assert {p.name for p in tmp_path.iterdir()} == {"runs.npz"}

@@ -135,9 +135,9 @@ def test_locked_joints_and_chains(tmp_path):
     result = run("convert", file, tmp_path / "c.yaml", "--chain", "a", "b")
     assert result.exit_code == 0 and "held at zero: shoulder" in result.stdout
     wrong = {
-        ("--lock", "wrist=0"): "no moving joint of that name",
+        ("--lock", "wrist=0"): "no moving joint 'wrist' to lock",
         ("--lock", "elbow"): "NAME=NUMBER",
-        ("--chain", "b", "a"): "outward",
+        ("--chain", "b", "a"): "the base link of the chain first",
         ("--chain", "a", "tool"): "no link",
     }
     for options, words in wrong.items():

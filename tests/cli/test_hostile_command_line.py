@@ -247,7 +247,7 @@ def test_corpus(path, tmp_path):
     else:
         code, said = answered(*command)
     refuted = (
-        code == 1 and "say --at-values" in said
+        code == 1 and "use --at-values" in said
     )  # a valid file, at whose constants the generic formulas do not hold
     assert code == 0 or refuted or (code == 2 and said[:-1].isprintable()), said
 

@@ -113,7 +113,7 @@ def test_links_and_pipes_at_its_names_are_refused(name, tmp_path):
     (tmp_path / "elsewhere" / "mine.txt").write_text("mine")
     for make in (os.mkfifo, lambda path: path.symlink_to(tmp_path / "elsewhere")):
         make(tmp_path / name)
-        with pytest.raises(OutputError, match=r"a link|a pipe|not a folder of symgen"):
+        with pytest.raises(OutputError, match=r"a link|a pipe|a folder of its own"):
             write_all(tmp_path, NEW)
         (tmp_path / name).unlink()
     assert [path.name for path in tmp_path.iterdir()] == ["elsewhere"]
@@ -204,7 +204,7 @@ def test_names_of_our_own_that_are_links_or_pipes(tmp_path, kind, name):
     place = folder / name
     place.symlink_to(other) if kind == "link" else os.mkfifo(place)
     if name == FINISHED:
-        with pytest.raises(OutputError, match="not a folder of symgen; remove or rename this file"):
+        with pytest.raises(OutputError, match="a folder of its own; remove or rename this file"):
             write_all(folder, NEW)
     else:
         write_all(folder, NEW)

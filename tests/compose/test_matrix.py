@@ -30,7 +30,7 @@ CLOSE = 1e-12
 """Of the largest entry."""
 FOLDER = TemporaryDirectory()
 """Of the files that studies name."""
-NOT_ASKED = "Not asked: a trial of another reading"
+NOT_ASKED = "Not checked: a trial of another reading"
 
 MOTION = "of a motion"
 NO_SLIPS = "not judged for a robot with force sensors"

@@ -124,7 +124,7 @@ def test_a_reader_is_one_line_of_a_list(tmp_path, log, monkeypatch):
         ),
         (
             "{options: {gain: 2}}",
-            "line 3: signals.options: given, but reader lowpass has no options",
+            "line 3: signals.options: the reader lowpass has no options",
         ),
     ],
 )

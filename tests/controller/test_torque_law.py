@@ -126,8 +126,12 @@ def test_parameters_of_an_arm_whose_torque_is_its_law(tmp_path):
     [
         ({}, None, "controller: {kp: ..., kd: ...}"),
         ({}, {"kp": 10, "law": {"kp": 10}}, "are short for law"),
-        ({}, {"law": {"kp": 10, "ki": 3}}, "controller.law.ki: 3.0 is not supported here"),
-        ({}, {"kp": [1, 2, 3]}, "3 values; expected one or 2"),
+        (
+            {},
+            {"law": {"kp": 10, "ki": 3}},
+            "controller.law.ki: an integral gain ki (3.0) is not supported here",
+        ),
+        ({}, {"kp": [1, 2, 3]}, "3 values are given; expected one value, or 2 values"),
         ({}, {"kd": 1}, "expected a gain other than 0 for every joint"),
         ({"qd_ref": ["q1"]}, {"kp": 10}, "1 reference velocities (q1); expected 2"),
         ({"qr": ["q1", "q2"]}, {"kp": 10}, "given together with q_ref"),

@@ -323,7 +323,10 @@ def test_verdicts():
         )
         assert result.verdict == verdict
         assert set(result.decided_by) - {"rho"} == names
-        assert "Not deciding" in result.message and "c" in result.message.rsplit(":", 1)[1]
+        assert (
+            "Without effect on this verdict" in result.message
+            and "c" in result.message.rsplit(":", 1)[1]
+        )
     assert deciding_names(reference) == ("a", "b")
 
 

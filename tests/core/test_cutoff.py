@@ -113,7 +113,7 @@ def test_a_median_of_torques_is_none_where_a_controller_answers_every_count():
     record = runtime.Record(T, np.round(q / 0.1) * 0.1, driven)
     study, why = resolved(Study(), [record])
     assert study.signals.window_of_torques == 1 and study.signals.median == 5
-    assert "Torques without a median" in why
+    assert "No median filter of the torques" in why
     assert resolved(Study(), [runtime.Record(T, q, torque)])[0].signals.window_of_torques == 5
     asked = Study(signals=Signals(torque_median=3))
     assert resolved(asked, [record])[0].signals.window_of_torques == 3

@@ -99,7 +99,7 @@ def test_estimate_is_frozen(found):
     with pytest.raises(AttributeError):
         found.method = "wls"
     assert found["FV1"] == found.X[3]
-    with pytest.raises(ValueError, match="10 names"):
+    with pytest.raises(ValueError, match="10 parameters"):
         Estimate(**{**{f: getattr(found, f) for f in found.__dataclass_fields__}, "X": np.zeros(3)})
 
 

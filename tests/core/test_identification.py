@@ -286,7 +286,9 @@ def test_joints_of_which_no_row_is_left_are_told(model):
     result = runtime.identify(model, record, study, physical=True)
     assert result.part("feasibility").judged is None
     assert any("physical consistency: the record does not determine" in x for x in result.missing)
-    assert result.warnings[0] == "No row of joint 1 is used: rows.low_speed leaves them out."
+    assert (
+        result.warnings[0] == "No row of joint 1 is used: rows.low_speed leaves all these rows out."
+    )
     assert result.estimate.status == "rank-deficient"
 
 

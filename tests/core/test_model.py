@@ -32,7 +32,9 @@ def test_load_by_name(tmp_path, monkeypatch):
     assert load_model("axis", trust=True).NAME == "emps"
     assert load_model("axis", folder=tmp_path / "generated", trust=True).NAME == "emps"
     assert not list(tmp_path.rglob("__pycache__"))
-    with pytest.raises(ModelError, match=r"contains axis: generate it with `symgen generate arm`"):
+    with pytest.raises(
+        ModelError, match=r"contains axis\); generate the model with `symgen generate arm`"
+    ):
         load_model("arm")
 
 
@@ -59,7 +61,7 @@ def changed(**values):
         ({"JOINTS": (1, 2, 3)}, "expected bool (10, 3)"),
         ({"STRUCTURE": np.ones((10, 2))}, "STRUCTURE is float64"),
         ({"BASE_PARAMETERS": ("A",) * 10}, "each name once"),
-        ({"DRIVES": {"ratio": [[1.0]]}}, "DRIVES of 1 joints; expected 2"),
+        ({"DRIVES": {"ratio": [[1.0]]}}, "DRIVES is for 1 joints, but the model has 2"),
         ({"regressor": 3}, "no function regressor"),
         ({"store": lambda N: np.zeros((N, 2, 10))}, "expected (10, 2, 2)"),
         (
@@ -95,7 +97,7 @@ def test_states_at_the_border():
 
 def test_a_file_that_fails_says_so(tmp_path):
     (tmp_path / "a.py").write_text(HEAD + "x = [][1]\n", encoding="utf-8")
-    with pytest.raises(ModelError, match="fails on import with IndexError"):
+    with pytest.raises(ModelError, match="the import of the module fails with IndexError"):
         load_model(tmp_path / "a.py", trust=True)
 
 

@@ -294,9 +294,9 @@ def test_columns_and_windows(record):
     np.testing.assert_array_equal(
         np.concatenate([first.Y[first.joint(1)], second.Y[second.joint(1)]]), o.Y[o.joint(1)]
     )
-    with pytest.raises(InputError, match="no column FV9; there are ZZ1R"):
+    with pytest.raises(InputError, match="no column FV9; expected some of ZZ1R"):
         o.columns(["FV9"])
-    with pytest.raises(InputError, match=r"no row in \[100, 200\] s"):
+    with pytest.raises(InputError, match=r"no row of the observation lies in \[100, 200\] s"):
         o.between(100, 200)
 
 
@@ -372,12 +372,15 @@ def test_stack_refuses(record):
     [
         (
             {"rows": {"window": [10, 20]}},
-            "no sample in rows.window [10.0, 20.0] s; the record spans [0, 5.999] s",
+            "no sample lies in rows.window [10.0, 20.0] s; the record spans [0, 5.999] s",
         ),
         ({"rows": {"window": [0, 0.02], "trim": 0}}, "needs more than 27"),
         ({"rows": {"trim": 400}}, "rows.trim leaves out 800"),
         ({"rows": {"low_speed": 100}}, "rows per joint is used: rows.trim leaves out"),
-        ({"rows": {"low_speed": [1, 2, 3]}}, "rows.low_speed has 3 values; expected one or 2"),
+        (
+            {"rows": {"low_speed": [1, 2, 3]}},
+            "rows.low_speed has 3 values; expected one value, or 2 values",
+        ),
         ({"signals": {"lowpass": {"cutoff": 500}}}, "Nyquist"),
     ],
 )

@@ -114,8 +114,8 @@ def late(t):
 @pytest.mark.parametrize(
     ("t", "rate", "said"),
     [
-        (T, 10 * RATE, "time runs at 200 Hz, but record.rate is 2000 Hz"),
-        (T / 10, RATE, "time runs at 2000 Hz, but record.rate is 200 Hz"),
+        (T, 10 * RATE, "the time stamps have the rate 200 Hz, but record.rate is 2000 Hz"),
+        (T / 10, RATE, "the time stamps have the rate 2000 Hz, but record.rate is 200 Hz"),
         (T[::-1], None, "sample 2: time goes from 0.295 s to 0.29 s; expected increasing time"),
         (shuffled(T), None, "sample 32: time goes from 0.295 s to 0.29 s"),
         (np.repeat(T[::2], 2), None, "sample 2: time goes from 0 s to 0 s"),
@@ -124,14 +124,14 @@ def late(t):
             T + 0.5 * (np.arange(N) >= 30),
             None,
             (
-                "59 samples in 0.29 s, pauses aside, are 200 Hz, 1/median step is 200 Hz. Remedy: "
+                "59 samples in 0.29 s (without pauses) give 200 Hz; the median step gives 200 Hz. Remedy: "
                 "one Record for each piece"
             ),
         ),
         (
             T + np.random.default_rng(0).uniform(-0.4, 0.4, N) / RATE,
             None,
-            "1/median step is 205.222 Hz. Remedy: runtime.resample(t, q), and so for tau",
+            "the median step gives 205.222 Hz. Remedy: runtime.resample(t, q), and so for tau",
         ),
     ],
 )
@@ -219,7 +219,9 @@ def test_folders_are_texts_or_paths(tmp_path, monkeypatch, folder):
 def test_errors_name_the_file(tmp_path):
     write_csv(tmp_path / "short.csv", rows=np.column_stack([T, Q, TAU])[:5])
     write_csv(tmp_path / "run.csv")
-    with pytest.raises(InputError, match=r"^short\.csv: 5 samples; a record needs at least 10"):
+    with pytest.raises(
+        InputError, match=r"^short\.csv: the record has 5 samples; expected at least 10"
+    ):
         read_record(settings(files="short.csv"), folder=tmp_path)
     with pytest.raises(InputError, match=r"^run\.csv: the record has 2 joints, but arm has 3"):
         read_record(
@@ -251,7 +253,7 @@ def test_a_file_a_study_and_a_dataset_are_read_by_name(tmp_path, monkeypatch, em
     )
     with pytest.raises(
         InputError,
-        match="2 records or pieces between gaps, but one is expected; use read_records, which returns all of them: run, b",
+        match=r"2 records \(or pieces between gaps\), but this function returns only one; use read_records, which returns all: run, b",
     ):
         read_record("two.yaml")
 
@@ -642,9 +644,15 @@ def test_bad_csv(tmp_path, rows, said):
         ({"columns": {"q": ["q1", "q3"]}}, "no column q3; the file has t, q1, q2, tau1, tau2"),
         ({"columns": {"q": ["q1"]}}, "1 columns of positions (q1), 2 of torques (tau1, tau2)"),
         ({"columns": {"t": "time"}}, "no column time"),
-        ({"rate": 100, "columns": {"t": "t"}}, "time runs at 200 Hz, but record.rate is 100 Hz"),
-        ({"scale": {"tau": "gtau"}}, "no single number 'gtau' in a text file"),
-        ({"scale": {"q": [1, 2, 3]}}, "record.scale.q has 3 values; expected one or 2"),
+        (
+            {"rate": 100, "columns": {"t": "t"}},
+            "the time stamps have the rate 200 Hz, but record.rate is 100 Hz",
+        ),
+        ({"scale": {"tau": "gtau"}}, "a text file contains no number 'gtau'"),
+        (
+            {"scale": {"q": [1, 2, 3]}},
+            "record.scale.q has 3 values; expected one value, or 2 values",
+        ),
         ({"units": {"q": ["rad", "rad", "m"]}}, "record.units.q has 3 units"),
         ({"files": ["b.csv"]}, "cannot be read"),
         ({"files": ["b.xls"]}, "unknown kind of file '.xls'"),

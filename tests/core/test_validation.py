@@ -113,7 +113,7 @@ def test_parameters_that_trade_are_named():
     (warning,) = found.warnings
     assert (
         warning.startswith(
-            "MX1R and MY1 trade against each other on this record (correlation -1.00)"
+            "MX1R and MY1 are strongly correlated on this record (correlation -1.00)"
         )
         and "excite" in warning
     )

@@ -174,7 +174,7 @@ def test_table_of_entry_points_and_wrong_kinds() -> None:
     [
         ((1e9 * T).astype("m8[ns]"), r"t has dtype timedelta64\[ns\], time spans; give seconds"),
         (T + 1j, "t has dtype complex128, complex numbers"),
-        (np.ma.masked_less(T, 0.1), "t masks 10 of its values"),
+        (np.ma.masked_less(T, 0.1), "t has 10 masked values"),
         (T.astype(str), "t has dtype <U"),
     ],
 )

@@ -187,7 +187,7 @@ def test_lost_counts_are_found_at_every_speed(speed, lost, samples, within):
     at = samples // 2 - 173
     counts[at:] += lost
     reading = read_counts(counts[:, None], 1000.0, 1.0)
-    (text,) = (text for text in reading.findings if "as if some were lost" in text)
+    (text,) = (text for text in reading.findings if "as if counts were lost" in text)
     assert f" at {t[at]:.4g} s" in text
     off = reading.q[:, 0] - q
     assert np.abs(off - off[:500].mean()).max() < 0.5 + within

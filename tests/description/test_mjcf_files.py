@@ -62,7 +62,7 @@ WRONG = [  # what is replaced, by what, line of the error, words of the message
     (WORLD, '<worldbody><flexcomp file="/etc/passwd"/>', 2, "<flexcomp> is not read"),
     (WORLD, '<worldbody><attach model="m" body="b"/>', 2, "<attach> is not read"),
     (WORLD, '<compiler settotalmass="x"/><worldbody>', 2, "expected 1 number"),
-    (WORLD, "<nonsense/><worldbody>", 1, "<nonsense> is no part"),
+    (WORLD, "<nonsense/><worldbody>", 1, "<nonsense> is no element of MJCF"),
     ('<geom size="0.1" mass="1"/>', '<geom type="mesh" mesh="m"/>', 4, "would come from a mesh"),
     ('<geom size="0.1" mass="1"/>', "", 4, "MuJoCo refuses"),
     ('<geom size="0.1" mass="1"/>', '<geom size="nan" mass="1"/>', 4, "finite"),
@@ -84,7 +84,7 @@ WRONG = [  # what is replaced, by what, line of the error, words of the message
             '0"/></equality>'
         ),
         6,
-        "a linear relation a0 + a1 y",
+        "is not linear; only a0 + a1*y is supported",
     ),
     (
         "</worldbody>",
@@ -100,7 +100,7 @@ WRONG = [  # what is replaced, by what, line of the error, words of the message
             'joint="s"/><motor joint="e"/></actuator>'
         ),
         6,
-        "ties driven joints",
+        "contains only actuated joints",
     ),
     (SMALL, '<robot name="x"/>', 1, "must end in .urdf"),
     (SMALL, "<mujoco><worldbody/></mujoco>", 1, "no joint that moves"),

@@ -371,7 +371,7 @@ def test_skeleton_is_a_robot_file():
         .replace("# values", "values")
     )
     assert parse_robot(every.encode(), "my_arm.yaml").drives is not None
-    with pytest.raises(DescriptionError, match="'my-arm' is no identifier"):
+    with pytest.raises(DescriptionError, match="'my-arm' is not a valid name"):
         skeleton("my-arm")
 
 

@@ -93,8 +93,11 @@ def test_the_rest_stands_still(part, moving, at):
             TreePart({"twin": 0.0}),
             "'twin' cannot be locked, because it follows other joints; lock finger",
         ),
-        (TreePart({"nose": 0.0}), "no moving joint of that name; the file has lift, head"),
-        (TreePart(chain=("eye", "pad")), "outward"),
+        (
+            TreePart({"nose": 0.0}),
+            "the file has no moving joint 'nose' to lock; its moving joints are lift, head",
+        ),
+        (TreePart(chain=("eye", "pad")), "the base link of the chain first"),
         (TreePart(chain=("torso", "nose")), "no link 'nose'"),
     ],
 )

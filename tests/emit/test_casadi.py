@@ -186,7 +186,10 @@ def test_constants_by_name_and_missing_inputs() -> None:
 
 def test_general_loops_have_none(capsys: pytest.CaptureFixture[str]) -> None:
     assert not emitted(["four_bar"], ("casadi",))
-    assert "no casadi target, its loops are closed by iteration" in capsys.readouterr().err
+    assert (
+        "the target casadi is not possible, because the loops of this robot are closed by iteration"
+        in capsys.readouterr().err
+    )
     assert not hasattr(module_of("four_bar"), "casadi")
 
 

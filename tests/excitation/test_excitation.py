@@ -312,7 +312,7 @@ def test_what_cannot_be_is_said(planar: tuple) -> None:
         search(planar, settings(begin=[3.0, 0.0]))
     with pytest.raises(SettingsError, match="no limits of qdd"):
         limits_of(planar[0], {"q": [1, 1], "qd": [1, 1], "qdd": None})
-    with pytest.raises(SettingsError, match="expected 2 numbers or pairs"):
+    with pytest.raises(SettingsError, match="expected 2 limits, each a number or a pair"):
         limits_of(planar[0], {**LIMITS, "q": [1.0]})
     with pytest.raises(SettingsError, match="has no motor and cannot be moved: lock it"):
         limits_of(planar[0], {**LIMITS, "tau": [10.0, 0.0]})

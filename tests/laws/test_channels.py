@@ -123,7 +123,8 @@ def test_columns_of_channels_are_those_of_casadi() -> None:
     assert not any(" forward_dynamics(" in text for text in files.values())
     assert not hasattr(module, "forward_dynamics")
     with pytest.raises(
-        ModelError, match="friction laws depend on tau_model, which depends on the accelerations"
+        ModelError,
+        match="friction laws depend on the torque tau_model and hence on the accelerations",
     ):
         require(module, "forward_dynamics")
     with pytest.raises(SymgenError, match="LD2 use tau_model, which depends on qdd"):

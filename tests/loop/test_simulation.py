@@ -405,12 +405,12 @@ def test_integral_settles_and_clamps(emps):
         ),
         (
             {"law": {"kind": "pid", "kp": [1, 2]}},
-            r"controller\.law\.kp: 2 values; expected one or 6",
+            r"controller\.law\.kp: 2 values are given; expected one value, or 6 values",
         ),
         ({"law": {"kind": "pid", "kp": 0}}, r"expected a gain other than 0 for every joint"),
         (
             {"torque": {"disturbance": 1.0, "bandwidth": 3000}},
-            r"bandwidth: 3000.0 Hz is too fast a disturbance",
+            r"bandwidth: the disturbance of the torque has a bandwidth of 3000.0 Hz",
         ),
         ({"values": {"ZZ9": 1.0}}, r"no standard parameter ZZ9"),
         ({"pole_step": 1e-5}, r"integration steps per tick"),
@@ -434,7 +434,7 @@ def test_parameters_that_cannot_be_simulated(tx40, truth):
     ) as e:
         simulator.run(-truth, reference)
     assert e.value.time == 0
-    with pytest.raises(InputError, match="expected 60 finite base parameters"):
+    with pytest.raises(InputError, match="expected the 60 base parameters, finite numbers"):
         simulator.run(truth[:5], reference)
     with pytest.raises(
         InputError, match="the reference is at 1000 Hz, but the controller runs at 5000 Hz"
@@ -451,7 +451,7 @@ def test_a_loop_that_is_lost(tx40, truth):
     reference = Reference.sampled(np.zeros((8000, 6)) + [0.0, -0.3, 1.0, 0.1, 0.1, 0.1], 5000.0)
     found = simulate(tx40, values, settings, reference)
     assert found.saturated.max() > 0.9
-    with pytest.raises(SimulationError, match=r"the motion leaves its reference at .* s"):
+    with pytest.raises(SimulationError, match=r"the simulated motion leaves its reference at .* s"):
         simulate(tx40, values, settings, reference, disturbance=np.full((8000, 6), 3e5))
 
 
@@ -461,7 +461,7 @@ def test_a_loop_that_is_lost(tx40, truth):
         ({"limits": "refuse", "motion": {"parts": [{"family": "fourier", "harmonics": 1, "p": [[9.0, 0.0, 0.0]] * 6}]}},
          r"leaves the limits of joint 1 at 0 s: q = 9 rad"),
         ({}, "no reference is given"),
-        ({"points": {"duration": 1e9}}, r"points: 1e\+09 s at 5000 Hz; expected at most 4,000,000 ticks"),
+        ({"points": {"duration": 1e9}}, r"points: the reference lasts 1e\+09 s at 5000 Hz; expected at most 4,000,000 ticks"),
         ({"record": 0}, "the study has 0"),
         ({"file": "ref.csv"}, r"no column q3 among t, q1, q2; expected q1 \.\.\. q6"),
     ],
@@ -483,7 +483,7 @@ def test_reference_files(emps, tmp_path):
     np.savetxt(path, rows[:, :2], delimiter=",", header="t,q1", comments="")
     found = reference_of(settings, emps, folder=tmp_path)
     np.testing.assert_allclose(found.qd[5:-5], rows[5:-5, 2:3], atol=1e-12)
-    with pytest.raises(InputError, match="time runs at 1000 Hz, but the controller at 500 Hz"):
+    with pytest.raises(InputError, match="the rate 1000 Hz, but the controller runs at 500 Hz"):
         reference_of(replace(settings, rate=500.0), emps, folder=tmp_path)
 
 

@@ -85,7 +85,9 @@ def outcome(seed: int) -> str:
             return "nothing moves"
         named = re.search(r"'(e\d)'", message)
         assert named and f'name="{named[1]}"' in lines[error.line - 1], message
-        return next(w for w in ("connect", "weld", "polycoef", "ties driven") if w in message)
+        return next(
+            w for w in ("connect", "weld", "polycoef", "only actuated joints") if w in message
+        )
     model = mujoco.MjModel.from_xml_string(text)
     data, names = mujoco.MjData(model), legend(notes)
     for q, qd in zip(*motion(robot, seed)[0][:2], strict=True):

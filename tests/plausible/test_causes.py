@@ -78,4 +78,4 @@ def test_slow_motion_with_coarse_encoders_has_no_cause(name, k, counts) -> None:
 @pytest.mark.parametrize("name", ["panda", "wrist"])
 def test_slow_records_are_asked_for_causes(name) -> None:
     found = judged(name, 11, right, "slow", 10.0, 2000)
-    assert not [c for c in found.checks() if c.finding.startswith("Not asked: too few")]
+    assert not [c for c in found.checks() if c.finding.startswith("Not checked: too few")]

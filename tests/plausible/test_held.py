@@ -58,7 +58,7 @@ def test_they_are_told_and_judged(arm, count, state) -> None:
     found = runtime.plausibility(arm, record, study_from_mapping({}))
     check = next(c for c in found.checks() if c.question == "Are the positions those of a motion?")
     assert check.state == state
-    assert f"held the positions at {count} instants, {6 * count} samples" in check.finding
+    assert f"held the positions at {count} instants ({6 * count} of " in check.finding
     assert "starts anew" not in check.remedy
 
 

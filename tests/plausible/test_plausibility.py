@@ -52,7 +52,9 @@ def test_a_slip_of_the_palletiser_is_named(right: slip_cases.Case, slip: slip_ca
 def test_speeds_for_other_joints_are_refused_by_name(right: slip_cases.Case) -> None:
     model, record, study, _ = right.parts()
     study = replace(study, rows=replace(study.rows, low_speed=(0.1,) * (record.n + 1)))
-    with pytest.raises(runtime.InputError, match=r"rows.low_speed has \d values; expected one or"):
+    with pytest.raises(
+        runtime.InputError, match=r"rows.low_speed has \d values; expected one value, or"
+    ):
         runtime.plausibility(model, record, study)
 
 
@@ -232,7 +234,7 @@ def test_loops_that_do_not_close_in_the_record_are_the_finding() -> None:
 def test_too_few_samples_are_not_judged(right: slip_cases.Case) -> None:
     short = replace(right, t=right.t[:400], q=right.q[:400], tau=right.tau[:400])
     found = short.judged()
-    assert not found.named and any("Not asked" in check.finding for check in found.checks()), (
+    assert not found.named and any("Not checked" in check.finding for check in found.checks()), (
         found.to_text()
     )
 

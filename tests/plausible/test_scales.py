@@ -41,7 +41,7 @@ def test_the_scale_of_a_position_is_named_with_its_size(
     q = np.where(np.arange(right.q.shape[1]) == joint - 1, scale, 1.0) * right.q
     (cause,) = causes(replace(right, q=q))
     text, factor = cause.rsplit(" ", 1)
-    assert text == f"the position of joint {joint} is to be multiplied by"
+    assert text == f"the position of joint {joint} must be multiplied by"
     assert float(factor) == pytest.approx(1 / scale, rel=0.03)
 
 

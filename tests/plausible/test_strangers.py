@@ -160,7 +160,7 @@ def test_clipped_friction_is_told() -> None:
     bound = np.quantile(np.abs(tau[:, 0]), 0.7)
     tau[:, 0] = np.clip(tau[:, 0], -bound, bound)
     check = judged(model, t, q, tau)[FULL]
-    assert check.state == "no" and "goes beyond it by" in check.finding
+    assert check.state == "no" and "exceeds the value by" in check.finding
 
 
 @pytest.mark.parametrize("unit", ["N*mm"])
@@ -233,7 +233,7 @@ def test_a_wrap_is_a_wrap_with_resample_too(tmp_path, resample) -> None:
     (check,) = (
         c for c in runtime.plausibility(model, record).checks() if "those of a motion" in c.question
     )
-    assert check.state == "no" and check.remedy.startswith("it starts anew"), check
+    assert check.state == "no" and check.remedy.startswith("the position starts anew"), check
 
 
 def test_physical_parameters_that_did_not_converge_are_not_printed(tmp_path, monkeypatch) -> None:
@@ -444,7 +444,7 @@ def test_currents_read_as_torques_are_no_wrong_rate() -> None:
         model, runtime.Record(t, q, tau / [11.7, 6.4], name="run"), variants=free
     )
     assert not any(trial.cause.kind == "rate" for trial in found.trials)
-    assert found.robot_values.heavy and "gravity torque of joint 1 0.0" in found.to_text()
+    assert found.robot_values.heavy and "gravity torque of joint 1 is 0.0" in found.to_text()
 
 
 def test_motor_inertias_of_zero_do_not_contradict_the_record(tmp_path) -> None:
@@ -476,7 +476,7 @@ def test_values_in_g_mm_are_told_of_links_with_fewer_than_ten(given, link) -> No
     values = ", ".join(f"{name}: {x}" for name, x in given.items())
     bare = text[: text.index("values:")] + f"values: {{{values}}}\n"
     check = judged(symgen.model(parse_robot(bare.encode(), "bare.yaml")), t, q, tau)[
-        "Can bodies have the values of the robot file?"
+        "Can real links have the inertial values of the robot file?"
     ]
     assert check.state == ("doubtful" if link else "good")
     assert f"The values of link {link} put its mass" in check.finding or not link
@@ -503,7 +503,7 @@ def test_a_yes_is_followed_by_what_to_do_with_the_values() -> None:
     assert "do not use these values one by one" not in right.brief()
     wrong = runtime.Record(*motion(model, noise=0.0, values=20.0), name="run")
     said_so = runtime.identify(model, wrong, plausible=True).checklist
-    assert said_so.answer == "No" and "A small error alone says little" in said_so.use
+    assert said_so.answer == "No" and "A small error does not prove" in said_so.use
     assert "16 times the limits" in said_so.doubt
 
 

@@ -133,4 +133,4 @@ def test_a_torque_that_never_changes_ends_the_questions(
 ) -> None:
     found = judged(replace(right, tau=right.tau * [1.0, 0.0] + [0.0, 3.0]))
     assert found.worst is not None and found.worst.finding == "The torque of joint 2 is constant"
-    assert found.checks()[-1].finding == "Not asked: a torque never changes" and not recwarn.list
+    assert found.checks()[-1].finding == "Not checked: a torque never changes" and not recwarn.list

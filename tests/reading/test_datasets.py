@@ -95,9 +95,9 @@ def test_download_with_another_hash(toy, tmp_path):
 
 
 def test_unknown_names():
-    with pytest.raises(InputError, match="there are tx40, emps"):
+    with pytest.raises(InputError, match="expected one of tx40, emps"):
         fetch("rx90", "a.csv")
-    with pytest.raises(InputError, match=r"it has pos_read_data\.csv, curr_data\.csv"):
+    with pytest.raises(InputError, match=r"its files are pos_read_data\.csv, curr_data\.csv"):
         fetch("tx40", "a.csv")
 
 

@@ -132,7 +132,9 @@ def test_clock(tmp_path, samples):
     ):
         with pytest.raises(InputError, match=message):
             read_record(settings(write("npz", tmp_path, (bad, q, tau))), folder=tmp_path)
-    with pytest.raises(InputError, match=r"time runs at 500 Hz, but record\.rate is 400 Hz"):
+    with pytest.raises(
+        InputError, match=r"the time stamps have the rate 500 Hz, but record\.rate is 400 Hz"
+    ):
         read_record(
             settings(write("npz", tmp_path, samples), rate=400, columns={"t": "t"}), folder=tmp_path
         )

@@ -64,7 +64,10 @@ def test_records_keep_what_was_subtracted_once():
         np.testing.assert_array_equal(same.tau_known, record.tau_known)
         np.testing.assert_array_equal(same.tau_ff, TAU)
         assert same.subtracted == record.subtracted
-    with pytest.raises(InputError, match=r"tau_known \(40,\), q \(40, 2\); expected the same"):
+    with pytest.raises(
+        InputError,
+        match=r"tau_known has shape \(40,\), but q has shape \(40, 2\); expected the same",
+    ):
         Record(T, Q, TAU, tau_known=BALANCE)
 
 

@@ -78,7 +78,7 @@ def test_jitter_is_told():
     rng = np.random.default_rng(0)
     found = time_stamps(T + rng.uniform(-0.05, 0.05, len(T)) / RATE)
     assert 0.08 < found.jitter < 0.11 and 0.03 < found.jitter_rms < 0.05
-    with pytest.raises(InputError, match="never goes forward"):
+    with pytest.raises(InputError, match="the time stamps never increase"):
         time_stamps(T[::-1])
 
 
@@ -214,7 +214,7 @@ def test_counted_samples_must_fill_their_time():
     ("settings", "said"),
     [
         (Resample(), "time has gaps or goes back; set record.resample.gaps: split"),
-        (Resample(gaps="split", rate=100), "below the 500 Hz of the record"),
+        (Resample(gaps="split", rate=100), "below the rate of the record, 500 Hz"),
         (Resample(gaps="split", shortest=5), "no part of the record lasts 5 s without a gap"),
     ],
 )
@@ -254,7 +254,7 @@ def test_a_record_with_a_gap_becomes_two(tmp_path):
     with pytest.raises(
         InputError,
         match=(
-            "2 records or pieces between gaps, but one is expected; use read_records, which returns all of them: a (1 of 2), a (2 of 2)"
+            "2 records (or pieces between gaps), but this function returns only one; use read_records, which returns all: a (1 of 2), a (2 of 2)"
         )
         .replace("(", r"\(")
         .replace(")", r"\)"),
@@ -280,7 +280,7 @@ def test_errors_tell_all_irregularities(tmp_path):
         ({"resample": {}}, "set record.resample.gaps: split"),
         (
             {"resample": {"gaps": "split"}, "rate": 1000},
-            "time runs at 500 Hz, but record.rate is 1000 Hz",
+            "the time stamps have the rate 500 Hz, but record.rate is 1000 Hz",
         ),
     ):
         with pytest.raises(InputError) as e:
@@ -372,8 +372,8 @@ def test_the_remedy_named_is_the_best_of_the_three(tmp_path):
     with pytest.raises(InputError) as e:
         record_with(tmp_path, *log)
     said = str(e.value)
-    assert f"{kept.sum()} samples in 11.999 s, pauses aside, are" in said
-    assert "1/median step is 1000 Hz. Remedy: record.resample: {longest: " in said
+    assert f"{kept.sum()} samples in 11.999 s (without pauses) give" in said
+    assert "the median step gives 1000 Hz. Remedy: record.resample: {longest: " in said
     longest = float(said.partition("{longest: ")[2].partition("}")[0])
     mean = float(said.partition("record.rate: ")[2].split()[0])
     error = {}
@@ -423,7 +423,7 @@ def test_resample():
     assert record.rate == pytest.approx(500)
     for wrong, match in (
         ((t, signal(t)[:-1]), "expected"),
-        ((t[::-1], signal(t)), "never goes forward"),
+        ((t[::-1], signal(t)), "the time stamps never increase"),
         ((t + (t > 3), signal(t), 500), "one Record for each piece"),
         ((t, signal(t) * np.nan), "nan"),
         ((t, signal(t), 50), "would be aliased"),

@@ -74,14 +74,14 @@ def test_units_of_pint(read, name, kind, factor):
             position_unit,
             "Grad",
             (
-                "one 'Grad' is 1e+09 radian, far too large a unit for a robot; expected units such as "
+                "one 'Grad' is 1e+09 radian, which is too large a unit for a robot; expected units such as "
                 "rad, deg"
             ),
         ),
         (
             torque_unit,
             "%",
-            "'%' does not say the rated quantity; write the unit of the rated value",
+            "'%' of an unknown rated value; write the unit of the rated value",
         ),
         (torque_unit, "MA", "'MA' is 1e+06 ampere"),
         (position_unit, "s", "is a unit of time"),

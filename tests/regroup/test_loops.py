@@ -409,7 +409,7 @@ def test_too_many_actuators(few_starts: None) -> None:
 def test_too_few_actuators() -> None:
     with pytest.raises(
         DescriptionError,
-        match=r"mobility is 3, but 2 joints are actuated .* 1 freedoms remain; .* under-constrained",
+        match=r"mobility is 3, but 2 joints are actuated .* 1 degrees of freedom remain; .* under-constrained",
     ):
         close(changed(load_robot("haptic"), 5, mu=0))
 

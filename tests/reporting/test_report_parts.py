@@ -212,7 +212,9 @@ def test_single_values_are_remarks_where_the_expected_error_is_known():
     for estimate in (fit(sigma=(0.2, 0.3)), fit(correlation=-0.95), fit(cond_unit=300.0)):
         checklist = checked(estimate, expected_error=2.0)
         assert checklist.state == "good" and checklist.grade == 2.0
-        assert "Single values are not asked for" in str([c.finding for c in checklist.checks])
+        assert "Single values do not count in this verdict" in str(
+            [c.finding for c in checklist.checks]
+        )
         assert checked(estimate, expected_error=2.0, single=True).state != "good"
 
 

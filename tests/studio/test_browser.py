@@ -211,7 +211,7 @@ def test_name_and_title_are_fields_of_the_table(page: Browser, running: Callable
     page.click("#r-name")
     type_in(page, "r-name", "2 links")
     wrong = until(page, "document.getElementById('wrong-name')?.textContent")
-    assert wrong.startswith("name: '2 links' is no identifier")
+    assert wrong.startswith("name: '2 links' is not a valid name")
     assert page.run("document.body.textContent.split(\"'2 links' is no\").length") == 2  # once
     assert page.run("document.activeElement.id") == "r-name"
     assert symgen.load_robot(file).name == before.name

@@ -411,7 +411,7 @@ KR300 = (
     Slip(
         15,
         "torque of joint 2 times 1.41",
-        r"torque of joint 2 is to be multiplied by 0\.[67]",
+        r"torque of joint 2 must be multiplied by 0\.[67]",
         lambda c: replace(c, tau=c.tau * factor(1, 1.41, 6)),
     ),
     Slip(
@@ -473,7 +473,7 @@ KR300 = (
     Slip(
         27,
         "torque of joint 5 in kp m",
-        r"torque of joint 5 (is to be multiplied|0\.)",
+        r"torque of joint 5 (must be multiplied|is 0\.)",
         lambda c: replace(c, tau=c.tau * factor(4, 1 / 9.81, 6)),
     ),
     Slip(
@@ -689,7 +689,7 @@ SIMULATED = (
     Slip(
         15,
         "torque of joint 2 times 1.41",
-        r"torque of joint 2 is to be multiplied by 0\.[67]",
+        r"torque of joint 2 must be multiplied by 0\.[67]",
         lambda c: replace(c, tau=c.tau * [1, 1.41, 1, 1]),
     ),
     Slip(
@@ -796,7 +796,7 @@ TX40 = (
     Slip(
         15,
         "torque of joint 2 times 1.41",
-        r"torque of joint 2 is to be multiplied by 0\.[67]",
+        r"torque of joint 2 must be multiplied by 0\.[67]",
         lambda c: replace(c, tau=c.tau * factor(1, 1.41, 6)),
     ),
     Slip(16, "ratio of joint 4 positive", r"joint 4 counts", lambda c: c.text("-48", "48")),

@@ -261,7 +261,7 @@ def test_the_parameters_printed_first_are_written(tmp_path) -> None:
     document = json.loads((tmp_path / "results" / "estimate.json").read_text())
     next(own for own in document["sets"] if own["name"] == "feasible")["X"].pop()
     (tmp_path / "results" / "estimate.json").write_text(json.dumps(document))
-    with pytest.raises(InputError, match="the sets and the parameters in the file do not match"):
+    with pytest.raises(InputError, match="the parameters in the list `sets` differ"):
         symgen.apply(tmp_path / "results", path)
 
 

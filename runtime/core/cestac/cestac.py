@@ -114,16 +114,17 @@ def cestac(
     if settings.side == "motor" and drives is None:
         raise SettingsError(
             (
-                f"motor, but {model.NAME} has no drives; use side: joint or give drives in the "
-                "robot file"
+                f"side: motor needs drives, but {model.NAME} has no drives; set side: joint, or "
+                "give drives in the robot file"
             ),
             path=("cestac", "side"),
         )
     if study.signals.reader == "counts" and settings.delta and settings.rounding != "phase":
         raise SettingsError(
             (
-                f"{settings.rounding} does not work with signals.reader: counts, because this rounding treats each sample independently, which destroys the changes of the count that the reader needs; use "
-                "rounding: phase"
+                f"rounding: {settings.rounding} does not work with signals.reader: counts, because "
+                "it rounds each sample independently and so destroys the changes of the encoder "
+                "count; set rounding: phase"
             ),
             path=("cestac", "rounding"),
         )

@@ -630,13 +630,13 @@ def _message(
     }[verdict]
     if undecided:
         text += (
-            f" Not deciding, since their own %sigma exceeds {LIMIT.DECIDING:g} %: "
-            f"{', '.join(undecided)}."
+            f" Without effect on this verdict, because their %sigma exceeds {LIMIT.DECIDING:g} "
+            f"%: {', '.join(undecided)}."
         )
     if half >= LIMIT.NEGLIGIBLE:
         text += (
-            f" {N} runs leave means uncertain by {half:.1f} %; about {needed} runs make that "
-            f"{LIMIT.NEGLIGIBLE:g} %."
+            f" After {N} runs, the means are uncertain by {half:.1f} %; about {needed} runs reduce "
+            f"this to {LIMIT.NEGLIGIBLE:g} %."
         )
     return text
 

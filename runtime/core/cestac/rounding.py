@@ -84,8 +84,8 @@ def counted(x: Array, step: float, phase: float, uneven: float, rng: np.random.G
     )
     if last - first > LIMIT.UNEVEN_LINES:
         raise InputError(
-            f"the motion crosses {last - first} encoder lines of step {step:.3g}; uneven lines are "
-            f"supported up to {LIMIT.UNEVEN_LINES} lines, use larger steps"
+            f"the motion crosses {last - first} encoder lines of step {step:.3g}, but unevenly "
+            f"spaced lines are limited to {LIMIT.UNEVEN_LINES}; use larger steps"
         )
     line, turn = np.arange(first, last), 2 * np.pi / step
     lines = round(turn) if abs(turn - round(turn)) < 1e-6 and round(turn) < len(line) else len(line)

@@ -41,7 +41,8 @@ def one_run(columns: Columns, task: Task, key: tuple[int, int]) -> Run:
         observation = perturbed(columns, task, level, draw)
     if not np.isfinite(observation.W).all():
         raise InputError(
-            f"the regressor of {task.model.NAME} is not finite at perturbed positions; use smaller steps"
+            f"the regressor of {task.model.NAME} is not finite at rounded positions; "
+            "use smaller steps"
         )
     X = _estimated(task, observation)
     norm = float(np.linalg.norm(observation.Y - observation.W @ X))

@@ -166,7 +166,9 @@ class Estimate:
         ):
             array = np.array(getattr(self, name), dtype=float)
             if array.shape != shape:
-                raise ValueError(f"{name} has shape {array.shape}; expected {shape} for {b} names")
+                raise ValueError(
+                    f"{name} has shape {array.shape}; expected {shape} for {b} parameters"
+                )
             array.flags.writeable = False
             object.__setattr__(self, name, array)
 

@@ -258,9 +258,9 @@ def outcome(system: System, fit: Solution) -> tuple[Status, str]:
             )
         parts.append(
             "Likely causes: a motion that does not excite them (a joint at rest, one "
-            "configuration, constant velocity), or columns that are not base "
-            "parameters of this robot. Use a richer motion, or leave names out with "
-            "estimate.columns until one of each group is gone."
+            "configuration, constant velocity), or columns that are not base parameters of this "
+            "robot. Use a richer motion, or remove one parameter of "
+            "each group (estimate.columns)."
         )
         return "rank-deficient", " ".join(parts)
     if system.weighted.rows <= b:

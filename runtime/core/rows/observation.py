@@ -173,7 +173,10 @@ class Observation:
     def where(self, mask: Array) -> Observation:
         """Return the rows of Y = W X + rho for which `mask`, bool of shape (r,), is true."""
         if mask.shape != self.Y.shape or mask.dtype != np.bool_:
-            raise InputError(f"mask {mask.dtype} {mask.shape}; expected bool {self.Y.shape}")
+            raise InputError(
+                f"the mask has dtype {mask.dtype} and shape {mask.shape}; "
+                f"expected bool {self.Y.shape}"
+            )
         rows = tuple(int(np.count_nonzero(mask[self.joint(j)])) for j in range(self.n))
         loop = (
             None
@@ -199,7 +202,8 @@ class Observation:
         part = self.where((self.t >= first) & (self.t <= last))
         if not any(part.rows):
             raise InputError(
-                f"no row in [{t0}, {t1}] s; the rows lie in [{self.span[0]:g}, {self.span[1]:g}] s"
+                f"no row of the observation lies in [{t0}, {t1}] s; the rows span "
+                f"[{self.span[0]:g}, {self.span[1]:g}] s"
             )
         return part
 
@@ -414,5 +418,5 @@ def all_files(hashes: Sequence[Mapping[str, str]]) -> dict[str, str]:
 def column_numbers(names: Sequence[str], among: Sequence[str]) -> list[int]:
     unknown = [name for name in names if name not in among]
     if unknown:
-        raise InputError(f"no column {', '.join(unknown)}; there are {', '.join(among)}")
+        raise InputError(f"no column {', '.join(unknown)}; expected some of {', '.join(among)}")
     return [list(among).index(name) for name in names]

@@ -188,8 +188,8 @@ def observation_of(
     n, K = selection.mask.shape
     if torque.shape != (n, K) or len(model.JOINTS) != n:
         raise InputError(
-            f"torque {torque.shape}, model {model.NAME} with {len(model.JOINTS)} joints; expected "
-            f"{(n, K)} and {n} joints"
+            f"torque has shape {torque.shape}, and {model.NAME} has {len(model.JOINTS)} joints; "
+            f"expected {(n, K)} and {n} joints"
         )
     window = states[selection.samples]
     used = np.flatnonzero(selection.mask.any(axis=0))

@@ -113,7 +113,8 @@ def window_of(
     stop = len(t) if t1 is None else int(np.searchsorted(t, t1, side="right"))
     if stop <= start:
         raise InputError(
-            f"no sample in rows.window [{t0}, {t1}] s; the record spans [{t[0]:g}, {t[-1]:g}] s",
+            f"no sample lies in rows.window [{t0}, {t1}] s; the record spans "
+            f"[{t[0]:g}, {t[-1]:g}] s",
             file=file,
         )
     margin = min(margin, len(t) // 10)
@@ -154,9 +155,8 @@ def instants_of(t: Array, rate: float, signals: Signals, rows: Rows, file: str) 
     K = len(kept)
     if 2 * trim >= K:
         raise InputError(
-            f"{K} rows per joint after decimation by {factor}, of which rows.trim leaves "
-            f"out {2 * trim}; "
-            "use a longer record or window, or a smaller rows.trim",
+            f"after decimation by {factor}, the record has {K} rows per joint, of which rows.trim "
+            f"leaves out {2 * trim}; use a longer record or window, or a smaller rows.trim",
             file=file,
         )
     return Instants(start, stop, factor, int(kept[0]), K, trim)
@@ -237,7 +237,7 @@ def unused_joints(
     reason = max(dropped, key=lambda name: sum(dropped[name][j] for j in bare))
     return (
         f"No row of joint {', '.join(joints[j] for j in bare)} is used: "
-        f"{LEAVES_OUT.get(reason, reason)} leaves them out."
+        f"{LEAVES_OUT.get(reason, reason)} leaves all these rows out."
     )
 
 
@@ -246,8 +246,8 @@ def _keep(keep: Array, record: Record) -> Array:
     if keep.dtype != np.bool_ or keep.shape not in {(len(record), 1), (len(record), record.n)}:
         raise InputError(
             (
-                f"keep {keep.dtype} {keep.shape}; expected bool {(len(record),)} or "
-                f"{(len(record), record.n)}"
+                f"`keep` has dtype {keep.dtype} and shape {keep.shape}; expected bool "
+                f"{(len(record),)} or {(len(record), record.n)}"
             ),
             file=record.file,
         )
@@ -258,7 +258,9 @@ def per_joint(value: float | tuple[float, ...], n: int, name: str) -> Array:
     """Expand a setting that is one number, or one for each joint, to shape (n,)."""
     values = np.atleast_1d(np.asarray(value, dtype=float))
     if values.shape not in {(1,), (n,)}:
-        raise InputError(f"{name} has {len(values)} values; expected one or {n}, one per joint")
+        raise InputError(
+            f"{name} has {len(values)} values; expected one value, or {n} values (one per joint)"
+        )
     return np.broadcast_to(values, (n,))
 
 

@@ -76,8 +76,8 @@ def switches(
         if strange:
             raise ModelError(
                 (
-                    f"{name} acts along the joints {strange}, which are not actuated; no prediction is "
-                    "possible for this parameter"
+                    f"the friction {name} acts along the passive joints {strange}, so the effect "
+                    "of rounding on it cannot be predicted; use symgen cestac without --advise"
                 ),
                 file=model.NAME,
             )

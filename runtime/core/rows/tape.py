@@ -78,7 +78,7 @@ class Row:
         return Row(np.power, (self, exponent))
 
     def __bool__(self) -> bool:
-        raise NotRecordedError("a decision by a value")
+        raise NotRecordedError("the function branches on the value of a signal")
 
 
 class Functions:

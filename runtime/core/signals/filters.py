@@ -165,9 +165,9 @@ def butterworth(rate: float, low: Lowpass) -> tuple[Array, int]:
     """
     if low.hertz >= rate / 2:
         raise InputError(
-            f"low-pass at {low.hertz:g} Hz for a record at {rate:g} Hz; expected less than the "
-            f"Nyquist frequency {rate / 2:g} Hz, "
-            "lower signals.lowpass.cutoff; if the record has another rate, correct record.units.t"
+            f"the low-pass has the cut-off frequency {low.hertz:g} Hz, but must be below the "
+            f"Nyquist frequency {rate / 2:g} Hz, half the rate of the record; lower "
+            f"signals.lowpass.cutoff, or correct record.units.t if the rate {rate:g} Hz is wrong"
         )
     sos = butter(low.order, low.hertz, fs=rate, output="sos")
     length = low.order + 1
@@ -258,6 +258,6 @@ def require_longer(samples: int, pad: int) -> None:
     """Raise InputError unless there are more samples than the `pad` samples added at each end."""
     if samples <= pad:
         raise InputError(
-            f"{samples} samples; this zero-phase filter needs more than {pad}, use a longer record "
-            "or window, or a lower order"
+            f"the record has {samples} samples; this zero-phase filter needs more than {pad}, use "
+            "a longer record or window, or a lower order"
         )

@@ -69,8 +69,8 @@ def bandwidth(signals: Signals, rate: float) -> Bandwidth:
     if signals.median != 1:
         raise SettingsError(
             (
-                f"a median over {signals.median} samples is not linear, so its effect cannot be "
-                "predicted; set 1, or sample the effect by symgen cestac without --advise"
+                f"a median filter over {signals.median} samples is not linear, so the advisor "
+                "cannot predict its effect; set median: 1, or use symgen cestac without --advise"
             ),
             path=("cestac", "median"),
         )

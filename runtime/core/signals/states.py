@@ -42,7 +42,7 @@ class SignalReader:
             return to_mapping(structure(self.options, signals.options, path))
         if signals.options:
             raise SettingsError(
-                f"given, but reader {signals.reader} has no options; remove this key", path=path
+                f"the reader {signals.reader} has no options; remove this key", path=path
             )
         return {}
 
@@ -63,6 +63,7 @@ def require_motion(signals: Signals, who: str) -> None:
     """
     if signals.reader == "static":
         raise SettingsError(
-            f"static is for poses at rest, but {who} needs records of a motion; set another reader",
+            f"reader: static is for poses at rest, but {who} needs records of a motion; "
+            "set another reader",
             path=("signals", "reader"),
         )
