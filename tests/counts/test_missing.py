@@ -133,7 +133,9 @@ def test_arrays():
         InputError, match=r"nan .* takes such samples as missing \(here: missing=np.isnan\(q\)\)"
     ):
         Record(T, np.where(MISSING, np.nan, Q), TAU)
-    with pytest.raises(InputError, match=r"missing bool \(4000,\).*|missing bool \(4000, 1\)"):
+    with pytest.raises(
+        InputError, match=r"missing.* bool and shape \(4000,\)|missing.* bool and shape \(4000, 1\)"
+    ):
         Record(T, Q, TAU, missing=MISSING[:, 0])
     with pytest.raises(
         InputError,
