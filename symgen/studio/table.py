@@ -36,6 +36,8 @@ SIZED = ("limits", "drives", "values", "labels", "elements", "constraints", "mas
 PLAIN_CELL = re.compile(r"(?!- )[A-Za-z0-9_.+/(-][A-Za-z0-9_.+*/() -]*(?<! )\Z|[0-9]\Z")
 TOP_LEVEL = re.compile(r"^(?=[A-Za-z_]+\s*:)", re.M)
 CELL = 200  # characters of a cell
+PRINTED = ((r"(?<=\d)\s*°", "*pi/180"), (r"(?<=[\d)])\s*π", "*pi"), ("π", "pi"), ("−", "-"))
+"""Signs that textbooks print, as patterns, and the text of a robot file for each."""
 
 
 def cells_of(text: str) -> dict[str, Any]:
@@ -94,11 +96,14 @@ def with_cells(text: str, asked: str) -> str:
     """Write edited cells into the text of a robot file.
 
     asked : the cells, in JSON with the form of `cells_of`. Other parts stay, with their comments.
+        A cell may hold the signs of a textbook: 90° is written as 90*pi/180, π/2 as pi/2.
 
     Raises DescriptionError if `asked` is no such table.
     """
     try:
         cells = {key: type(empty)(json.loads(asked)[key]) for key, empty in EDITED.items()}
+        for row in cells["frames"].values():
+            row.update({column: _as_in_files(cell) for column, cell in row.items()})
         frames = [f"  {int(j)}: {_flow(row.items())}" for j, row in cells["frames"].items()]
         loops = [f"  - {_flow(loop.items())}" for loop in cells["loops"]]
         gravity = ", ".join(map(_scalar, cells["gravity"]))
@@ -163,6 +168,13 @@ def _comments(part: str) -> str:
     """Keep only the lines after the first of a part that are comments or empty."""
     lines = part.splitlines(keepends=True)[1:]
     return "".join(line for line in lines if line.lstrip()[:1] in ("", "#"))
+
+
+def _as_in_files(cell: str) -> str:
+    """Replace the signs π, ° and − of a cell by the text that a robot file has for them."""
+    for sign, text in PRINTED:
+        cell = re.sub(sign, text, cell)
+    return cell
 
 
 def _quoted(text: str) -> str:

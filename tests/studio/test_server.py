@@ -335,6 +335,21 @@ def test_the_convention_changes_how_a_table_is_read(studio: Any) -> None:
 
 
 @pytest.mark.parametrize(
+    ("typed", "written"),
+    [
+        ("q1 + 90°", "q1 + 90*pi/180"),
+        ("q1−π/2", "q1-pi/2"),
+        ("q1 - 30 °", "q1 - 30*pi/180"),
+        ("q1 + 3π/2", "q1 + 3*pi/2"),
+    ],
+)
+def test_angles_are_typed_as_a_textbook_prints_them(studio: Any, typed: str, written: str) -> None:
+    studio.upload("robot", "arm.yaml", CLASSIC.encode())
+    edited(studio, lambda cells: cells["frames"]["1"].update(theta=typed))
+    assert f"theta: {written}, r: 0" in (studio.path / "robot.yaml").read_text()
+
+
+@pytest.mark.parametrize(
     ("old", "new", "place"),
     [
         ("values:", "loops: [{cut: 1, twin: 2}]\nvalues:", ""),
