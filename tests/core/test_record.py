@@ -434,7 +434,7 @@ def test_joint_angles_beside_motor_currents(tmp_path):
         ),
         (
             {"columns": {"q": ["a", "a"]}},
-            r"record\.columns\.q: 'a' twice; expected one column per joint",
+            r"record\.columns\.q: column 'a' is given twice; expected one column per joint",
         ),
     ],
 )
@@ -628,7 +628,7 @@ def spoiled(i, j, value):
             [*cells()[:4], [1.0, 2.0, 3.0]],
             "a.csv, line 6: 3 fields; expected 5 (t, q1, q2, tau1, tau2)",
         ),
-        ([], "a.csv: no line of numbers"),
+        ([], "a.csv: the file has no line of numbers"),
     ],
 )
 def test_bad_csv(tmp_path, rows, said):

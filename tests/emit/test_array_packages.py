@@ -232,4 +232,4 @@ def test_mixed_precisions_packages_and_shapes_are_refused():
 
 def test_loops_closed_by_iteration_have_none(capsys):
     assert emitted(["four_bar"], ("numpy", "xp")).keys() == {"four_bar.py"}
-    assert "no xp target" in capsys.readouterr().err
+    assert "the target xp is not possible" in capsys.readouterr().err

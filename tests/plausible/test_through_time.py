@@ -72,7 +72,7 @@ def test_a_right_record_and_one_of_coarse_counts_are_left_alone(right: runtime.R
     ("kept", "frozen", "joints", "remedy"),
     [
         ((0, 4000, 4200, 10_000), (0, 0), "Joints 1, 2 jump by", "samples are missing"),
-        ((0, 10_000), (3000, 3300), "Joint 2 jumps by", "dropped out"),
+        ((0, 10_000), (3000, 3300), "Joint 2 jumps by", "an encoder failed"),
     ],
 )
 def test_jumps_are_told(
@@ -125,7 +125,7 @@ def test_an_encoder_that_froze_and_came_back_is_told(right: runtime.Record) -> N
     b = a + 20 + int(np.argmin(np.abs(right.q[a + 20 : a + 400, 1] - q[a, 1])))
     q[a:b, 1] = q[a, 1]
     worst = judged(replace(right, q=q)).worst
-    assert worst is not None and "holds one value" in worst.finding
+    assert worst is not None and "stays at one value" in worst.finding
 
 
 def test_a_torque_that_never_changes_ends_the_questions(
