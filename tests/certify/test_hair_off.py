@@ -118,7 +118,9 @@ def test_what_the_certificate_says_is_so_in_60_digits(alpha: str) -> None:
         small = sum(x < s[0] * mpmath.mpf("1e-9") for x in s)
     assert certificate.valid == (alpha not in ("1e-9", "1e-7")), str(certificate)
     if not certificate.valid:
-        assert f"almost a special one: {small} combinations of base param" in certificate.failures[0]
+        assert (
+            f"almost a special one: {small} combinations of base param" in certificate.failures[0]
+        )
 
 
 def test_coefficients_beyond_double_precision_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
