@@ -199,7 +199,7 @@ def test_unit_start_needs_gains_that_follow(emps, axes):
         )
     with pytest.raises(
         InputError,
-        match="gains: start: these parameters do not give a positive inertia about joint 1",
+        match="gains: start: the parameters that this option selects do not give a positive inertia about joint 1",
     ):
         estimate_of(
             seen,
