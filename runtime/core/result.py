@@ -162,7 +162,7 @@ class Identification:
     def set_errors(self) -> dict[SetName, float]:
         """Relative error, %, of torques that each set of parameters predicts for unseen data.
 
-        The sets are for instance "physical" and "essential". If several parts or records are
+        The sets are "essential", "feasible" (the physical set) and "all". If several parts or records are
         predicted, the error is the largest one. Empty if none is predicted.
         """
         judged = self.validation[-1].errors() if self.validation else {}

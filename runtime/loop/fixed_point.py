@@ -102,7 +102,7 @@ def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]
     if not isinstance(which, str):
         if unknown := [name for name in which if name not in names]:
             raise SettingsError(
-                f"no parameter {', '.join(unknown)}; expected some of {', '.join(names)}",
+                f"the fit has no parameter {', '.join(unknown)}; expected some of {', '.join(names)}",
                 path=("estimate", "options", "start"),
             )
         return np.array([which.get(name, 0.0) for name in names])

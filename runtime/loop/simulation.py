@@ -334,7 +334,10 @@ def _rest_functions(model: GeneratedModel) -> Any:
 
 def _check_shapes(reference: Reference, rate: float, n: int, N: int, *given: Array | None) -> None:
     if reference.q.shape[1] != n:
-        raise InputError(f"the reference has {reference.q.shape[1]} joints; expected {n}")
+        raise InputError(
+            f"the reference has {reference.q.shape[1]} joints, but the model has {n}; give a "
+            "reference of all joints of the robot"
+        )
     if abs(reference.rate / rate - 1) > 1e-9:
         raise InputError(
             f"the reference is at {reference.rate:g} Hz, but the controller runs at {rate:g} Hz; resample the reference"

@@ -403,7 +403,7 @@ def test_a_record_slower_than_its_controller_is_its_own_reference(arm, every):
     with pytest.raises(
         SettingsError,
         match=(
-            r"controller at 4000 Hz that records every 1\. tick; set controller\.record_every: "
+            r"controller at 4000 Hz that records every tick; set controller\.record_every: "
             rf"{every}"
         ),
     ):
