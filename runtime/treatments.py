@@ -246,8 +246,8 @@ def columns_text(name: SetName, fit: Estimate) -> str:
 def _require_alike(name: str, further: Sequence[Record], first: Sequence[Record]) -> None:
     if not further:
         raise InputError(
-            f"{name} has no validation record, which the comparison of treatments needs; set "
-            "validate.record"
+            f"{name} has no validation record, on which studies are compared; set "
+            "validate.record in every study file"
         )
     for record in further:
         if not record.tau.any():
@@ -260,8 +260,9 @@ def _require_alike(name: str, further: Sequence[Record], first: Sequence[Record]
             )
     if [len(record) for record in further] != [len(record) for record in first]:
         raise InputError(
-            f"{name} is validated by {', '.join(r.file for r in further)}, but the first treatment by "
-            f"{', '.join(r.file for r in first)}; expected the same validation records"
+            f"{name} predicts {', '.join(r.file for r in further)}, but the first study predicts "
+            f"{', '.join(r.file for r in first)}; set the same validate.record, with as many "
+            "samples, in every study file"
         )
 
 

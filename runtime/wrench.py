@@ -74,15 +74,15 @@ def force_sensors(problem: Problem) -> Problem:
         for c in channels:
             if record.channels.get(c, np.empty((0, 0))).shape[1] != 6:
                 raise InputError(
-                    f"the record has no signal {c} of three forces and three moments; give the six "
-                    "columns of this sensor in every record that is fitted or predicted, "
-                    f"record.columns: {{wrench: {{{c.removeprefix(WRENCH)}: [...]}}}}",
+                    f"three forces and three moments of the sensor in frame {c.removeprefix(WRENCH)} "
+                    "are needed in every record: write record.columns: "
+                    f"{{wrench: {{{c.removeprefix(WRENCH)}: [...]}}}} in the study, with six columns",
                     file=record.file,
                 )
     settings = problem.settings
     if settings.signals.reader not in READ_SAMPLE_BY_SAMPLE:
         raise InputError(
-            f"signals.reader: {settings.signals.reader} does not support wrenches; use reader: lowpass, or remove record.columns.wrench"
+            f"signals.reader: {settings.signals.reader} does not support force sensors; write signals: {{reader: lowpass}} in the study, or remove record.columns.wrench"
         )
     n = len(problem.model.JOINTS)
     torques = any(record.tau.any() for record in problem.records)

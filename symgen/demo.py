@@ -347,9 +347,10 @@ def percent(value: float, reference: float) -> float:
 
 
 def _fit_cells(fit: Estimate, name: str) -> tuple[str, str, str]:
-    """Write an estimated parameter, its difference from Table 2, and its relative sigma, both in %.
+    """Write an estimate, its difference from the published value, and its relative deviation.
 
-    A parameter that is not in the fit gives "removed".
+    The published value is that of Table 2 of the book chapter. The difference and the standard
+    deviation are in %. A parameter that is not in the fit gives "removed".
     """
     if name not in fit.names:
         return "removed", "-", "-"

@@ -159,12 +159,12 @@ def test_deviations_by_row_group(name: str) -> None:
 def test_what_is_missing_is_said() -> None:
     model, _, record = measured("planar_2r")
     bare = runtime.Record(record.t, record.q, record.tau, rate=1000.0, name="bare")
-    with pytest.raises(InputError, match="no signal wrench0 of three forces"):
+    with pytest.raises(InputError, match="three moments of the sensor in frame 0"):
         runtime.problem(model, [record, bare], STUDY)
     with pytest.raises(InputError, match="--with base_wrench_regressor"):
         runtime.identify(symgen.model("planar_2r"), record, STUDY)
     counts = study_from_mapping({"signals": {"reader": "counts"}})
-    with pytest.raises(InputError, match="reader: counts does not support wrenches"):
+    with pytest.raises(InputError, match="reader: counts does not support force sensors"):
         runtime.identify(model, record, counts)
     elsewhere = runtime.Record(
         record.t, record.q, record.tau, rate=1000.0, channels={"wrench9": np.ones((6000, 6))}

@@ -163,10 +163,10 @@ copyreg.pickle(ModuleType, _reduced)
 
 
 def checked_model(module: ModuleType) -> GeneratedModel:
-    """Return the module if it is a consistent emitted model; raise ModelError otherwise.
+    """Check a generated module, and return it as a model; raise ModelError if a check fails.
 
-    Checked are its functions and names, the numbers n of joints and b of base parameters, and the
-    shapes of its arrays.
+    The module needs all functions and names of a generated model. The shapes of its arrays must
+    agree with its numbers of joints and base parameters.
     """
     label = module.__name__
     missing = [name for name in (*CONSTANTS, *FUNCTIONS) if not hasattr(module, name)]

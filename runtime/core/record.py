@@ -355,7 +355,7 @@ def require_finite(
         numbers = f"numbers up to {largest:g} (SI)" if np.isfinite(x[i, j]) else "finite numbers"
         column = names[j] if len(names) == x.shape[1] else f"{', '.join(names)} ({j + 1})"
         raise InputError(
-            f"{x[i, j]} ({len(bad)} such values in all); expected {numbers}, repair or cut the "
+            f"the value is {x[i, j]} ({len(bad)} such values in all); expected {numbers}: repair or cut the "
             f"record{f'; {hint}' if hint and np.isnan(x[i, j]) else ''}",
             file=file,
             column=column,

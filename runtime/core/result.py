@@ -160,7 +160,11 @@ class Identification:
 
     @property
     def set_errors(self) -> dict[SetName, float]:
-        """Largest error on unseen data, %, of each set of parameters; empty without predictions."""
+        """Relative error, %, of torques that each set of parameters predicts for unseen data.
+
+        The sets are "essential", "feasible" (the physical set) and "all". If several parts or records are
+        predicted, the error is the largest one. Empty if none is predicted.
+        """
         judged = self.validation[-1].errors() if self.validation else {}
         return {name: judged[name] for name in ORDER if name in judged}
 

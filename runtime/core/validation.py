@@ -128,7 +128,10 @@ class CrossValidation(Result):
     further: bool = False
 
     def errors(self) -> dict[str, float]:
-        """Return the largest relative error on unseen data, %, of each set of parameters."""
+        """Return the relative error, %, of torques that each set of parameters predicts.
+
+        It is the largest one of all predictions of data outside the fit.
+        """
         unseen = [p for p in self.predictions if not p.fitted]
         return {
             columns: max(p.relative_error for p in unseen if p.columns == columns)

@@ -177,8 +177,9 @@ def weights_of(
         largest[units.get(name, "")] = max(largest.get(units.get(name, ""), 0.0), abs(X[name]))
     if not all(largest.values()):
         raise InputError(
-            f"all parameters in {', '.join(u for u, x in largest.items() if not x)} are zero, so their "
-            "columns have no scale; give values in the robot file, or an estimate"
+            f"all parameters in {', '.join(u for u, x in largest.items() if not x)} are zero, but the "
+            "criterion compares each parameter with its size; give values in the robot file, or a "
+            "record"
         )
     return Weights(
         names,

@@ -101,7 +101,8 @@ def excite(
         raise InputError(
             f"none of {settings.starts} starts gave a motion within the limits; the best one exceeds "
             f"a limit by {100 * least.violation:.2g} % ({least.message}). Widen the limits, make the "
-            "parts longer, use fewer harmonics or points, or remove `begin`"
+            "parts of the motion longer, use fewer harmonics or points, or remove the start "
+            "positions (the setting `begin`)"
         )
     candidates = []
     for motion, margin in _within(model, search, kept[: LIMIT.STARTS_COMPARED]):

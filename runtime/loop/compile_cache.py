@@ -121,7 +121,9 @@ def _compiled(
         done = _ran([*command, *flags, source.name, "-o", target.name, *LIBRARIES], scratch)
         if done.returncode or not target.is_file():
             first = next(iter(done.stderr.strip().splitlines()), "no message")
-            raise NotCompiledError(f"{' '.join(command)} failed with {done.returncode}: {first}")
+            raise NotCompiledError(
+                f"the compiler {' '.join(command)} failed with {done.returncode}: {first}"
+            )
         final = folder / f"{key}-{hashlib.sha256(target.read_bytes()).hexdigest()[:32]}.so"
         target.replace(final)
     return final
@@ -140,7 +142,9 @@ def compiler() -> tuple[tuple[str, ...], str]:
     )
     if program is None:
         raise NotCompiledError(
-            f"no C compiler {given[0]} (CC)" if given else "no C compiler cc, gcc or clang on PATH"
+            f"no C compiler {given[0]}, which the variable CC names"
+            if given
+            else "no C compiler cc, gcc or clang on PATH"
         )
     unsafe = [flag for flag in given[1:] if flag in UNSAFE]
     if unsafe:
@@ -164,4 +168,4 @@ def _ran(words: Sequence[str], folder: str | None = None) -> subprocess.Complete
             check=False,
         )
     except (OSError, subprocess.TimeoutExpired) as e:
-        raise NotCompiledError(f"{words[0]} did not run: {e}") from e
+        raise NotCompiledError(f"the compiler {words[0]} did not run: {e}") from e

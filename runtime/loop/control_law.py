@@ -132,9 +132,9 @@ def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
 
     if "fit" in (law.kd, law.delay):
         raise SettingsError(
-            "the setting `fit` has no number, which a simulation needs; identify the record "
-            "first, and write the fitted numbers here",
-            path=("controller", "law"),
+            "a simulation needs a number, not `fit`; identify the record first, and write the "
+            "fitted number here",
+            path=("controller", "law", "kd" if law.kd == "fit" else "delay"),
         )
     gains = law.gains(n)
     one, zero = np.ones(n), np.zeros(n)

@@ -102,7 +102,7 @@ def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]
     if not isinstance(which, str):
         if unknown := [name for name in which if name not in names]:
             raise SettingsError(
-                f"no parameter {', '.join(unknown)}; expected some of {', '.join(names)}",
+                f"the fit has no parameter {', '.join(unknown)}; expected some of {', '.join(names)}",
                 path=("estimate", "options", "start"),
             )
         return np.array([which.get(name, 0.0) for name in names])
@@ -125,7 +125,8 @@ def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]
             own = next((name for name in (f"Ia{j}", f"ZZ{j}", f"M{j}") if name in standard), None)
             if own is None:
                 raise SettingsError(
-                    f"joint {j} of {model.NAME} has no inertia parameter of its own; use start: ols",
+                    f"start: unit sets an inertia of 1 for each joint, but joint {j} of {model.NAME} "
+                    "has no inertia parameter of its own; use start: ols",
                     path=("estimate", "options", "start"),
                 )
             standard[own] = 1.0
@@ -148,7 +149,7 @@ def iterate(
     J = None if options.gains == "one" else loop.inertia(full(names, reference, every))
     if J is not None and not np.all(J > 0):
         raise InputError(
-            f"gains: {options.gains}: these parameters do not give a positive inertia about joint "
+            f"gains: {options.gains}: the parameters that this option selects do not give a positive inertia about joint "
             f"{joint_labels(loop.model)[int(np.argmin(J))]}; {_physical_start(loop, start)}"
         )
     remedy = _physical_start(loop, start)

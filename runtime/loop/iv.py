@@ -121,9 +121,9 @@ def _solve(W: Array, Z: Array, Y: Array) -> tuple[Array, Array, Array]:
         A = np.linalg.inv(Z.T @ W)
     except LinAlgError:
         raise InputError(
-            "Z'VW is singular (Z: regressor of the simulated motion, W: of the record, V: "
-            "weights), since the simulated motion excites less than the measured one; check "
-            "controller and reference"
+            "the simulated motion excites fewer parameters than the measured motion, so method iv "
+            "has no solution; check the settings of the controller and its reference (Z'VW is "
+            "singular, with the regressors Z of the simulation and W of the record, and weights V)"
         ) from None
     X = A @ (Z.T @ Y)
     X += A @ (Z.T @ (Y - W @ X))

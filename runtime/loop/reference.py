@@ -214,7 +214,7 @@ def require_rate(record: Record, controller: Controller) -> None:
     ratio = rate / record.rate
     told = (
         f"{record.file} has the rate {record.rate:g} Hz, which does not match a controller at "
-        f"{rate:g} Hz that records every {every}. tick"
+        f"{rate:g} Hz that records {'every tick' if every == 1 else f'one tick in {every}'}"
     )
     if round(ratio) >= 1 and abs(ratio / round(ratio) - 1) <= LIMIT.RATE_TOLERANCE:
         raise SettingsError(
@@ -223,8 +223,8 @@ def require_rate(record: Record, controller: Controller) -> None:
         )
     raise SettingsError(
         (
-            f"{told}; the rate of the controller is no multiple of the rate of the record: correct one "
-            "of these rates"
+            f"{told}; the rate of the controller is no multiple of the rate of the record: correct "
+            "controller.rate or record.rate"
         ),
         path=("controller", "rate"),
     )

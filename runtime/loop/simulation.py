@@ -134,8 +134,8 @@ class Simulator:
         X, g = np.asarray(X, dtype=float), np.broadcast_to(np.asarray(g, dtype=float), (n,)).copy()
         if X.shape != (b,) or not np.isfinite(X).all():
             raise InputError(
-                f"X has shape {X.shape}; expected the {b} base parameters, finite "
-                f"numbers, of {self.model.NAME}"
+                f"X has shape {X.shape}; expected finite numbers, one for each of the {b} base "
+                f"parameters of {self.model.NAME}"
             )
         _check_shapes(reference, self.controller.rate, n, N, disturbance, feedforward)
         substeps = self.substeps(X, reference, g)
@@ -206,16 +206,15 @@ class Simulator:
             smallest, time = np.linalg.eigvalsh((A + A.T) / 2)[0], k / reference.rate
             if not smallest > 0:
                 raise SimulationError(
-                    f"the inertia matrix of these parameters is not positive definite at {time:g} "
+                    f"the inertia matrix of the simulated robot is not positive definite at {time:g} "
                     f"s of the reference, smallest eigenvalue {smallest:.3g}; "
-                    "use parameters of a physical robot (method feasible, CAD), or a smaller step "
-                    "towards these parameters",
+                    "use parameters of a physical robot, from CAD or from estimate: {method: feasible}",
                     time=time,
                 )
             pole = np.abs(discrete_poles(self.law, A, B, g)).max()
             if pole > LIMIT.UNSTABLE_POLE:
                 raise SimulationError(
-                    f"the loop with these gains and parameters is unstable at {time:g} s of the "
+                    f"the simulated control loop is unstable at {time:g} s of the "
                     f"reference: a discrete pole has modulus {pole:.4g}, expected at most 1; "
                     f"lower kp and {'kd' if self.controller.law.kind == 'pid' else 'kv'}, raise "
                     "the controller's rate, or scale the gains with the inertia (g)",
@@ -226,7 +225,7 @@ class Simulator:
         if steps > LIMIT.MOST_SUBSTEPS:
             raise SettingsError(
                 (
-                    f"a pole at {fastest:.3g} 1/s needs {steps} integration steps per tick of the controller; at most "
+                    f"a pole of the control loop at {fastest:.3g} 1/s needs {steps} integration steps per tick of the controller; at most "
                     f"{LIMIT.MOST_SUBSTEPS} are allowed: raise the rate or pole_step, or lower the gains"
                 ),
                 path=("controller", "rate"),
@@ -266,7 +265,7 @@ class Simulator:
         given = self.controller.start if start is None else start
         q = np.asarray(reference.q[0] if given is None else given, dtype=float)
         if q.shape != (n,) or not np.isfinite(q).all():
-            raise InputError(f"start {q}; expected {n} finite joint positions")
+            raise InputError(f"start positions {q}; expected {n} finite numbers, one per joint")
         y = q if ideal else self.law.shown(q)
         return np.concatenate([q, np.zeros(n), y, y, np.zeros(2 * n)])
 
@@ -335,7 +334,10 @@ def _rest_functions(model: GeneratedModel) -> Any:
 
 def _check_shapes(reference: Reference, rate: float, n: int, N: int, *given: Array | None) -> None:
     if reference.q.shape[1] != n:
-        raise InputError(f"the reference has {reference.q.shape[1]} joints; expected {n}")
+        raise InputError(
+            f"the reference has {reference.q.shape[1]} joints, but the model has {n}; give a "
+            "reference of all joints of the robot"
+        )
     if abs(reference.rate / rate - 1) > 1e-9:
         raise InputError(
             f"the reference is at {reference.rate:g} Hz, but the controller runs at {rate:g} Hz; resample the reference"
@@ -358,8 +360,8 @@ def _check_motion(q: Array, reference: Reference) -> None:
     if lost.any():
         k, j = np.argwhere(lost)[0]
         raise SimulationError(
-            f"the simulated motion leaves its reference at {(k + 1) / reference.rate:g} s, "
-            f"position {j + 1} first: the loop is unstable there; lower the gains, raise the rate, "
-            "or slow down the reference",
+            f"the simulated motion leaves its reference at {(k + 1) / reference.rate:g} s, first at "
+            f"joint {j + 1}: the control loop is unstable there; lower the gains, raise the rate of "
+            "the controller, or slow down the reference",
             time=(k + 1) / reference.rate,
         )

@@ -33,10 +33,10 @@ class Part:
     def __post_init__(self) -> None:
         p = np.array(self.p, dtype=float)
         if p.ndim != 2 or len(p) != len(self.family.names) or not np.all(np.isfinite(p)):
-            expected = f"({len(self.family.names)}, joints)"
             raise InputError(
-                f"coefficients of shape {p.shape} of a {self.family.family} part; expected "
-                f"finite numbers of shape {expected}"
+                f"coefficients of shape {p.shape} for a {self.family.family} motion; expected a "
+                f"table of finite numbers with {len(self.family.names)} rows, one for each of "
+                f"{', '.join(self.family.names)}, and one column for each joint"
             )
         object.__setattr__(self, "p", p)
 
@@ -50,7 +50,8 @@ class Motion:
     def __post_init__(self) -> None:
         if not self.parts or len({part.p.shape[1] for part in self.parts}) != 1:
             raise InputError(
-                "a motion needs at least one part, and every part must have the same number of joints"
+                "a motion needs at least one part (a Fourier series, for instance), and every part "
+                "needs coefficients for the same number of joints"
             )
 
     @property
@@ -120,7 +121,9 @@ def motion_from_mapping(mapping: Mapping[str, Any]) -> Motion:
         path = ("parts", k)
         if not isinstance(part, Mapping) or "p" not in part:
             raise SettingsError(
-                f"part {k + 1} of the trajectory has no coefficients `p`", path=path
+                f"part {k + 1} of the trajectory has no coefficients; give `p`, one list of "
+                "coefficients for each joint",
+                path=path,
             )
         settings = {key: value for key, value in part.items() if key != "p"}
         family: Family = structure(cast(Any, AnyFamily), settings, path)

@@ -305,12 +305,12 @@ class Row:
 
 
 def study(robot: Robot) -> Iterator[Item]:
-    """Yield one empty mapping: the error concerns the whole study, not one joint."""
+    """Yield one empty mapping, for a mistake that concerns the whole study and not one joint."""
     yield {}
 
 
 def several_joints(robot: Robot) -> Iterator[Item]:
-    """Yield one empty mapping, for an error of all joints together; nothing for a single joint."""
+    """Yield one empty mapping, for a mistake in all joints together; nothing for a single joint."""
     yield from [{}] if robot.n > 1 else []
 
 
@@ -402,7 +402,10 @@ def position_unit_of_joints(robot: Robot) -> Iterator[Item]:
 
 
 def of_each_joint(robot: Robot, items: Iterator[Item]) -> Iterator[Item]:
-    """Yield, for an error of several joints, the same error of each of these joints alone."""
+    """Yield a mistake in the data of several joints, such as a wrong unit, for each joint alone.
+
+    `items` are the mistakes of several joints.
+    """
     for item in items:
         for j in np.flatnonzero(item["chosen"]) if item["chosen"].sum() > 1 else ():
             yield {**item, "chosen": np.arange(robot.n) == j, "joint": robot.labels[j]}
@@ -442,7 +445,7 @@ def known_torques(robot: Robot) -> Iterator[Item]:
 
 
 def geared(robot: Robot) -> Iterator[Item]:
-    """Yield one empty mapping, for an error of the gear ratios; nothing if the robot has no gears.
+    """Yield one empty mapping, for a mistake in the gear ratios; nothing if there are no gears.
 
     A ratio may be missing or applied twice.
     """
@@ -450,9 +453,9 @@ def geared(robot: Robot) -> Iterator[Item]:
 
 
 def with_constants(robot: Robot) -> Iterator[Item]:
-    """Yield one empty mapping, for an error of the torque constants; nothing without them.
+    """Yield one empty mapping, for a mistake in the torque constants of the motors.
 
-    The torque constants may be missing, or applied to signals that are torques already.
+    Nothing is yielded for a robot without torque constants. The torque constants may be missing, or applied to signals that are torques already.
     """
     yield from [{}] if not np.allclose(robot.constant, np.eye(robot.n)) else []
 
@@ -599,7 +602,7 @@ def entries(robot: Robot, names: str) -> Iterator[Item]:
 
 
 def slow_joints(robot: Robot) -> Iterator[Item]:
-    """Yield one error to try: the model lacks friction at low speed in some joints.
+    """Yield one possible error: the model lacks friction at low speed in some joints.
 
     Nothing is yielded if no joint certainly has such friction.
     """

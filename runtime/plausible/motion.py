@@ -172,7 +172,11 @@ def unexcited_shares(observation: Observation, signals: Signals, rate: float) ->
         ]
     )
     if not s.all():
-        raise InputError("the torque of a joint is zero throughout; leave this joint out")
+        zero = ", ".join(str(j + 1) for j in np.flatnonzero(s == 0))
+        raise InputError(
+            f"all measured torques of joint {zero} are zero; give the columns of these torques in "
+            "record.columns.tau"
+        )
     columns = np.linalg.norm(observation.W / s[observation.joints][:, None], axis=0)
     if not columns.all():
         raise np.linalg.LinAlgError("a column of the observation matrix is zero")

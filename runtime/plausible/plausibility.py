@@ -182,10 +182,13 @@ def plausibility_of(result: Identification, variants: GeneratedModel | None = No
     Static poses and robots with force sensors are refused with an InputError.
     """
     if result.study.signals.reader == "static":
-        raise InputError("not judged for poses at rest")
+        raise InputError(
+            "record and study are not judged for poses at rest; the checks need a motion"
+        )
     if any(is_axis(joint) for joint in result.model.JOINTS):
         raise InputError(
-            "not judged for a robot with force sensors; identify once without record.columns.wrench"
+            "record and study are not judged for a robot with force sensors; identify once without "
+            "record.columns.wrench"
         )
     return plausibility(result.problem, variants=variants)
 

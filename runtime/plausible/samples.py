@@ -109,9 +109,10 @@ def moving(qd: Array) -> Array:
 
 
 def excerpts(reading: Prepared) -> list[Prepared]:
-    """Cut a long record to a few excerpts that are spread evenly over its time window.
+    """Cut a few excerpts from a long record, spread evenly over the time window of the study.
 
-    Their number and length are LIMIT.EXCERPTS. A shorter record stays whole.
+    LIMIT.EXCERPTS gives the number of excerpts and the samples of each. A shorter record stays
+    whole.
     """
     record = reading.record
     start, stop = window_of(record.t, reading.study.rows.window, record.name)
@@ -156,7 +157,7 @@ class Filtered:
     states: States
 
     def torque(self, tau: Array) -> Array:
-        """Filter torques with the low-pass that filtered the positions, shape (N, n)."""
+        """Filter torques, shape (N, n), by a median filter and the low-pass of the positions."""
         smooth = median_filtered(tau, self.study.signals.window_of_torques)
         return lowpass_filtered(smooth, self.record.rate, self.low)
 
@@ -171,7 +172,9 @@ def filtered(reading: Prepared, study: Study) -> Filtered:
 
 
 def samples_of(records: Sequence[Prepared | Filtered], study: Study) -> Samples:
-    """Filter all records, and select at most LIMIT.INSTANTS_KEPT samples in their time windows.
+    """Filter all records, and select at most LIMIT.INSTANTS_KEPT samples of all records together.
+
+    The samples are inside the time window of the study, `rows.window`.
 
     Raises
     ------
@@ -219,8 +222,8 @@ def usable(record: Record, study: Study, before: int, after: int) -> Array:
 def _instants(through: Filtered, number: int) -> Samples:
     """Select samples of one filtered record, about 0.4/f seconds apart (f: cut-off frequency).
 
-    If these are fewer than LIMIT.INSTANTS_LEAST in a long record, twice as many are chosen. A time
-    of 2/cutoff is left out at each end.
+    If a long record gives fewer than LIMIT.INSTANTS_LEAST samples, twice as many are selected. The
+    first and last 2/f seconds of the time window are left out.
     """
     record, states, cutoff = through.record, through.states, through.low.hertz
     known = np.zeros_like(record.tau) if record.tau_known is None else record.tau_known

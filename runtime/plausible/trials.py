@@ -524,11 +524,11 @@ def _of_numbers(baseline: Baseline, robot: Robot) -> list[Trial]:
 
 
 def _search_number(baseline: Baseline, row: Row, change: Change, first: float) -> Trial | None:
-    """Search the best value of the unknown number of a possible error; None if none gains enough.
+    """Search the size xi of one possible error, such as a torque factor, that fits the record best.
 
-    A coarse grid uses the weights of the study, then a golden section search uses the weights of
-    each value: far from the best value its own weights may mislead. Each parameter of the cause
-    costs half of log N of the gain.
+    None if no size improves the fit enough. A few sizes are tried with the joint weights of the
+    study, then a bounded search uses the weights of each trial. Each unknown number of the error
+    reduces the gain by log(N)/2 for N independent samples.
     """
     scores: dict[float, float] = {}
     sigma = baseline.given.sigma

@@ -361,7 +361,9 @@ def _command(settings: RecordSettings, n: int) -> str:
     units = {torque_unit(name)[0] for name in _units(settings.units.tau, n, "units.tau")}
     if len(units) > 1 or settings.columns.tau_known:
         raise InputError(
-            "record.torque_constant: none is for torque columns that are all currents or all voltages, without tau_known; set the constants (N*m/A), 1 for columns in N*m"
+            "record.torque_constant: none needs torque columns that are all currents or all voltages, "
+            "and no record.columns.tau_known; otherwise give the torque constant (N*m/A) of each "
+            "joint, 1 for a column in N*m"
         )
     return {"current": "A", "voltage": "V"}[units.pop()]
 

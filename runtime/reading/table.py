@@ -122,7 +122,7 @@ class Table:
                 raise self.refused[name]
             if name in self.empty and not empty:
                 raise InputError(
-                    f"an empty field; expected a number{hint}",
+                    f"the field is empty; expected a number{hint}",
                     file=self.file,
                     column=name,
                     row=self.empty[name],
@@ -150,7 +150,7 @@ class Table:
             raise self.refused[name]
         if name not in self.columns:
             raise InputError(
-                f"{self.what} contains no number {name!r}; write the number itself in the settings",
+                f"{self.what} contains no number named {name!r}; in the settings, write the number instead of its name",
                 file=self.file,
             )
         x = self.columns[name]

@@ -36,7 +36,7 @@ def read_text(path: Path, options: Options) -> Table:
     decimal = options.decimal
     _, first = next(_lines(path), (0, ""))
     if not first:
-        raise InputError("no line of numbers; expected one line of numbers per sample", file=file)
+        raise InputError("the file has no line of numbers; expected one line per sample", file=file)
     delimiter = next((mark for mark in ";\t," if mark in first and mark != decimal), None)
     if _width(first, delimiter) > WIDEST:
         raise InputError(

@@ -126,14 +126,12 @@ def speed(value: Any) -> Any:
 
 def _unit(text: str, kinds: tuple[str, ...]) -> Unit:
     if text == "grad":
-        raise InputError(
-            "'grad' can mean 1/400 of a turn or a degree; write units such as gon or deg"
-        )
+        raise InputError("'grad' can mean 1/400 of a turn or a degree; write gon or deg instead")
     if kinds == TORQUES and text.strip() in ("%", "percent", "per cent"):
         raise InputError(
-            f"{text!r} of an unknown rated value; write the unit of the rated value (such as A or "
-            "N*m) in record.units.tau, and a hundredth of the rated value of each "
-            "joint in record.scale"
+            f"{text!r} is a share of a rated value that is not given; write the unit of the rated "
+            "value (such as A or N*m) in record.units.tau, and a hundredth of the rated value of "
+            "each joint in record.scale.tau"
         )
     kind, factor = TABLE[text] if text in TABLE else _of_pint(text)
     if kind not in kinds:

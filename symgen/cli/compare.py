@@ -15,7 +15,7 @@ def compare(
     study: Annotated[
         list[str],
         typer.Argument(
-            help="Study files to compare, all with the same validate.record. A single file is compared with variants of itself: without rows at rest, and without known torques."
+            help="Study files to compare, all with the same validate.record. A single study is compared with changed copies of itself: without the samples of joints at rest, and without subtracting known torques (record.columns.tau_known)."
         ),
     ],
     output: Annotated[

@@ -39,13 +39,16 @@ def show(
     ] = None,
     rows: Annotated[
         str | None,
-        typer.Option(help="Rows of the Jacobian of which the determinant is taken, e.g. 1,2."),
+        typer.Option(
+            help="With --model determinant: rows of the Jacobian that form the square matrix, e.g. 1,2."
+        ),
     ] = None,
     form: Annotated[
         str | None,
         typer.Option(
-            help="closed (factored by parameter) or recursive (every step, as SYMORO prints). "
-            "Default: closed."
+            help="closed: each entry of the model as one formula, factored by parameter. recursive: "
+            "the equations link by link, with intermediate variables, as SYMORO prints. Default: "
+            "closed."
         ),
     ] = None,
     parameters: Annotated[
@@ -58,7 +61,7 @@ def show(
     passive: Annotated[
         str | None,
         typer.Option(
-            help="Print passive joints of loops as `functions` of the others, or as `symbols`."
+            help="Print the positions of passive joints of loops as `functions` of the actuated joints, or as `symbols`."
         ),
     ] = None,
     format: Annotated[

@@ -28,7 +28,9 @@ def studio(
     output: Annotated[
         Path,
         typer.Option(
-            "-o", "--output", help="Work folder of ordinary files, which the studio can open again."
+            "-o",
+            "--output",
+            help="Folder in which the studio saves robot files, study files and results, and opens them again.",
         ),
     ] = Path("symgen-studio"),
     port: Annotated[

@@ -241,19 +241,20 @@ class Draw:
         return result
 
     def _joint(self, j: int) -> Point:
-        """Return cosine and sine, modulo p, of the angle q_j/D at each state.
+        """Return random cosines and sines, modulo the prime p, of the angle q_j/D of joint j.
 
-        D is a common denominator of the ratios between passive and independent joint angles.
+        D is a common denominator of the ratios between passive and independent joint angles: with
+        q5 = q2/2, D = 2. So every angle of the robot is a whole multiple of some q_j/D.
         """
         if j not in self._points:
             self._points[j] = self._point_at(self._random(("angle", j), self.samples))
         return self._points[j]
 
     def _unit(self, unit: Unit) -> Point:
-        """Return cosine and sine, modulo p, of a unit angle, such as pi/D.
+        """Return cosine and sine, modulo the prime p, of a unit angle, such as pi/D.
 
-        For pi/D the point is a root of unity of order 2D; for any other unit angle it is random,
-        unless the geometry gives it.
+        D is the common denominator of the robot's fractions of pi. For pi/D the point is a root of
+        unity of order 2D; for any other unit angle it is random, unless the geometry gives it.
         """
         if unit not in self._points:
             if unit in self._geometry:
@@ -266,9 +267,9 @@ class Draw:
 
     @cached_property
     def half_turn(self) -> Point:
-        """Cosine and sine, modulo p, of the unit angle pi/D; 2*D such angles make a full turn.
+        """Cosine and sine, modulo the prime p, of the angle pi/D; 2 D such angles make a full turn.
 
-        Its multiple pi/2 has the cosine 0 and the sine 1.
+        D is the common denominator of the robot's fractions of pi. The multiple pi/2 has the cosine 0 and the sine 1.
         """
         order = 2 * self.units.D
         rng = np.random.default_rng([self.seed, 1])
@@ -348,9 +349,10 @@ class Draw:
         return b if lead.value(self.robot.constants) > 0 else 1 - b
 
     def _opaque(self, op: str, x: list[Fp]) -> Fp:
-        """Return substitute values for a function, such as exp, that does not exist modulo p.
+        """Return substitute values for a function, such as exp, that no arithmetic modulo a prime has.
 
-        Equal operands give equal values. The head of this module has the formula.
+        Equal operands x of the function `op` give equal values (x + k)^m modulo the prime p, with k
+        from `op`.
         """
         total = sum((v.x * KEY**k % self.p for k, v in enumerate(x)), sum(op.encode()) * KEY)
         return self._fp(power(total % self.p, OPAQUE_POWER, self.p))

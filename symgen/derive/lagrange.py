@@ -538,10 +538,10 @@ class Sample:
 
 
 def _leverage(robot: Robot, constants: Mapping[str, float]) -> Array:
-    """Return the largest coefficient of each actuated joint in friction that acts on several joints.
+    """Return the largest factor of each actuated velocity in friction that acts on several joints.
 
-    For instance 101.25 for q5 in friction along q4 + 101.25 q5; 1 if there is no such element.
-    Shape (n,).
+    Friction along q4 + 101.25 q5, for instance, depends on the velocity q4d + 101.25 q5d: the
+    factor of joint 5 is 101.25. It is 1 for a joint without such friction. Shape (n,).
     """
     closure = close(robot)
     rows = [dict(closure.in_independent(r)) for e in robot.elements for r in e.along.values()]

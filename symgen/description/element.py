@@ -165,10 +165,11 @@ class Element:
         return {parameter(name, j): x for name, x in values.items() for j in self.keys}
 
     def _of_key(self, law: Expression, j: int) -> Expression:
-        """Replace fitted constants in the law by symbols for frame j (vs3), others by numbers.
+        """Return the law of this element for frame j: each constant becomes a symbol or a number.
 
-        A constant to be fitted becomes a symbol (vs3 for vs), a fixed one a number. The transmitted
-        torque tau_model becomes channel.tau_model3.
+        For j = 3, a nonlinear constant vs that a fit may change becomes the symbol vs3, and the
+        transmitted torque tau_model becomes channel.tau_model3. A fixed constant becomes its
+        number.
         """
         torque = Expression.symbol(f"{CHANNEL}{parameter(TRANSMITTED, j)}")
         return law.substitute(
@@ -248,9 +249,10 @@ class Element:
 
 
 def check_law(e: Element, robot: Any) -> None:
-    """Check that the law of an element has only known names and gives finite torques.
+    """Check that the torque law of an element, such as joint friction, gives finite torques.
 
-    The torques are computed at rest and in motion.
+    The torques are computed at rest and in motion. The law may contain only names that the robot
+    file or the element defines.
     """
     where: Path = ("elements", e.family)
     states = [f"{state}{j}" for state in ("q", "qd") for j in ("", *robot.moving)]

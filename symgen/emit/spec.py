@@ -248,9 +248,9 @@ def function(
     only: Callable[[str], bool] = lambda own: True,
     graph: Rewrite | None = None,
 ) -> Function:
-    """Make the data of one function of the emitted code, such as the regressor.
+    """Make the description of one emitted function: its model, its expressions and its shape.
 
-    Only base parameters named after a standard parameter for which `only` is true take part.
+    `name` is the model, such as inverse_dynamics. Only base parameters named after a standard parameter for which `only` is true take part.
     `graph` is an expression graph that several models share; it needs all parameters. A model on
     request adds nodes to its derivation, so it has one of its own: its operations do not depend on
     what was asked before.

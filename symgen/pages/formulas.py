@@ -44,10 +44,11 @@ def printed(regrouping: Regrouping, form: str, only: str | None = None) -> str:
 
 
 def _page(regrouping: Regrouping, formulas: list[str]) -> list[str]:
-    """Compose the text of `symgen show`: counts, formulas, parameters without regrouping or effect.
+    """Compose the text of `symgen show`: the regrouping formulas and two lists of parameters.
 
-    The formulas are aligned as in eq. (27). The lists are base parameters without regrouping, and
-    standard parameters without effect. Joint names and relations of passive joints are included if
+    The formulas are aligned as in eq. (27). The first list has the base parameters that are single
+    standard parameters, the second the standard parameters that do not act on any torque. The
+    number of base parameters is in the first line. Joint names and relations of passive joints are included if
     there are any.
     """
     robot = regrouping.robot

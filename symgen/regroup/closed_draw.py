@@ -252,9 +252,10 @@ class ClosedDraw(Draw):
         )
 
     def _take(self, closed: Array) -> None:
-        """Select samples whose loops close, the same number for each geometry; drop the others.
+        """Keep samples in which all loops close, the same number for each geometry.
 
-        `closed` marks the samples that close, shape (geometries, samples).
+        A geometry is one random choice of the lengths of the robot. `closed`, shape (geometries,
+        samples), says in which samples the loops close.
         """
         count = self.shape[1]
         whole = self.samples

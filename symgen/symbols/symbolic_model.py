@@ -244,11 +244,9 @@ class SymbolicModel:
         if len(moved) != n:
             first = [k + 1 for k in (moved + [k for k in range(6) if k not in moved])[:n]]
             raise SymgenError(
-                f"the Jacobian of frame {self.request.of} of {self.source.robot.name} in frame "
-                f"{self.request.frame} has {len(moved)} rows that "
-                f"are not zero ({', '.join(TWIST[k] for k in moved)}) and {n} columns; choose {n} of "
-                "its rows 1 to 6, such as "
-                f"rows={tuple(first)}, --rows {','.join(map(str, first))}"
+                f"a determinant needs a square matrix, but this Jacobian has {n} columns and "
+                f"{len(moved)} rows that are not zero ({', '.join(TWIST[k] for k in moved)}); choose "
+                f"{n} rows: --rows {','.join(map(str, first))}, or rows={tuple(first)} in Python"
             )
         return moved
 
@@ -260,7 +258,7 @@ class SymbolicModel:
             raise SymgenError(
                 f"the direct model of {robot.name} has no closed form: the laws of "
                 f"{', '.join(robot.loaded)} use tau_model, which depends on qdd, so A qdd = Gamma - H "
-                "is implicit in qdd"
+                "is implicit in qdd; use forward_dynamics of the generated module"
             )
         if len(n) > LARGEST_DIRECT:
             raise SymgenError(

@@ -174,7 +174,7 @@ def _require_same_joints(result: Estimate, robot: Robot, of: str) -> None:
         q = different[0]
         ours = robot.labels.get(int(q[1:])) if q[1:].isdigit() else None
         raise DescriptionError(
-            f"{q} is {theirs.get(q, 'no joint with a name')!s:.60} in the estimate, but "
+            f"joint {q} is {theirs.get(q, 'no joint with a name')!s:.60} in the estimate, but "
             f"{ours or 'no joint with a name'} in {of}; give the same --chain and --lock as in the conversion of the robot, or give the robot file that was identified (--robot)"
         )
 

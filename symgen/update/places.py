@@ -304,7 +304,8 @@ class Places:
             K, offset = (values.get(family, before[family]) for family in SPRING)
             if K <= 0:
                 raise DescriptionError(
-                    f"joint {joint.name!a:.60}: a stiffness of {K:.4g} would result; MuJoCo needs a positive stiffness",
+                    f"joint {joint.name!a:.60}: the identified stiffness is {K:.4g}, but MuJoCo needs a "
+                    "positive stiffness; remove the spring of this joint, and identify again",
                     line=e.line,
                 )
             turns = self.degrees and joint.kind != "prismatic"

@@ -125,15 +125,16 @@ class Writing:
             wanted = np.zeros(10) if at is None else self.nearest.chi[at]
             if np.abs(link.ten - wanted).max() > AGREE * max(float(np.abs(wanted).max()), AGREE):
                 raise DescriptionError(
-                    f"link {link.name!a:.60}: a program that reads the new file would change the written values; "
-                    "remove compiler settings that bound or balance inertia"
+                    f"link {link.name!a:.60}: a program that reads the new file would change the written values of mass and inertia; "
+                    "remove settings of <compiler> such as boundmass, boundinertia or balanceinertia"
                 )
         for name, (family, j) in self.own.items():
             attribute, x = self.text.attribute(family, j), self._value(name)
             if attribute and abs(again.joint_values(j)[family] - x) > AGREE * max(1.0, abs(x)):
                 raise DescriptionError(
                     f"joint {again.table.joint[j].name!a:.60}: a program that reads the new file would "
-                    f"change the written {attribute}; remove the settings of the file that change {attribute}"
+                    f"not use the written {attribute}, because another entry of the file sets {attribute} "
+                    "too; remove this entry (springdamper, for instance, sets stiffness and damping)"
                 )
         if len(again.links) != len(self.nearest.links):
             raise DescriptionError(

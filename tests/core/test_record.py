@@ -614,8 +614,11 @@ def spoiled(i, j, value):
 @pytest.mark.parametrize(
     ("rows", "said"),
     [
-        (spoiled(3, 2, "nan"), "a.csv, column 'q2', line 5: nan (1 such values in all)"),
-        (spoiled(3, 2, ""), "a.csv, column 'q2', line 5: an empty field"),
+        (
+            spoiled(3, 2, "nan"),
+            "a.csv, column 'q2', line 5: the value is nan (1 such values in all)",
+        ),
+        (spoiled(3, 2, ""), "a.csv, column 'q2', line 5: the field is empty"),
         (spoiled(3, 4, "1.5x"), "a.csv, column 'tau2', line 5: '1.5x'; expected a number"),
         (
             spoiled(3, 0, T[2]),
@@ -648,7 +651,7 @@ def test_bad_csv(tmp_path, rows, said):
             {"rate": 100, "columns": {"t": "t"}},
             "the time stamps have the rate 200 Hz, but record.rate is 100 Hz",
         ),
-        ({"scale": {"tau": "gtau"}}, "a text file contains no number 'gtau'"),
+        ({"scale": {"tau": "gtau"}}, "a text file contains no number named 'gtau'"),
         (
             {"scale": {"q": [1, 2, 3]}},
             "record.scale.q has 3 values; expected one value, or 2 values",

@@ -95,7 +95,7 @@ def test_every_format(tmp_path, kind):
     with pytest.raises(
         InputError,
         match=(
-            r"column 'q\d', (line|sample) \d+: (nan|an empty field).*reader: counts} takes such "
+            r"column 'q\d', (line|sample) \d+: (the value is nan|the field is empty).*reader: counts} takes such "
             r"samples"
         ),
     ):
@@ -103,7 +103,11 @@ def test_every_format(tmp_path, kind):
 
 
 @pytest.mark.parametrize(
-    ("column", "words"), [("t", "(nan|an empty field)"), ("tau2", "(nan|an empty field)")]
+    ("column", "words"),
+    [
+        ("t", "(the value is nan|the field is empty)"),
+        ("tau2", "(the value is nan|the field is empty)"),
+    ],
 )
 @pytest.mark.parametrize("kind", ["csv", "csv nan", "npz"])
 def test_time_and_torques_are_refused(tmp_path, kind, column, words):

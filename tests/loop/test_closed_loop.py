@@ -199,7 +199,7 @@ def test_unit_start_needs_gains_that_follow(emps, axes):
         )
     with pytest.raises(
         InputError,
-        match="gains: start: these parameters do not give a positive inertia about joint 1",
+        match="gains: start: the parameters that this option selects do not give a positive inertia about joint 1",
     ):
         estimate_of(
             seen,
@@ -403,7 +403,7 @@ def test_a_record_slower_than_its_controller_is_its_own_reference(arm, every):
     with pytest.raises(
         SettingsError,
         match=(
-            r"controller at 4000 Hz that records every 1\. tick; set controller\.record_every: "
+            r"controller at 4000 Hz that records every tick; set controller\.record_every: "
             rf"{every}"
         ),
     ):

@@ -414,7 +414,7 @@ def test_integral_settles_and_clamps(emps):
         ),
         ({"values": {"ZZ9": 1.0}}, r"no standard parameter ZZ9"),
         ({"pole_step": 1e-5}, r"integration steps per tick"),
-        ({"start": [0.0]}, r"start \[0\.\]; expected 6"),
+        ({"start": [0.0]}, r"start positions \[0\.\]; expected 6"),
     ],
 )
 def test_settings_that_cannot_be_simulated(tx40, changes, said):
@@ -434,7 +434,7 @@ def test_parameters_that_cannot_be_simulated(tx40, truth):
     ) as e:
         simulator.run(-truth, reference)
     assert e.value.time == 0
-    with pytest.raises(InputError, match="expected the 60 base parameters, finite numbers"):
+    with pytest.raises(InputError, match="one for each of the 60 base parameters of tx40"):
         simulator.run(truth[:5], reference)
     with pytest.raises(
         InputError, match="the reference is at 1000 Hz, but the controller runs at 5000 Hz"

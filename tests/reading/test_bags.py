@@ -84,7 +84,7 @@ def test_columns(tmp_path):
         assert said in str(e.value)
     with pytest.raises(InputError, match="time stamps of bags are in s"):
         read_record(settings(path, units={"t": "ms"}))
-    with pytest.raises(InputError, match="a bag contains no number 'gain'"):
+    with pytest.raises(InputError, match="a bag contains no number named 'gain'"):
         read_record(settings(path, scale={"q": "gain"}))
 
 
@@ -120,7 +120,10 @@ def test_joints_change_places(tmp_path):
             lambda s, q, tau: (s, ("shoulder", "elbow", "elbow"), (*q, 0), (), (*tau, 0)),
             "joint elbow more than once",
         ),
-        (lambda s, q, tau: (s, JOINTS, q * np.nan, (), tau), "nan (2 such values in all)"),
+        (
+            lambda s, q, tau: (s, JOINTS, q * np.nan, (), tau),
+            "the value is nan (2 such values in all)",
+        ),
     ],
 )
 @some(2)

@@ -69,7 +69,7 @@ def test_columns_that_nobody_asks_for_may_hold_anything(tmp_path):
     [
         (lambda line: line + ",7", "line 5: 4 fields; expected 3"),
         (lambda line: line.rsplit(",", 1)[0] + ",x", "line 5: 'x'; expected a number"),
-        (lambda line: line.rsplit(",", 1)[0] + ",", "line 5: an empty field"),
+        (lambda line: line.rsplit(",", 1)[0] + ",", "line 5: the field is empty"),
     ],
 )
 def test_what_is_wrong_is_told_by_line(tmp_path, damage, words):

@@ -69,7 +69,7 @@ def test_units_of_pint(read, name, kind, factor):
     [
         (position_unit, "grad/s", "such as rad, deg, rev"),
         (position_unit, "percent", "not a unit known here"),
-        (position_unit, "grad", "such as gon or deg"),
+        (position_unit, "grad", "write gon or deg"),
         (
             position_unit,
             "Grad",
@@ -81,7 +81,7 @@ def test_units_of_pint(read, name, kind, factor):
         (
             torque_unit,
             "%",
-            "'%' of an unknown rated value; write the unit of the rated value",
+            "'%' is a share of a rated value that is not given; write the unit",
         ),
         (torque_unit, "MA", "'MA' is 1e+06 ampere"),
         (position_unit, "s", "is a unit of time"),

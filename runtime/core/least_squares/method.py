@@ -1,4 +1,4 @@
-"""Definition of an estimation method: its options, the rows from which it starts, and its fit.
+"""Definition of an estimation method: its options, its first least squares, and its fit.
 
     start = rows(observation, settings, options)     least squares, solved once for every method
     fitted = fit(start)                              the result of the method; None: nothing more

@@ -58,7 +58,11 @@ class JointFactor:
     rows: int
 
     def spread(self, b: int) -> Array:
-        """Expand R_j with zeros to the columns of all b parameters and Y, shape (k, b + 1)."""
+        """Return the factor R_j of this joint with a column for each of all b parameters and for Y.
+
+        Parameters that do not act on the joint get zero columns. R_j has k rows, so the shape is
+        (k, b + 1).
+        """
         block = np.zeros((len(self.R), b + 1))
         block[:, [*self.columns, b]] = self.R
         return block
