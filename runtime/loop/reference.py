@@ -141,7 +141,8 @@ def reference_of(
         )
     if reference.q.shape[1] != n:
         raise SettingsError(
-            f"the reference has {reference.q.shape[1]} joints, but {model.NAME} has {n} joints",
+            f"the reference motion has {reference.q.shape[1]} joints, but {model.NAME} has {n} "
+            "joints; give one column of positions per joint",
             path=("controller", "reference"),
         )
     if settings.limits == "refuse":
