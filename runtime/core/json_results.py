@@ -98,14 +98,14 @@ def from_text(kind: type[T], text: str, schema: str, file: str) -> T:
         )
     if missing := [f.name for f in fields(kind) if f.name not in data]:  # type: ignore[arg-type]
         raise InputError(
-            f"the key {missing[0]!r} is missing, so the file is incomplete; write the file again",
+            f"the key {missing[0]!r} is missing, so the file is incomplete; run the command that wrote the file again",
             file=file,
         )
     try:
         result: T = TypeAdapter(kind).validate_python(data)
     except ValidationError as e:
         raise InputError(
-            f"{settings_error(e, data)}; the file was edited, or another version of symgen wrote the file; write the file again",
+            f"{settings_error(e, data)}; the file was edited, or another version of symgen wrote it; run the command that wrote the file again",
             file=file,
         ) from e
     return result

@@ -1,4 +1,4 @@
-"""The encoder of a record, and the coarser encoders that the record can simulate.
+"""The encoder that measured a record, and coarser encoders simulated from its positions.
 
 The study simulates encoders of step Delta (`rounding: phase` of CESTAC): the positions are
 quantised again, with a random phase in every run.

@@ -170,9 +170,9 @@ def _rows_at_rest(model: GeneratedModel, q: Array, names: Sequence[str]) -> Arra
 
 
 def _acting(model: GeneratedModel, q: Array, columns: Any) -> tuple[str, ...]:
-    """Find the base parameters in the setting `columns` that cause torques at rest in the poses q.
+    """Select, from the base parameters `columns`, those that cause torques at rest in the poses q.
 
-    The values essential and all of `columns` mean all base parameters.
+    columns : names of base parameters; essential and all mean all base parameters.
     """
     names = tuple(model.BASE_PARAMETERS)
     size = np.abs(_rows_at_rest(model, q, names)).max(axis=(0, 1))

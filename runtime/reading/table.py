@@ -150,7 +150,7 @@ class Table:
             raise self.refused[name]
         if name not in self.columns:
             raise InputError(
-                f"{self.what} contains no number named {name!r}; in the settings, write the number instead of its name",
+                f"{self.what} contains no variable {name!r}, to which a setting refers; write a number in this setting",
                 file=self.file,
             )
         x = self.columns[name]

@@ -39,9 +39,9 @@ def excite(
         typer.Option(
             help="Criterion of the motion: cond minimises the condition number of the observation "
             "matrix W, logdet maximises the determinant of W'W, sigma minimises the largest "
-            "standard deviation of a parameter, in %. record minimises the largest ratio of this "
-            "standard deviation to the one with the motion of RECORD. Default: record if RECORD is "
-            "given, else cond."
+            "standard deviation of a parameter, in %. record compares the standard deviations of each "
+            "parameter, with the new motion and with RECORD, and minimises the largest ratio of "
+            "the new one to the other. Default: record if RECORD is given, else cond."
         ),
     ] = None,
     columns: options.Columns = None,

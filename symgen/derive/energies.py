@@ -124,10 +124,10 @@ def potential_energy(d: Derivation) -> Scalar:
 
 
 def _square(d: Derivation, e: Element, j: int, x: Mapping[int, Scalar]) -> Scalar:
-    """Return twice the energy of an inertia or spring with unit parameter: (G x)**2 or x' B x, with
-    joint velocities or positions x.
+    """Return twice the energy of an inertia or spring whose parameter is 1.
 
-    x are joint velocities (inertia) or positions (spring). The element has a row G or a matrix B.
+    It is (G x)**2 for an element with a row G of coefficients, and x' B x for one with a matrix B.
+    x are the joint velocities (inertia) or the joint positions (spring).
     """
     if j in e.along:
         s = linear(d.algebra, e.along[j], x)

@@ -112,8 +112,8 @@ def _require_closed_form(d: Derivation) -> None:
     if d.closure.tied:
         tied = ", ".join(f"q{u}" for u in d.closure.tied)
         raise SymgenError(
-            f"C(q, qd) of {d.robot.name} has no closed form in the actuated joints, because the passive "
-            f"joints {tied} are symbols; the model bias has C qd + Q + friction with these symbols"
+            f"C(q, qd) of {d.robot.name} has no formula in the actuated joints alone, because the loops give "
+            f"the passive joints {tied} only by iteration; use the model bias, C qd + Q + friction"
         )
 
 

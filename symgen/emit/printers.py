@@ -82,7 +82,7 @@ class Language:
     is_word: Callable[[str], bool] = lambda name: False
 
     def expression(self, e: Expression) -> str:
-        """Write an expression of constants, or one linear in joint positions, in this language."""
+        """Write an expression of constants, or a linear expression of joint positions, as code."""
         text = re.sub(r"\b(cos|sin|sqrt)\(", lambda name: f"{self.calls[name[1]]}(", str(e))
         return re.sub(r"\bpi\b", self.pi, text)
 

@@ -651,7 +651,7 @@ def test_bad_csv(tmp_path, rows, said):
             {"rate": 100, "columns": {"t": "t"}},
             "the time stamps have the rate 200 Hz, but record.rate is 100 Hz",
         ),
-        ({"scale": {"tau": "gtau"}}, "a text file contains no number named 'gtau'"),
+        ({"scale": {"tau": "gtau"}}, "a text file contains no variable 'gtau'"),
         (
             {"scale": {"q": [1, 2, 3]}},
             "record.scale.q has 3 values; expected one value, or 2 values",

@@ -84,7 +84,7 @@ def test_columns(tmp_path):
         assert said in str(e.value)
     with pytest.raises(InputError, match="time stamps of bags are in s"):
         read_record(settings(path, units={"t": "ms"}))
-    with pytest.raises(InputError, match="a bag contains no number named 'gain'"):
+    with pytest.raises(InputError, match="a bag contains no variable 'gain'"):
         read_record(settings(path, scale={"q": "gain"}))
 
 
