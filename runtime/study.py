@@ -22,6 +22,7 @@ from pydantic import BeforeValidator, TypeAdapter
 from runtime.core import study as chapter
 from runtime.core.arrays import require_kind
 from runtime.core.errors import InputError
+from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel
 from runtime.core.record import Record
 from runtime.core.settings import NotNegative, PerJoint, Settings, structure, to_mapping
@@ -270,19 +271,18 @@ def suggested(study: Study, model: GeneratedModel) -> tuple[Study, list[str]]:
 def _starts_anew(settings: RecordSettings, model: GeneratedModel, missing: bool) -> bool:
     """Whether the recorded angles wrap around at full turns.
 
-    They do if unwrapping makes the largest step between two samples more than five times smaller.
+    They do if unwrapping makes the largest step between two samples more than five times smaller,
+    and steps of that size are rare. In a wrong unit, such as degrees read as rad, they are not.
     """
-    jumps, moves = (
-        np.max(
-            [
-                np.abs(np.diff(r.q, axis=0)).max(axis=0)
-                for r in read_records((s,), model, missing=missing)
-            ],
-            axis=0,
+    as_read, unwrapped = (
+        np.concatenate(
+            [np.abs(np.diff(r.q, axis=0)) for r in read_records((s,), model, missing=missing)]
         )
         for s in (settings, replace(settings, unwrap=True))
     )
-    return bool(np.any(jumps > 5 * moves))
+    jumps = as_read.max(axis=0)
+    rare = (as_read > jumps / 2).mean(axis=0) < LIMIT.RARE_WRAPS
+    return bool(np.any(rare & (jumps > 5 * unwrapped.max(axis=0))))
 
 
 def draft(study: Study, model: GeneratedModel) -> str:

@@ -58,6 +58,8 @@ GUESSES = {
     9.81: "9.81: kp m for N m",
 }
 """Mistakes that multiply a torque by a known factor."""
+SCALE = "record.scale."
+"""Start of the settings that multiply columns of the record, such as record.scale.tau."""
 GRAVITY = ("free_gx", "free_gy", "free_gz")
 ENTRY = re.compile(r"free_(alpha|[drb])(\d+)")
 
@@ -289,14 +291,19 @@ class Row:
         Rows of NUMBERS also need xi, the unknown number.
         """
         words = {**item, **(self.words(robot, item, *xi) if xi else {})}
-        says = self.says.format(**words)
+        says, change = self.says.format(**words), self.change(robot, item)
+        scale = ", ".join(
+            f"{key.removeprefix(SCALE)}: {signs}"
+            for key, signs in change.items()
+            if key.startswith(SCALE)
+        )
         return unchanged_study(
             robot.n,
             kind=self.kind,
             says=says,
-            remedy=self.remedy.format(**words),
+            remedy=self.remedy.format(**words) + f" (record.scale: {{{scale}}})" * bool(scale),
             subject=self.subject.format(**words) or says,
-            change=self.change(robot, item),
+            change=change,
             **self.maps(robot, item, *xi),
         )
 
@@ -639,7 +646,7 @@ def turned(*quantities: str) -> Callable[[Robot, Item], Mapping[str, Any]]:
 
     def change(robot: Robot, item: Item) -> Mapping[str, Any]:
         signs = robot.one(item["j"], -1) if "j" in item else -np.ones(robot.n)
-        return {f"record.scale.{key}": [int(sign) for sign in signs] for key in quantities}
+        return {f"{SCALE}{key}": [int(sign) for sign in signs] for key in quantities}
 
     return change
 

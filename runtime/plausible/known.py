@@ -92,6 +92,21 @@ class KnownValues(Result):
         return len(ratios) > 0 and bool((ratios < low).all() or (ratios > high).all())
 
     @property
+    def factor(self) -> float | None:
+        """Factor of all measured torques that only another unit or side of the gears can explain.
+
+        It is the median ratio of measured to computed torques, if all ratios are nearly alike
+        (within LIMIT.CAD_RATIOS of the median) and far below 1; None otherwise.
+        """
+        ratios = np.concatenate([self.gravity, self.inertia])
+        ratios = ratios[np.isfinite(ratios)]
+        if len(ratios) < 3 or (ratios <= 0).any():
+            return None
+        median, (low, high) = float(np.median(ratios)), LIMIT.CAD_RATIOS
+        alike = ((low <= ratios / median) & (ratios / median <= high)).all()
+        return median if alike and median < LIMIT.OTHER_UNIT else None
+
+    @property
     def off(self) -> tuple[str, ...]:
         """Sentences that name the joints whose measured torques differ too much from the computed
         ones.

@@ -142,6 +142,15 @@ def values(case: Case) -> Answer | None:
     """
     if case.robot_values is None:
         return None
+    if factor := case.robot_values.factor:
+        return Answer(
+            "no",
+            f"The measured torques of all joints are about {factor:.2g} times those computed from the "
+            "values",
+            "check the unit and the side of the torques: currents need record.torque_constant, "
+            "torques of the motor side need the gear ratio (drives.ratio with record.torque_side: "
+            "motor, or record.scale: {tau: ratio})",
+        )
     if off := case.robot_values.off:
         return Answer("doubtful", f"No: {'; '.join(off[:4])}")
     ratios = [x for x in (*case.robot_values.gravity, *case.robot_values.inertia) if np.isfinite(x)]

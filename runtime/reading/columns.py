@@ -263,7 +263,7 @@ def conversion(
     if "motor" in settings.sides and drives is None:
         key = "side" if settings.side == "motor" else "torque_side"
         raise InputError(
-            f"record.{key} is motor but the robot file has no drives; give drives (ratio, torque_constant) in the robot file, or use a record of the joint side",
+            f"record.{key} is motor but the robot file has no drives; give drives (ratio, torque_constant) in the robot file. For a URDF or MJCF, set {key}: joint and record.scale: {{q: 1/ratio, tau: ratio}} as numbers, for instance {{q: 0.01, tau: 100}}",
             file=first.file,
         )
     units, constant = _torque_constant(settings, drives, n)

@@ -447,6 +447,22 @@ def test_currents_read_as_torques_are_no_wrong_rate() -> None:
     assert found.robot_values.heavy and "gravity torque of joint 1 is 0.0" in found.to_text()
 
 
+@pytest.mark.parametrize(
+    ("factor", "state"), [(80, "no"), (20, "no"), ([200, 8], "doubtful"), (5, "doubtful")]
+)
+def test_torques_of_another_size_on_every_joint(factor, state) -> None:
+    """Of motors in place of joints; a factor that differs by joint has other reasons."""
+    model = symgen.model("planar_2r")
+    t, q, tau = motion(model)
+    found = runtime.plausibility(model, runtime.Record(t, q, tau / factor, name="run"))
+    question = "Do the values of the robot file agree with the record?"
+    (check,) = (check for check in found.checks() if check.question == question)
+    assert check.state == state
+    if state == "no":
+        found = re.search(r"about (\S+) times those computed", check.finding)
+        assert found and float(found[1]) == pytest.approx(1 / factor, rel=0.05)
+
+
 def test_motor_inertias_of_zero_do_not_contradict_the_record(tmp_path) -> None:
     """All that a URDF can say: its values left 23 to 42 % of the torques of an arm with rotors."""
     text = (files("symgen") / "description/robots/planar_2r.yaml").read_text(encoding="utf-8")

@@ -67,6 +67,22 @@ def test_proposed_where_positions_jump_by_turns(tmp_path: Path) -> None:
         assert "unwrap: true" in sentences[-1]
 
 
+def test_not_proposed_for_fast_positions_in_a_wrong_unit(tmp_path: Path) -> None:
+    """Degrees of a motor read as rad: steps beyond a turn are the motion itself."""
+    path = tmp_path / "a.csv"
+    fast = 80 * np.degrees(0.8 * np.sin(4 * t)[:, None] * [1.0, 0.7])
+    np.savetxt(
+        path,
+        np.column_stack([t, fast, tau]),
+        delimiter=",",
+        header="t,q1,q2,tau1,tau2",
+        comments="",
+    )
+    study = replace(Study(), record=(RecordSettings(files=(str(path),)),))
+    assert np.abs(np.diff(fast, axis=0)).max() > 5 * np.pi
+    assert not suggested(study, planar_2r)[0].record[0].unwrap
+
+
 def test_not_proposed_where_they_do_not(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     jumps = q + np.where(t[:, None] > 5, 4.0, 0.0)  # of no whole turn
