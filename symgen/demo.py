@@ -336,7 +336,7 @@ def sections(demo: Demonstration) -> list[Section]:
 
 
 def differences(demo: Demonstration) -> dict[str, float]:
-    """Compute the differences of the essential parameters from Table 2 of the book chapter, %."""
+    """Return the differences, %, of the essential parameters from those of Table 2 of the chapter."""
     fit = demo.result.essential.estimate
     return {n: percent(fit[n], value) for n, value in TABLE_2.items() if n in fit.names}
 

@@ -369,7 +369,7 @@ class Advice(Result, Part):
         return "\n\n".join([self.verdict, *steps, *self.asked_lines()])
 
     def to_table(self) -> str:
-        """Write tables of the coarsest steps, by encoder and by parameter, then the assumptions."""
+        """Write tables of the coarsest acceptable encoder steps, then the assumptions."""
         tables = [table.to_text() for table in self.tables()]
         notes = [note for reader in self.real for note in reader.notes]
         return "\n\n".join(

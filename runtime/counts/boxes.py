@@ -260,7 +260,7 @@ class Boxes:
         return boxes, boxes.posterior(read.errors, read.c, read.density, read.tau, nu)
 
     def _tilted(self, m: Array, v: Array, e2: Array) -> tuple[Array, Array, Array]:
-        """Compute, for each sample, a normal distribution (site) that replaces the position bounds.
+        """Compute, for each sample, a normal distribution (site) in place of its position bounds.
 
         The other samples give the position m and its variance v. Returns the logarithm of the mass
         of the tilted law, and the precision and precision times mean of the new site.

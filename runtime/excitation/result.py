@@ -52,7 +52,7 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """Parameter values used in the search, and the precision that the recorded motion gives.
+    """Parameter values assumed in the search, and their precision from the recorded motion.
 
     Attributes
     ----------

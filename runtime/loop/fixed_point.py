@@ -114,7 +114,7 @@ def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]
             base = parameters_of(model)
         except InputError as e:
             raise SettingsError(
-                f"start: values needs the values of all parameters, but "
+                f"the setting start: values needs a value of every parameter, but "
                 f"{e.message.partition(';')[0]}; give the missing values in the robot file (0 for a "
                 "parameter that is zero), or use start: ols and gains: one",
                 path=("estimate", "options"),

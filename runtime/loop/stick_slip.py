@@ -90,7 +90,7 @@ def _at_rest(D: SX, free: SX, moving: SX, plus: SX, minus: SX) -> tuple[SX, SX]:
 
 
 def _masked(D: SX, rows: SX) -> SX:
-    """Replace the rows and columns of D that `rows` does not mark by those of the identity matrix.
+    """Keep the rows and columns of D marked in `rows`; set the others to the identity matrix.
 
     The diagonal becomes slightly larger, since rows of G may depend on each other.
     """

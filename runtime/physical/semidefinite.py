@@ -103,7 +103,9 @@ def solutions(K: Array, X: Array, scale: Array) -> Space:
 
 
 def within(space: Space, rows: LinearBounds) -> tuple[Space, LinearBounds]:
-    """Restrict a set of chi to the solutions of the equations in `rows` (rows with lower = upper).
+    """Restrict a set of standard parameters chi to the solutions of the equations in `rows`.
+
+    An equation is a row whose lower and upper bounds are equal.
 
     Returns the restricted space and the other rows. If the equations contradict the space, the
     points of the space that come nearest to the equations are used.

@@ -637,7 +637,7 @@ def in_both(robot: Robot, item: Item) -> Maps:
 
 
 def turned(*quantities: str) -> Callable[[Robot, Item], Mapping[str, Any]]:
-    """Make a function that writes reversed signs of columns as the study's setting `record.scale`.
+    """Make a function that gives the setting `record.scale` that reverses the signs of columns.
 
     The sign is that of the joint of the item, or of all joints if the item has none.
 

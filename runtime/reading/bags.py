@@ -223,7 +223,9 @@ def _inside(folder: Path, name: str, where: str) -> Path:
         )
     if not path.is_file():
         raise InputError(
-            f"relative_file_paths contains {name!r}, but this file is not in the folder", file=where
+            f"relative_file_paths contains {name!r}, but the folder of the bag has no such file; "
+            "copy it there",
+            file=where,
         )
     return path
 

@@ -14,7 +14,9 @@ def simulate(
     robot: options.RobotOrModule,
     study: Annotated[
         str,
-        typer.Argument(help="Study file with a section `controller`, or a dataset that has one."),
+        typer.Argument(
+            help="Study file with a section `controller`, or a dataset whose study has this section."
+        ),
     ],
     output: Annotated[
         Path | None, options.folder("simulated.csv, study.yaml, simulation.json and the figure")

@@ -205,7 +205,10 @@ class Draw:
         return (np.frombuffer(digest, dtype="<u8") % (self.p - 1) + 1).astype(np.int64)
 
     def _of_geometry(self, key: str | Call) -> Array:
-        """Return values modulo p, given or random, of a constant, pi or a square root."""
+        """Return the values modulo the prime p that replace a constant, pi or a square root.
+
+        They are random if no value was given.
+        """
         if key not in self._geometry:
             self._geometry[key] = self._random(str(key), 1)
         return self._geometry[key]

@@ -341,6 +341,6 @@ def check_channels(robot: Any) -> None:
         if name in laws or any(name in x.symbols for x in every):
             raise DescriptionError(
                 f"{name} is used as a constant and as the measured quantity {CHANNEL}{name}; write "
-                f"{CHANNEL}{name} in every law, and use a constant with another name elsewhere",
+                f"{CHANNEL}{name} for the measured quantity, and rename the constant",
                 path=("constants", name),
             )

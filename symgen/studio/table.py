@@ -83,7 +83,7 @@ def columns_of(cells: Mapping[str, Any]) -> list[str]:
 def degrees(
     frames: Mapping[str, Mapping[str, str]], constants: Mapping[str, float]
 ) -> dict[str, dict[str, str]]:
-    """Convert the angles of a valid table, for q = 0, to degrees as texts by frame and column."""
+    """Return the angles of a valid frame table at q = 0 in degrees: {frame: {column: text}}."""
     values = {f"q{j}": 0.0 for j in frames} | dict(constants)
     angles = [c for c, unit in UNITS_OF_CELLS.items() if unit == "rad"]
     return {

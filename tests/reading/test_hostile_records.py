@@ -245,7 +245,7 @@ LAUGHS = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
                 "rosbag2_bagfile_information: {relative_file_paths: [x], compression_mode: file, "
                 "compression_format: rar}"
             ),
-            "but this file is not in the folder",
+            "but the folder of the bag has no such file",
         ),
         ("\x00", "not YAML"),
     ],
