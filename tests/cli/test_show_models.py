@@ -51,7 +51,7 @@ def test_frames_values_forms_and_formats():
     [
         (("tx40", "--model", "jacobian", "--of", "9"), "tx40 has frames 0 to 6"),
         (("planar_2r", "--model", "mass_matrix"), "expected one of regressor"),
-        (("four_bar", "--model", "coriolis"), "bias has C qd"),
+        (("four_bar", "--model", "coriolis"), "use the model bias"),
         (("panda", "--model", "bias", "--parameters", "standard"), "form recursive"),
         (("planar_2r", "--model", "gravity", "--value", "q2"), "--value q3=pi/2"),
         (("planar_2r", "--model", "gravity", "--value", "q9=1"), "is no symbol"),

@@ -116,7 +116,7 @@ def test_numbers_that_no_robot_has_are_refused(tmp_path, column, number, resampl
     written(tmp_path, t, q, tau)
     result = said(tmp_path, record=resample)
     assert result.exit_code == 2 and isinstance(result.exception, SystemExit)
-    assert f"line 502: {number:g}" in result.stderr and result.stderr.count("\n") == 1
+    assert f"line 502: the value is {number:g}" in result.stderr and result.stderr.count("\n") == 1
 
 
 def test_identify_notes_gravity_in_other_units(tmp_path) -> None:

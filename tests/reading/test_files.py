@@ -117,7 +117,7 @@ def test_what_is_not_finite_is_found_where_it_stands(tmp_path, samples, kind, pl
     t, q, tau = samples
     q = q.copy()
     q[716, 1] = np.nan
-    with pytest.raises(InputError, match=f"column '(q2|3)', {place}: nan"):
+    with pytest.raises(InputError, match=f"column '(q2|3)', {place}: the value is nan"):
         read_record(settings(write(kind, tmp_path, (t, q, tau))), folder=tmp_path)
 
 

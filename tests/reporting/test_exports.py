@@ -128,7 +128,7 @@ def test_an_estimate_comes_back_to_the_bit(found, tmp_path):
         (lambda d: {"names": [1] * 10}, "expected a text"),
         (lambda d: {"per_joint": [{"joint": "1"}]}, "per_joint[0]: no key rows"),
         (lambda d: {"settings": []}, "expected a mapping"),
-        (lambda d: {"status": "of-another-time"}, "or another version of symgen wrote the file"),
+        (lambda d: {"status": "of-another-time"}, "or another version of symgen wrote it"),
     ],
 )
 def test_another_file_is_refused_in_one_line(found, tmp_path, change, words):
