@@ -93,7 +93,7 @@ class KnownValues(Result):
 
     @property
     def factor(self) -> float | None:
-        """Factor of all measured torques that only another unit or side of the gears can explain.
+        """Common factor of all measured torques, as another unit or side of the gears makes it.
 
         It is the median ratio of measured to computed torques, if all ratios are nearly alike
         (within LIMIT.CAD_RATIOS of the median) and far below 1; None otherwise.
