@@ -187,7 +187,7 @@ def test_one_call_finds_the_best_treatment(robot):
     assert not agreement.agree and agreement.disagreements[0].record == "B"
     with pytest.raises(InputError, match="no validation record"):
         runtime.compare(model, {"a": (careful, A, ()), "b": (careful, A, B)})
-    with pytest.raises(InputError, match=r"expected the same"):
+    with pytest.raises(InputError, match=r"set the same validate"):
         runtime.compare(
             model,
             {
