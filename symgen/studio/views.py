@@ -52,10 +52,9 @@ def answered(view: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, Any
             except (SymgenError, InputError, OSError, MemoryError, ArithmeticError) as e:
                 text = getattr(e, "message", "") or str(e) or type(e).__name__
                 return {"error": text, "path": list(map(str, getattr(e, "path", ())))}
-        said: dict[bool, list[str]] = {True: [], False: []}
-        for w in caught:
-            said[issubclass(w.category, AngleWarning)].append(str(w.message))
-        return value | {"remarks": said[True], "notes": said[False] + value.get("notes", [])}
+        angles = [str(w.message) for w in caught if issubclass(w.category, AngleWarning)]
+        others = [str(w.message) for w in caught if not issubclass(w.category, AngleWarning)]
+        return value | {"remarks": angles, "notes": others + value.get("notes", [])}
 
     return shown
 
