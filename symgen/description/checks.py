@@ -27,7 +27,6 @@ from symgen.description.parts import (
     Form,
     Frame,
     Row,
-    determinant,
     moves,
 )
 from symgen.errors import DescriptionError
@@ -376,7 +375,9 @@ def _check_drives(robot: Any) -> None:
             f"drives: ratio has rows with {shape} numbers; expected {n} rows with {n} numbers, one row per actuated joint",
             path=("drives", "ratio"),
         )
-    if determinant(drives.ratio) == 0:
+    import numpy as np
+
+    if np.linalg.matrix_rank(drives.ratio) < n:
         raise DescriptionError(
             "drives: ratio is singular; expected an invertible matrix, so that motor positions determine joint positions",
             path=("drives", "ratio"),

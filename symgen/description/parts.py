@@ -324,20 +324,3 @@ def _cofactors(
 def moves(c: Expression) -> bool:
     """Whether a joint position occurs in the expression `c`."""
     return any(re.fullmatch(r"q\d+", name) for name in c.symbols)
-
-
-def determinant(matrix: tuple[tuple[float, ...], ...]) -> Fraction:
-    """Compute the exact determinant of a square matrix of floats."""
-    a = [[Fraction(x) for x in row] for row in matrix]
-    det = Fraction(1)
-    for k in range(len(a)):
-        pivot = next((i for i in range(k, len(a)) if a[i][k]), None)
-        if pivot is None:
-            return Fraction(0)
-        if pivot != k:
-            a[k], a[pivot], det = a[pivot], a[k], -det
-        det *= a[k][k]
-        for i in range(k + 1, len(a)):
-            if factor := a[i][k] / a[k][k]:
-                a[i] = [x - factor * y for x, y in zip(a[i], a[k], strict=True)]
-    return det
