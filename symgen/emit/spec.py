@@ -7,12 +7,12 @@ prints them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 from symgen.derive.derivation import Derivation, derive, derived
-from symgen.derive.graph import ADD, COS, MUL, SIN, SYM, Node, Scalar, Symbol, reachable
+from symgen.derive.graph import ADD, COS, MUL, SIN, Node, Scalar, reachable
 from symgen.derive.loops import close
 from symgen.derive.model import Entry, Model, Place, Request, Values, labels, rewriting
 from symgen.derive.models import MODELS
@@ -49,29 +49,6 @@ class Function:
     def nodes(self) -> list[Node]:
         """Nodes of the expression graph on which the result depends: inputs and operations."""
         return reachable(self.values.outputs)
-
-    @cached_property
-    def inputs(self) -> set[Symbol]:
-        """Symbols on which the result depends: states, parameters and constants."""
-        return {node.value for node in self.nodes if node.op == SYM}
-
-    def reads(self, kind: str) -> bool:
-        return any(symbol.kind == kind for symbol in self.inputs)
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """States on which the function depends, such as q and qd.
-
-        They are among q, qd, qdd, qdr, qddr and G, the derivatives of the tied joint positions by
-        the actuated joint positions.
-        """
-        kinds = {**{state: state for state in STATES}, "G": "rate"}
-        return tuple(state for state, kind in kinds.items() if self.reads(kind))
-
-    def constants(self, free: Iterable[str]) -> tuple[str, ...]:
-        """Select from the names `free` the constants that the function depends on."""
-        read = {symbol.name for symbol in self.inputs if symbol.kind in ("constant", "channel")}
-        return tuple(name for name in free if name in read)
 
     def places(self, entry: Entry) -> tuple[Place, ...]:
         """List the indices at which the result array contains an entry: (i, k), and (k, i) if it is
