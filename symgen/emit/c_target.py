@@ -1,8 +1,15 @@
-"""Data for the template of a C file: lines, tables and signatures of all functions of a robot.
+"""The C file of a robot: its lines, and the tables and signatures of all functions for its template.
+
+Names and sections are the same as in the NumPy module.
+
+A C function computes a tile of samples in several loops: first sines and cosines, which compilers
+turn into calls of vector functions, then the other arithmetic, which they turn into vector
+instructions of any width. Values that are the same for all samples are computed before the loops.
 
 The body of each function is written once, as a loop over `lanes` samples. The compiler makes two
 versions of it, one for a single state and one for a tile, a group of samples that are computed
-together.
+together. The time of compilers grows faster than the length of a function, so a long body becomes
+several functions. Values that later parts need are stored in an array `kept`.
 
 Joints that only the closure equations tie belong to a state struct. One function computes it by
 Newton's method; every other function uses it.
@@ -11,26 +18,242 @@ Newton's method; every other function uses it.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
 from functools import lru_cache
 from math import prod
 from typing import Any
 
-from symgen.derive.graph import Scalar
+from symgen.derive.graph import CONST, COS, SIN, SYM, Node, Scalar, reachable
 from symgen.derive.loop_equations import loop_system
-from symgen.description.expression import Expression
+from symgen.description.expression import FUNCTIONS, Expression
 from symgen.description.naming import Namespace
 from symgen.description.robot import FIXED, PRISMATIC
 from symgen.emit.blocks import label
-from symgen.emit.c_parts import Part, in_parts, read_by, words
-from symgen.emit.c_printer import C, CText, is_word
-from symgen.emit.c_states import CStates
 from symgen.emit.header import header, line_of, packed, plain
-from symgen.emit.printers import Section, under_titles
+from symgen.emit.printers import Language, Section, Text, under_titles
 from symgen.emit.python_target import signature
 from symgen.emit.render import WIDTH, laid_out
 from symgen.emit.spec import STATES, Function, ModuleSpec, signals
 from symgen.version import VERSION
+
+KEYWORDS = """auto break case char const continue default do double else enum extern float for goto
+if inline int long register restrict return short signed sizeof static struct switch typedef union
+unsigned void volatile while"""
+MACROS = """asm typeof errno linux unix NULL NAN INFINITY HUGE_VAL TILE KERNEL STREAM PORTABLE
+WIDTH REAL AT INLINE PART"""
+OWN = """sin cos sqrt exp tanh pow sign above below load save real lanes kept rate constants m t start row
+tile U T S N size_t int32_t int64_t memcpy memset"""
+RESERVED = frozenset(f"{KEYWORDS} {MACROS} {OWN}".split())
+HEADERS = re.compile(r"(M|FP|HUGE|MATH|U?INT\w*|SIZE|PTRDIFF|SIG|WCHAR|WINT)_\w+")
+"""Macros of math.h and stdint.h."""
+
+
+def is_word(name: str) -> bool:
+    """Whether a name is reserved: a word of C, of its header files or of the emitted C code."""
+    return name in RESERVED or bool(HEADERS.fullmatch(name))
+
+
+def number(c: Fraction) -> str:
+    """Write a rational number in C: a small integer as digits, others with the type `real`."""
+    whole = c.denominator == 1 and abs(c) < 2**31
+    return str(c.numerator) if whole else f"(real){float(c)!r}"
+
+
+C = Language(
+    {op: f.c for op, f in FUNCTIONS.items()},
+    "above({})",
+    "below({})",
+    "(real)3.141592653589793",
+    one="1",
+    square="{0}*{0}",
+    number=number,
+    comment="//",
+    step="const real {} = {};",
+    entry="{} = {};",
+    is_word=is_word,
+)
+
+
+class CText(Text):
+    """The lines of C that compute one function for a tile, a group of samples computed together.
+
+    They run in this order: `fixed` (the same for all samples), `angles`, `trigonometry_of` (sines
+    and cosines of the angles), `sections`, and `expression` for each output.
+    """
+
+    language: Language = C
+
+    def __init__(
+        self,
+        outputs: Sequence[Scalar | int],
+        headings: Sequence[tuple[int, str]],
+        names: Namespace,
+        labels: Sequence[str],
+    ) -> None:
+        self._calls = [n for n in reachable(outputs) if n.op in (COS, SIN) and not n.fixed]
+        self._under = set(_needed([x.node for n in self._calls for x in n.operands]))
+        self._main = set(_needed([o.node for o in outputs if isinstance(o, Scalar)]))
+        super().__init__(outputs, headings, names, labels)
+        lines = [n for n in self.nodes if n.index in self.named]
+        self.fixed = tuple(self._line(n) for n in lines if n.fixed)
+        self.angles = tuple(self._line(n) for n in lines if n.index in self._under and not n.fixed)
+        self.trigonometry_of = {  # name: call
+            self.called[n.index]: self._body(self._as_named(n)) for n in self._calls
+        }
+        symbols = {n.index: str(n.value) for n in self.nodes if n.op == SYM}
+        self.trigonometry_inputs = {symbols[i] for i in self._under & symbols.keys()}
+        self.main_inputs = {symbols[i] for i in self._main & symbols.keys()}
+
+    def _has_line(self, node: Node) -> bool:
+        return super()._has_line(node) or (node.op in (COS, SIN) and not node.fixed)
+
+    def sections_of(self, nodes: Collection[int]) -> tuple[Section, ...]:
+        own = self.named & self._main & {*nodes}
+        lines = [n for n in self.nodes if n.index in own and not n.fixed and n.op not in (COS, SIN)]
+        return under_titles(
+            ("Angles" if n.index in self._under else self._title(n), self._line(n)) for n in lines
+        )
+
+
+def _needed(outputs: Iterable[Node]) -> Iterator[int]:
+    """Yield the indices of the graph nodes that a C loop over the samples must compute or load.
+
+    Operands of sines and cosines are left out, because another loop computes them; so are operands
+    of values that are computed before the loops.
+    """
+    stack, visited = list(outputs), set()
+    while stack:
+        node = stack.pop()
+        if node.index in visited:
+            continue
+        visited.add(node.index)
+        yield node.index
+        if node.op not in (COS, SIN, CONST) and not node.fixed:
+            stack.extend(x.node for x in node.operands)
+
+
+# --- arguments: one pointer for each of q, qd, qdd, or one struct with all of them ---
+
+
+@dataclass(frozen=True)
+class CStates:
+    """The arguments by which the C functions of one robot receive the joint states q, qd, ...
+
+    Attributes
+    ----------
+    robot : str
+        Name of the robot; the name of the struct starts with it.
+    widths : mapping of str to int
+        Number of values of each state per sample, in the order of the struct.
+    closed : bool
+        Whether loops tie joints, so that q, qd, qdd, G and qdd0 are members of one struct s.
+    """
+
+    robot: str
+    widths: Mapping[str, int]
+    closed: bool
+
+    @classmethod
+    def of(cls, spec: ModuleSpec) -> CStates:
+        """Make the description of the state arguments that all C functions of a robot have."""
+        size = spec.sizes
+        if not spec.tied:
+            return cls(spec.robot.name, dict.fromkeys(STATES, size["n"]), closed=False)
+        joints = dict.fromkeys(("q", "qd", "qdd"), size["k"])
+        tied = {"G": size["m"] * size["n"], "qdd0": size["m"]}
+        return cls(spec.robot.name, joints | tied, closed=True)
+
+    def arguments(self, *states: str) -> list[str]:
+        """Return the argument names for the given states: s (the struct), or one per state."""
+        return ["s"] if self.closed else [*states]
+
+    def parameters(self, *states: str) -> list[str]:
+        """Return the C declarations of the state arguments, such as `const real *q`."""
+        kind = f"{self.robot}_state" if self.closed else "real"
+        return [f"const {kind} *{x}" for x in self.arguments(*states)]
+
+    def read(self, state: str) -> str:
+        """Return the C expression that points to a state of one sample: `s->q`, or `q`."""
+        return f"s->{state}" if self.closed else state
+
+    def load(self, state: str) -> str:
+        """Return the C arguments that locate a state: distance between samples, and start address.
+
+        The distance, in numbers, is from one sample to the next. The address is the address of the
+        first sample of a tile, a group of samples computed together.
+        """
+        if self.closed:
+            return f"sizeof *s/sizeof(real), s[start].{state}"
+        n = self.widths[state]
+        return f"{n}, {state} + {n}*start"
+
+
+# --- parts of a long body ---
+
+Titled = tuple[str, Sequence[str]]  # lines that belong together, under a title
+
+
+@dataclass(frozen=True)
+class Part:
+    """One part of a long C function body: its lines, and the names that occur in these lines."""
+
+    sections: tuple[Section, ...]
+    read: frozenset[str]
+
+
+def in_parts(
+    inputs: Sequence[str], steps: Sequence[Titled], results: Sequence[Titled], longest: int
+) -> tuple[list[Part], int]:
+    """Split the body of a C function into parts of at most `longest` steps; a step computes one
+    variable.
+
+    A result belongs to the part of the last step that it depends on. Each part loads the inputs
+    that it uses. Return the parts, and the number of values that must be stored for later parts.
+    """
+    chunks = [list(steps[k : k + longest]) for k in range(0, len(steps), longest)]
+    place = {lines[0].split()[2]: p for p, chunk in enumerate(chunks) for _, lines in chunk}
+    for title, lines in results:
+        last = max((place.get(word, 0) for word in words(lines)), default=0)
+        chunks[last].append((title, lines))
+    read = [words([line for _, lines in chunk for line in lines]) for chunk in chunks]
+    crossing = [x for x, p in place.items() if any(x in later for later in read[p + 1 :])]
+    row = {x: k for k, x in enumerate(crossing)}
+    parts = []
+    for p, chunk in enumerate(chunks):
+        recalled = [
+            f"const real {x} = AT(kept, {k});"
+            for x, k in row.items()
+            if x in read[p] and place[x] < p
+        ]
+        saved = [f"AT(kept, {k}) = {x};" for x, k in row.items() if place[x] == p]
+        own = [("Inputs", line) for line in (*read_by(read[p], inputs), *recalled)]
+        own += [(title, line) for title, lines in chunk for line in lines]
+        own += [("Read by later parts", line) for line in saved]
+        parts.append(Part(under_titles(own), words([line for _, line in own])))
+    return parts, len(row)
+
+
+def words(lines: Sequence[str]) -> frozenset[str]:
+    """Collect the names that occur in lines of C code, except in comments."""
+    return frozenset(word for line in lines for word in re.findall(r"\w+", line.partition("/*")[0]))
+
+
+def read_by(read: frozenset[str], steps: Sequence[str]) -> list[str]:
+    """Select the C lines that compute the variables `read`, and all lines that these depend on.
+
+    Each step has the form `const real x = ...;`.
+    """
+    needed = []
+    for step in reversed(steps):
+        if step.split()[2] in read:
+            read |= words([step])
+            needed.append(step)
+    return needed[::-1]
+
+
+# --- the file ---
 
 SCRATCH = 262144  # bytes of stack for the results of one tile
 FLAGS = (

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from symgen.description.robot import Robot
 from symgen.emit import c_target, python_target
-from symgen.emit.c_printer import C
+from symgen.emit.c_target import C
 from symgen.emit.printers import PYTHON, Language
 from symgen.emit.spec import ModuleSpec, module_spec, spec_of
 from symgen.emit.targets import TARGETS

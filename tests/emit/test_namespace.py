@@ -23,7 +23,7 @@ from campaign import sampled, some
 
 from symgen.description import Robot, load_robot, parse_robot
 from symgen.description.naming import LAYOUT, check_families
-from symgen.emit.c_printer import RESERVED
+from symgen.emit.c_target import RESERVED
 from symgen.emit.generate import generate_files
 from symgen.errors import DescriptionError
 
