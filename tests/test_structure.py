@@ -97,7 +97,7 @@ ONLY_IN = {  # library: files and folders that may import it
     ),
     "pooch": ("runtime/reading/datasets.py",),
     "pint": ("runtime/reading/units.py",),
-    "mujoco": ("symgen/description/mjcf_model.py",),
+    "mujoco": ("symgen/description/mjcf.py",),
     "polars": ("runtime/reading/parquet.py",),
     "h5py": ("runtime/reading/mat.py",),
     "rosbags": ("runtime/reading/bags.py",),

@@ -120,7 +120,7 @@ def read_robot(
     if suffix == ".par":
         return read_par(content, path.name, constants, exact=exact)
     if suffix in TREES[1:] and b"<include" in content:
-        from symgen.description.mjcf_model import with_includes
+        from symgen.description.mjcf import with_includes
 
         with located(path.name):
             content = with_includes(content, _beside(path))

@@ -1,8 +1,8 @@
 """Reader of URDF files: the XML text becomes a tree of links and joints.
 
-`tree_frames` converts the tree to Khalil frames, and `tree_robot` adds the values. Numbers are read
-as they are; meshes, textures and packages are never opened. A URDF library would load such files,
-and its XML parser would expand entities, which `xml_text` refuses. Every error names its line.
+`tree_robot` converts the tree to Khalil frames and adds the values. Numbers are read as they are;
+meshes, textures and packages are never opened. A URDF library would load such files, and its XML
+parser would expand entities, which `xml_text` refuses. Every error names its line.
 """
 
 from __future__ import annotations

@@ -25,14 +25,15 @@ import numpy as np
 
 from symgen.description.fields import located
 from symgen.description.files import TREES
-from symgen.description.mjcf_model import DEEPEST, ORIENTATION
+from symgen.description.mjcf import DEEPEST, ORIENTATION
 from symgen.description.robot import FIXED, Robot
 from symgen.description.tree import FIXED_TYPE, Array, Inertial, Joint, Tree, TreePart, part_of
-from symgen.description.tree_frames import Table, placed
 from symgen.description.tree_robot import (
     JOINT_TERMS,
+    Table,
     inertial_of,
     parse_tree,
+    placed,
     robot_of_tree,
     ten_of,
 )

@@ -15,7 +15,7 @@ import pinocchio as pin
 
 from oracles.urdf_table import snapped_text
 from runtime.core.least_squares.estimate import Estimate
-from symgen.description.mjcf_model import compiled as compiled_mjcf
+from symgen.description.mjcf import compiled as compiled_mjcf
 from symgen.description.robot import INERTIAL
 from symgen.description.xml_text import read_elements
 
