@@ -23,7 +23,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from symgen.derive.geometry import Geometry, Rotation
-from symgen.derive.names import Names
 from symgen.derive.regressor import element_names
 from symgen.derive.scalar import Scalar, Vector, add, cross, dot, mul, scale, sub, vadd
 from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, parameter
@@ -50,7 +49,7 @@ class CompositeLinks:
         self.geometry = geometry
         self.robot = geometry.robot
         self.algebra = geometry.algebra
-        self.named = Names(len(self.robot.frames))
+        self.named = self.algebra.named
         self.chi = chi
         self.JP: dict[int, Tensor] = {}
         self.MSP: dict[int, Vector] = {}
@@ -75,17 +74,14 @@ class CompositeLinks:
         """
         for (k, m), x in zip(PLACES, self.JP[j], strict=True):
             self.algebra.name(x, self.named("JP", k, m, j))
-        for k, x in enumerate(self.MSP[j], start=1):
-            self.algebra.name(x, self.named("MSP", k, j))
+        self.algebra.vector("MSP", self.MSP[j], j)
         self.algebra.name(self.MP[j], self.named("MP", j))
 
     def _take(self, j: int, i: int) -> None:
         """Add the inertia of link j and all links after it to the inertia of its antecedent i."""
         R = self.geometry.rotation[j]
         P = self.geometry.P[j]
-        AS = R.up(self.MSP[j])
-        for k, x in enumerate(AS, start=1):
-            self.algebra.name(x, self.named("AS", k, j))
+        AS = self.algebra.vector("AS", R.up(self.MSP[j]), j)
         moved = vadd(AS, scale(self.MP[j], P))
         AJA = turned(R, self.JP[j])
         for (k, m), x in zip(PLACES, AJA, strict=True):
@@ -131,9 +127,8 @@ class CompositeLinks:
         column: dict[int, Scalar] = {}
         for i in reversed(self.robot.path(k)):
             frame = self.robot.frame(i)
-            for family, vector in (("E", E), ("NE", NE)):
-                for c, x in enumerate(vector, start=1):
-                    self.algebra.name(x, self.named(family, c, i, k))
+            self.algebra.vector("E", E, i, k)
+            self.algebra.vector("NE", NE, i, k)
             if frame.sigma != FIXED:
                 column[i] = E[2] if frame.sigma == PRISMATIC else NE[2]
             rotation = self.geometry.rotation[i]

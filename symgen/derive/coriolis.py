@@ -81,20 +81,15 @@ class CompositeRates(CompositeLinks):
             PP = cross(self.motion.link[f.ant].w, self.geometry.P[f.j])
             if f.sigma == PRISMATIC:
                 PP = vadd(PP, scale(self.motion.qd(f.j), self.geometry.rotation[f.j].up(E3)))
-            self.PP[f.j] = self._called("PP", PP, f.j)
+            self.PP[f.j] = self.algebra.vector("PP", PP, f.j)
         for f in reversed(self.robot.frames):
             self.algebra.section(f"Rates of composite link {f.j}")
-            self._called("HP", self.HP[f.j], f.j)
+            self.algebra.vector("HP", self.HP[f.j], f.j)
             for a, row in enumerate(self.BP[f.j], start=1):
                 for b, x in enumerate(row, start=1):
                     self.algebra.name(x, self.named("BP", a, b, f.j))
             if f.ant:
                 self._take_rates(f.j, f.ant)
-
-    def _called(self, family: str, v: Vector, *indices: int) -> Vector:
-        for c, x in enumerate(v, start=1):
-            self.algebra.name(x, self.named(family, c, *indices))
-        return v
 
     def _link(self, d: Derivation, j: int) -> None:
         """Compute the sums HP = sum m rd and BP = sum m r rd' over the points of link j alone; m, r
@@ -161,7 +156,7 @@ class CompositeRates(CompositeLinks):
                 if i != k:
                     below = dot(self._axis_rate(i), F if slides else N)
                     C[k, i] = below if slides else add(below, ND[2])
-            E, F = self._called("E", R.up(E), i, k), R.up(F)
+            E, F = self.algebra.vector("E", R.up(E), i, k), R.up(F)
             NE, N = vadd(R.up(NE), cross(P, E)), vadd(R.up(N), cross(P, F))
             ND = vadd(R.up(ND), cross(self.PP[i], F))
         return C

@@ -56,7 +56,7 @@ class _Law:
 
     def __init__(self, motion: Motion, e: Element, j: int) -> None:
         self.motion, self.element, self.row = motion, e, e.along[j]
-        self.name = f"{motion.named('QP')}{parameter(e.family, j)}"
+        self.name = f"{motion.algebra.named('QP')}{parameter(e.family, j)}"
 
     def of(self, e: Expression) -> Scalar:
         """Convert an expression in the torque law to a node of the expression graph."""

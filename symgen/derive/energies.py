@@ -153,11 +153,10 @@ class AtRates(Motion):
     """
 
     def __init__(self, motion: Motion, rates: Mapping[int, Scalar], tag: int) -> None:
-        self.geometry, self.robot, self.algebra, self.named, self.tag = (
+        self.geometry, self.robot, self.algebra, self.tag = (
             motion.geometry,
             motion.robot,
             motion.algebra,
-            motion.named,
             (tag,),
         )
         every = dict.fromkeys(self.geometry.closure.independent, 0) | dict(rates)

@@ -11,7 +11,6 @@ from __future__ import annotations
 from symgen.derive.geometry import Geometry, Rotation, summed
 from symgen.derive.graph import Turn
 from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.derive.names import Names
 from symgen.derive.scalar import E3, ZERO3, Matrix, Vector, add, cross, dot, sub, vadd
 from symgen.description.expression import Expression
 from symgen.description.robot import REVOLUTE
@@ -24,7 +23,7 @@ def frame_poses(geometry: Geometry) -> dict[int, tuple[Matrix, Vector]]:
 
     The root frame itself is included, unless it is the base.
     """
-    algebra, named = geometry.algebra, Names(len(geometry.robot.frames))
+    algebra = geometry.algebra
     root = geometry.root
     own = (root,) if root else ()
     pose: dict[int, tuple[Matrix, Vector]] = {root: (IDENTITY, ZERO3)}
@@ -33,14 +32,13 @@ def frame_poses(geometry: Geometry) -> dict[int, tuple[Matrix, Vector]]:
         carrier, (A_0i, P_0i) = pose[geometry.carrier[f.j].m][0], pose[f.ant]
         rows = (geometry.carrier[f.j].rotation.down(row) for row in carrier)
         A = tuple(
-            tuple(algebra.name(x, named("R", k, m, f.j, *own)) for m, x in enumerate(row, 1))
+            tuple(
+                algebra.name(x, algebra.named("R", k, m, f.j, *own)) for m, x in enumerate(row, 1)
+            )
             for k, row in enumerate(rows, 1)
         )
-        P = tuple(
-            algebra.name(add(P_0i[k], dot(A_0i[k], geometry.P[f.j])), named("P", k + 1, f.j, *own))
-            for k in range(3)
-        )
-        pose[f.j] = (A, P)  # type: ignore[assignment]
+        P = [add(P_0i[k], dot(A_0i[k], geometry.P[f.j])) for k in range(3)]
+        pose[f.j] = (A, algebra.vector("P", P, f.j, *own))  # type: ignore[assignment]
     pose.pop(0, None)
     return pose
 

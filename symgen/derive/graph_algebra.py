@@ -7,6 +7,7 @@ node contains the description that exact arithmetic needs (see `graph.Node`).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 
 from symgen.derive.graph import (
@@ -171,6 +172,15 @@ class GraphAlgebra:
     def name(self, value: Scalar | int, name: str) -> Scalar | int:
         """Give a name, such as W12, to the node of a value, and return the value."""
         return self.graph.name(value, name)
+
+    def vector(
+        self, family: str, value: Sequence[Scalar | int], *indices: int
+    ) -> tuple[Scalar | int, Scalar | int, Scalar | int]:
+        """Name the components of a vector, such as W12 (component 1, link 2); return the vector."""
+        x, y, z = (
+            self.name(v, self.named(family, k, *indices)) for k, v in enumerate(value, start=1)
+        )
+        return x, y, z
 
     def hint(self, value: Scalar | int, name: str) -> Scalar | int:
         """Suggest a name for a value, used if it is needed more than once, and return the value."""

@@ -209,34 +209,28 @@ class Model:
         return Values(tuple(entries), rewrite.algebra)
 
 
+AXES: Mapping[str, Callable[[Derivation, Sequence[str]], Iterable[object]]] = {
+    "joints": lambda d, parameters: d.robot.joints,
+    "parameters": lambda d, parameters: parameters,
+    "standard parameters": lambda d, parameters: d.robot.parameters,
+    "frames": lambda d, parameters: [f.j for f in d.robot.frames],
+    "pose": lambda d, parameters: range(1, 5),
+    "twist": lambda d, parameters: TWIST,
+    "wrench": lambda d, parameters: ("fx", "fy", "fz", "nx", "ny", "nz"),
+    "energies": lambda d, parameters: ("kinetic", "potential"),
+    "equations": lambda d, parameters: range(1, len(equations(d)) + 1),
+    "residual, derivatives": lambda d, parameters: ("r", *d.closure.independent),
+    "curvatures, traces": lambda d, parameters: [
+        *d.closure.tied,
+        *(loop.cut for loop in d.robot.loops if loop.cut in d.closure.tied),
+    ],
+}
+"""Labels of the rows or columns of a model, by the name of the axis."""
+
+
 def labels(d: Derivation, axis: str, parameters: Sequence[str]) -> tuple[str, ...]:
     """Return the labels of the rows or columns of a model, such as joint or parameter names."""
-    closure, robot = d.closure, d.robot
-    match axis:
-        case "joints":
-            return tuple(map(str, robot.joints))
-        case "parameters":
-            return tuple(parameters)
-        case "frames":
-            return tuple(str(f.j) for f in robot.frames)
-        case "pose":
-            return ("1", "2", "3", "4")
-        case "twist":
-            return TWIST
-        case "wrench":
-            return ("fx", "fy", "fz", "nx", "ny", "nz")
-        case "energies":
-            return ("kinetic", "potential")
-        case "standard parameters":
-            return robot.parameters
-        case "equations":
-            return tuple(str(k + 1) for k in range(len(equations(d))))
-        case "residual, derivatives":
-            return ("r", *map(str, closure.independent))
-        case "curvatures, traces":
-            traces = (str(p.cut) for p in robot.loops if p.cut in closure.tied)
-            return (*map(str, closure.tied), *traces)
-    raise KeyError(axis)
+    return tuple(map(str, AXES[axis](d, parameters)))
 
 
 def equations(d: Derivation) -> tuple[int, ...]:

@@ -23,7 +23,6 @@ from symgen.derive.frames import Frames
 from symgen.derive.graph import Symbol
 from symgen.derive.loop_equations import LoopSystem
 from symgen.derive.model import Case, Entry, Model, Place, Request, equations
-from symgen.derive.names import Names
 from symgen.derive.regressor import element_names
 from symgen.derive.rewrite import Input
 from symgen.derive.scalar import Vector
@@ -99,7 +98,7 @@ def _unit_accelerations(d: Derivation, r: Request) -> Iterator[Case]:
 
     A tied passive joint then has the acceleration G = dq_u/dq_i.
     """
-    named, common = Names(len(d.robot.frames)), _still(d, "qd", "qdd") | _weightless(d)
+    named, common = d.algebra.named, _still(d, "qd", "qdd") | _weightless(d)
     common |= _without(d, lambda e: e.kind == "inertia")
     for column, i in enumerate(d.robot.joints):
         unit: dict[Symbol, Input] = {Symbol("qdd", f"QDP{i}"): ONE}

@@ -21,7 +21,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from symgen.derive.geometry import Geometry
-from symgen.derive.names import Names
 from symgen.derive.scalar import (
     ZERO3,
     Matrix,
@@ -97,7 +96,7 @@ class Motion:
         qdd: Mapping[int, Scalar] | None = None,
     ) -> None:
         self.geometry, self.robot, self.algebra = geometry, geometry.robot, geometry.algebra
-        self.named, self.tag = Names(len(self.robot.frames)), tag
+        self.tag = tag
         independent = geometry.closure.independent
         self._qd = qd or {i: self.algebra.qd(i) for i in independent}
         self._qdd = qdd or {i: self.algebra.qdd(i) for i in independent}
@@ -124,22 +123,7 @@ class Motion:
 
     def vector(self, family: str, value: Vector, *indices: int) -> Vector:
         """Name the components of a vector, such as W12 (component 1, link 2); return the vector."""
-        x, y, z = (
-            self.algebra.name(v, self.named(family, k, *indices, *self.tag))
-            for k, v in enumerate(value, start=1)
-        )
-        return x, y, z
-
-    def hinted(self, family: str, value: Vector, *indices: int) -> Vector:
-        """Suggest names for the components of a vector, and return the vector.
-
-        A name is used if its component is needed more than once.
-        """
-        x, y, z = (
-            self.algebra.hint(v, self.named(family, k, *indices, *self.tag))
-            for k, v in enumerate(value, start=1)
-        )
-        return x, y, z
+        return self.algebra.vector(family, value, *indices, *self.tag)
 
     def _link(self, j: int) -> LinkMotion:
         f, geometry = self.robot.frame(j), self.geometry
@@ -173,7 +157,7 @@ class Motion:
         return LinkMotion(w, wd, DV, DW, U, self.vector("VP", a, j))
 
     def _products(self, w: Vector, wd: Vector, j: int) -> tuple[Matrix, Vector, Matrix]:
-        name, named = self.algebra.name, self.named
+        name, named = self.algebra.name, self.algebra.named
         D = {
             (k, m): name(mul(w[k], w[m]), named("DV", k + 1, m + 1, j, *self.tag))
             for k in range(3)

@@ -118,7 +118,9 @@ class Axes:
             if sigma == REVOLUTE:
                 z = geometry.from_carrier(j, self.z[i, m]) if inside else E3
                 lever = vadd(self.v[i, frame.ant], cross(self.z[i, frame.ant], geometry.P[j]))
-                v = geometry.rotation[j].down(motion.hinted("VS", lever, j, i))
+                for k, x in enumerate(lever, start=1):
+                    motion.algebra.hint(x, motion.algebra.named("VS", k, j, i))
+                v = geometry.rotation[j].down(lever)
             else:
                 z = ZERO3
                 v = geometry.from_carrier(j, self.v[i, m]) if inside else E3
@@ -138,12 +140,12 @@ class Axes:
         for i in motion.robot.path(j):
             if motion.robot.frame(i).sigma != FIXED:
                 turning = motion.algebra.hint(
-                    dot(self.z[i, j], N), f"{motion.named('DN', i)}{parameter}{j}"
+                    dot(self.z[i, j], N), f"{motion.algebra.named('DN', i)}{parameter}{j}"
                 )
                 pushing = motion.algebra.hint(
-                    dot(self.v[i, j], F), f"{motion.named('DF', i)}{parameter}{j}"
+                    dot(self.v[i, j], F), f"{motion.algebra.named('DF', i)}{parameter}{j}"
                 )
                 entries[i] = motion.algebra.hint(
-                    add(turning, pushing), f"{motion.named('DG', i)}{parameter}{j}"
+                    add(turning, pushing), f"{motion.algebra.named('DG', i)}{parameter}{j}"
                 )
         return entries
