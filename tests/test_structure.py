@@ -88,7 +88,7 @@ ONLY_IN = {  # library: files and folders that may import it
         "runtime/study.py",
     ),
     "ruamel": ("symgen/description/", "symgen/cli/", "runtime/documents/yaml_text.py"),
-    "sympy": ("symgen/regroup/formula.py", "symgen/symbols/"),
+    "sympy": ("symgen/symbols/",),
     "casadi": (
         "symgen/derive/lagrange.py",
         "runtime/loop/",

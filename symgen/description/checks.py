@@ -10,9 +10,8 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from symgen.description.advice import degrees_advice
 from symgen.description.element import Element, check_channels, check_law
-from symgen.description.expression import ONE, Call, Expression
+from symgen.description.expression import ONE, PI, Call, Expression
 from symgen.description.fields import Path, dotted
 from symgen.description.kinds import KINDS, OWN_LAWS
 from symgen.description.naming import check_names
@@ -30,6 +29,8 @@ from symgen.description.parts import (
     moves,
 )
 from symgen.errors import DescriptionError
+
+FULL_TURN = 2 * math.pi  # rad: a larger constant in an angle, pi aside, was meant in degrees
 
 
 def check_robot(robot: Any) -> None:
@@ -161,9 +162,28 @@ def _check_geometry(robot: Any) -> None:
                 )
             _check_expression(e, where, constants, angle=name in ANGLES, q=f.q if variable else "")
             if name in ANGLES and (
-                advice := degrees_advice(f.theta0 if name == "theta" else e, dict(constants))
+                advice := _degrees_advice(f.theta0 if name == "theta" else e, dict(constants))
             ):
                 raise DescriptionError(f"frame {row}: {name} = {e}: {advice}", path=where)
+
+
+def _degrees_advice(angle: Expression, constants: dict[str, float]) -> str:
+    """Return a hint if an angle larger than a full turn was probably written in degrees.
+
+    Multiples of pi in the angle are ignored. `angle` is given without the joint variable q_j.
+    """
+    turn = angle - PI * angle.coefficient("pi")
+    if "pi" in turn.atoms or turn.symbols - constants.keys():
+        return ""
+    value = turn.value(constants)
+    return (
+        (
+            f"{value:g} rad are {abs(value) / FULL_TURN:.3g} turns; angles are in rad: 90 degrees "
+            "are pi/2"
+        )
+        if abs(value) > FULL_TURN
+        else ""
+    )
 
 
 def _check_expression(

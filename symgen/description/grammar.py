@@ -14,11 +14,11 @@ limited, so that every text is parsed quickly.
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Iterable
 from fractions import Fraction
 
-from symgen.description.advice import symbol_advice, unit_advice
 from symgen.description.expression import FUNCTIONS as TABLE
 from symgen.description.expression import Expression, call, power, simplified
 from symgen.errors import ExpressionError
@@ -45,6 +45,26 @@ _LAW_TOKEN = re.compile(
 )
 
 
+def _symbol_advice(name: str, declared: Iterable[str]) -> str:
+    """Suggest the declared symbol that the user probably meant by the unknown symbol `name`."""
+    symbols = [*declared, "pi"]
+    same = [symbol for symbol in symbols if symbol.lower() == name.lower()]
+    close = same or difflib.get_close_matches(
+        name, [symbol for symbol in symbols if len(symbol) > 2], 1
+    )
+    return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def _unit_advice(token: str) -> str:
+    """Return a hint if `token` in an expression is a unit, such as deg, or the power sign ^."""
+    unit = token.lower()
+    if unit in ("deg", "degree", "degrees", "°", "grad"):
+        return "; angles are in rad: 90 degrees are pi/2"
+    if unit in ("mm", "cm", "m", "in", "kg", "g", "rad"):
+        return "; write the number alone: everything is in SI and rad"
+    return "; a power is written **" if token == "^" else ""
+
+
 class _Parser:
     def __init__(self, text: str, symbols: Iterable[str] | None, functions: tuple[str, ...]):
         self.text, self.functions = text, functions
@@ -66,7 +86,7 @@ class _Parser:
                         f"( ), {', '.join(functions)}"
                     ),
                     at + 1,
-                    unit_advice(text[at]),
+                    _unit_advice(text[at]),
                 )
             kind = str(match.lastgroup)
             self.tokens.append((kind, match.group(kind), match.start(kind) + 1))
@@ -178,7 +198,7 @@ class _Parser:
                     raise self.error(
                         f"{text!r} is not a known function; expected {', '.join(others)} or {last}",
                         column,
-                        unit_advice(text),
+                        _unit_advice(text),
                     )
                 e = self.sum()
                 if text in ("min", "max"):
@@ -206,7 +226,7 @@ class _Parser:
             raise self.error(
                 f"undeclared symbol {text!r}; declared symbols: {', '.join(declared) or 'none'}",
                 column,
-                symbol_advice(text, declared),
+                _symbol_advice(text, declared),
             )
         raise self.error(f"expected a number, a symbol or (, found {text!r}", column)
 
@@ -229,6 +249,6 @@ def parse(
     kind, token, column = parser.tokens[parser.position]
     if kind != "end":
         raise parser.error(
-            f"unexpected {token!r} after a complete expression", column, unit_advice(token)
+            f"unexpected {token!r} after a complete expression", column, _unit_advice(token)
         )
     return simplified(e)

@@ -18,7 +18,6 @@ from typing import Any
 from ruamel.yaml import YAML, MappingNode, Node, ScalarNode
 from ruamel.yaml.error import MarkedYAMLError
 
-from symgen.description.advice import ANCHORS, yaml_advice
 from symgen.description.element import Element
 from symgen.description.expression import ONE
 from symgen.description.fields import Path, located
@@ -39,6 +38,25 @@ CONSTANTS |= {
 }
 
 
+ANCHORS = "anchors and aliases (& and *) are not supported; write the value itself"
+_ADVICE = {  # what the scanner says: what to change
+    "'\\t'": "there is a tab here; indent with spaces",
+    "mapping values are not allowed here": (
+        "a second `: ` on this line; put text that contains `: ` between quotes"
+    ),
+    "but found '<block mapping start>'": (
+        "this line has another indent than the lines above; "
+        "give all rows of one table the same indent"
+    ),
+    "<block end>, ": (
+        "the lines above are a list (-) or have another indent; write every row as `1: {...}`, "
+        "with the same indent"
+    ),
+    "found another document": "a second document starts here; a robot file holds one",
+    "found undefined alias": ANCHORS,
+    "expected ',' or '}'": "look here, or at the end of the row above, for a missing , or }",
+    "expected ',' or ']'": "look here, or at the end of the row above, for a missing , or ]",
+}
 WORDS = ("null", "true", "false", "yes", "no", "on", "off")  # of YAML, of version 1.1 too
 DRIVES = ("ratio", "offset", "torque_constant")
 BY_ROW = ("frames", "elements", "limits", "values", "labels")
@@ -102,8 +120,9 @@ def _document(content: bytes, lines: dict[Path, int]) -> Any:
             error.problem_mark or error.context_mark,
             str(error.problem or error.context),
         )
+        advice = next((f"; {text}" for part, text in _ADVICE.items() if part in problem), "")
         raise DescriptionError(
-            f"not YAML: {problem}{yaml_advice(problem)}", line=mark.line + 1 if mark else None
+            f"not YAML: {problem}{advice}", line=mark.line + 1 if mark else None
         ) from error
     except RecursionError as error:
         raise DescriptionError(

@@ -14,8 +14,7 @@ from symgen.description.expression import ONE, Expression
 from symgen.emit.header import loop_lines, wrap_text
 from symgen.emit.spec import function, is_inertial, is_inertial_or_actuator
 from symgen.errors import SymgenError
-from symgen.regroup.formula import Formula
-from symgen.regroup.regrouping import BaseParameter, Regrouping
+from symgen.regroup.regrouping import BaseParameter, Formula, Regrouping
 
 
 def printed(regrouping: Regrouping, form: str, only: str | None = None) -> str:

@@ -21,8 +21,7 @@ from symgen.description.expression import ONE, ZERO
 from symgen.description.fields import Path, dotted
 from symgen.description.robot import PRISMATIC, REVOLUTE, Robot
 from symgen.description.yaml import flow, tables_of
-from symgen.regroup.formula import Formula
-from symgen.regroup.regrouping import Regrouping
+from symgen.regroup.regrouping import Formula, Regrouping
 from symgen.regroup.rules import Transfer
 
 OF_REVOLUTE = {  # family: the relation of `rules`, in words

@@ -28,8 +28,7 @@ from symgen.description.expression import ONE, Expression
 from symgen.description.grammar import parse
 from symgen.description.robot import Robot
 from symgen.errors import SymgenError
-from symgen.regroup.formula import Formula
-from symgen.regroup.regrouping import Regrouping, regroup
+from symgen.regroup.regrouping import Formula, Regrouping, regroup
 from symgen.symbols.expressions import in_decimals
 
 PARAMETERS = ("base", "standard")

@@ -22,8 +22,7 @@ from symgen.description.robot import Robot
 from symgen.emit.header import frame_table, informative_columns, wrap_text
 from symgen.emit.render import WIDTH
 from symgen.errors import SymgenError
-from symgen.regroup.formula import Formula
-from symgen.regroup.regrouping import Regrouping
+from symgen.regroup.regrouping import Formula, Regrouping
 from symgen.symbols import expressions
 from symgen.symbols.derivation import source_of
 from symgen.symbols.expressions import Tree

@@ -14,8 +14,7 @@ from typing import Any
 import sympy
 
 from symgen.description.expression import FUNCTIONS, ONE, Call, Expression, Monomial, Number
-from symgen.regroup.formula import Formula
-from symgen.regroup.regrouping import Regrouping
+from symgen.regroup.regrouping import Formula, Regrouping
 
 Tree = Any  # a SymPy expression that is not evaluated
 DIGITS = 15

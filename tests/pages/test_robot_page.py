@@ -26,8 +26,7 @@ from symgen.emit.spec import module_spec
 from symgen.errors import SymgenError
 from symgen.pages.effects import effects
 from symgen.pages.page import embedded, robot_page
-from symgen.regroup.formula import Formula
-from symgen.regroup.regrouping import regroup
+from symgen.regroup.regrouping import Formula, regroup
 from symgen.symbols import expressions
 from symgen.symbols.printers import math, math_terms
 

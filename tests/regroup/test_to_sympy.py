@@ -15,8 +15,7 @@ from symgen.description import load_robot
 from symgen.description.expression import call, with_known_cosines
 from symgen.description.grammar import parse
 from symgen.emit.printers import PYTHON
-from symgen.regroup.formula import Formula
-from symgen.regroup.regrouping import regroup
+from symgen.regroup.regrouping import Formula, regroup
 from symgen.symbols import expressions
 from symgen.symbols.printers import latex, math_terms
 
