@@ -28,7 +28,16 @@ from symgen.description.expression import ONE, ZERO, Expression
 from symgen.description.fields import CONFIG, UNWRITTEN, Numeric, Path, Text, Whole, Written
 from symgen.description.grammar import LAWS, parse
 from symgen.description.kinds import CHANNEL, KINDS, OWN_LAWS, STATE, TRANSMITTED, USUAL_KINDS
-from symgen.description.parts import DIRECTIONS, Form, Row, form_of, parameter, reduced, rows
+from symgen.description.parts import (
+    DIRECTIONS,
+    GEOMETRY,
+    Form,
+    Row,
+    form_of,
+    parameter,
+    reduced,
+    rows,
+)
 from symgen.errors import DescriptionError, ExpressionError
 
 
@@ -329,11 +338,7 @@ def _positions(robot: Any, row: Any) -> tuple[float, float]:
 
 def check_channels(robot: Any) -> None:
     """Check that a constant used as a function of time (a channel) is not also used as a number."""
-    of_frames = [
-        getattr(f, name)
-        for f in robot.frames
-        for name in ("gamma", "b", "alpha", "d", "theta", "r")
-    ]
+    of_frames = [getattr(f, name) for f in robot.frames for name in GEOMETRY]
     rows = [c for e in robot.elements for row in e.along.values() for c in row.values()]
     every = [*of_frames, *rows, *robot.gravity, *robot.constraints.values()]
     laws = set().union(*(e.symbols for e in robot.elements if e.is_own))

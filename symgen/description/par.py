@@ -28,6 +28,7 @@ from symgen.description.angles import SNAP, Angles
 from symgen.description.expression import ONE, PI, Expression, twelfths
 from symgen.description.fields import located
 from symgen.description.grammar import parse
+from symgen.description.parts import ANGLES, GEOMETRY
 from symgen.description.robot import (
     FIXED,
     INERTIAL,
@@ -198,15 +199,15 @@ def _without_comments(text: str, par: _Par) -> str:
 
     The text is scanned once, however many comments it opens.
     """
-    parts, position = [], 0
-    while (start := text.find("(*", position)) >= 0:
-        end, line = text.find("*)", start + 2) + 2, text.count("\n", 0, start) + 1
-        if end < 2:
+
+    def blank(comment: re.Match[str]) -> str:
+        line = text.count("\n", 0, comment.start()) + 1
+        if not comment["end"]:
             raise DescriptionError("a comment (* opens and does not end; add *)", line=line)
-        _comment(text[start + 2 : end - 2].strip(), line, par)
-        parts += [text[position:start], re.sub(r"[^\n]", " ", text[start:end])]
-        position = end
-    return "".join([*parts, text[position:]])
+        _comment(comment["text"].strip(), line, par)
+        return re.sub(r"[^\n]", " ", comment[0])
+
+    return re.sub(r"\(\*(?P<text>.*?)(?P<end>\*\)|\Z)", blank, text, flags=re.DOTALL)
 
 
 def _comment(text: str, line: int, par: _Par) -> None:
@@ -287,9 +288,9 @@ def _robot(par: _Par, constants: dict[str, float], file: str, sha256: str) -> Ro
         )
     frames = _frames(par, NF, loops=kind == 2)
     gravity = [_expression(*item) for item in _list(par, "G", 3, "0")]
-    used = {
-        s for f in frames for e in (f.gamma, f.b, f.alpha, f.d, f.theta, f.r) for s in e.symbols
-    }.union(*(e.symbols for e in gravity))
+    used = {s for f in frames for key in GEOMETRY for s in getattr(f, key).symbols}.union(
+        *(e.symbols for e in gravity)
+    )
     numbers = {**par.numbers.get("constants", {}), **constants}
     if missing := sorted(s for s in used - set(numbers) if not re.fullmatch(r"q\d+", s)):
         example = ", ".join(f"{s} = ..." for s in missing)
@@ -342,8 +343,8 @@ def _frames(par: _Par, NF: int, *, loops: bool) -> tuple[Frame, ...]:
                 f"joint {j}: sigma = {sigma}; expected 0 revolute, 1 prismatic or 2 fixed",
                 line=rows["sigma"][k][1],
             )
-        e = {key: _expression(*rows[key][k]) for key in ("gamma", "b", "alpha", "d", "theta", "r")}
-        for key in ("gamma", "alpha", "theta"):
+        e = {key: _expression(*rows[key][k]) for key in GEOMETRY}
+        for key in ANGLES:
             e[key] = _rounded(e[key], f"{key} of frame {j} (line {rows[key][k][1]})", par)
         moved = {REVOLUTE: "theta", PRISMATIC: "r"}.get(sigma)
         if moved is not None:
@@ -360,7 +361,7 @@ def _frames(par: _Par, NF: int, *, loops: bool) -> tuple[Frame, ...]:
             "could move them"
         )
     for f in frames:
-        for key in ("gamma", "b", "alpha", "d", "theta", "r"):
+        for key in GEOMETRY:
             if shared := (getattr(f, key).symbols - {f.q}) & set(variables):
                 raise DescriptionError(
                     (
