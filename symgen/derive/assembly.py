@@ -22,7 +22,7 @@ from symgen.derive.frames import frame_poses
 from symgen.derive.geometry import Geometry
 from symgen.derive.graph import interpret
 from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.derive.scalar import Matrix, Scalar, Vector, dot, sub
+from symgen.derive.scalar import Matrix, Scalar, Vector, dot
 from symgen.description.expression import ZERO, Expression
 from symgen.description.parts import row_of
 from symgen.description.robot import Loop, Robot
@@ -55,7 +55,7 @@ def coincidence(ends: list[tuple[Pose, Pose]]) -> list[Scalar]:
     The differences are P_cut - P_twin and A_cut - A_twin.
     """
     return [
-        sub(x, y)
+        x - y
         for (A, P), (B, Q) in ends
         for u, v in zip((P, *A), (Q, *B), strict=True)
         for x, y in zip(u, v, strict=True)
@@ -73,10 +73,10 @@ def residuals(robot: Robot, algebra: GraphAlgebra, closure: Closure) -> list[Sca
     ends = loop_ends(robot, algebra, closure)
     for loop, ((A, P), (B, Q)) in zip(robot.loops, ends, strict=True):
         algebra.section(f"Loop: frame {loop.twin} on frame {loop.cut}")
-        rows += [sub(P[k], Q[k]) for k in range(3)]
+        rows += [P[k] - Q[k] for k in range(3)]
         if loop.cut in closure.independent:
             C = [[dot(u, v) for v in zip(*B, strict=True)] for u in zip(*A, strict=True)]
-            rows += [sub(C[2][1], C[1][2]), sub(C[0][2], C[2][0]), sub(C[1][0], C[0][1])]
+            rows += [C[2][1] - C[1][2], C[0][2] - C[2][0], C[1][0] - C[0][1]]
         else:
             rows += [0, 0, 0]
     return rows

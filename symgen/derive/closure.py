@@ -22,7 +22,7 @@ from math import lcm, prod
 
 from symgen.derive.graph import ActiveRow, Turn
 from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.derive.scalar import Scalar, add, mul
+from symgen.derive.scalar import Scalar
 from symgen.description.expression import ONE, ZERO, Expression
 from symgen.description.robot import REVOLUTE, Robot
 from symgen.errors import DescriptionError
@@ -118,10 +118,10 @@ class Closure:
         total: dict[int, Scalar] = dict.fromkeys(self.independent, 0)
         for j, value in torque.items():
             for i, g in self.row[j].items():
-                total[i] = add(total[i], mul(algebra.constant(g), value))
+                total[i] = total[i] + algebra.constant(g) * value
         for i in self.robot.joints:
             for u in self.tied:
-                total[i] = add(total[i], mul(algebra.rate(u, i), total[u]))
+                total[i] = total[i] + algebra.rate(u, i) * total[u]
         return {i: total[i] for i in self.robot.joints}
 
 

@@ -24,7 +24,7 @@ from collections.abc import Mapping
 
 from symgen.derive.geometry import Geometry, Rotation
 from symgen.derive.regressor import element_names
-from symgen.derive.scalar import Scalar, Vector, add, cross, dot, mul, scale, sub, vadd
+from symgen.derive.scalar import Scalar, Vector, cross, dot, scale, vadd
 from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, parameter
 
 Tensor = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]  # 11, 12, 13, 22, 23, 33
@@ -87,10 +87,10 @@ class CompositeLinks:
         for (k, m), x in zip(PLACES, AJA, strict=True):
             self.algebra.hint(x, self.named("AJA", k, m, j))
         shifted = parallel(P, AS, moved)
-        JP = (add(a, add(b, c)) for a, b, c in zip(self.JP[i], AJA, shifted, strict=True))
+        JP = (a + (b + c) for a, b, c in zip(self.JP[i], AJA, shifted, strict=True))
         self.JP[i] = tuple(JP)
         self.MSP[i] = vadd(self.MSP[i], moved)
-        self.MP[i] = add(self.MP[i], self.MP[j])
+        self.MP[i] = self.MP[i] + self.MP[j]
 
     def matrix(self) -> dict[Place, Scalar]:
         """Return the inertia matrix {(i, k): A_ik} of all moving joints of the open tree.
@@ -110,7 +110,7 @@ class CompositeLinks:
                     (i, k): a * b for i, a in row.items() for k, b in row.items()
                 }
                 for place, b in form.items():
-                    A[place] = add(A[place], mul(self.algebra.constant(b), self.chi[name]))
+                    A[place] = A[place] + self.algebra.constant(b) * self.chi[name]
         return A
 
     def _column(self, k: int) -> dict[int, Scalar]:
@@ -119,10 +119,10 @@ class CompositeLinks:
         The joints i are those between the base and joint k.
         """
         x, y, _ = self.MSP[k]
-        E: Vector = (sub(0, y), x, 0)
+        E: Vector = (-y, x, 0)
         NE: Vector = (self.JP[k][2], self.JP[k][4], self.JP[k][5])
         if self.robot.frame(k).sigma == PRISMATIC:
-            E, NE = (0, 0, self.MP[k]), (y, sub(0, x), 0)
+            E, NE = (0, 0, self.MP[k]), (y, -x, 0)
         self.algebra.section(f"Unit acceleration of joint {k}")
         column: dict[int, Scalar] = {}
         for i in reversed(self.robot.path(k)):
@@ -141,11 +141,11 @@ class CompositeLinks:
 def turned(R: Rotation, J: Tensor) -> Tensor:
     """Rotate an inertia tensor J from frame j to frame i: return iRj J jRi."""
     XX, XY, XZ, YY, YZ, ZZ = J
-    cc, cs = mul(R.c, R.c), mul(R.c, R.s)
-    x = sub(mul(cc, sub(XX, YY)), mul(add(cs, cs), XY))
-    xy = add(mul(cs, sub(XX, YY)), sub(mul(add(cc, cc), XY), XY))
-    xz, yz = sub(mul(R.c, XZ), mul(R.s, YZ)), add(mul(R.s, XZ), mul(R.c, YZ))
-    rows = [(add(YY, x), xy, xz), (xy, sub(XX, x), yz), (xz, yz, ZZ)]
+    cc, cs = R.c * R.c, R.c * R.s
+    x = cc * (XX - YY) - (cs + cs) * XY
+    xy = cs * (XX - YY) + ((cc + cc) * XY - XY)
+    xz, yz = R.c * XZ - R.s * YZ, R.s * XZ + R.c * YZ
+    rows = [(YY + x, xy, xz), (xy, XX - x, yz), (xz, yz, ZZ)]
     if R.A is not None:
         half = [[dot(axis, column) for column in rows] for axis in R.A]
         rows = [(dot(a, R.A[0]), dot(a, R.A[1]), dot(a, R.A[2])) for a in half]
@@ -157,6 +157,6 @@ def parallel(P: Vector, AS: Vector, moved: Vector) -> Tensor:
 
     They are (P . AS + P . moved) E - P moved' - AS P', with moved = AS + MP P.
     """
-    trace = add(dot(P, AS), dot(P, moved))
-    outer = {(k, m): add(mul(P[k - 1], moved[m - 1]), mul(AS[k - 1], P[m - 1])) for k, m in PLACES}
-    return tuple(sub(trace if k == m else 0, x) for (k, m), x in outer.items())
+    trace = dot(P, AS) + dot(P, moved)
+    outer = {(k, m): P[k - 1] * moved[m - 1] + AS[k - 1] * P[m - 1] for k, m in PLACES}
+    return tuple((trace if k == m else 0) - x for (k, m), x in outer.items())

@@ -42,13 +42,10 @@ from symgen.derive.scalar import (
     Matrix,
     Scalar,
     Vector,
-    add,
     apply,
     cross,
     dot,
-    mul,
     scale,
-    sub,
     vadd,
 )
 from symgen.description.expression import Expression
@@ -98,9 +95,9 @@ class CompositeRates(CompositeLinks):
         w, half = self.motion.link[j].w, self.algebra.constant(HALF)
         XX, XY, XZ, YY, YZ, ZZ = self.own[j][:6]
         K = (
-            (mul(half, sub(add(YY, ZZ), XX)), sub(0, XY), sub(0, XZ)),
-            (sub(0, XY), mul(half, sub(add(XX, ZZ), YY)), sub(0, YZ)),
-            (sub(0, XZ), sub(0, YZ), mul(half, sub(add(XX, YY), ZZ))),
+            (half * (YY + ZZ - XX), -XY, -XZ),
+            (-XY, half * (XX + ZZ - YY), -YZ),
+            (-XZ, -YZ, half * (XX + YY - ZZ)),
         )
         mx, my, mz = self.own[j][6:9]
         self.HP[j] = cross(w, (mx, my, mz))
@@ -135,18 +132,18 @@ class CompositeRates(CompositeLinks):
         if self.robot.frame(k).sigma == PRISMATIC:
             E, NE = scale(self.MP[k], zd), cross(self.MSP[k], zd)
             F: Vector = (0, 0, self.MP[k])
-            N: Vector = (y, sub(0, x), 0)
-            ND: Vector = (H[1], sub(0, H[0]), 0)
+            N: Vector = (y, -x, 0)
+            ND: Vector = (H[1], -H[0], 0)
         else:
             XX, XY, XZ, YY, YZ, ZZ = self.JP[k]
-            across = add(B[0][0], B[1][1])
-            E = vadd(cross(zd, self.MSP[k]), (sub(0, H[1]), H[0], 0))
+            across = B[0][0] + B[1][1]
+            E = vadd(cross(zd, self.MSP[k]), (-H[1], H[0], 0))
             NE = vadd(
                 apply(((XX, XY, XZ), (XY, YY, YZ), (XZ, YZ, ZZ)), zd),
-                (sub(0, B[2][0]), sub(0, B[2][1]), across),
+                (-B[2][0], -B[2][1], across),
             )
-            F, N = (sub(0, y), x, 0), (XZ, YZ, ZZ)
-            ND = (sub(0, B[0][2]), sub(0, B[1][2]), across)
+            F, N = (-y, x, 0), (XZ, YZ, ZZ)
+            ND = (-B[0][2], -B[1][2], across)
         C: dict[tuple[int, int], Scalar] = {}
         for i in reversed(self.robot.path(k)):
             frame, R, P = self.robot.frame(i), self.geometry.rotation[i], self.geometry.P[i]
@@ -155,7 +152,7 @@ class CompositeRates(CompositeLinks):
                 C[i, k] = E[2] if slides else NE[2]
                 if i != k:
                     below = dot(self._axis_rate(i), F if slides else N)
-                    C[k, i] = below if slides else add(below, ND[2])
+                    C[k, i] = below if slides else below + ND[2]
             E, F = self.algebra.vector("E", R.up(E), i, k), R.up(F)
             NE, N = vadd(R.up(NE), cross(P, E)), vadd(R.up(N), cross(P, F))
             ND = vadd(R.up(ND), cross(self.PP[i], F))
@@ -164,21 +161,21 @@ class CompositeRates(CompositeLinks):
     def _axis_rate(self, k: int) -> Vector:
         """Return the rate of change of joint axis k, zd_k = w_k x z_k, in frame k."""
         w = self.motion.link[k].w
-        return (w[1], sub(0, w[0]), 0)
+        return (w[1], -w[0], 0)
 
 
 def turned(R: Rotation, B: Matrix) -> Matrix:
     """Rotate a 3x3 matrix B from frame j to frame i: return iRj B jRi."""
-    cc, cs = mul(R.c, R.c), mul(R.c, R.s)
-    difference, sum_ = sub(B[0][0], B[1][1]), add(B[0][1], B[1][0])
-    x = sub(mul(cc, difference), mul(cs, sum_))
-    xy = add(mul(cc, sum_), mul(cs, difference))
+    cc, cs = R.c * R.c, R.c * R.s
+    difference, sum_ = B[0][0] - B[1][1], B[0][1] + B[1][0]
+    x = cc * difference - cs * sum_
+    xy = cc * sum_ + cs * difference
     rows: Matrix = (
-        (add(B[1][1], x), sub(xy, B[1][0]), sub(mul(R.c, B[0][2]), mul(R.s, B[1][2]))),
-        (sub(xy, B[0][1]), sub(B[0][0], x), add(mul(R.s, B[0][2]), mul(R.c, B[1][2]))),
+        (B[1][1] + x, xy - B[1][0], R.c * B[0][2] - R.s * B[1][2]),
+        (xy - B[0][1], B[0][0] - x, R.s * B[0][2] + R.c * B[1][2]),
         (
-            sub(mul(R.c, B[2][0]), mul(R.s, B[2][1])),
-            add(mul(R.s, B[2][0]), mul(R.c, B[2][1])),
+            R.c * B[2][0] - R.s * B[2][1],
+            R.s * B[2][0] + R.c * B[2][1],
             B[2][2],
         ),
     )

@@ -27,7 +27,7 @@ from symgen.derive.loops import close
 from symgen.derive.newton_euler import Motion, joint_torques
 from symgen.derive.numbers import numbered
 from symgen.derive.regressor import columns, element_names
-from symgen.derive.scalar import Matrix, Scalar, Vector, add, mul
+from symgen.derive.scalar import Matrix, Scalar, Vector
 from symgen.description.robot import Robot
 
 ABSORBED = ("YY", "MZ", "M")
@@ -109,7 +109,7 @@ def derived(robot: Robot, closing: Callable[[Robot], Closure]) -> Derivation:
     algebra.section("Friction, actuators")
     for name, (e, key) in element_names(written).items():
         for i, x in element_column(motion, e, key).items():
-            torque[i] = add(torque[i], mul(chi[name], x))
+            torque[i] = torque[i] + chi[name] * x
     actuated = closure.project(algebra, torque)
     last = [name for name in robot.parameters if name.rstrip("0123456789") in ABSORBED]
     D = columns(motion, [*(name for name in robot.parameters if name not in last), *last])

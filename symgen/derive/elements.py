@@ -17,7 +17,7 @@ from __future__ import annotations
 from symgen.derive.angles import varies
 from symgen.derive.graph import Turn
 from symgen.derive.newton_euler import Motion
-from symgen.derive.scalar import Scalar, add, linear, mul
+from symgen.derive.scalar import Scalar, linear
 from symgen.description.expression import FUNCTIONS, ONE, ZERO, Atom, Call, Expression
 from symgen.description.kinds import CHANNEL, STATE
 from symgen.description.robot import Element, Form, Row, parameter
@@ -34,11 +34,11 @@ def element_column(motion: Motion, e: Element, j: int) -> dict[int, Scalar]:
     law, others = e.laws(j)
     values = _Law(motion, e, j)
     x = values.one_sided(law) if e.when is not None else values.of(law)
-    if type(x) is int and x == 0 and not others:
+    if x == 0 and not others:
         return dict.fromkeys(row, 0)
-    column = {i: mul(motion.algebra.constant(g), x) for i, g in row.items()} if law else {}
+    column = {i: motion.algebra.constant(g) * x for i, g in row.items()} if law else {}
     for i, slope in others.items():
-        column[i] = add(column.get(i, 0), values.of(slope))
+        column[i] = column.get(i, 0) + values.of(slope)
     return column
 
 
@@ -69,8 +69,8 @@ class _Law:
                 x = self._atom(a)
                 x = self.motion.algebra.function("inv", x) if n < 0 else x
                 for _ in range(abs(n)):
-                    term = mul(term, x)
-            total = add(total, term)
+                    term = term * x
+            total = total + term
         return total
 
     def one_sided(self, law: Expression) -> Scalar:
@@ -109,7 +109,7 @@ class _Law:
             return algebra.cos_sin(*turn)[a.function == "sin"]
         operands = [self.of(e) for e in a.operands]
         at_zero = FUNCTIONS[a.function].at_zero
-        if type(operands[0]) is int and operands[0] == 0 and at_zero is not None:
+        if operands[0] == 0 and at_zero is not None:
             return at_zero
         return algebra.function(a.function, *operands)
 
@@ -173,6 +173,6 @@ def linear_in(
 def _form(motion: Motion, coordinate: str, form: Form) -> dict[int, Scalar]:
     column: dict[int, Scalar] = {}
     for (i, m), b in form.items():
-        x = mul(motion.algebra.constant(b), getattr(motion, coordinate)(m))
-        column[i] = add(column.get(i, 0), x)
+        x = motion.algebra.constant(b) * getattr(motion, coordinate)(m)
+        column[i] = column.get(i, 0) + x
     return column

@@ -46,14 +46,11 @@ from symgen.derive.scalar import (
     Matrix,
     Scalar,
     Vector,
-    add,
     apply,
     cross,
     dot,
     linear,
-    mul,
     scale,
-    sub,
     turned,
     vadd,
 )
@@ -75,9 +72,7 @@ def origin_velocities(motion: Motion) -> dict[int, Vector]:
         x, y, z = motion.geometry.rotation[f.j].down(
             vadd(v[f.ant], cross(motion.link[f.ant].w, motion.geometry.P[f.j]))
         )
-        v[f.j] = motion.vector(
-            "VO", (x, y, add(z, motion.qd(f.j)) if f.sigma == PRISMATIC else z), f.j
-        )
+        v[f.j] = motion.vector("VO", (x, y, z + motion.qd(f.j) if f.sigma == PRISMATIC else z), f.j)
     return v
 
 
@@ -90,12 +85,12 @@ def kinetic_energy(d: Derivation) -> Scalar:
         w, K = motion.link[j].w, {p: d.chi[parameter(p, j)] for p in INERTIAL}
         XX, XY, XZ, YY, YZ, ZZ = (K[p] for p in INERTIAL[:6])
         Jw = apply(((XX, XY, XZ), (XY, YY, YZ), (XZ, YZ, ZZ)), w)
-        total = add(total, mul(half, add(dot(w, Jw), mul(K["M"], dot(v[j], v[j])))))
-        total = add(total, dot((K["MX"], K["MY"], K["MZ"]), cross(v[j], w)))
+        total = total + half * (dot(w, Jw) + K["M"] * dot(v[j], v[j]))
+        total = total + dot((K["MX"], K["MY"], K["MZ"]), cross(v[j], w))
     for name, (e, j) in element_names(d.robot).items():
         if e.kind == "inertia":
             rates = {i: motion.qd(i) for i in d.robot.moving}
-            total = add(total, mul(d.chi[name], mul(half, _square(d, e, j, rates))))
+            total = total + d.chi[name] * (half * _square(d, e, j, rates))
     return total
 
 
@@ -109,17 +104,17 @@ def potential_energy(d: Derivation) -> Scalar:
     total: Scalar = 0
     for j in d.robot.links:
         height = dot((x, y, z), frames.position(j, 0, 0))
-        total = add(total, mul(d.chi[parameter("M", j)], height))
+        total = total + d.chi[parameter("M", j)] * height
         first = [d.chi[parameter(p, j)] for p in ("MX", "MY", "MZ")]
-        total = add(total, dot(frames.rotated((x, y, z), 0, j), first))
+        total = total + dot(frames.rotated((x, y, z), 0, j), first)
     positions = {i: d.geometry.position(i) for i in d.robot.moving}
     for name, (e, j) in element_names(d.robot).items():
         if e.kind == "stiffness":
-            total = add(total, mul(d.chi[name], mul(half, _square(d, e, j, positions))))
+            total = total + d.chi[name] * (half * _square(d, e, j, positions))
         elif e.kind == "offset":
-            total = add(total, mul(d.chi[name], linear(d.algebra, e.along[j], positions)))
+            total = total + d.chi[name] * linear(d.algebra, e.along[j], positions)
         elif e.energy is not None:
-            total = add(total, mul(d.chi[name], law_value(d.motion, e, j, e.potential(j))))
+            total = total + d.chi[name] * law_value(d.motion, e, j, e.potential(j))
     return total
 
 
@@ -131,8 +126,8 @@ def _square(d: Derivation, e: Element, j: int, x: Mapping[int, Scalar]) -> Scala
     """
     if j in e.along:
         s = linear(d.algebra, e.along[j], x)
-        return mul(s, s)
-    return linear(d.algebra, e.form[j], {(i, m): mul(x[i], x[m]) for i, m in e.form[j]})
+        return s * s
+    return linear(d.algebra, e.form[j], {(i, m): x[i] * x[m] for i, m in e.form[j]})
 
 
 class AtRates(Motion):
@@ -194,12 +189,12 @@ def _link(z: Vector, zd: Vector, w: Vector, a: Vector, half: Scalar) -> LinkMoti
     skew = ((0, -zd[2], zd[1]), (zd[2], 0, -zd[0]), (-zd[1], zd[0], 0))
     rows = []
     for k in range(3):
-        x, y, t = (add(skew[k][m], mul(w[k], z[m])) for m in range(3))
-        rows.append(tuple(sub(e, across) if m == k else e for m, e in enumerate((x, y, t))))
+        x, y, t = (skew[k][m] + w[k] * z[m] for m in range(3))
+        rows.append(tuple(e - across if m == k else e for m, e in enumerate((x, y, t))))
     U: Matrix = (rows[0], rows[1], rows[2])
-    turning = scale(half, (sub(U[2][1], U[1][2]), sub(U[0][2], U[2][0]), sub(U[1][0], U[0][1])))
-    DV = tuple(tuple(mul(half, add(U[k][m], U[m][k])) for m in range(3)) for k in range(3))
-    DW = (sub(U[1][1], U[2][2]), sub(U[2][2], U[0][0]), sub(U[0][0], U[1][1]))
+    turning = scale(half, (U[2][1] - U[1][2], U[0][2] - U[2][0], U[1][0] - U[0][1]))
+    DV = tuple(tuple(half * (U[k][m] + U[m][k]) for m in range(3)) for k in range(3))
+    DW = (U[1][1] - U[2][2], U[2][2] - U[0][0], U[0][0] - U[1][1])
     return LinkMotion(w, turning, DV, DW, U, a)  # type: ignore[arg-type]
 
 
@@ -256,8 +251,8 @@ def momentum_rate(d: Derivation) -> Columns:
         unit = AtRates(d.motion, {i: 1}, i).link
         for name, (p, j) in inertial.items():
             F, N = unit_wrench(unit[j], p)
-            power = add(dot(v[j], F), dot(d.motion.link[j].w, N))
-            found[name][i] = add(found[name].get(i, 0), power)
+            power = dot(v[j], F) + dot(d.motion.link[j].w, N)
+            found[name][i] = found[name].get(i, 0) + power
     return found
 
 

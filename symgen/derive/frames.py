@@ -11,7 +11,7 @@ from __future__ import annotations
 from symgen.derive.geometry import Geometry, Rotation, summed
 from symgen.derive.graph import Turn
 from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.derive.scalar import E3, ZERO3, Matrix, Vector, add, cross, dot, sub, vadd
+from symgen.derive.scalar import E3, ZERO3, Matrix, Vector, cross, dot, vadd
 from symgen.description.expression import Expression
 from symgen.description.robot import REVOLUTE
 
@@ -37,7 +37,7 @@ def frame_poses(geometry: Geometry) -> dict[int, tuple[Matrix, Vector]]:
             )
             for k, row in enumerate(rows, 1)
         )
-        P = [add(P_0i[k], dot(A_0i[k], geometry.P[f.j])) for k in range(3)]
+        P = [P_0i[k] + dot(A_0i[k], geometry.P[f.j]) for k in range(3)]
         pose[f.j] = (A, algebra.vector("P", P, f.j, *own))  # type: ignore[assignment]
     pose.pop(0, None)
     return pose
@@ -82,7 +82,7 @@ class Frames:
         for f in start:
             if f not in to:
                 x, y, z = self.rotated(self.geometry.P[f], self.robot.frame(f).ant, seen_from)
-                total = (sub(total[0], x), sub(total[1], y), sub(total[2], z))
+                total = (total[0] - x, total[1] - y, total[2] - z)
         return total
 
     def pose(self, j: int, i: int) -> tuple[Matrix, Vector]:

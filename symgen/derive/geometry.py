@@ -21,13 +21,10 @@ from symgen.derive.scalar import (
     Matrix,
     Scalar,
     Vector,
-    add,
     apply,
     apply_transposed,
     is_zero,
     linear,
-    mul,
-    sub,
 )
 from symgen.description.expression import Expression, call
 from symgen.description.robot import PRISMATIC, REVOLUTE, Frame, Robot
@@ -52,8 +49,8 @@ class Rotation:
     def up(self, v: Vector) -> Vector:
         """Transform a vector v from outer frame j to inner frame i: A Rot(z, theta) v."""
         u = (
-            sub(mul(self.c, v[0]), mul(self.s, v[1])),
-            add(mul(self.s, v[0]), mul(self.c, v[1])),
+            self.c * v[0] - self.s * v[1],
+            self.s * v[0] + self.c * v[1],
             v[2],
         )
         return u if self.A is None else apply(self.A, u)
@@ -62,8 +59,8 @@ class Rotation:
         """Transform a vector v from inner frame i to outer frame j: (A Rot(z, theta))' v."""
         u = v if self.A is None else apply_transposed(self.A, v)
         return (
-            add(mul(self.c, u[0]), mul(self.s, u[1])),
-            sub(mul(self.c, u[1]), mul(self.s, u[0])),
+            self.c * u[0] + self.s * u[1],
+            self.c * u[1] - self.s * u[0],
             u[2],
         )
 
@@ -91,15 +88,15 @@ class Carrier:
 
 def axis_rotation(cg: Scalar, sg: Scalar, ca: Scalar, sa: Scalar) -> Matrix:
     """Return A = Rot(z, gamma) Rot(x, alpha) from cosines and sines of gamma and alpha."""
-    return ((cg, -mul(sg, ca), mul(sg, sa)), (sg, mul(cg, ca), -mul(cg, sa)), (0, sa, ca))
+    return ((cg, -(sg * ca), sg * sa), (sg, cg * ca, -(cg * sa)), (0, sa, ca))
 
 
 def displacement(A: Matrix, b: Scalar, d: Scalar, r: Scalar) -> Vector:
     """Return the origin of frame j in frame i, P_ij = b e3 + d A e1 + r A e3."""
     return (
-        add(mul(d, A[0][0]), mul(r, A[0][2])),
-        add(mul(d, A[1][0]), mul(r, A[1][2])),
-        add(b, mul(r, A[2][2])),
+        d * A[0][0] + r * A[0][2],
+        d * A[1][0] + r * A[1][2],
+        b + r * A[2][2],
     )
 
 
@@ -143,7 +140,7 @@ class Geometry:
         self.rotation[j] = self._rotation(None if parallel else A, turn, offset)
         b, d, r = algebra.constant(f.b), algebra.constant(f.d), algebra.constant(f.r0)
         if f.sigma == PRISMATIC:
-            r = algebra.name(add(r, self.position(j)), f"r{j}")
+            r = algebra.name(r + self.position(j), f"r{j}")
         self.P[j] = displacement(A, b, d, r)
         if parallel and f.ant != self.root:
             inner = self.carrier[f.ant]
@@ -160,9 +157,8 @@ class Geometry:
     def position(self, j: int) -> Scalar:
         """Return the position q_j of any moving joint as a function of the independent joints."""
         q = {i: self.algebra.q(i) for i in self.closure.row[j]}
-        return add(
-            linear(self.algebra, self.closure.row[j], q),
-            self.algebra.constant(self.closure.offset[j]),
+        return linear(self.algebra, self.closure.row[j], q) + self.algebra.constant(
+            self.closure.offset[j]
         )
 
     def from_carrier(self, j: int, v: Vector) -> Vector:

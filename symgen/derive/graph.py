@@ -117,19 +117,21 @@ class Scalar:
         return Scalar(self.graph, self.node, -self.sign)
 
     def __add__(self, other: Scalar | int) -> Scalar | int:
-        return self.graph.add(self, self.graph.lift(other))
+        return self if other == 0 else self.graph.add(self, self.graph.lift(other))
 
     def __sub__(self, other: Scalar | int) -> Scalar | int:
-        return self.graph.add(self, -self.graph.lift(other))
+        return self if other == 0 else self.graph.add(self, -self.graph.lift(other))
 
     def __mul__(self, other: Scalar | int) -> Scalar | int:
+        if isinstance(other, int) and -1 <= other <= 1:
+            return (0, self, -self)[other]
         return self.graph.mul(self, self.graph.lift(other))
 
     def __radd__(self, other: int) -> Scalar | int:
-        return self.graph.add(self.graph.lift(other), self)
+        return self if other == 0 else self.graph.add(self.graph.lift(other), self)
 
     def __rsub__(self, other: int) -> Scalar | int:
-        return self.graph.add(self.graph.lift(other), -self)
+        return -self if other == 0 else self.graph.add(self.graph.lift(other), -self)
 
     __rmul__ = __mul__
 
@@ -376,7 +378,7 @@ def rates(
     for node in reachable(outputs):
         x = node.operands
         xd = [signed(operand) for operand in x]
-        still = all(isinstance(v, int) and v == 0 for v in xd)
+        still = all(v == 0 for v in xd)
         match node.op:
             case "sym":
                 rate[node.index] = inputs.get(node.value, 0)

@@ -26,15 +26,12 @@ from symgen.derive.scalar import (
     Matrix,
     Scalar,
     Vector,
-    add,
     apply,
     cross,
     dot,
     is_zero,
     linear,
-    mul,
     scale,
-    sub,
     turned,
     vadd,
 )
@@ -141,10 +138,10 @@ class Motion:
         ):
             return REST
         w0, wd0 = geometry.from_carrier(j, inner.w), geometry.from_carrier(j, inner.wd)
-        w = self.vector("W", (w0[0], w0[1], add(w0[2], rate)), j)
+        w = self.vector("W", (w0[0], w0[1], w0[2] + rate), j)
         wd = self.vector(
             "WP",
-            (add(wd0[0], mul(w[1], rate)), sub(wd0[1], mul(w[0], rate)), add(wd0[2], acceleration)),
+            (wd0[0] + w[1] * rate, wd0[1] - w[0] * rate, wd0[2] + acceleration),
             j,
         )
         DV, DW, U = self._products(w, wd, j)
@@ -152,14 +149,14 @@ class Motion:
         VSP = self.vector("VSP", vadd(i.a, apply(i.U, P)), j)
         a = geometry.rotation[j].down(VSP)
         if f.sigma == PRISMATIC:
-            qd2 = mul(self.algebra.constant(TWO), slides[0])
-            a = (add(a[0], mul(qd2, w[1])), sub(a[1], mul(qd2, w[0])), add(a[2], slides[1]))
+            qd2 = self.algebra.constant(TWO) * slides[0]
+            a = (a[0] + qd2 * w[1], a[1] - qd2 * w[0], a[2] + slides[1])
         return LinkMotion(w, wd, DV, DW, U, self.vector("VP", a, j))
 
     def _products(self, w: Vector, wd: Vector, j: int) -> tuple[Matrix, Vector, Matrix]:
         name, named = self.algebra.name, self.algebra.named
         D = {
-            (k, m): name(mul(w[k], w[m]), named("DV", k + 1, m + 1, j, *self.tag))
+            (k, m): name(w[k] * w[m], named("DV", k + 1, m + 1, j, *self.tag))
             for k in range(3)
             for m in range(k, 3)
         }
@@ -169,9 +166,9 @@ class Motion:
             (D[0, 2], D[1, 2], D[2, 2]),
         )
         DW: Vector = (
-            name(sub(DV[1][1], DV[2][2]), named("DW", 2, 3, j, *self.tag)),
-            name(sub(DV[2][2], DV[0][0]), named("DW", 3, 1, j, *self.tag)),
-            name(sub(DV[0][0], DV[1][1]), named("DW", 1, 2, j, *self.tag)),
+            name(DV[1][1] - DV[2][2], named("DW", 2, 3, j, *self.tag)),
+            name(DV[2][2] - DV[0][0], named("DW", 3, 1, j, *self.tag)),
+            name(DV[0][0] - DV[1][1], named("DW", 1, 2, j, *self.tag)),
         )
 
         def off(k: int, m: int, value: Scalar) -> Scalar:
@@ -179,19 +176,19 @@ class Motion:
 
         U: Matrix = (
             (
-                off(1, 1, -add(DV[1][1], DV[2][2])),
-                off(1, 2, sub(DV[0][1], wd[2])),
-                off(1, 3, add(DV[0][2], wd[1])),
+                off(1, 1, -(DV[1][1] + DV[2][2])),
+                off(1, 2, DV[0][1] - wd[2]),
+                off(1, 3, DV[0][2] + wd[1]),
             ),
             (
-                off(2, 1, add(DV[0][1], wd[2])),
-                off(2, 2, -add(DV[0][0], DV[2][2])),
-                off(2, 3, sub(DV[1][2], wd[0])),
+                off(2, 1, DV[0][1] + wd[2]),
+                off(2, 2, -(DV[0][0] + DV[2][2])),
+                off(2, 3, DV[1][2] - wd[0]),
             ),
             (
-                off(3, 1, sub(DV[0][2], wd[1])),
-                off(3, 2, add(DV[1][2], wd[0])),
-                off(3, 3, -add(DV[0][0], DV[1][1])),
+                off(3, 1, DV[0][2] - wd[1]),
+                off(3, 2, DV[1][2] + wd[0]),
+                off(3, 3, -(DV[0][0] + DV[1][1])),
             ),
         )
         return DV, DW, U
@@ -211,9 +208,9 @@ def moment(m: LinkMotion, K: Mapping[str, Scalar]) -> Vector:
     (XX, XY, XZ, YY, YZ, ZZ), MS = (K[p] for p in INERTIAL[:6]), (K["MX"], K["MY"], K["MZ"])
     DV, DW, U, wd = m.DV, m.DW, m.U, m.wd
     N = (
-        dot((XX, sub(ZZ, YY), YZ, XZ, -XY), (wd[0], DV[1][2], DW[0], U[1][0], U[2][0])),
-        dot((YY, sub(XX, ZZ), XZ, XY, -YZ), (wd[1], DV[0][2], DW[1], U[2][1], U[0][1])),
-        dot((ZZ, sub(YY, XX), XY, YZ, -XZ), (wd[2], DV[0][1], DW[2], U[0][2], U[1][2])),
+        dot((XX, ZZ - YY, YZ, XZ, -XY), (wd[0], DV[1][2], DW[0], U[1][0], U[2][0])),
+        dot((YY, XX - ZZ, XZ, XY, -YZ), (wd[1], DV[0][2], DW[1], U[2][1], U[0][1])),
+        dot((ZZ, YY - XX, XY, YZ, -XZ), (wd[2], DV[0][1], DW[2], U[0][2], U[1][2])),
     )
     return vadd(N, cross(MS, m.a))
 

@@ -19,7 +19,7 @@ from typing import Any
 
 from symgen.derive.elements import element_column
 from symgen.derive.newton_euler import LinkMotion, Motion, force, moment
-from symgen.derive.scalar import E3, ZERO3, Scalar, Vector, add, cross, dot, vadd
+from symgen.derive.scalar import E3, ZERO3, Scalar, Vector, cross, dot, vadd
 from symgen.description.expression import Expression
 from symgen.description.robot import (
     FIXED,
@@ -146,6 +146,6 @@ class Axes:
                     dot(self.v[i, j], F), f"{motion.algebra.named('DF', i)}{parameter}{j}"
                 )
                 entries[i] = motion.algebra.hint(
-                    add(turning, pushing), f"{motion.algebra.named('DG', i)}{parameter}{j}"
+                    turning + pushing, f"{motion.algebra.named('DG', i)}{parameter}{j}"
                 )
         return entries

@@ -153,9 +153,9 @@ class Rewrite:
                         offset = offset + value * n
                 turn = tuple((j, n) for j, n in turn if given[j] is None)
                 return self.algebra.cos_sin(turn, offset)[node.op == SIN]
-            case "pos" if type(x[0]) is int and x[0] == 0:
+            case "pos" if x[0] == 0:
                 return 0
-            case op if op in FUNCTIONS and type(x[0]) is int and x[0] == 0:
+            case op if op in FUNCTIONS and x[0] == 0:
                 at_zero = FUNCTIONS[op].at_zero
                 if at_zero is not None:
                     return at_zero

@@ -25,37 +25,13 @@ E3: Vector = (0, 0, 1)
 
 def is_zero(v: Vector) -> bool:
     """Whether every component of v is the Python integer 0, so that v vanishes identically."""
-    return all(type(x) is int and x == 0 for x in v)
-
-
-def add(a: Scalar, b: Scalar) -> Scalar:
-    if type(a) is int and a == 0:
-        return b
-    if type(b) is int and b == 0:
-        return a
-    return a + b
-
-
-def sub(a: Scalar, b: Scalar) -> Scalar:
-    if type(b) is int and b == 0:
-        return a
-    if type(a) is int and a == 0:
-        return -b
-    return a - b
-
-
-def mul(a: Scalar, b: Scalar) -> Scalar:
-    if type(a) is int and -1 <= a <= 1:
-        return 0 if a == 0 else b if a == 1 else -b
-    if type(b) is int and -1 <= b <= 1:
-        return 0 if b == 0 else a if b == 1 else -a
-    return a * b
+    return all(x == 0 for x in v)
 
 
 def dot(u: Sequence[Scalar], v: Sequence[Scalar]) -> Scalar:
     total: Scalar = 0
     for a, b in zip(u, v, strict=True):
-        total = add(total, mul(a, b))
+        total = total + a * b
     return total
 
 
@@ -72,18 +48,18 @@ def turned(algebra: GraphAlgebra, turn: Turn, x: Mapping[int, Scalar]) -> Scalar
 
 def cross(u: Vector, v: Vector) -> Vector:
     return (
-        sub(mul(u[1], v[2]), mul(u[2], v[1])),
-        sub(mul(u[2], v[0]), mul(u[0], v[2])),
-        sub(mul(u[0], v[1]), mul(u[1], v[0])),
+        u[1] * v[2] - u[2] * v[1],
+        u[2] * v[0] - u[0] * v[2],
+        u[0] * v[1] - u[1] * v[0],
     )
 
 
 def vadd(u: Vector, v: Vector) -> Vector:
-    return (add(u[0], v[0]), add(u[1], v[1]), add(u[2], v[2]))
+    return (u[0] + v[0], u[1] + v[1], u[2] + v[2])
 
 
 def scale(s: Scalar, u: Vector) -> Vector:
-    return (mul(s, u[0]), mul(s, u[1]), mul(s, u[2]))
+    return (s * u[0], s * u[1], s * u[2])
 
 
 def apply(m: Matrix, u: Vector) -> Vector:
