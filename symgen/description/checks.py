@@ -1,18 +1,19 @@
 """Checks that frames, elements on the joints, and loops of a robot file make a valid mechanism.
 
-Each check raises DescriptionError with the path of the wrong field, for instance frames.2.alpha.
+Each check yields rows: whether the field is wrong, the message, and the path of the field, for
+instance frames.2.alpha. The first wrong row is raised as DescriptionError.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 from symgen.description.element import Element, check_channels, check_law
 from symgen.description.expression import ONE, PI, Call, Expression
-from symgen.description.fields import Path, dotted
+from symgen.description.fields import Path, Problem, dotted
 from symgen.description.kinds import KINDS, OWN_LAWS
 from symgen.description.naming import check_names
 from symgen.description.parts import (
@@ -38,98 +39,88 @@ def check_robot(robot: Any) -> None:
 
     Raises DescriptionError if they do not.
     """
-    _check_tree(robot.frames, robot.massless)
+    for wrong, message, path in _problems(robot):
+        if wrong:
+            raise DescriptionError(message, path=path)
+
+
+def _problems(robot: Any) -> Iterator[Problem]:
+    yield from _check_tree(robot.frames, robot.massless)
     check_names(robot)
-    if not robot.parameters:
-        raise DescriptionError(
-            "the robot has no parameters: every link is massless and no element acts on a joint; "
-            "remove links from the list massless, or add elements",
-            path=("massless",),
-        )
-    _check_geometry(robot)
+    yield (
+        not robot.parameters,
+        "the robot has no parameters: every link is massless and no element acts on a joint; "
+        "remove links from the list massless, or add elements",
+        ("massless",),
+    )
+    yield from _check_geometry(robot)
     for e in robot.elements:
-        _check_element(e, robot)
-    check_channels(robot)
-    _check_loops(robot)
-    _check_drives(robot)
-    _check_limits(robot)
+        yield from _check_element(e, robot)
+    yield from check_channels(robot)
+    yield from _check_loops(robot)
+    yield from _check_drives(robot)
+    yield from _check_limits(robot)
     for key, names in (("assume", sorted(robot.assume)), ("values", robot.values)):
         for name in (name for name in names if name not in robot.parameters):
-            raise DescriptionError(
-                f"{key}: {name!r} is not a standard parameter of {robot.name}{_meant(name, robot)}",
-                path=(key, name),
-            )
+            what = f"is not a standard parameter of {robot.name}{_meant(name, robot)}"
+            yield True, f"{key}: {name!r} {what}", (key, name)
 
 
-def _check_tree(frames: Sequence[Frame], massless: Collection[int]) -> None:
+def _check_tree(frames: Sequence[Frame], massless: Collection[int]) -> Iterator[Problem]:
     """Check the numbers, joint types and antecedents of the frames.
 
     Frames are numbered 1, 2, 3 ... without gaps, every chain of antecedents ends at the base, and
     at least one joint is actuated.
     """
     numbers = [f.j for f in frames]
-    if not numbers:
-        raise DescriptionError("the robot has no frames; add at least frame 1", path=("frames",))
+    yield not numbers, "the robot has no frames; add at least frame 1", ("frames",)
     for k, j in enumerate(numbers, start=1):
-        if j != k:
-            what = (
-                f"frame {j} is given twice"
-                if j in numbers[: k - 1]
-                else f"frame {k} is missing (found {numbers})"
-            )
-            raise DescriptionError(
-                f"{what}; frames are numbered 1, 2, 3 ... without gaps", path=("frames", j)
-            )
+        given = j in numbers[: k - 1]
+        what = f"frame {j} is given twice" if given else f"frame {k} is missing (found {numbers})"
+        yield j != k, f"{what}; frames are numbered 1, 2, 3 ... without gaps", ("frames", j)
     for f in frames:
         where = ("frames", f.j)
-        if f.sigma not in (REVOLUTE, PRISMATIC, FIXED):
-            raise DescriptionError(
-                f"joint {f.j}: sigma = {f.sigma}; expected 0 revolute, 1 prismatic or 2 fixed",
-                path=(*where, "sigma"),
-            )
-        if f.mu not in (0, 1) or (f.mu and f.sigma == FIXED):
-            raise DescriptionError(
-                (
-                    f"joint {f.j}: mu = {f.mu}; expected 1 actuated or 0 passive, and 0 for a "
-                    "fixed frame"
-                ),
-                path=(*where, "mu"),
-            )
-        if f.ant == f.j or f.ant > len(numbers) or f.ant < 0:
-            raise DescriptionError(
-                f"frame {f.j}: ant = {f.ant}; expected an earlier frame, 0 for the base",
-                path=(*where, "ant"),
-            )
+        yield (
+            f.sigma not in (REVOLUTE, PRISMATIC, FIXED),
+            f"joint {f.j}: sigma = {f.sigma}; expected 0 revolute, 1 prismatic or 2 fixed",
+            (*where, "sigma"),
+        )
+        yield (
+            f.mu not in (0, 1) or (f.mu and f.sigma == FIXED),
+            f"joint {f.j}: mu = {f.mu}; expected 1 actuated or 0 passive, and 0 for a fixed frame",
+            (*where, "mu"),
+        )
+        yield (
+            f.ant == f.j or f.ant > len(numbers) or f.ant < 0,
+            f"frame {f.j}: ant = {f.ant}; expected an earlier frame, 0 for the base",
+            (*where, "ant"),
+        )
+    for f in frames:
         chain, i = {f.j}, f.ant
-        while i:
-            if i in chain:
-                raise DescriptionError(
-                    (
-                        f"frames {sorted(chain)} are each other's antecedents (a cycle); every "
-                        "chain of `ant` must end at 0"
-                    ),
-                    path=(*where, "ant"),
-                )
+        while i and i not in chain:
             chain.add(i)
             i = frames[i - 1].ant
-        if f.ant > f.j:
-            raise DescriptionError(
-                f"frame {f.j}: ant = {f.ant} comes later; number frames from the base outward",
-                path=(*where, "ant"),
-            )
-    if strange := sorted(set(massless) - set(numbers)):
-        raise DescriptionError(
-            f"massless: link {strange[0]} does not exist; frames are {numbers}", path=("massless",)
+        yield (
+            i,
+            f"frames {sorted(chain)} are each other's antecedents (a cycle); every chain of `ant` "
+            "must end at 0",
+            ("frames", f.j, "ant"),
         )
-    if not any(f.mu for f in frames):
-        raise DescriptionError(
-            "the robot has no actuated joint; set mu: 1 (actuated) for a revolute "
-            "or prismatic joint",
-            path=("frames",),
+        yield (
+            f.ant > f.j,
+            f"frame {f.j}: ant = {f.ant} comes later; number frames from the base outward",
+            ("frames", f.j, "ant"),
         )
+    for j in sorted(set(massless) - set(numbers)):
+        yield True, f"massless: link {j} does not exist; frames are {numbers}", ("massless",)
+    yield (
+        not any(f.mu for f in frames),
+        "the robot has no actuated joint; set mu: 1 (actuated) for a revolute or prismatic joint",
+        ("frames",),
+    )
 
 
-def _check_geometry(robot: Any) -> None:
+def _check_geometry(robot: Any) -> Iterator[Problem]:
     """Check the expressions of gravity and of the frame table.
 
     All symbols must be declared constants. q_j must occur once in theta_j of a revolute joint or in
@@ -137,34 +128,30 @@ def _check_geometry(robot: Any) -> None:
     """
     constants = robot.constants
     for k, component in enumerate(robot.gravity):
-        _check_expression(component, ("gravity", k), constants)
+        yield from _check_expression(component, ("gravity", k), constants)
     for f in robot.frames:
         for name in GEOMETRY:
             row = robot.row(f.j, name)
             where = ("frames", row, name)
             e: Expression = getattr(f, name)
             variable = (name, f.sigma) in {("theta", REVOLUTE), ("r", PRISMATIC)}
-            if variable and (e.coefficient(f.q) != ONE or moves(e - Expression.symbol(f.q))):
-                raise DescriptionError(
-                    (
-                        f"frame {row}: {name} = {e}; expected {f.q} once, as {f.q} or {f.q} + "
-                        f"constant{_other_sigma(f)}"
-                    ),
-                    path=where,
-                )
-            if not variable and moves(e):
-                raise DescriptionError(
-                    (
-                        f"frame {row}: {name} = {e}; write the joint position in theta if sigma is "
-                        "0, in r if sigma is 1, and nowhere else"
-                    ),
-                    path=where,
-                )
-            _check_expression(e, where, constants, angle=name in ANGLES, q=f.q if variable else "")
-            if name in ANGLES and (
-                advice := _degrees_advice(f.theta0 if name == "theta" else e, dict(constants))
-            ):
-                raise DescriptionError(f"frame {row}: {name} = {e}: {advice}", path=where)
+            yield (
+                variable and (e.coefficient(f.q) != ONE or moves(e - Expression.symbol(f.q))),
+                f"frame {row}: {name} = {e}; expected {f.q} once, as {f.q} or {f.q} + "
+                f"constant{_other_sigma(f)}",
+                where,
+            )
+            yield (
+                not variable and moves(e),
+                f"frame {row}: {name} = {e}; write the joint position in theta if sigma is 0, in r "
+                "if sigma is 1, and nowhere else",
+                where,
+            )
+            q = f.q if variable else ""
+            yield from _check_expression(e, where, constants, angle=name in ANGLES, q=q)
+            if name in ANGLES:
+                advice = _degrees_advice(f.theta0 if name == "theta" else e, dict(constants))
+                yield advice, f"frame {row}: {name} = {e}: {advice}", where
 
 
 def _degrees_advice(angle: Expression, constants: dict[str, float]) -> str:
@@ -188,13 +175,13 @@ def _degrees_advice(angle: Expression, constants: dict[str, float]) -> str:
 
 def _check_expression(
     e: Expression, path: Path, constants: Mapping[str, float], *, angle: bool = False, q: str = ""
-) -> None:
-    _check_declared(e, path, {*constants, q} if q else constants)
-    _check_exact(e, path, angle=angle)
-    _check_finite(e, path, constants)
+) -> Iterator[Problem]:
+    yield from _check_declared(e, path, {*constants, q} if q else constants)
+    yield from _check_exact(e, path, angle=angle)
+    yield from _check_finite(e, path, constants)
 
 
-def _check_finite(e: Expression, path: Path, constants: Mapping[str, float]) -> None:
+def _check_finite(e: Expression, path: Path, constants: Mapping[str, float]) -> Iterator[Problem]:
     """Refuse an expression with a division by zero or a square root of a negative number.
 
     Joint positions have the value 1 in this check.
@@ -204,42 +191,34 @@ def _check_finite(e: Expression, path: Path, constants: Mapping[str, float]) -> 
     except (ArithmeticError, ValueError):
         finite = False
     if not finite:
-        given = ", ".join(
-            f"{name} = {constants[name]:g}" for name in sorted(e.symbols & {*constants})
-        )
-        raise DescriptionError(
-            f"{dotted(path)}: {e} has no finite real value{f' at {given}' * bool(given)}; "
-            "change the constant or the expression",
-            path=path,
-        )
+        names = sorted(e.symbols & {*constants})
+        given = ", ".join(f"{name} = {constants[name]:g}" for name in names)
+        what = f"has no finite real value{f' at {given}' * bool(given)}"
+        yield True, f"{dotted(path)}: {e} {what}; change the constant or the expression", path
 
 
-def _check_declared(e: Expression, path: Path, symbols: Collection[str]) -> None:
+def _check_declared(e: Expression, path: Path, symbols: Collection[str]) -> Iterator[Problem]:
     if unknown := e.symbols - set(symbols):
         declared = ", ".join(name for name in symbols if not re.fullmatch(r"q\d+", name)) or "none"
-        raise DescriptionError(
-            (
-                f"undeclared symbol {', '.join(sorted(unknown))}; declare it under constants "
-                f"(declared: {declared})"
-            ),
-            path=path,
-        )
+        what = f"undeclared symbol {', '.join(sorted(unknown))}"
+        yield True, f"{what}; declare it under constants (declared: {declared})", path
 
 
-def _check_exact(e: Expression, path: Path, *, angle: bool) -> None:
+def _check_exact(e: Expression, path: Path, *, angle: bool) -> Iterator[Problem]:
     """Refuse expressions without exact values: pi outside an angle, or functions inside an angle.
 
     For instance, pi in a length, or cos in an angle, must be written as a declared constant.
     """
     for a in e.atoms:
         if isinstance(a, Call) and not angle:
-            _check_exact(a.argument, path, angle=a.function in ("cos", "sin"))
-        elif isinstance(a, Call) or (a == "pi" and not angle):
-            problem = f"{a} in an angle" if angle else "pi outside an angle"
-            raise DescriptionError(
-                f"{dotted(path)}: {problem}; declare a constant of that value and write its name",
-                path=path,
-            )
+            yield from _check_exact(a.argument, path, angle=a.function in ("cos", "sin"))
+            continue
+        problem = f"{a} in an angle" if angle else "pi outside an angle"
+        yield (
+            isinstance(a, Call) or (a == "pi" and not angle),
+            f"{dotted(path)}: {problem}; declare a constant of that value and write its name",
+            path,
+        )
 
 
 def _other_sigma(f: Frame) -> str:
@@ -260,54 +239,54 @@ def _other_sigma(f: Frame) -> str:
     )
 
 
-def _check_element(e: Element, robot: Any) -> None:
+def _check_element(e: Element, robot: Any) -> Iterator[Problem]:
     """Check an element, such as friction: kind, law, unit, direction of motion, coefficients."""
     where: Path = ("elements", e.family)
     both = sorted(set(e.along) & set(e.form))
     laws = [law for law in (e.torque, e.energy) if law is not None]
     own = e.kind in OWN_LAWS
-    problems = (
+    kind = KINDS.get(e.kind)
+    rows = (
         (
             own and len(laws) != 1,
             "give one of `torque` and `energy`, or a `kind` that has a law",
-            "",
+            where,
         ),
         (
             laws and not own,
             f"kind {e.kind} already defines the law; leave out torque and energy",
-            "kind",
+            (*where, "kind"),
         ),
-        (own and not e.unit, "give the `unit` of its parameter, such as N*m", ""),
+        (own and not e.unit, "give the `unit` of its parameter, such as N*m", where),
         (
             not re.fullmatch(r"[\w*/^().°%+-]{0,40}", e.unit),
             f"unit {e.unit!r:.50}; expected up to 40 letters, digits and * / ^ ( ), such as N*m*s/rad",
-            "unit",
+            (*where, "unit"),
         ),
-        (e.kind not in KINDS, f"kind {e.kind!r}; expected one of {', '.join(KINDS)}", "kind"),
+        (kind is None, f"kind {e.kind!r}; expected one of {', '.join(KINDS)}", (*where, "kind")),
         (
-            e.when is not None
-            and (e.when not in DIRECTIONS or e.kind not in KINDS or not KINDS[e.kind].when),
+            e.when is not None and (e.when not in DIRECTIONS or kind is None or not kind.when),
             f"when {e.when!r}; expected positive or negative, only for viscous and coulomb elements",
-            "when",
+            (*where, "when"),
         ),
-        (not e.along and not e.form, "it acts on no joint; give `along` or `form`", ""),
+        (not e.along and not e.form, "it acts on no joint; give `along` or `form`", where),
         (
-            e.form and e.kind in KINDS and not KINDS[e.kind].form,
+            e.form and kind and not kind.form,
             f"a {e.kind} element has no quadratic form; use `along`",
-            "form",
+            (*where, "form"),
         ),
         (
             e.form and e.when,
             "`when` needs a direction of motion; use `along` instead of `form`",
-            "when",
+            (*where, "form"),
         ),
-        (both, f"keys {both} are in both along and form; keep each key in one of the two", "form"),
+        (
+            both,
+            f"keys {both} are in both along and form; keep each key in one of the two",
+            (*where, "form"),
+        ),
     )
-    for wrong, message, key in problems:
-        if wrong:
-            raise DescriptionError(
-                f"element {e.family}: {message}", path=(*where, key) if key else where
-            )
+    yield from ((wrong, f"element {e.family}: {message}", path) for wrong, message, path in rows)
     tables: tuple[tuple[str, Mapping[int, Row | Form]], ...] = (
         ("along", e.along),
         ("form", e.form),
@@ -315,30 +294,30 @@ def _check_element(e: Element, robot: Any) -> None:
     for part, table in tables:
         for j, coefficients in table.items():
             place = (*where, part, j)
-            if not 0 < j <= len(robot.frames):
-                raise DescriptionError(
-                    f"element {e.family}: frame {j} does not exist; frames are 1 to {len(robot.frames)}",
-                    path=place,
-                )
+            yield (
+                not 0 < j <= len(robot.frames),
+                f"element {e.family}: frame {j} does not exist; frames are 1 to {len(robot.frames)}",
+                place,
+            )
             for index, c in coefficients.items():
                 for i in (index,) if isinstance(index, int) else index:
-                    if i not in robot.moving:
-                        raise DescriptionError(
-                            f"element {e.family}{j}: q{i} is not a joint of this robot (joints "
-                            f"{list(robot.moving)})",
-                            path=place,
-                        )
-                _check_expression(c, place, robot.constants)
-            if not any(coefficients.values()):
-                raise DescriptionError(
-                    f"element {e.family}{j}: all coefficients are zero; give a joint a coefficient that is not zero",
-                    path=place,
-                )
+                    yield (
+                        i not in robot.moving,
+                        f"element {e.family}{j}: q{i} is not a joint of this robot (joints "
+                        f"{list(robot.moving)})",
+                        place,
+                    )
+                yield from _check_expression(c, place, robot.constants)
+            yield (
+                not any(coefficients.values()),
+                f"element {e.family}{j}: all coefficients are zero; give a joint a coefficient that is not zero",
+                place,
+            )
     if e.is_own and (not own or laws):
-        check_law(e, robot)
+        yield from check_law(e, robot)
 
 
-def _check_loops(robot: Any) -> None:
+def _check_loops(robot: Any) -> Iterator[Problem]:
     """Check the closed loops and the constraints on passive joints.
 
     A cut joint must be passive and its twin frame fixed. A constraint must give the position of a
@@ -348,86 +327,88 @@ def _check_loops(robot: Any) -> None:
     for k, loop in enumerate(robot.loops):
         where = ("loops", k)
         for name, j in (("cut", loop.cut), ("twin", loop.twin)):
-            if j not in numbers:
-                raise DescriptionError(
-                    f"loop {k + 1}: {name} frame {j} does not exist; frames are 1 to {len(numbers)}",
-                    path=(*where, name),
-                )
+            yield (
+                j not in numbers,
+                f"loop {k + 1}: {name} frame {j} does not exist; frames are 1 to {len(numbers)}",
+                (*where, name),
+            )
         cut, twin = robot.frame(loop.cut), robot.frame(loop.twin)
-        if twin.sigma != FIXED:
-            raise DescriptionError(
-                f"loop {k + 1}: twin frame {loop.twin} has sigma {twin.sigma}; expected 2 (fixed "
-                f"on its link){'; exchange cut and twin' if cut.sigma == FIXED else ''}",
-                path=(*where, "twin"),
-            )
-        if cut.mu:
-            raise DescriptionError(
-                f"loop {k + 1}: cut joint {loop.cut} is actuated; cut the loop at a passive joint (mu: 0)",
-                path=(*where, "cut"),
-            )
+        yield (
+            twin.sigma != FIXED,
+            f"loop {k + 1}: twin frame {loop.twin} has sigma {twin.sigma}; expected 2 (fixed on its "
+            f"link){'; exchange cut and twin' if cut.sigma == FIXED else ''}",
+            (*where, "twin"),
+        )
+        yield (
+            cut.mu,
+            f"loop {k + 1}: cut joint {loop.cut} is actuated; cut the loop at a passive joint (mu: 0)",
+            (*where, "cut"),
+        )
     passive = list(robot.passive)
     for j, e in robot.constraints.items():
         place = ("constraints", f"q{j}")
-        if j not in passive:
-            raise DescriptionError(
-                f"constraint on q{j}: joint {j} is not a passive joint (passive joints: "
-                f"{passive}); remove the constraint, or set mu: 0 (passive)",
-                path=place,
-            )
-        _check_declared(e, place, [*robot.constants, *(f"q{i}" for i in robot.moving)])
-        _check_finite(e, place, robot.constants)
-    if passive and not robot.loops and not robot.constraints:
-        raise DescriptionError(
-            f"joints {passive} are passive, but there is no loop and no constraint; set mu: 1 "
-            "(actuated), or add a loop or a constraint",
-            path=("frames", passive[0], "mu"),
+        yield (
+            j not in passive,
+            f"constraint on q{j}: joint {j} is not a passive joint (passive joints: {passive}); "
+            "remove the constraint, or set mu: 0 (passive)",
+            place,
         )
+        symbols = [*robot.constants, *(f"q{i}" for i in robot.moving)]
+        yield from _check_declared(e, place, symbols)
+        yield from _check_finite(e, place, robot.constants)
+    yield (
+        passive and not robot.loops and not robot.constraints,
+        f"joints {passive} are passive, but there is no loop and no constraint; set mu: 1 "
+        "(actuated), or add a loop or a constraint",
+        ("frames", *passive[:1], "mu"),
+    )
 
 
-def _check_drives(robot: Any) -> None:
+def _check_drives(robot: Any) -> Iterator[Problem]:
     """Check the drives: one row per actuated joint, and an invertible matrix of gear ratios."""
     drives, n = robot.drives, len(robot.joints)
     if drives is None:
         return
     shape = [len(row) for row in drives.ratio]
-    if shape != [n] * n:
-        raise DescriptionError(
-            f"drives: ratio has rows with {shape} numbers; expected {n} rows with {n} numbers, one row per actuated joint",
-            path=("drives", "ratio"),
-        )
+    yield (
+        shape != [n] * n,
+        f"drives: ratio has rows with {shape} numbers; expected {n} rows with {n} numbers, one row per actuated joint",
+        ("drives", "ratio"),
+    )
     import numpy as np
 
-    if np.linalg.matrix_rank(drives.ratio) < n:
-        raise DescriptionError(
-            "drives: ratio is singular; expected an invertible matrix, so that motor positions determine joint positions",
-            path=("drives", "ratio"),
-        )
+    yield (
+        np.linalg.matrix_rank(drives.ratio) < n,
+        "drives: ratio is singular; expected an invertible matrix, so that motor positions determine joint positions",
+        ("drives", "ratio"),
+    )
     for name, row in (("offset", drives.offset), ("torque_constant", drives.torque_constant)):
-        if row is not None and len(row) != n:
-            raise DescriptionError(
-                f"drives: {name} has {len(row)} entries; expected {n}, one per actuated joint",
-                path=("drives", name),
-            )
+        count = n if row is None else len(row)
+        yield (
+            count != n,
+            f"drives: {name} has {count} entries; expected {n}, one per actuated joint",
+            ("drives", name),
+        )
 
 
-def _check_limits(robot: Any) -> None:
+def _check_limits(robot: Any) -> Iterator[Problem]:
     """Check the joint limits: one entry per actuated joint, lower bounds below upper bounds."""
     n = len(robot.joints)
     for name, row in robot.limits.items():
-        if name not in ("q", "qd", "qdd", "tau") or len(row) != n:
-            raise DescriptionError(
-                f"limits: {name} has {len(row)} entries; expected the keys q, qd, qdd, tau with {n} "
-                "entries each, one per actuated joint",
-                path=("limits", name),
-            )
+        yield (
+            name not in ("q", "qd", "qdd", "tau") or len(row) != n,
+            f"limits: {name} has {len(row)} entries; expected the keys q, qd, qdd, tau with {n} "
+            "entries each, one per actuated joint",
+            ("limits", name),
+        )
         for i, entry in enumerate(row):
             low, high = entry if isinstance(entry, tuple) else (0.0, entry)
-            if not low < high and (name, entry) != ("tau", 0.0):
-                raise DescriptionError(
-                    f"limits: {name} of joint {robot.joints[i]} is {entry}; expected lower < "
-                    "upper, or a positive number; for tau of a joint without a motor write 0",
-                    path=("limits", name, i),
-                )
+            yield (
+                not low < high and (name, entry) != ("tau", 0.0),
+                f"limits: {name} of joint {robot.joints[i]} is {entry}; expected lower < upper, or "
+                "a positive number; for tau of a joint without a motor write 0",
+                ("limits", name, i),
+            )
 
 
 def _meant(name: str, robot: Any) -> str:

@@ -16,7 +16,7 @@ the rest of the model transmits at the joint.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 from itertools import product
 from typing import Annotated, Any, Literal
@@ -25,7 +25,16 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from symgen.description.expression import ONE, ZERO, Expression
-from symgen.description.fields import CONFIG, UNWRITTEN, Numeric, Path, Text, Whole, Written
+from symgen.description.fields import (
+    CONFIG,
+    UNWRITTEN,
+    Numeric,
+    Path,
+    Problem,
+    Text,
+    Whole,
+    Written,
+)
 from symgen.description.grammar import LAWS, parse
 from symgen.description.kinds import CHANNEL, KINDS, OWN_LAWS, STATE, TRANSMITTED, USUAL_KINDS
 from symgen.description.parts import (
@@ -257,7 +266,7 @@ class Element:
         return tuple(sorted({*self.along, *self.form}))
 
 
-def check_law(e: Element, robot: Any) -> None:
+def check_law(e: Element, robot: Any) -> Iterator[Problem]:
     """Check that the torque law of an element, such as joint friction, gives finite torques.
 
     The torques are computed at rest and in motion. The law may contain only names that the robot
@@ -267,42 +276,43 @@ def check_law(e: Element, robot: Any) -> None:
     states = [f"{state}{j}" for state in ("q", "qd") for j in ("", *robot.moving)]
     for name, x in e.scalars.items():
         lower, upper = x.bounds
-        if not lower <= x.value <= upper or not 1 <= x.grid <= 50:
-            raise DescriptionError(
-                f"{e.family}: fit.{name}: start {x.value:g}, bounds [{lower:g}, {upper:g}], grid "
-                f"{x.grid}; expected a start within the bounds and a grid of 1 to 50 starts",
-                path=(*where, "fit", name),
-            )
+        yield (
+            not lower <= x.value <= upper or not 1 <= x.grid <= 50,
+            f"{e.family}: fit.{name}: start {x.value:g}, bounds [{lower:g}, {upper:g}], grid "
+            f"{x.grid}; expected a start within the bounds and a grid of 1 to 50 starts",
+            (*where, "fit", name),
+        )
     law = e.energy if e.energy is not None else e.torque
     key = "energy" if e.energy is not None else "torque"
     if law is None:
         law = KINDS[e.kind].torque
     for name in e.scalars:
-        if name not in law.symbols or name in states:
-            raise DescriptionError(
-                f"{e.family}: fit.{name}: the law {law} has no constant {name} to fit; use {name} in the law or remove fit.{name}",
-                path=(*where, "fit", name),
-            )
+        yield (
+            name not in law.symbols or name in states,
+            f"{e.family}: fit.{name}: the law {law} has no constant {name} to fit; use {name} in the law or remove fit.{name}",
+            (*where, "fit", name),
+        )
     channels = {f"{CHANNEL}{name}": x for name, x in robot.constants.items()}
     declared = [*states, *e.scalars, *robot.constants, *channels, TRANSMITTED]
     if e.energy is not None:
         timed = ("qd", CHANNEL, TRANSMITTED)
         declared = [name for name in declared if not name.startswith(timed)]
     for j in e.keys if TRANSMITTED in law.symbols else ():
-        if e.along.get(j) != {j: ONE} or j not in robot.joints:
-            raise DescriptionError(
-                f"{e.family}{j}: a law with {TRANSMITTED} acts on one actuated joint; expected "
-                f"`along: j` with j one of {list(robot.joints)}",
-                path=(*where, "along", j),
-            )
-    if unknown := sorted(law.symbols - {*declared}):
-        raise DescriptionError(
-            f"{e.family}: {key}: {unknown[0]!r} is unknown in this law; expected q, qd, q1, qd1 ... "
-            f"of the joints{' (in an energy: positions only)' * bool(e.energy)}, constants of the law "
+        yield (
+            e.along.get(j) != {j: ONE} or j not in robot.joints,
+            f"{e.family}{j}: a law with {TRANSMITTED} acts on one actuated joint; expected "
+            f"`along: j` with j one of {list(robot.joints)}",
+            (*where, "along", j),
+        )
+    for name in sorted(law.symbols - {*declared}):
+        yield (
+            True,
+            f"{e.family}: {key}: {name!r} is unknown in this law; expected q, qd, q1, qd1 ... of "
+            f"the joints{' (in an energy: positions only)' * bool(e.energy)}, constants of the law "
             "given under `fit`, constants of the robot file "
             f"({', '.join(robot.constants) or 'none'}), {TRANSMITTED}, or {CHANNEL}NAME for a constant "
             "NAME whose values the record has",
-            path=(*where, key),
+            (*where, key),
         )
     for j in e.along:
         for position, speed in product(_positions(robot, e.along[j]), (0.0, 1.0)):
@@ -315,12 +325,12 @@ def check_law(e: Element, robot: Any) -> None:
                 finite = all(map(math.isfinite, torque))
             except (ArithmeticError, ValueError) as error:
                 finite, reason = False, f" ({error})"
-            if not finite:
-                raise DescriptionError(
-                    f"{e.family}: {law} is not finite at q = {position:g}, qd = {speed:g} with the "
-                    f"constants of the robot file{reason}; write a law that is finite at rest and in motion",
-                    path=(*where, key),
-                )
+            yield (
+                not finite,
+                f"{e.family}: {law} is not finite at q = {position:g}, qd = {speed:g} with the "
+                f"constants of the robot file{reason}; write a law that is finite at rest and in motion",
+                (*where, key),
+            )
 
 
 def _positions(robot: Any, row: Any) -> tuple[float, float]:
@@ -336,16 +346,16 @@ def _positions(robot: Any, row: Any) -> tuple[float, float]:
     return low + 0.3 * (high - low), low + 0.9 * (high - low)
 
 
-def check_channels(robot: Any) -> None:
+def check_channels(robot: Any) -> Iterator[Problem]:
     """Check that a constant used as a function of time (a channel) is not also used as a number."""
     of_frames = [getattr(f, name) for f in robot.frames for name in GEOMETRY]
     rows = [c for e in robot.elements for row in e.along.values() for c in row.values()]
     every = [*of_frames, *rows, *robot.gravity, *robot.constraints.values()]
     laws = set().union(*(e.symbols for e in robot.elements if e.is_own))
     for name in robot.channels:
-        if name in laws or any(name in x.symbols for x in every):
-            raise DescriptionError(
-                f"{name} is used as a constant and as the measured quantity {CHANNEL}{name}; write "
-                f"{CHANNEL}{name} for the measured quantity, and rename the constant",
-                path=("constants", name),
-            )
+        yield (
+            name in laws or any(name in x.symbols for x in every),
+            f"{name} is used as a constant and as the measured quantity {CHANNEL}{name}; write "
+            f"{CHANNEL}{name} for the measured quantity, and rename the constant",
+            ("constants", name),
+        )

@@ -31,6 +31,7 @@ from symgen.description.grammar import parse
 from symgen.errors import DescriptionError, ExpressionError, SymgenError
 
 Path = tuple[str | int, ...]  # keys that lead to a field of a robot file
+Problem = tuple[object, str, Path]  # whether a field is wrong, the message, and the field
 CONFIG = ConfigDict(extra="forbid", arbitrary_types_allowed=True, defer_build=True)
 
 

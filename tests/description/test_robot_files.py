@@ -121,6 +121,7 @@ WRONG = [
         ["rows with [2] numbers", "expected 2 rows with 2 numbers"],
     ),
     ("[[100, 0], [0, 100]]", "[[100, 0], [50, 0]]", 12, ["singular"]),
+    ("[[100, 0], [0, 100]]", "[[0.1, 0.3], [0.3, 0.9]]", 12, ["singular"]),
     ("[[100, 0], [0, 100]]", "[[100, 0], [0, x]]", 12, ["'x'", "expected a number"]),
     ("offset: [0, 0]", "offset: [0]", 12, ["1 entries", "expected 2"]),
     ("torque_constant: 2", "torque_constant: [2]", 12, ["1 entries", "expected 2"]),
@@ -222,6 +223,12 @@ def test_error_names_line_given_and_expected(old, new, line, words):
     assert str(error).endswith(f"(arm.yaml, line {error.line})")
     for word in words:
         assert word in str(error), str(error)
+
+
+def test_an_antecedent_after_one_that_does_not_exist():
+    """Frame 1 is mounted on frame 2, and frame 2 on a frame that the table lacks."""
+    error = error_of(ARM.replace("ant: 1", "ant: 7").replace("ant: 0", "ant: 2"))
+    assert error.line == 8 and "ant = 7; expected an earlier frame" in str(error)
 
 
 def test_cut_and_twin_exchanged():
