@@ -16,7 +16,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
-from itertools import groupby
+from itertools import count, groupby
 from operator import itemgetter
 from string import ascii_lowercase
 
@@ -265,13 +265,8 @@ class Text:
     def _part_of(self, node: Node, whole: Mapping[int, str]) -> str:
         """Name an intermediate variable after the quantity that contains it: N16a after N16."""
         of = whole.get(node.index, "K").rstrip(ascii_lowercase + "_") or "K"
-        for k in range(len(self.nodes)):
-            letters = ascii_lowercase[k % 26] * (k // 26 + 1)
-            if not self.names.has(f"{of}{letters}"):
-                return self.names.own(f"{of}{letters}")
-        raise AssertionError("more intermediate variables than nodes of the graph")
-
-    # --- lines ---
+        names = (f"{of}{ascii_lowercase[k % 26] * (k // 26 + 1)}" for k in count())
+        return self.names.own(next(name for name in names if not self.names.has(name)))
 
     def sections_of(self, nodes: Collection[int]) -> tuple[Section, ...]:
         """Write the lines that compute the given graph nodes, grouped under headings."""
