@@ -24,7 +24,7 @@ from collections.abc import Mapping
 
 from symgen.derive.geometry import Geometry, Rotation
 from symgen.derive.regressor import element_names
-from symgen.derive.scalar import Scalar, Vector, cross, dot, scale, vadd
+from symgen.derive.scalar import Scalar, Vector, array, cross, dot
 from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, parameter
 
 Tensor = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]  # 11, 12, 13, 22, 23, 33
@@ -60,7 +60,7 @@ class CompositeLinks:
             self.own[f.j] = link
             XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M = link
             self.JP[f.j] = (XX, XY, XZ, YY, YZ, ZZ)
-            self.MSP[f.j] = (MX, MY, MZ)
+            self.MSP[f.j] = array((MX, MY, MZ))
             self.MP[f.j] = M
         for f in reversed(self.robot.frames):
             self.algebra.section(f"Composite link {f.j}")
@@ -82,14 +82,14 @@ class CompositeLinks:
         R = self.geometry.rotation[j]
         P = self.geometry.P[j]
         AS = self.algebra.vector("AS", R.up(self.MSP[j]), j)
-        moved = vadd(AS, scale(self.MP[j], P))
+        moved = AS + P * self.MP[j]
         AJA = turned(R, self.JP[j])
         for (k, m), x in zip(PLACES, AJA, strict=True):
             self.algebra.hint(x, self.named("AJA", k, m, j))
         shifted = parallel(P, AS, moved)
         JP = (a + (b + c) for a, b, c in zip(self.JP[i], AJA, shifted, strict=True))
         self.JP[i] = tuple(JP)
-        self.MSP[i] = vadd(self.MSP[i], moved)
+        self.MSP[i] = self.MSP[i] + moved
         self.MP[i] = self.MP[i] + self.MP[j]
 
     def matrix(self) -> dict[Place, Scalar]:
@@ -119,10 +119,9 @@ class CompositeLinks:
         The joints i are those between the base and joint k.
         """
         x, y, _ = self.MSP[k]
-        E: Vector = (-y, x, 0)
-        NE: Vector = (self.JP[k][2], self.JP[k][4], self.JP[k][5])
+        E, NE = array((-y, x, 0)), array((self.JP[k][2], self.JP[k][4], self.JP[k][5]))
         if self.robot.frame(k).sigma == PRISMATIC:
-            E, NE = (0, 0, self.MP[k]), (y, -x, 0)
+            E, NE = array((0, 0, self.MP[k])), array((y, -x, 0))
         self.algebra.section(f"Unit acceleration of joint {k}")
         column: dict[int, Scalar] = {}
         for i in reversed(self.robot.path(k)):
@@ -132,9 +131,8 @@ class CompositeLinks:
             if frame.sigma != FIXED:
                 column[i] = E[2] if frame.sigma == PRISMATIC else NE[2]
             rotation = self.geometry.rotation[i]
-            FDI = rotation.up(E)
-            NE = vadd(rotation.up(NE), cross(self.geometry.P[i], FDI))
-            E = FDI
+            E = rotation.up(E)
+            NE = rotation.up(NE) + cross(self.geometry.P[i], E)
         return column
 
 
@@ -145,10 +143,9 @@ def turned(R: Rotation, J: Tensor) -> Tensor:
     x = cc * (XX - YY) - (cs + cs) * XY
     xy = cs * (XX - YY) + ((cc + cc) * XY - XY)
     xz, yz = R.c * XZ - R.s * YZ, R.s * XZ + R.c * YZ
-    rows = [(YY + x, xy, xz), (xy, XX - x, yz), (xz, yz, ZZ)]
+    rows = array([(YY + x, xy, xz), (xy, XX - x, yz), (xz, yz, ZZ)])
     if R.A is not None:
-        half = [[dot(axis, column) for column in rows] for axis in R.A]
-        rows = [(dot(a, R.A[0]), dot(a, R.A[1]), dot(a, R.A[2])) for a in half]
+        rows = R.A @ rows @ R.A.T
     return rows[0][0], rows[0][1], rows[0][2], rows[1][1], rows[1][2], rows[2][2]
 
 

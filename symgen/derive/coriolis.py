@@ -42,11 +42,9 @@ from symgen.derive.scalar import (
     Matrix,
     Scalar,
     Vector,
-    apply,
+    array,
     cross,
     dot,
-    scale,
-    vadd,
 )
 from symgen.description.expression import Expression
 from symgen.description.robot import FIXED, PRISMATIC
@@ -77,7 +75,7 @@ class CompositeRates(CompositeLinks):
             self._link(d, f.j)
             PP = cross(self.motion.link[f.ant].w, self.geometry.P[f.j])
             if f.sigma == PRISMATIC:
-                PP = vadd(PP, scale(self.motion.qd(f.j), self.geometry.rotation[f.j].up(E3)))
+                PP = PP + self.geometry.rotation[f.j].up(E3) * self.motion.qd(f.j)
             self.PP[f.j] = self.algebra.vector("PP", PP, f.j)
         for f in reversed(self.robot.frames):
             self.algebra.section(f"Rates of composite link {f.j}")
@@ -94,26 +92,24 @@ class CompositeRates(CompositeLinks):
         """
         w, half = self.motion.link[j].w, self.algebra.constant(HALF)
         XX, XY, XZ, YY, YZ, ZZ = self.own[j][:6]
-        K = (
-            (half * (YY + ZZ - XX), -XY, -XZ),
-            (-XY, half * (XX + ZZ - YY), -YZ),
-            (-XZ, -YZ, half * (XX + YY - ZZ)),
+        K = array(
+            (
+                (half * (YY + ZZ - XX), -XY, -XZ),
+                (-XY, half * (XX + ZZ - YY), -YZ),
+                (-XZ, -YZ, half * (XX + YY - ZZ)),
+            )
         )
-        mx, my, mz = self.own[j][6:9]
-        self.HP[j] = cross(w, (mx, my, mz))
-        self.BP[j] = (cross(w, K[0]), cross(w, K[1]), cross(w, K[2]))
+        self.HP[j] = cross(w, array(self.own[j][6:9]))
+        self.BP[j] = array([cross(w, row) for row in K])
 
     def _take_rates(self, j: int, i: int) -> None:
         """Add the sums HP and BP of link j and all links after it to those of its antecedent i."""
         R, P, PP = self.geometry.rotation[j], self.geometry.P[j], self.PP[j]
         ABA, AH = turned(R, self.BP[j]), R.up(self.HP[j])
-        moved = vadd(R.up(self.MSP[j]), scale(self.MP[j], P))
-        rows = (
-            vadd(self.BP[i][a], vadd(ABA[a], vadd(scale(P[a], AH), scale(moved[a], PP))))
-            for a in range(3)
-        )
-        self.BP[i] = tuple(rows)  # type: ignore[assignment]
-        self.HP[i] = vadd(self.HP[i], vadd(AH, scale(self.MP[j], PP)))
+        moved = R.up(self.MSP[j]) + P * self.MP[j]
+        rows = [self.BP[i][a] + (ABA[a] + (AH * P[a] + PP * moved[a])) for a in range(3)]
+        self.BP[i] = array(rows)
+        self.HP[i] = self.HP[i] + (AH + PP * self.MP[j])
 
     def coriolis(self) -> dict[tuple[int, int], Scalar]:
         """Return the Coriolis matrix {(i, k): C_ik} of all moving joints of the open tree."""
@@ -130,20 +126,17 @@ class CompositeRates(CompositeLinks):
         B, H = self.BP[k], self.HP[k]
         zd = self._axis_rate(k)
         if self.robot.frame(k).sigma == PRISMATIC:
-            E, NE = scale(self.MP[k], zd), cross(self.MSP[k], zd)
-            F: Vector = (0, 0, self.MP[k])
-            N: Vector = (y, -x, 0)
-            ND: Vector = (H[1], -H[0], 0)
+            E, NE = zd * self.MP[k], cross(self.MSP[k], zd)
+            F, N = array((0, 0, self.MP[k])), array((y, -x, 0))
+            ND = array((H[1], -H[0], 0))
         else:
             XX, XY, XZ, YY, YZ, ZZ = self.JP[k]
             across = B[0][0] + B[1][1]
-            E = vadd(cross(zd, self.MSP[k]), (-H[1], H[0], 0))
-            NE = vadd(
-                apply(((XX, XY, XZ), (XY, YY, YZ), (XZ, YZ, ZZ)), zd),
-                (-B[2][0], -B[2][1], across),
-            )
-            F, N = (-y, x, 0), (XZ, YZ, ZZ)
-            ND = (-B[0][2], -B[1][2], across)
+            E = cross(zd, self.MSP[k]) + array((-H[1], H[0], 0))
+            J = array(((XX, XY, XZ), (XY, YY, YZ), (XZ, YZ, ZZ)))
+            NE = J @ zd + array((-B[2][0], -B[2][1], across))
+            F, N = array((-y, x, 0)), array((XZ, YZ, ZZ))
+            ND = array((-B[0][2], -B[1][2], across))
         C: dict[tuple[int, int], Scalar] = {}
         for i in reversed(self.robot.path(k)):
             frame, R, P = self.robot.frame(i), self.geometry.rotation[i], self.geometry.P[i]
@@ -154,14 +147,14 @@ class CompositeRates(CompositeLinks):
                     below = dot(self._axis_rate(i), F if slides else N)
                     C[k, i] = below if slides else below + ND[2]
             E, F = self.algebra.vector("E", R.up(E), i, k), R.up(F)
-            NE, N = vadd(R.up(NE), cross(P, E)), vadd(R.up(N), cross(P, F))
-            ND = vadd(R.up(ND), cross(self.PP[i], F))
+            NE, N = R.up(NE) + cross(P, E), R.up(N) + cross(P, F)
+            ND = R.up(ND) + cross(self.PP[i], F)
         return C
 
     def _axis_rate(self, k: int) -> Vector:
         """Return the rate of change of joint axis k, zd_k = w_k x z_k, in frame k."""
         w = self.motion.link[k].w
-        return (w[1], -w[0], 0)
+        return array((w[1], -w[0], 0))
 
 
 def turned(R: Rotation, B: Matrix) -> Matrix:
@@ -170,7 +163,7 @@ def turned(R: Rotation, B: Matrix) -> Matrix:
     difference, sum_ = B[0][0] - B[1][1], B[0][1] + B[1][0]
     x = cc * difference - cs * sum_
     xy = cc * sum_ + cs * difference
-    rows: Matrix = (
+    rows = (
         (B[1][1] + x, xy - B[1][0], R.c * B[0][2] - R.s * B[1][2]),
         (xy - B[0][1], B[0][0] - x, R.s * B[0][2] + R.c * B[1][2]),
         (
@@ -179,10 +172,7 @@ def turned(R: Rotation, B: Matrix) -> Matrix:
             B[2][2],
         ),
     )
-    if R.A is None:
-        return rows
-    half = [[dot(axis, column) for column in zip(*rows, strict=True)] for axis in R.A]
-    return tuple(tuple(dot(a, axis) for axis in R.A) for a in half)  # type: ignore[return-value]
+    return array(rows) if R.A is None else R.A @ array(rows) @ R.A.T
 
 
 def coriolis(d: Derivation) -> dict[tuple[int, int], Scalar]:

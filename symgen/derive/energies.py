@@ -43,16 +43,13 @@ from symgen.derive.regressor import columns, element_names, inertial_names, unit
 from symgen.derive.scalar import (
     E3,
     ZERO3,
-    Matrix,
     Scalar,
     Vector,
-    apply,
+    array,
     cross,
     dot,
     linear,
-    scale,
     turned,
-    vadd,
 )
 from symgen.description.expression import Expression
 from symgen.description.robot import INERTIAL, PRISMATIC, Element, parameter
@@ -70,7 +67,7 @@ def origin_velocities(motion: Motion) -> dict[int, Vector]:
     v: dict[int, Vector] = {0: ZERO3}
     for f in motion.robot.frames:
         x, y, z = motion.geometry.rotation[f.j].down(
-            vadd(v[f.ant], cross(motion.link[f.ant].w, motion.geometry.P[f.j]))
+            v[f.ant] + cross(motion.link[f.ant].w, motion.geometry.P[f.j])
         )
         v[f.j] = motion.vector("VO", (x, y, z + motion.qd(f.j) if f.sigma == PRISMATIC else z), f.j)
     return v
@@ -84,7 +81,7 @@ def kinetic_energy(d: Derivation) -> Scalar:
     for j in d.robot.links:
         w, K = motion.link[j].w, {p: d.chi[parameter(p, j)] for p in INERTIAL}
         XX, XY, XZ, YY, YZ, ZZ = (K[p] for p in INERTIAL[:6])
-        Jw = apply(((XX, XY, XZ), (XY, YY, YZ), (XZ, YZ, ZZ)), w)
+        Jw = array(((XX, XY, XZ), (XY, YY, YZ), (XZ, YZ, ZZ))) @ w
         total = total + half * (dot(w, Jw) + K["M"] * dot(v[j], v[j]))
         total = total + dot((K["MX"], K["MY"], K["MZ"]), cross(v[j], w))
     for name, (e, j) in element_names(d.robot).items():
@@ -106,7 +103,7 @@ def potential_energy(d: Derivation) -> Scalar:
         height = dot((x, y, z), frames.position(j, 0, 0))
         total = total + d.chi[parameter("M", j)] * height
         first = [d.chi[parameter(p, j)] for p in ("MX", "MY", "MZ")]
-        total = total + dot(frames.rotated((x, y, z), 0, j), first)
+        total = total + dot(frames.rotated(array((x, y, z)), 0, j), first)
     positions = {i: d.geometry.position(i) for i in d.robot.moving}
     for name, (e, j) in element_names(d.robot).items():
         if e.kind == "stiffness":
@@ -164,18 +161,16 @@ class AtRates(Motion):
             of = f"unit rate of joint {tag}" if tag else "reference rates"
             self.algebra.section(f"Link {j}, {of}")
             m = self.geometry.carrier[j].m
-            axis_rate = (w[1], -w[0], 0)  # w x e3
+            axis_rate = array((w[1], -w[0], 0))  # w x e3
             n = turned(self.algebra, self.geometry.carrier[j].turn, every)
-            z[j] = self.vector("Z", vadd(self.geometry.from_carrier(j, z[m]), scale(n, E3)), j)
-            zd[j] = self.vector(
-                "ZP", vadd(self.geometry.from_carrier(j, zd[m]), scale(n, axis_rate)), j
-            )
+            z[j] = self.vector("Z", self.geometry.from_carrier(j, z[m]) + E3 * n, j)
+            zd[j] = self.vector("ZP", self.geometry.from_carrier(j, zd[m]) + axis_rate * n, j)
             a = self.geometry.rotation[j].down(
-                vadd(self.link[f.ant].a, apply(self.link[f.ant].U, self.geometry.P[j]))
+                self.link[f.ant].a + self.link[f.ant].U @ self.geometry.P[j]
             )
             if f.sigma == PRISMATIC:
                 n = linear(self.algebra, self.geometry.closure.row[j], every)
-                a = vadd(vadd(a, scale(n, axis_rate)), cross(z[j], scale(motion.qd(j), E3)))
+                a = a + axis_rate * n + cross(z[j], E3 * motion.qd(j))
             self.link[j] = _link(z[j], zd[j], w, self.vector("VP", a, j), half)
 
 
@@ -190,12 +185,12 @@ def _link(z: Vector, zd: Vector, w: Vector, a: Vector, half: Scalar) -> LinkMoti
     rows = []
     for k in range(3):
         x, y, t = (skew[k][m] + w[k] * z[m] for m in range(3))
-        rows.append(tuple(e - across if m == k else e for m, e in enumerate((x, y, t))))
-    U: Matrix = (rows[0], rows[1], rows[2])
-    turning = scale(half, (U[2][1] - U[1][2], U[0][2] - U[2][0], U[1][0] - U[0][1]))
-    DV = tuple(tuple(half * (U[k][m] + U[m][k]) for m in range(3)) for k in range(3))
-    DW = (U[1][1] - U[2][2], U[2][2] - U[0][0], U[0][0] - U[1][1])
-    return LinkMotion(w, turning, DV, DW, U, a)  # type: ignore[arg-type]
+        rows.append([e - across if m == k else e for m, e in enumerate((x, y, t))])
+    U = array(rows)
+    turning = array((U[2][1] - U[1][2], U[0][2] - U[2][0], U[1][0] - U[0][1])) * half
+    DV = array([[half * (U[k][m] + U[m][k]) for m in range(3)] for k in range(3)])
+    DW = array((U[1][1] - U[2][2], U[2][2] - U[0][0], U[0][0] - U[1][1]))
+    return LinkMotion(w, turning, DV, DW, U, a)
 
 
 Columns = Mapping[str, Mapping[int, Scalar]]
@@ -229,14 +224,7 @@ def slotine_li(d: Derivation) -> Columns:
 
 def _together(a: LinkMotion, b: LinkMotion) -> LinkMotion:
     """Add the accelerations of one link in two motions a and b."""
-    return LinkMotion(
-        b.w,
-        vadd(a.wd, b.wd),
-        tuple(map(vadd, a.DV, b.DV)),  # type: ignore[arg-type]
-        vadd(a.DW, b.DW),
-        tuple(map(vadd, a.U, b.U)),  # type: ignore[arg-type]
-        vadd(a.a, b.a),
-    )
+    return LinkMotion(b.w, a.wd + b.wd, a.DV + b.DV, a.DW + b.DW, a.U + b.U, a.a + b.a)
 
 
 def momentum_rate(d: Derivation) -> Columns:
@@ -263,6 +251,6 @@ def base_wrench(d: Derivation) -> dict[str, tuple[Scalar, ...]]:
     """
     found = {}
     for name, (p, j) in inertial_names(d.robot).items():
-        F, N = (apply(d.poses[j][0], x) for x in unit_wrench(d.motion.link[j], p))
-        found[name] = (*F, *vadd(N, cross(d.poses[j][1], F)))
+        F, N = (d.poses[j][0] @ x for x in unit_wrench(d.motion.link[j], p))
+        found[name] = (*F, *(N + cross(d.poses[j][1], F)))
     return found

@@ -11,11 +11,9 @@ from __future__ import annotations
 from symgen.derive.geometry import Geometry, Rotation, summed
 from symgen.derive.graph import Turn
 from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.derive.scalar import E3, ZERO3, Matrix, Vector, cross, dot, vadd
+from symgen.derive.scalar import E3, IDENTITY, ZERO3, Matrix, Vector, array, cross, dot
 from symgen.description.expression import Expression
 from symgen.description.robot import REVOLUTE
-
-IDENTITY: Matrix = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 
 
 def frame_poses(geometry: Geometry) -> dict[int, tuple[Matrix, Vector]]:
@@ -31,14 +29,12 @@ def frame_poses(geometry: Geometry) -> dict[int, tuple[Matrix, Vector]]:
         algebra.section(f"Frame {f.j}")
         carrier, (A_0i, P_0i) = pose[geometry.carrier[f.j].m][0], pose[f.ant]
         rows = (geometry.carrier[f.j].rotation.down(row) for row in carrier)
-        A = tuple(
-            tuple(
-                algebra.name(x, algebra.named("R", k, m, f.j, *own)) for m, x in enumerate(row, 1)
-            )
+        A = [
+            [algebra.name(x, algebra.named("R", k, m, f.j, *own)) for m, x in enumerate(row, 1)]
             for k, row in enumerate(rows, 1)
-        )
+        ]
         P = [P_0i[k] + dot(A_0i[k], geometry.P[f.j]) for k in range(3)]
-        pose[f.j] = (A, algebra.vector("P", P, f.j, *own))  # type: ignore[assignment]
+        pose[f.j] = (array(A), algebra.vector("P", P, f.j, *own))
     pose.pop(0, None)
     return pose
 
@@ -76,19 +72,18 @@ class Frames:
         total = ZERO3
         for f in to:
             if f not in start:
-                total = vadd(
-                    total, self.rotated(self.geometry.P[f], self.robot.frame(f).ant, seen_from)
-                )
+                P = self.rotated(self.geometry.P[f], self.robot.frame(f).ant, seen_from)
+                total = total + P
         for f in start:
             if f not in to:
-                x, y, z = self.rotated(self.geometry.P[f], self.robot.frame(f).ant, seen_from)
-                total = (total[0] - x, total[1] - y, total[2] - z)
+                P = self.rotated(self.geometry.P[f], self.robot.frame(f).ant, seen_from)
+                total = total - P
         return total
 
     def pose(self, j: int, i: int) -> tuple[Matrix, Vector]:
         """Return the orientation A_ij and the origin P_ij of frame j in frame i."""
-        x, y, z = (self.rotated(e, j, i) for e in ((1, 0, 0), (0, 1, 0), E3))
-        return ((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])), self.position(j, i, i)
+        axes = array([self.rotated(e, j, i) for e in IDENTITY])
+        return axes.T, self.position(j, i, i)
 
     def columns(self, j: int, i: int) -> dict[int, tuple[Vector, Vector]]:
         """Return the Jacobian of frame j in frame i: a column per moving joint from base to j.

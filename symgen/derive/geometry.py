@@ -21,8 +21,7 @@ from symgen.derive.scalar import (
     Matrix,
     Scalar,
     Vector,
-    apply,
-    apply_transposed,
+    array,
     is_zero,
     linear,
 )
@@ -48,21 +47,13 @@ class Rotation:
 
     def up(self, v: Vector) -> Vector:
         """Transform a vector v from outer frame j to inner frame i: A Rot(z, theta) v."""
-        u = (
-            self.c * v[0] - self.s * v[1],
-            self.s * v[0] + self.c * v[1],
-            v[2],
-        )
-        return u if self.A is None else apply(self.A, u)
+        u = array((self.c * v[0] - self.s * v[1], self.s * v[0] + self.c * v[1], v[2]))
+        return u if self.A is None else self.A @ u
 
     def down(self, v: Vector) -> Vector:
         """Transform a vector v from inner frame i to outer frame j: (A Rot(z, theta))' v."""
-        u = v if self.A is None else apply_transposed(self.A, v)
-        return (
-            self.c * u[0] + self.s * u[1],
-            self.c * u[1] - self.s * u[0],
-            u[2],
-        )
+        u = v if self.A is None else self.A.T @ v
+        return array((self.c * u[0] + self.s * u[1], self.c * u[1] - self.s * u[0], u[2]))
 
 
 @dataclass(frozen=True)
@@ -88,16 +79,12 @@ class Carrier:
 
 def axis_rotation(cg: Scalar, sg: Scalar, ca: Scalar, sa: Scalar) -> Matrix:
     """Return A = Rot(z, gamma) Rot(x, alpha) from cosines and sines of gamma and alpha."""
-    return ((cg, -(sg * ca), sg * sa), (sg, cg * ca, -(cg * sa)), (0, sa, ca))
+    return array(((cg, -(sg * ca), sg * sa), (sg, cg * ca, -(cg * sa)), (0, sa, ca)))
 
 
 def displacement(A: Matrix, b: Scalar, d: Scalar, r: Scalar) -> Vector:
     """Return the origin of frame j in frame i, P_ij = b e3 + d A e1 + r A e3."""
-    return (
-        d * A[0][0] + r * A[0][2],
-        d * A[1][0] + r * A[1][2],
-        b + r * A[2][2],
-    )
+    return array((d * A[0][0] + r * A[0][2], d * A[1][0] + r * A[1][2], b + r * A[2][2]))
 
 
 class Geometry:

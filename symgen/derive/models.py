@@ -6,7 +6,7 @@ entry here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 
 from symgen.derive.coriolis import coriolis
 from symgen.derive.derivation import Derivation
@@ -25,7 +25,7 @@ from symgen.derive.loop_equations import LoopSystem
 from symgen.derive.model import Case, Entry, Model, Place, Request, equations
 from symgen.derive.regressor import element_names
 from symgen.derive.rewrite import Input
-from symgen.derive.scalar import Vector
+from symgen.derive.scalar import Matrix, Vector
 from symgen.description.expression import ONE, ZERO
 from symgen.description.robot import Element
 from symgen.errors import SymgenError
@@ -193,7 +193,7 @@ def _potential_energy(d: Derivation, r: Request) -> Iterator[Case]:
 # --- kinematics ---
 
 
-def _pose_entries(first: Place, A: Sequence[Vector], P: Vector) -> list[Entry]:
+def _pose_entries(first: Place, A: Matrix, P: Vector) -> list[Entry]:
     rows = (*((*A[k], P[k]) for k in range(3)), HOMOGENEOUS)
     return [
         Entry((*first, k, m), x, "Poses") for k, row in enumerate(rows) for m, x in enumerate(row)

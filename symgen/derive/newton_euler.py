@@ -17,7 +17,7 @@ Robots, 2002, ch. 9.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from symgen.derive.geometry import Geometry
@@ -26,19 +26,17 @@ from symgen.derive.scalar import (
     Matrix,
     Scalar,
     Vector,
-    apply,
+    array,
     cross,
     dot,
     is_zero,
     linear,
-    scale,
     turned,
-    vadd,
 )
 from symgen.description.expression import Expression
 from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, REVOLUTE, parameter
 
-ZERO33: Matrix = (ZERO3, ZERO3, ZERO3)
+ZERO33 = array((ZERO3, ZERO3, ZERO3))
 TWO = Expression.number(2)
 
 
@@ -104,7 +102,7 @@ class Motion:
     def _base(self) -> LinkMotion:
         """Return the motion of the base: at rest, but accelerated by minus gravity."""
         x, y, z = (self.algebra.gravity(axis) for axis in range(3))
-        return REST if is_zero((x, y, z)) else replace(REST, a=(x, y, z))
+        return REST if is_zero((x, y, z)) else replace(REST, a=array((x, y, z)))
 
     def q(self, j: int) -> Scalar:
         """Return the position of any moving joint j."""
@@ -118,7 +116,7 @@ class Motion:
         """Return the acceleration of any moving joint j."""
         return linear(self.algebra, self.geometry.closure.row[j], self._qdd)
 
-    def vector(self, family: str, value: Vector, *indices: int) -> Vector:
+    def vector(self, family: str, value: Iterable[Scalar], *indices: int) -> Vector:
         """Name the components of a vector, such as W12 (component 1, link 2); return the vector."""
         return self.algebra.vector(family, value, *indices, *self.tag)
 
@@ -146,11 +144,11 @@ class Motion:
         )
         DV, DW, U = self._products(w, wd, j)
         P = geometry.P[j]
-        VSP = self.vector("VSP", vadd(i.a, apply(i.U, P)), j)
+        VSP = self.vector("VSP", i.a + i.U @ P, j)
         a = geometry.rotation[j].down(VSP)
         if f.sigma == PRISMATIC:
             qd2 = self.algebra.constant(TWO) * slides[0]
-            a = (a[0] + qd2 * w[1], a[1] - qd2 * w[0], a[2] + slides[1])
+            a = array((a[0] + qd2 * w[1], a[1] - qd2 * w[0], a[2] + slides[1]))
         return LinkMotion(w, wd, DV, DW, U, self.vector("VP", a, j))
 
     def _products(self, w: Vector, wd: Vector, j: int) -> tuple[Matrix, Vector, Matrix]:
@@ -160,21 +158,25 @@ class Motion:
             for k in range(3)
             for m in range(k, 3)
         }
-        DV: Matrix = (
-            (D[0, 0], D[0, 1], D[0, 2]),
-            (D[0, 1], D[1, 1], D[1, 2]),
-            (D[0, 2], D[1, 2], D[2, 2]),
+        DV = array(
+            (
+                (D[0, 0], D[0, 1], D[0, 2]),
+                (D[0, 1], D[1, 1], D[1, 2]),
+                (D[0, 2], D[1, 2], D[2, 2]),
+            )
         )
-        DW: Vector = (
-            name(DV[1][1] - DV[2][2], named("DW", 2, 3, j, *self.tag)),
-            name(DV[2][2] - DV[0][0], named("DW", 3, 1, j, *self.tag)),
-            name(DV[0][0] - DV[1][1], named("DW", 1, 2, j, *self.tag)),
+        DW = array(
+            (
+                name(DV[1][1] - DV[2][2], named("DW", 2, 3, j, *self.tag)),
+                name(DV[2][2] - DV[0][0], named("DW", 3, 1, j, *self.tag)),
+                name(DV[0][0] - DV[1][1], named("DW", 1, 2, j, *self.tag)),
+            )
         )
 
         def off(k: int, m: int, value: Scalar) -> Scalar:
             return name(value, named("U", k, m, j, *self.tag))
 
-        U: Matrix = (
+        U = (
             (
                 off(1, 1, -(DV[1][1] + DV[2][2])),
                 off(1, 2, DV[0][1] - wd[2]),
@@ -191,12 +193,13 @@ class Motion:
                 off(3, 3, -(DV[0][0] + DV[1][1])),
             ),
         )
-        return DV, DW, U
+        return DV, DW, array(U)
 
 
 def force(m: LinkMotion, K: Mapping[str, Scalar]) -> Vector:
     """Return the force F = M a + U MS that moves a link."""
-    return vadd(scale(K["M"], m.a), apply(m.U, (K["MX"], K["MY"], K["MZ"])))
+    F: Vector = m.a * K["M"] + m.U @ array((K["MX"], K["MY"], K["MZ"]))
+    return F
 
 
 def moment(m: LinkMotion, K: Mapping[str, Scalar]) -> Vector:
@@ -205,14 +208,16 @@ def moment(m: LinkMotion, K: Mapping[str, Scalar]) -> Vector:
     N1 = XX wd1 + (ZZ - YY) w2 w3 + YZ (w2**2 - w3**2) + XZ U21 - XY U31 + (MS x a)1, and
     cyclically.
     """
-    (XX, XY, XZ, YY, YZ, ZZ), MS = (K[p] for p in INERTIAL[:6]), (K["MX"], K["MY"], K["MZ"])
+    (XX, XY, XZ, YY, YZ, ZZ), MS = (K[p] for p in INERTIAL[:6]), array((K["MX"], K["MY"], K["MZ"]))
     DV, DW, U, wd = m.DV, m.DW, m.U, m.wd
-    N = (
-        dot((XX, ZZ - YY, YZ, XZ, -XY), (wd[0], DV[1][2], DW[0], U[1][0], U[2][0])),
-        dot((YY, XX - ZZ, XZ, XY, -YZ), (wd[1], DV[0][2], DW[1], U[2][1], U[0][1])),
-        dot((ZZ, YY - XX, XY, YZ, -XZ), (wd[2], DV[0][1], DW[2], U[0][2], U[1][2])),
-    )
-    return vadd(N, cross(MS, m.a))
+    N: Vector = array(
+        (
+            dot((XX, ZZ - YY, YZ, XZ, -XY), (wd[0], DV[1][2], DW[0], U[1][0], U[2][0])),
+            dot((YY, XX - ZZ, XZ, XY, -YZ), (wd[1], DV[0][2], DW[1], U[2][1], U[0][1])),
+            dot((ZZ, YY - XX, XY, YZ, -XZ), (wd[2], DV[0][1], DW[2], U[0][2], U[1][2])),
+        )
+    ) + cross(MS, m.a)
+    return N
 
 
 def joint_torques(motion: Motion, K: Mapping[str, Scalar]) -> dict[int, Scalar]:
@@ -232,13 +237,13 @@ def joint_torques(motion: Motion, K: Mapping[str, Scalar]) -> dict[int, Scalar]:
             continue
         motion.algebra.section(f"Joint {j}")
         link = {p: K.get(parameter(p, j), 0) for p in INERTIAL}
-        f[j] = vector("E", vadd(vector("F", force(motion.link[j], link), j), f[j]), j)
-        n[j] = vector("NE", vadd(vector("N", moment(motion.link[j], link), j), n[j]), j)
+        f[j] = vector("E", vector("F", force(motion.link[j], link), j) + f[j], j)
+        n[j] = vector("NE", vector("N", moment(motion.link[j], link), j) + n[j], j)
         if frame.sigma == REVOLUTE:
             torque[j] = n[j][2]
         elif frame.sigma == PRISMATIC:
             torque[j] = f[j][2]
         fi = vector("FDI", geometry.rotation[j].up(f[j]), j)
-        f[i] = vadd(f[i], fi)
-        n[i] = vadd(n[i], vadd(geometry.rotation[j].up(n[j]), cross(geometry.P[j], fi)))
+        f[i] = f[i] + fi
+        n[i] = n[i] + (geometry.rotation[j].up(n[j]) + cross(geometry.P[j], fi))
     return torque

@@ -19,7 +19,7 @@ from typing import Any
 
 from symgen.derive.elements import element_column
 from symgen.derive.newton_euler import LinkMotion, Motion, force, moment
-from symgen.derive.scalar import E3, ZERO3, Scalar, Vector, cross, dot, vadd
+from symgen.derive.scalar import E3, ZERO3, Scalar, Vector, cross, dot
 from symgen.description.expression import Expression
 from symgen.description.robot import (
     FIXED,
@@ -117,7 +117,7 @@ class Axes:
             inside = i in robot.path(m)  # it turns the carrier, or else about z_j itself
             if sigma == REVOLUTE:
                 z = geometry.from_carrier(j, self.z[i, m]) if inside else E3
-                lever = vadd(self.v[i, frame.ant], cross(self.z[i, frame.ant], geometry.P[j]))
+                lever = self.v[i, frame.ant] + cross(self.z[i, frame.ant], geometry.P[j])
                 for k, x in enumerate(lever, start=1):
                     motion.algebra.hint(x, motion.algebra.named("VS", k, j, i))
                 v = geometry.rotation[j].down(lever)

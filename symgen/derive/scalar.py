@@ -7,8 +7,10 @@ or -1 is simplified at once and makes no node of the graph.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
+
+import numpy as np
 
 from symgen.derive.graph import Turn
 from symgen.derive.graph_algebra import GraphAlgebra
@@ -16,19 +18,30 @@ from symgen.description.expression import Expression
 
 K = TypeVar("K")
 Scalar = Any
-Vector = tuple[Scalar, Scalar, Scalar]
-Matrix = tuple[Vector, Vector, Vector]  # rows
-
-ZERO3: Vector = (0, 0, 0)
-E3: Vector = (0, 0, 1)
+Vector = np.ndarray  # of three scalars
+Matrix = np.ndarray  # of three rows
 
 
-def is_zero(v: Vector) -> bool:
+def array(entries: Any) -> Vector:
+    """Return a vector of scalars, or a matrix from its rows; + - * and @ act on the scalars.
+
+    It cannot be changed in place, because several links may share it.
+    """
+    made = np.array(entries, dtype=object)
+    made.flags.writeable = False
+    return made
+
+
+ZERO3, E3 = array((0, 0, 0)), array((0, 0, 1))
+IDENTITY = array(((1, 0, 0), (0, 1, 0), (0, 0, 1)))
+
+
+def is_zero(v: Iterable[Scalar]) -> bool:
     """Whether every component of v is the Python integer 0, so that v vanishes identically."""
     return all(x == 0 for x in v)
 
 
-def dot(u: Sequence[Scalar], v: Sequence[Scalar]) -> Scalar:
+def dot(u: Iterable[Scalar], v: Iterable[Scalar]) -> Scalar:
     total: Scalar = 0
     for a, b in zip(u, v, strict=True):
         total = total + a * b
@@ -47,30 +60,10 @@ def turned(algebra: GraphAlgebra, turn: Turn, x: Mapping[int, Scalar]) -> Scalar
 
 
 def cross(u: Vector, v: Vector) -> Vector:
-    return (
-        u[1] * v[2] - u[2] * v[1],
-        u[2] * v[0] - u[0] * v[2],
-        u[0] * v[1] - u[1] * v[0],
-    )
-
-
-def vadd(u: Vector, v: Vector) -> Vector:
-    return (u[0] + v[0], u[1] + v[1], u[2] + v[2])
-
-
-def scale(s: Scalar, u: Vector) -> Vector:
-    return (s * u[0], s * u[1], s * u[2])
-
-
-def apply(m: Matrix, u: Vector) -> Vector:
-    """Return the product M u of a 3x3 matrix M and a vector u."""
-    return (dot(m[0], u), dot(m[1], u), dot(m[2], u))
-
-
-def apply_transposed(m: Matrix, u: Vector) -> Vector:
-    """Return the product M' u of the transpose of a 3x3 matrix M and a vector u."""
-    return (
-        dot((m[0][0], m[1][0], m[2][0]), u),
-        dot((m[0][1], m[1][1], m[2][1]), u),
-        dot((m[0][2], m[1][2], m[2][2]), u),
+    return array(
+        (
+            u[1] * v[2] - u[2] * v[1],
+            u[2] * v[0] - u[0] * v[2],
+            u[0] * v[1] - u[1] * v[0],
+        )
     )

@@ -18,7 +18,7 @@ that reaches the base has no effect.
 from __future__ import annotations
 
 from symgen.derive.geometry import Rotation, axis_rotation, displacement
-from symgen.derive.scalar import Vector, apply
+from symgen.derive.scalar import IDENTITY, Vector, array
 from symgen.description.expression import ONE, ZERO, Expression, call
 from symgen.description.robot import FIXED, PRISMATIC, REVOLUTE, Frame, Robot, parameter
 
@@ -119,13 +119,13 @@ def link_relations(f: Frame) -> dict[str, dict[tuple[str, int], Expression]]:
     relations: dict[str, dict[tuple[str, int], Expression]] = {}
     mass = {"M": {("M", 1): ONE} | _first(p) | _tensor(_steiner(p, p, 0))}
     if f.sigma == REVOLUTE:
-        a = apply(A, (ZERO, ZERO, ONE))
+        a = A @ array((ZERO, ZERO, ONE))
         zz = [[A[k][0] * A[m][0] + A[k][1] * A[m][1] for m in range(3)] for k in range(3)]
         relations["YY"] = {("XX", 0): -ONE} | _tensor(zz)
         relations["MZ"] = _first(a) | _tensor(_steiner(p, a, 1))
         return relations | mass
     turned = Rotation(A, call("cos", f.theta0), call("sin", f.theta0))
-    R = [turned.up(e) for e in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]  # axes of frame j in frame i
+    R = [turned.up(e) for e in IDENTITY]  # axes of frame j in frame i
     for name, (k, m) in TENSOR.items():
         relations[name] = _tensor(
             [
