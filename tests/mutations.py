@@ -45,17 +45,17 @@ class Fault:
 
 FAULTS = (
     # derive
-    Fault("symgen/derive/newton_euler.py", "off(1, 2, sub(DV[0][1], wd[2]))", "off(1, 2, add(DV[0][1], wd[2]))", "sign in U = skew(wd) + skew(w)**2", EMITTED),
-    Fault("symgen/derive/newton_euler.py", "sub(a[1], mul(qd2, w[0]))", "add(a[1], mul(qd2, w[0]))", "sign of the Coriolis term of a prismatic joint", EMITTED),
+    Fault("symgen/derive/newton_euler.py", "off(1, 2, DV[0][1] - wd[2])", "off(1, 2, DV[0][1] + wd[2])", "sign in U = skew(wd) + skew(w)**2", EMITTED),
+    Fault("symgen/derive/newton_euler.py", "a[1] - qd2 * w[0]", "a[1] + qd2 * w[0]", "sign of the Coriolis term of a prismatic joint", EMITTED),
     Fault("symgen/derive/model.py", "-e for k, e in enumerate(d.robot.gravity)", "e for k, e in enumerate(d.robot.gravity)", "gravity turned", EMITTED),
-    Fault("symgen/derive/newton_euler.py", "dot((YY, sub(XX, ZZ), XZ, XY, -YZ)", "dot((YY, sub(ZZ, XX), XZ, XY, -YZ)", "sign in w x (J w)", EMITTED),
+    Fault("symgen/derive/newton_euler.py", "dot((YY, XX - ZZ, XZ, XY, -YZ)", "dot((YY, ZZ - XX, XZ, XY, -YZ)", "sign in w x (J w)", EMITTED),
     Fault("symgen/derive/newton_euler.py", "cross(geometry.P[j], fi)", "cross(fi, geometry.P[j])", "lever of the force on the link before, turned", EMITTED),
     Fault("symgen/derive/geometry.py", "self.turn[f.ant][1] + offset", "self.turn[f.ant][1]", "constant of an angle sum of parallel axes lost", EMITTED),
     Fault("symgen/derive/elements.py", 'return speed if law == Expression.symbol("qd") else direction', 'return direction if law == Expression.symbol("qd") else speed', "one-sided Coulomb and viscous friction exchanged", EMITTED),
     # regroup
     Fault("symgen/regroup/rules.py", '{("XX", 0): -ONE}', '{("XX", 0): ONE}', "YY goes into XX with the wrong sign", REGROUPED),
     Fault("symgen/regroup/rules.py", "- p[k] * u[m] -", "+ p[k] * u[m] -", "sign in the parallel axis rule", REGROUPED),
-    Fault("symgen/derive/geometry.py", "add(mul(d, A[1][0]), mul(r, A[1][2]))", "sub(mul(d, A[1][0]), mul(r, A[1][2]))", "y of P_ij with the wrong sign", REGROUPED),
+    Fault("symgen/derive/geometry.py", "d * A[1][0] + r * A[1][2]", "d * A[1][0] - r * A[1][2]", "y of P_ij with the wrong sign", REGROUPED),
     Fault("symgen/regroup/finite_field.py", "        left[r] = False\n", "", "a row is a pivot twice", REGROUPED),
     Fault("symgen/regroup/regrouping.py", 'FIRST_CHOICE = ("ZZ", "XX", "XY", "XZ", "YZ", "MX", "MY")', 'FIRST_CHOICE = ("XX", "ZZ", "XY", "XZ", "YZ", "MY", "MX")', "another order of preference: other base parameters", REGROUPED),
     Fault("symgen/certify/certificate.py", "not self.failures and self.numeric_valid and all(", "True or all(", "the certificate says yes to everything", REGROUPED),
