@@ -408,8 +408,8 @@ def _robot(table: Table, file: str, sha256: str) -> Robot:
         constants={**table.constants, **constants},
         elements=tuple(
             Element(family, kind, {j: {j: ONE} for j in keys}, {})
-            for family, kind, _ in JOINT_TERMS
-            if (keys := _keys(table, family, actuated))
+            for family, kind, value in JOINT_TERMS
+            if (keys := _keys(table, family, value, actuated))
         ),
         constraints=constraints,
         massless=massless,
@@ -476,13 +476,14 @@ def _constraints(table: Table) -> dict[int, Expression]:
     }
 
 
-def _keys(table: Table, family: str, actuated: list[int]) -> list[int]:
+def _keys(
+    table: Table, family: str, value: Callable[[Joint], float], actuated: list[int]
+) -> list[int]:
     """Find the joints that have a parameter of the family `family`, for instance FV.
 
     These are all actuated joints, and the joints that follow others if the file gives a value. A
-    spring (family K) needs a value of the file in any case.
+    spring (family K) needs a value of the file in any case. `value` gives that of a joint.
     """
-    value = next(value for name, _, value in JOINT_TERMS if name == family)
     return [
         j for j, joint in table.joint.items() if value(joint) or (j in actuated and family != "K")
     ]
@@ -541,7 +542,8 @@ def _values(table: Table, actuated: list[int]) -> tuple[dict[str, float], frozen
         }
     for family, _, value in JOINT_TERMS:
         values |= {
-            parameter(family, j): value(table.joint[j]) for j in _keys(table, family, actuated)
+            parameter(family, j): value(table.joint[j])
+            for j in _keys(table, family, value, actuated)
         }
     return values, massless
 

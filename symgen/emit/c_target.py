@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 from math import prod
@@ -27,6 +27,7 @@ from typing import Any
 
 from symgen.derive.graph import CONST, COS, SIN, SYM, Node, Scalar, reachable
 from symgen.derive.loop_equations import loop_system
+from symgen.derive.model import Entry, Place
 from symgen.description.expression import FUNCTIONS, Expression
 from symgen.description.naming import Namespace
 from symgen.description.robot import FIXED, PRISMATIC
@@ -35,7 +36,7 @@ from symgen.emit.header import header, line_of, packed, plain
 from symgen.emit.printers import Language, Section, Text, under_titles
 from symgen.emit.python_target import signature
 from symgen.emit.render import WIDTH, laid_out
-from symgen.emit.spec import STATES, Function, ModuleSpec, signals
+from symgen.emit.spec import STATES, Function, ModuleSpec
 from symgen.version import VERSION
 
 KEYWORDS = """auto break case char const continue default do double else enum extern float for goto
@@ -432,14 +433,12 @@ def _kernel(spec: ModuleSpec, states: CStates, f: Function, names: Namespace) ->
         names,
         [label(f, e) for e in entries],
     )
-    distinct = signals(f, entries)
+    distinct, places = _signals(f, entries)
     results = [
         (e.heading, _result(result, k, text.expression(e.value), e.comment))
-        for k, e in enumerate(distinct.entries)
+        for k, e in enumerate(distinct)
     ]
-    rows = [
-        f"{{{_row(place, f.shape)}, {signal}, {sign}}}" for place, signal, sign in distinct.places
-    ]
+    rows = [f"{{{_row(place, f.shape)}, {signal}, {sign}}}" for place, signal, sign in places]
     independent = spec.derivation.closure.independent
     place = {
         f"{letter}{j}": (state, k)
@@ -511,10 +510,39 @@ def _kernel(spec: ModuleSpec, states: CStates, f: Function, names: Namespace) ->
         "kept": kept,
         "rows": packed(rows),
         "entries": len(rows),
-        "computed": len(distinct.entries),
+        "computed": len(distinct),
     }
     given = {"X": parameters, "constants": constants}
     return laid | _signatures(states, f, laid, [name for name, lines in given.items() if lines])
+
+
+def _signals(
+    f: Function, entries: Sequence[Entry]
+) -> tuple[list[Entry], list[tuple[Place, int, int]]]:
+    """Collect the distinct values among entries of a result; x and -x count as one value.
+
+    Entries that are plain numbers must be 0, 1 or -1. Return for each distinct value the first
+    entry that has this value or its negative; its comment joins the comments of all these entries.
+    Return also, for every entry, its array index, the number of its value, and the sign by which
+    this value is multiplied.
+    """
+    number: dict[tuple[str, int], tuple[int, int]] = {}  # node or number: signal, its sign
+    distinct: list[Entry] = []
+    places = []
+    for entry in entries:
+        value = entry.value
+        if isinstance(value, int):
+            key, own = ("number", abs(value)), -1 if value < 0 else 1
+        else:
+            key, own = ("node", value.node.index), value.sign
+        signal, sign = number.setdefault(key, (len(distinct), own))
+        if signal == len(distinct):
+            distinct.append(entry)
+        elif entry.comment:
+            comment = f"{distinct[signal].comment}, {entry.comment}".removeprefix(", ")
+            distinct[signal] = replace(distinct[signal], comment=comment)
+        places += [(place, signal, own * sign) for place in f.places(entry)]
+    return distinct, places
 
 
 def _row(place: Sequence[int], shape: Sequence[int]) -> int:

@@ -8,7 +8,7 @@ prints them.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 from symgen.derive.derivation import Derivation, derive, derived
@@ -100,48 +100,6 @@ class Function:
             f"{self.count(MUL)} multiplications, {self.count(ADD)} additions, "
             f"{self.count(SIN)} sin, {self.count(COS)} cos"
         )
-
-
-@dataclass(frozen=True)
-class Signals:
-    """The distinct values among the entries of a result; x and -x count as one value.
-
-    Attributes
-    ----------
-    entries : tuple of Entry
-        For each distinct value the first entry that has this value or its negative. Its comment
-        joins the comments of all these entries.
-    places : tuple of (place, signal, sign)
-        Array index of every entry, the number of its value in `entries`, and the sign by which this
-        value is multiplied.
-    """
-
-    entries: tuple[Entry, ...]
-    places: tuple[tuple[Place, int, int], ...]
-
-
-def signals(f: Function, entries: Sequence[Entry]) -> Signals:
-    """Collect the distinct values among entries of a result; x and -x count as one value.
-
-    Entries that are plain numbers must be 0, 1 or -1.
-    """
-    number: dict[tuple[str, int], tuple[int, int]] = {}  # node or number: signal, its sign
-    distinct: list[Entry] = []
-    places = []
-    for entry in entries:
-        value = entry.value
-        if isinstance(value, int):
-            key, own = ("number", abs(value)), -1 if value < 0 else 1
-        else:
-            key, own = ("node", value.node.index), value.sign
-        signal, sign = number.setdefault(key, (len(distinct), own))
-        if signal == len(distinct):
-            distinct.append(entry)
-        elif entry.comment:
-            comment = f"{distinct[signal].comment}, {entry.comment}".removeprefix(", ")
-            distinct[signal] = replace(distinct[signal], comment=comment)
-        places += [(place, signal, own * sign) for place in f.places(entry)]
-    return Signals(tuple(distinct), tuple(places))
 
 
 @dataclass(frozen=True, eq=False)
