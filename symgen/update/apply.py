@@ -230,10 +230,11 @@ def apply(
         if parameter(family, j) in families
     }
     stated = {name: text.joint_values(j)[family] for name, (family, j) in own.items()}
+    inertial = {physical.standard[k] for j in physical.links for k in physical.link(j)}
     elsewhere = {
         name: described.values.get(name, 0.0)
         for name in physical.standard
-        if name not in own and name not in _inertial(physical)
+        if name not in own and name not in inertial
     }
     try:
         values = elsewhere | stated
@@ -310,10 +311,6 @@ def _require_same_joints(result: Estimate, robot: Robot, of: str) -> None:
             f"joint {q} is {theirs.get(q, 'no joint with a name')!s:.60} in the estimate, but "
             f"{ours or 'no joint with a name'} in {of}; give the same --chain and --lock as in the conversion of the robot, or give the robot file that was identified (--robot)"
         )
-
-
-def _inertial(physical: PhysicalModel) -> set[str]:
-    return {physical.standard[k] for j in physical.links for k in physical.link(j)}
 
 
 def _determined_names(
