@@ -46,7 +46,7 @@ def check_robot(robot: Any) -> None:
 
 def _problems(robot: Any) -> Iterator[Problem]:
     yield from _check_tree(robot.frames, robot.massless)
-    check_names(robot)
+    yield from check_names(robot)
     yield (
         not robot.parameters,
         "the robot has no parameters: every link is massless and no element acts on a joint; "

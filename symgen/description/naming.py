@@ -11,11 +11,11 @@ from __future__ import annotations
 import builtins
 import keyword
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from symgen.description.element import Element
-from symgen.description.fields import Path, dotted
+from symgen.description.fields import Path, Problem, dotted
 from symgen.description.parts import INERTIAL
 from symgen.errors import DescriptionError
 
@@ -82,63 +82,66 @@ def check_identifier(name: str, path: Path) -> None:
         raise DescriptionError(f"{dotted(path[:-1] or path)}: {name!r} {what}", path=path)
 
 
-def check_names(robot: Any) -> None:
+def check_names(robot: Any) -> Iterator[Problem]:
     """Check that robot, element families, constants and parameters have distinct, allowed names.
 
     Title, source and file name must not contain characters that end a docstring or comment.
     """
     check_identifier(robot.name, ("name",))
-    if robot.name.upper() in DEVICES:
-        raise DescriptionError(
-            f"{robot.name!r} is the name of a device on Windows, where no file can have this name; choose "
-            "another name",
-            path=("name",),
-        )
+    yield (
+        robot.name.upper() in DEVICES,
+        f"{robot.name!r} is the name of a device on Windows, where no file can have this name; choose "
+        "another name",
+        ("name",),
+    )
     for key, text in (("title", robot.title), ("source", robot.source), ("file", robot.file)):
         long = not text.isprintable() or len(text) > 1000
-        if long or text.endswith('"') or any(mark in text for mark in MARKS):
-            raise DescriptionError(
-                f"{key} {text[:60]!r}: expected one line of printable text, at most 1000 "
-                "characters, without \\, triple or final quotes, /*, */ or ??/",
-                path=(key,),
-            )
-    _check_labels(robot.labels, len(robot.frames))
-    check_families(robot.elements)
+        yield (
+            long or text.endswith('"') or any(mark in text for mark in MARKS),
+            f"{key} {text[:60]!r}: expected one line of printable text, at most 1000 "
+            "characters, without \\, triple or final quotes, /*, */ or ??/",
+            (key,),
+        )
+    yield from _check_labels(robot.labels, len(robot.frames))
+    yield from check_families(robot.elements)
     taken = {*robot.parameters, *(f"{name}R" for name in robot.parameters)}
     for name in robot.constants:
         check_identifier(name, ("constants", name))
-        if what := "a parameter" if name in taken else _of_others(name):
-            raise DescriptionError(
-                f"constant {name!r} is the name of {what}; choose another name, such as {name}c",
-                path=("constants", name),
-            )
-    if double := sorted({n for n in robot.parameters if robot.parameters.count(n) > 1}):
-        raise DescriptionError(
-            f"several parameters would have the same name: {double}; rename an element family",
-            path=("elements",),
+        what = "a parameter" if name in taken else _of_others(name)
+        yield (
+            what,
+            f"constant {name!r} is the name of {what}; choose another name, such as {name}c",
+            ("constants", name),
         )
+    double = sorted({n for n in robot.parameters if robot.parameters.count(n) > 1})
+    yield (
+        double,
+        f"several parameters would have the same name: {double}; rename an element family",
+        ("elements",),
+    )
 
 
-def check_families(elements: Sequence[Element]) -> None:
+def check_families(elements: Sequence[Element]) -> Iterator[Problem]:
     """Check that names of element families, such as FV, and of their parameters are unique."""
     families = [e.family for e in elements]
     for e in elements:
         family, path = e.family, ("elements", e.family)
         check_identifier(family, path)
         taken = family in INERTIAL or families.count(family) > 1
-        if taken or family[-1].isdigit() or family.endswith("_"):
-            raise DescriptionError(
-                f"element {family!r}: give each family a unique name; it must not be the name "
-                "of an inertial parameter, nor end in a digit or _",
-                path=path,
-            )
+        yield (
+            taken or family[-1].isdigit() or family.endswith("_"),
+            f"element {family!r}: give each family a unique name; it must not be the name of an "
+            "inertial parameter, nor end in a digit or _",
+            path,
+        )
         for name in (f"{family}{j}" for j in e.keys):
-            if what := _of_others(name):
-                raise DescriptionError(
-                    f"element {family!r}: its parameter would be named {name}, which is already "
-                    f"the name of {what}; choose another family name, such as K{family}",
-                    path=path,
-                )
+            what = _of_others(name)
+            yield (
+                what,
+                f"element {family!r}: its parameter would be named {name}, which is already the "
+                f"name of {what}; choose another family name, such as K{family}",
+                path,
+            )
 
 
 def _of_others(name: str) -> str:
@@ -152,22 +155,27 @@ def _of_others(name: str) -> str:
     return "a builtin of Python" if hasattr(builtins, name) else ""
 
 
-def _check_labels(labels: Mapping[int, str], frames: int) -> None:
+def _check_labels(labels: Mapping[int, str], frames: int) -> Iterator[Problem]:
     """Check that each joint label belongs to an existing frame and that labels are different."""
     used: dict[str, int] = {}
     for j, text in labels.items():
-        message = ""
-        if not 0 < j <= frames:
-            message = f"labels: frame {j} does not exist; frames are 1 to {frames}"
-        elif not is_label(text):
-            message = (
-                f"labels.{j}: found {text[:LONGEST_LABEL]!r}; expected 1 to {LONGEST_LABEL} "
-                "printable characters without \\, quotes, /* or */"
-            )
-        elif text in used:
-            message = f"labels.{j}: {text!r} names frame {used[text]} already; give each frame a different label"
-        if message:
-            raise DescriptionError(message, path=("labels", j))
+        path = ("labels", j)
+        yield (
+            not 0 < j <= frames,
+            f"labels: frame {j} does not exist; frames are 1 to {frames}",
+            path,
+        )
+        yield (
+            not is_label(text),
+            f"labels.{j}: found {text[:LONGEST_LABEL]!r}; expected 1 to {LONGEST_LABEL} printable "
+            "characters without \\, quotes, /* or */",
+            path,
+        )
+        yield (
+            text in used,
+            f"labels.{j}: {text!r} names frame {used.get(text)} already; give each frame a different label",
+            path,
+        )
         used[text] = j
 
 
