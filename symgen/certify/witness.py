@@ -166,6 +166,11 @@ class Witness:
         return np.concatenate([base, self.model.poses(self.x)], axis=1)
 
     @cached_property
+    def jacobians(self) -> Array:
+        """Jacobians of all frames in frame 0, by the actuated joints, shape (N, frames, 6, n)."""
+        return self.model.jacobians(self.x) @ self.G[:, None]
+
+    @cached_property
     def tau(self) -> Array:
         """Torques Gamma of the actuated joints, shape (N, n)."""
         return np.asarray(self.D @ self.chi)
@@ -258,8 +263,8 @@ class Witness:
             return np.concatenate([R @ twist[:, :3], R @ twist[:, 3:]], axis=1)
 
         def jacobian() -> Array:
-            J = self.model.jacobian(self.x, of) if of else np.zeros((N, 6, self.x.shape[1]))
-            return turned(J @ self.G)
+            still = np.zeros((N, 6, self.q.shape[1]))
+            return turned(self.jacobians[:, of - 1] if of else still)
 
         def acceleration(qdd: Array) -> Array:
             motion = self.model.motion(self.q, self.qd, qdd)[:3]
