@@ -14,9 +14,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -42,8 +42,7 @@ SPREADS = ((0.25, 0.3), (0.25, 0.0), (0.03, 0.03), (0.03, 0.0))  # of constants,
 RANDOM, OF_THE_FILE = "random constants", "the constants of the file"
 
 
-@dataclass(frozen=True)
-class Check:
+class Check(NamedTuple):
     """One test call of an emitted function: its arguments, and the result that it must return.
 
     Attributes
@@ -63,7 +62,7 @@ class Check:
     arguments: tuple[Array, ...]
     expected: Array
     scale: Array | float
-    keywords: Mapping[str, int] = field(default_factory=dict)
+    keywords: Mapping[str, int] = MappingProxyType({})
     compared: Callable[[Array], Array] = np.asarray
 
 
@@ -228,12 +227,11 @@ class Witness:
                 )
         whole, first = checks["forward_dynamics"]  # as good as A is regular: by its torque
         checks["forward_dynamics"] = [
-            replace(
-                whole,
+            whole._replace(
                 expected=self.tau,
                 compared=lambda qdd: _torque(A, qdd, H),
             ),
-            replace(first, expected=self.tau[0], compared=lambda qdd: _torque(A[0], qdd, H[0])),
+            first._replace(expected=self.tau[0], compared=lambda qdd: _torque(A[0], qdd, H[0])),
         ]
         if self.robot.passive:
             place = [self.robot.moving.index(j) for j in self.robot.passive]

@@ -38,9 +38,9 @@ University, 1965.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -501,8 +501,7 @@ def _symbolic(e: Expression, q: Mapping[str, SX], constants: Mapping[str, SX]) -
     return ca.SX(e.evaluate(values.__getitem__, function, float))
 
 
-@dataclass(frozen=True)
-class Sample:
+class Sample(NamedTuple):
     """Random states of a robot, and its standard regressor at these states.
 
     Attributes

@@ -8,15 +8,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from symgen.emit.printers import Section, under_titles
 
 Titled = tuple[str, Sequence[str]]  # lines that belong together, under a title
 
 
-@dataclass(frozen=True)
-class Part:
+class Part(NamedTuple):
     """One part of a long C function body: its lines, and the names that occur in these lines."""
 
     sections: tuple[Section, ...]

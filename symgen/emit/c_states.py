@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from symgen.emit.spec import STATES, ModuleSpec
 
 
-@dataclass(frozen=True)
-class CStates:
+class CStates(NamedTuple):
     """The arguments by which the C functions of one robot receive the joint states q, qd, ...
 
     Attributes

@@ -8,8 +8,9 @@ prints them.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 from symgen.derive.derivation import Derivation, derive, derived
 from symgen.derive.graph import ADD, COS, MUL, SIN, SYM, Node, Scalar, Symbol, reachable
@@ -125,8 +126,7 @@ class Function:
         )
 
 
-@dataclass(frozen=True)
-class Signals:
+class Signals(NamedTuple):
     """The distinct values among the entries of a result; x and -x count as one value.
 
     Attributes
@@ -162,7 +162,7 @@ def signals(f: Function, entries: Sequence[Entry]) -> Signals:
             distinct.append(entry)
         elif entry.comment:
             comment = f"{distinct[signal].comment}, {entry.comment}".removeprefix(", ")
-            distinct[signal] = replace(distinct[signal], comment=comment)
+            distinct[signal] = distinct[signal]._replace(comment=comment)
         places += [(place, signal, own * sign) for place in f.places(entry)]
     return Signals(tuple(distinct), tuple(places))
 

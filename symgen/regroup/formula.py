@@ -7,16 +7,14 @@ The coefficients stay expressions until they are written: as text here, in Pytho
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from symgen.description.expression import ONE, Expression
 
 Signed = tuple[bool, str]  # whether a term is added, and the term
 
 
-@dataclass(frozen=True)
-class Formula:
+class Formula(NamedTuple):
     """A sum of parameters with coefficients, sum_k c_k chi_k.
 
     Attributes
