@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
+from functools import lru_cache
 from itertools import product
 from typing import Any
 
@@ -35,6 +36,7 @@ from symgen.derive.graph import (
 from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.names import families_of
 from symgen.description.expression import FUNCTIONS, Expression
+from symgen.description.robot import Robot
 
 SAMPLES = 3
 NUMBERS = ((0,) * SAMPLES, (1,) * SAMPLES)  # the values of 0 and 1
@@ -55,6 +57,11 @@ class ByNode(Draw):
         return self._opaque(SIGN, [rate])
 
 
+@lru_cache(maxsize=8)
+def _draw(robot: Robot) -> ByNode:
+    return ByNode(robot, 7, SAMPLES)
+
+
 class Rewrite:
     """A new graph, `algebra`, to which nodes of a derivation are copied with some inputs replaced.
 
@@ -73,7 +80,7 @@ class Rewrite:
         self.algebra = GraphAlgebra(source.robot, written=False)
         self.algebra.labels |= source.labels  # one name, one angle, here as there
         self.graph = self.algebra.graph
-        self.draw = ByNode(source.robot, 7, SAMPLES)
+        self.draw = _draw(source.robot)
         self._values: list[Any] = []  # of the nodes of self.graph, over F_p
         self._first: dict[tuple[int, ...], Scalar] = {}  # by value
         self._same: dict[int, Scalar | int] = {}  # of a node: the first one of the same value
