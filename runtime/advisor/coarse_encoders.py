@@ -325,8 +325,7 @@ class CoarseEncoders:
             )
             for (states, mask), record in zip(parts, self.task.records, strict=True)
         ]
-        whole = rows[0] if len(rows) == 1 else stack(rows)
-        return linear_system(whole, self.task.estimate).solve().X
+        return linear_system(stack(rows), self.task.estimate).solve().X
 
 
 def mean_change(ratios: Array) -> Array:

@@ -40,7 +40,8 @@ from runtime.core.problem import Problem
 from runtime.core.progress import at
 from runtime.core.record import Record
 from runtime.core.rows.observation import LoopRows, Observation, stack
-from runtime.core.rows.prepared import Prepared, decimated_torque, observation_from_states, stacked
+from runtime.core.rows.prepared import Prepared, decimated_torque, observation_of, stacked
+from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import Selection, certain_rows, select_rows
 from runtime.core.settings import NotNegative, Settings, structure
 from runtime.core.signals.filters import States, decimated, filtered_states
@@ -227,13 +228,13 @@ class ClosedLoop:
         return np.asarray(np.einsum("tjj->j", functions.inertia_matrix(q, X)) / len(q))
 
     def _observed(self, states: Sequence[States]) -> Observation:
-        observation = [
-            observation_from_states(
-                self.model, s, part.torque, part.selection, files=part.record.files
-            )
-            for s, part in zip(states, self.parts, strict=True)
-        ]
-        return observation[0] if len(observation) == 1 else stack(observation)
+        columns = Columns(self.model)
+        return stack(
+            [
+                observation_of(columns, s, part.torque, part.selection, files=part.record.files)
+                for s, part in zip(states, self.parts, strict=True)
+            ]
+        )
 
 
 def observed_loop(problem: Problem, simulator: Simulator | None = None) -> Observation:

@@ -405,4 +405,4 @@ def system_of(
         )
         for record, q, torque in zip(task.records, positions, torques, strict=True)
     ]
-    return observations[0] if len(observations) == 1 else stack(observations)
+    return stack(observations)

@@ -95,14 +95,9 @@ class Prepared:
         self, model: GeneratedModel, columns: Sequence[str] | None = None
     ) -> Observation:
         """Build the system Y = W X + rho of the selected rows."""
-        return observation_from_states(
-            model,
-            self.states,
-            self.torque,
-            self.selection,
-            files=self.record.files,
-            columns=columns,
-        )
+        wanted = Columns(model, columns)
+        files = self.record.files
+        return observation_of(wanted, self.states, self.torque, self.selection, files=files)
 
     def by(self, study: Study) -> Prepared:
         """Return the same record prepared with the settings of another study.
@@ -150,23 +145,6 @@ def decimated_torque(tau: Array, selection: Selection) -> Array:
     tau = median_filtered(tau, selection.signals.window_of_torques)
     windowed = np.ascontiguousarray(tau[selection.samples].T)
     return windowed if selection.plan is None else decimate(windowed, selection.plan)
-
-
-def observation_from_states(
-    model: GeneratedModel,
-    states: States,
-    torque: Array,
-    selection: Selection,
-    *,
-    files: Mapping[str, str] | None = None,
-    columns: Sequence[str] | None = None,
-) -> Observation:
-    """Build the system Y = W X + rho from given states, shape (N, n), and torques Y, shape (n, K).
-
-    columns : names of the columns wanted; the others are neither filtered nor stored. Default: all.
-    """
-    wanted = Columns(model, columns)
-    return observation_of(wanted, states, torque, selection, files=files)
 
 
 def observation_of(
@@ -247,8 +225,7 @@ def stacked(
     """
     if not records:
         raise InputError("no record is given; expected at least one")
-    parts = [record.observation(model, columns) for record in records]
-    return parts[0] if len(parts) == 1 else stack(parts)
+    return stack([record.observation(model, columns) for record in records])
 
 
 def with_torques(
