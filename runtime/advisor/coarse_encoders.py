@@ -36,8 +36,7 @@ from runtime.core.problem import Problem
 from runtime.core.rows.observation import stack
 from runtime.core.rows.prepared import observation_of
 from runtime.core.rows.selection import certain_rows
-from runtime.core.signals.filters import SpeedErrors, States, filtered_states
-from runtime.core.signals.states import Reader, lowpassed
+from runtime.core.signals.filters import Reader, SpeedErrors, States, filtered_states, lowpassed
 from runtime.counts.own_encoder import own_encoder
 from runtime.counts.reader import counted as counted_states
 from runtime.counts.reader import encoder_position

@@ -10,7 +10,9 @@ from __future__ import annotations
 import copyreg
 import re
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from importlib import import_module
+from inspect import signature
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Protocol, cast
@@ -440,3 +442,33 @@ def check_states(model: GeneratedModel, **states: Array) -> None:
             )
         if not np.issubdtype(x.dtype, np.floating) and not np.issubdtype(x.dtype, np.integer):
             raise InputError(f"{model.NAME}: {name} has dtype {x.dtype}; expected real numbers")
+
+
+class BoundModel:
+    """A model in which new values replace some constants of the robot file.
+
+    Every function of the model has the new values as default arguments.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+        An emitted module.
+    constants : mapping of str to float
+        New values of some of its CONSTANTS, by name.
+    """
+
+    def __init__(self, model: GeneratedModel, constants: Mapping[str, float]) -> None:
+        self._model, self._given = model, dict(constants)
+        self.CONSTANTS = {**model.CONSTANTS, **constants}
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        value = getattr(self._model, name)
+        if name == "ELEMENTS":
+            return self._model.elements(**self._given)  # type: ignore[attr-defined]
+        if not callable(value) or isinstance(value, type):
+            return value
+        own = signature(value).parameters
+        rest = any(p.kind is p.VAR_KEYWORD for p in own.values())
+        return partial(value, **{key: x for key, x in self._given.items() if rest or key in own})

@@ -35,8 +35,7 @@ from pydantic_core import ArgsKwargs
 from runtime.core.arithmetic import number
 from runtime.core.documents import plain
 from runtime.core.errors import SettingsError
-from runtime.core.gone import gone
-from runtime.core.settings_errors import settings_error, shown
+from runtime.core.settings_errors import gone, settings_error, shown
 
 T = TypeVar("T")
 Path = tuple[str | int, ...]

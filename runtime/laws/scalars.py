@@ -14,12 +14,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from runtime.core.bound import BoundModel
 from runtime.core.errors import InputError
 from runtime.core.least_squares.block_covariance import block_covariance
 from runtime.core.least_squares.linear import percent
-from runtime.core.markup import number
-from runtime.core.model import GeneratedModel
+from runtime.core.model import BoundModel, GeneratedModel
 from runtime.core.part import Part
 from runtime.core.problem import Note, Problem
 from runtime.core.progress import at
@@ -27,7 +25,7 @@ from runtime.core.residuals import correlation_time, p_value, residual_correlati
 from runtime.core.result import Identification
 from runtime.core.rows.observation import split_rows
 from runtime.core.rows.prepared import Prepared
-from runtime.core.table import Table
+from runtime.core.table import Table, number
 from runtime.laws.projection import LawProblem, Projection, basis
 from runtime.laws.transmitted import transmitted_torque
 

@@ -37,7 +37,7 @@ from runtime.core.model import GeneratedModel
 from runtime.core.problem import Problem
 from runtime.core.rows.observation import LoopRows, Observation
 from runtime.core.settings import to_mapping
-from runtime.core.signals.states import lowpassed
+from runtime.core.signals.filters import lowpassed
 from runtime.core.study import EstimateSettings
 from runtime.loop.closed_loop import ClosedLoop, LoopPart, closed_loop
 from runtime.loop.control_law import parameters_of

@@ -28,9 +28,9 @@ from typing import Any, cast
 
 import numpy as np
 
+from runtime.core.checklist import SIGNED, is_form
 from runtime.core.errors import InputError, ModelError
 from runtime.core.model import GeneratedModel, elements_of, require
-from runtime.core.signs import SIGNED, is_form
 
 Array = np.ndarray
 

@@ -27,12 +27,11 @@ import numpy as np
 
 from runtime.core.documents import Result
 from runtime.core.limits import LIMIT
-from runtime.core.markup import number
 from runtime.core.model import GeneratedModel, elements_of, is_axis, joint_labels
 from runtime.core.part import Part
 from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
-from runtime.core.table import Table
+from runtime.core.table import Table, number
 from runtime.physical.inertia import INERTIAL
 
 if TYPE_CHECKING:

@@ -16,9 +16,9 @@ from planar_data import TRUE, motion
 
 from runtime import Record, estimate, load_model, observe
 from runtime.compose import estimate_of, problem
-from runtime.core.bound import BoundModel
 from runtime.core.errors import InputError
 from runtime.core.essential import essential_of
+from runtime.core.model import BoundModel
 from runtime.core.record import Origin
 from runtime.core.rows.factor import factor
 from runtime.core.rows.observation import stack

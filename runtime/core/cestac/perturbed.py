@@ -33,8 +33,14 @@ from runtime.core.rows.observation import Observation, stack
 from runtime.core.rows.prepared import Prepared, decimated_torque, observation_of, stacked
 from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import Selection, select_rows
-from runtime.core.signals.filters import States, derivative, filtered_states
-from runtime.core.signals.states import Reader, lowpassed, require_motion
+from runtime.core.signals.filters import (
+    Reader,
+    States,
+    derivative,
+    filtered_states,
+    lowpassed,
+    require_motion,
+)
 from runtime.core.study import CestacSettings, EstimateSettings, Signals, Study
 
 Array = np.ndarray

@@ -28,8 +28,7 @@ from runtime.core.rows.observation import Observation, stack
 from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import Selection, certain_rows, nothing_left, select_rows
 from runtime.core.signals.decimation import decimate
-from runtime.core.signals.filters import States, median_filtered
-from runtime.core.signals.states import Reader
+from runtime.core.signals.filters import Reader, States, median_filtered
 from runtime.core.study import Study
 
 Array = np.ndarray
