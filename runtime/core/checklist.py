@@ -28,7 +28,7 @@ from runtime.core.check import (
 from runtime.core.documents import Result
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.limits import LIMIT
-from runtime.core.model import GeneratedModel
+from runtime.core.model import SIGNED, GeneratedModel, is_form
 from runtime.core.part import About, Part
 from runtime.core.table import Table, notebook
 
@@ -438,19 +438,6 @@ def separate(fit: Estimate) -> Answer:
 def rounded(cond: float) -> str:
     """Write a condition number with three digits, for instance 1230 or 1.23e+06."""
     return f"{float(f'{cond:.3g}'):.0f}" if 100 <= cond < 1e6 else f"{cond:.3g}"
-
-
-SIGNED = ("inertia", "viscous", "coulomb", "dissipative")
-"""Kinds of elements whose parameter is not negative."""
-
-
-def is_form(acts: Mapping[Any, float]) -> bool:
-    """Whether an element on the joints, such as a spring, is given by a quadratic form q'Bq.
-
-    Other elements act along a combination s = G q of joints. acts : coefficients of the element, by
-    joint; in a quadratic form by pair of joints.
-    """
-    return any(isinstance(key, tuple) for key in acts)
 
 
 def negative_elements(model: GeneratedModel, fit: Estimate) -> tuple[str, ...]:

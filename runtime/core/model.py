@@ -42,6 +42,8 @@ TRANSMITTED = "tau_model"
 """Beginning of the channels that are torques of the model, before the number of the joint."""
 OWN_KINDS = ("column", "dissipative")  # of the user's own columns
 SLIDING = frozenset({"kg", "N", "N*s/m", "N/m"})  # units of elements along a joint that slides
+SIGNED = ("inertia", "viscous", "coulomb", "dissipative")
+"""Kinds of elements whose parameter is not negative."""
 FUNCTIONS = (
     "store",
     "regressor",
@@ -280,6 +282,15 @@ def joint_labels(model: GeneratedModel) -> tuple[str, ...]:
 def is_axis(joint: int | str) -> bool:
     """Whether an entry of JOINTS is an axis of a force sensor (`runtime.wrench`), not a joint."""
     return isinstance(joint, str)
+
+
+def is_form(acts: Mapping[Any, float]) -> bool:
+    """Whether an element on the joints, such as a spring, is given by a quadratic form q'Bq.
+
+    Other elements act along a combination s = G q of joints. acts : coefficients of the element, by
+    joint; in a quadratic form by pair of joints.
+    """
+    return any(isinstance(key, tuple) for key in acts)
 
 
 def elements_of(

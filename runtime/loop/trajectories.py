@@ -229,9 +229,7 @@ class Polyline(Family):
         basis = np.zeros((3, len(t), self.points))
         basis[0, :, 0] = 1.0
         for k, (start, stop) in enumerate(self.ramps):
-            piece = (_corner(t - start, self.blend) - _corner(t - stop, self.blend)) / (
-                stop - start
-            )
+            piece = ramp(t, start, stop, self.blend)
             basis[:, :, k] -= piece
             basis[:, :, k + 1] += piece
         return _linear(tuple(basis), p, math)
@@ -345,6 +343,14 @@ def _step(t: Array, width: float, sign: float = 1.0) -> tuple[Array, Array, Arra
     x = np.clip(t / width, 0.0, 1.0)
     speed, bend = 30 * x**2 * (1 - x) ** 2 / width, 60 * x * (1 - x) * (1 - 2 * x) / width**2
     return x**3 * (10 - 15 * x + 6 * x**2), sign * speed, bend
+
+
+def ramp(t: Array, start: float, stop: float, blend: float) -> Array:
+    """Compute a move from 0 to 1 of constant velocity between start and stop, rounded at both.
+
+    The result is the move with its two time derivatives, shape (3, N); each corner lasts `blend`.
+    """
+    return np.asarray((_corner(t - start, blend) - _corner(t - stop, blend)) / (stop - start))
 
 
 def _corner(u: Array, blend: float) -> Array:

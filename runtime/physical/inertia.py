@@ -28,9 +28,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from runtime.core.checklist import SIGNED, is_form
 from runtime.core.errors import InputError, ModelError
-from runtime.core.model import GeneratedModel, elements_of, require
+from runtime.core.model import SIGNED, GeneratedModel, elements_of, is_form, require
 
 Array = np.ndarray
 
