@@ -211,7 +211,9 @@ def test_mask_of_samples_and_joints(record):
 
     def masked(keep, sections):
         reading = problem(planar, record, study(**sections)).prepared[0]
-        return replace(reading, keep=keep).observation(planar)
+        s, qd = reading.study, reading.states.qd
+        selected = select_rows(reading.record, qd, s.signals, s.rows, keep=keep)
+        return replace(reading, selected=selected).observation(planar)
 
     o = masked(keep, {"rows": {"trim": 0}})
     assert o.dropped["mask"] == (0, 375) and o.t[o.joint(1)].min() == pytest.approx(3.0)

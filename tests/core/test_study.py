@@ -10,9 +10,8 @@ import pytest
 
 from runtime.compose import METHODS, complete_study
 from runtime.core import settings_errors
-from runtime.core.arithmetic import number
 from runtime.core.errors import InputError, SettingsError
-from runtime.core.settings import to_mapping
+from runtime.core.settings import number, to_mapping
 from runtime.core.settings_errors import WENT
 from runtime.core.study import CestacSettings, Lowpass, Signals
 from runtime.reading.datasets import DATASETS, dataset_study

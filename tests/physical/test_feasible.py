@@ -40,9 +40,8 @@ from runtime.physical.feasible import (
     solve_with_weight,
     within_limits,
 )
-from runtime.physical.inertia import INERTIAL, physical_model, pseudo_inertia
+from runtime.physical.inertia import INERTIAL, physical_model, pseudo_inertia, reach_of
 from runtime.physical.semidefinite import closest, everything
-from runtime.physical.signs import reach_of
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.study import study_from_mapping

@@ -39,7 +39,7 @@ from runtime.core.cestac.perturbed import (
     Task,
     measured_rows,
     perturbed,
-    prepared_records,
+    prepared_record,
     study_columns,
 )
 from runtime.core.cestac.result import Cestac, level_result, names_judged
@@ -134,14 +134,13 @@ def cestac(
             path=("cestac", "rounding"),
         )
     loop = loop_of(problem)
-    if settings.place == "loop":
-        assert loop is not None
-        as_measured = [part.prepared for part in loop.parts]
     asked = to_mapping(study.estimate)
     if loop is not None:
+        as_measured = list(loop.records)
         study = replace(study, estimate=loop.estimate)
+    rounded = () if settings.place == "loop" else as_measured
     task = Task(
-        records=prepared_records(as_measured, study, own_encoder, drives, loop),
+        records=tuple(prepared_record(own, study, own_encoder, drives) for own in rounded),
         model=model,
         names=study_columns(problem, as_measured, columns, loop),
         estimate=replace(study.estimate, columns="all"),

@@ -46,14 +46,14 @@ class Prepared:
         Settings of signals and rows, with numbers in place of "auto".
     reader : Reader
         Function that computes the states of the record.
-    keep : ndarray of bool, shape (N,) or (N, n), or None
-        Samples (and joints) that may be used; None: all.
+    selected : Selection or None
+        Rows to use; None: the settings choose them.
     """
 
     record: Record
     study: Study
     reader: Reader
-    keep: Array | None = None
+    selected: Selection | None = None
 
     @property
     def drives(self) -> Drives | None:
@@ -77,9 +77,10 @@ class Prepared:
 
     @cached_property
     def selection(self) -> Selection:
-        """Used rows of the record, chosen by time, decimation, speed and the mask `keep`."""
-        signals, rows = self.study.signals, self.study.rows
-        return select_rows(self.record, self.states.qd, signals, rows, keep=self.keep)
+        """Used rows of the record: those selected, or chosen by time, decimation and speed."""
+        if self.selected is not None:
+            return self.selected
+        return select_rows(self.record, self.states.qd, self.study.signals, self.study.rows)
 
     @cached_property
     def torque(self) -> Array:
