@@ -45,18 +45,6 @@ SetName = Literal["essential", "feasible", "all"]
 ORDER: tuple[SetName, ...] = ("essential", "feasible", "all")
 
 
-def least_squares_sets(
-    settings: EstimateSettings, reduced: Essential
-) -> tuple[dict[SetName, Estimate], dict[SetName, EstimateSettings]]:
-    """Return the estimates of the essential and of all parameters, and the settings of each fit.
-
-    The method of estimation is linear.
-    """
-    essential = EstimateSettings(settings.method, settings.weights, reduced.names, settings.options)
-    sets: dict[SetName, Estimate] = {"essential": reduced.estimate, "all": reduced.all_parameters}
-    return sets, {"essential": essential, "all": settings}
-
-
 def physical_asked(errors: Mapping[Any, float], first: bool) -> bool:
     """Whether a fit of physically consistent parameters is needed for the final model.
 
@@ -73,7 +61,7 @@ def physical_asked(errors: Mapping[Any, float], first: bool) -> bool:
     return bool(errors) and not stands
 
 
-def physical_possible(observation: Observation, settings: EstimateSettings, fit: Estimate) -> bool:
+def physical_possible(settings: EstimateSettings, fit: Estimate) -> bool:
     """Whether a second fit, of physically consistent parameters, is possible after this fit.
 
     `fit` has all parameters. This needs all columns, a fit with status ok, and weights other than
@@ -206,10 +194,15 @@ def fit_problem(problem: Problem, observation: Observation, provenance: Mapping[
         model=model,
         provenance=provenance,
     )
-    if study.estimate.method in LINEAR:
-        return Fits(reduced.all_parameters, reduced, *least_squares_sets(study.estimate, reduced))
-    at(study.estimate.method)
     essential = replace(study.estimate, columns=reduced.names)
+    if study.estimate.method in LINEAR:
+        return Fits(
+            reduced.all_parameters,
+            reduced,
+            {"essential": reduced.estimate, "all": reduced.all_parameters},
+            {"essential": essential, "all": study.estimate},
+        )
+    at(study.estimate.method)
     return Fits(
         estimated(problem, observation, provenance=provenance),
         reduced,
@@ -243,7 +236,7 @@ def validated(
     validation, missing = predict(fits.settings, fits.sets or {"all": fits.estimate})
     errors = validation[-1].errors() if validation else {}
     linear = method in LINEAR
-    possible = linear and physical_possible(observation, study.estimate, fits.estimate)
+    possible = linear and physical_possible(study.estimate, fits.estimate)
     if possible and physical_asked(errors, study.essential.first):
         try:
             fit, settings = physical_set(problem, observation)
