@@ -161,9 +161,6 @@ def prepared(problem: Problem, steps: Iterable[Step]) -> Problem:
     return problem
 
 
-Array = np.ndarray
-
-
 def observe_rows(problem: Problem) -> Observation:
     """Build the observation matrix W and the torques Y of all fitted records.
 

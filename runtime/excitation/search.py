@@ -34,8 +34,6 @@ from runtime.loop.control_law import parameters_of
 from runtime.loop.dry_friction import dry_friction
 from runtime.loop.trajectories import Motion, motion_from_mapping
 
-Array = np.ndarray
-
 
 def excite(
     problem: Problem,

@@ -26,8 +26,6 @@ from runtime.core.table import Table, in_lines, with_intervals
 from runtime.payload.gains import DriveGains, drive_gains, scaled
 from runtime.payload.load import Payload, payload
 
-Array = np.ndarray
-
 
 @dataclass(frozen=True, eq=False)
 class PayloadStudy(Result, Part, keys="payload drive_gains:gains"):

@@ -24,8 +24,6 @@ import numpy as np
 from runtime.core.documents import InfIfNull, Matrix, NanIfNull, Vector, Whole, from_text, json_text
 from runtime.core.table import Table, notebook, number, parameter_table
 
-Array = np.ndarray
-
 SCHEMA = "symgen-estimate/1"
 """Kind and version of the JSON layout; `symgen schema --of estimate` prints its JSON Schema."""
 
