@@ -140,6 +140,11 @@ class ClosedLoop:
     assumption: str = ""
     law: tuple[LawFit, ...] = ()
 
+    def all_of(self, names: Sequence[str], X: Array) -> Array:
+        """Extend the values X of the parameters `names` to all base parameters; the others are zero."""
+        by_name = dict(zip(names, X, strict=True))
+        return np.array([by_name.get(name, 0.0) for name in self.model.BASE_PARAMETERS])
+
     def run(self, X: Array, g: Array | float = 1.0) -> list[Simulation]:
         """Simulate every record with base parameters X, shape (b,), without noise or quantisation.
 
