@@ -264,15 +264,6 @@ class Mount:
     T: Array
 
     @property
-    def place(self) -> str:
-        """Words that name the link or frame to which the load is fixed, such as "link 6"."""
-        return (
-            f"link {self.link}"
-            if self.frame == self.link
-            else f"frame {self.frame} of link {self.link}"
-        )
-
-    @property
     def action(self) -> Array:
         """Matrix A, (10, 10), that transforms inertial parameters from `frame` to the link frame.
 
