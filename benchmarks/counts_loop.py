@@ -128,7 +128,7 @@ def observed(robot: str, record: Record, study: Study) -> Observation:
     selection = replace(loop.parts[0].selection, signals=study.signals)
     prepared = problem(bench(robot).model, record, study).prepared[0]
     part = replace(loop.parts[0], prepared=replace(prepared, selected=selection))
-    return replace(loop, study=study, parts=(part,), law=()).measured()
+    return replace(loop, parts=(part,), law=()).measured()
 
 
 def calibration(robot: str, run: Any, step: float) -> list[float]:
