@@ -38,9 +38,8 @@ from rounds import interleave, processor, ratio
 
 from runtime import Record, Study, load_model
 from runtime.compose import cestac, observe, problem
-from runtime.core.cestac.cestac import levels_of
+from runtime.core.cestac.cestac import levels_of, one_run
 from runtime.core.cestac.perturbed import Task, perturbed_position, prepared_record
-from runtime.core.cestac.run import one_run
 from runtime.core.drives import Drives
 from runtime.core.essential import essential_of
 from runtime.core.model import GeneratedModel

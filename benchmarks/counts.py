@@ -39,7 +39,8 @@ from runtime.advisor.coarse_encoders import READERS
 from runtime.compose import cestac, estimate_of, observe
 from runtime.core.essential import essential_of
 from runtime.core.record import Record
-from runtime.core.rows.prepared import decimated_torque, observation_from_states
+from runtime.core.rows.prepared import decimated_torque, observation_of
+from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import certain_rows, select_rows
 from runtime.core.signals.filters import filtered_states
 from runtime.core.table import aligned
@@ -139,9 +140,7 @@ def estimated(record: Record, q: Array, step: float, reader: str) -> dict[str, A
     if by_counts:
         several[f"{reader}_alike"] = filtered_states(record.q, record.rate, study.signals)
     for label, x in several.items():
-        e = estimate_of(
-            observation_from_states(model, x, torque, selection, columns=names), study.estimate
-        )
+        e = estimate_of(observation_of(Columns(model, names), x, torque, selection), study.estimate)
         row |= {
             label: [e[name] for name in MAIN],
             f"{label}_sigma": e.sigma_corrected[[e.names.index(name) for name in MAIN]].tolist(),

@@ -34,7 +34,6 @@ from runtime import InputError
 from runtime.compose import estimate_of, problem
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
-from runtime.core.rows.prepared import decimated_torque
 from runtime.core.signals.filters import lowpass_filtered
 from runtime.core.study import EstimateSettings, Lowpass
 from runtime.core.table import aligned
@@ -127,13 +126,9 @@ def observed(robot: str, record: Record, study: Study) -> Observation:
     """Rows of one record with its loop, through the filters of a study."""
     loop = first_loop(robot)
     selection = replace(loop.parts[0].selection, signals=study.signals)
-    part = replace(
-        loop.parts[0],
-        prepared=problem(bench(robot).model, record, study).prepared[0],
-        selection=selection,
-        torque=decimated_torque(record.tau, selection),
-    )
-    return replace(loop, study=study, parts=(part,), law=()).measured()
+    prepared = problem(bench(robot).model, record, study).prepared[0]
+    part = replace(loop.parts[0], prepared=replace(prepared, selected=selection))
+    return replace(loop, parts=(part,), law=()).measured()
 
 
 def calibration(robot: str, run: Any, step: float) -> list[float]:

@@ -47,7 +47,8 @@ from runtime.compose import estimate_of
 from runtime.core.essential import essential_of
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
-from runtime.core.rows.prepared import decimated_torque, observation_from_states
+from runtime.core.rows.prepared import decimated_torque, observation_of
+from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import certain_rows, select_rows
 from runtime.core.rows.switches import switches
 from runtime.core.signals.filters import States, filtered_states
@@ -166,12 +167,11 @@ def observed(
         record, states.qd, study.signals, study.rows, keep=None if certain is None else certain.T
     )
     plain = States(states.q, states.qd, states.qdd)
-    return observation_from_states(
-        bench("tx40").model,
+    return observation_of(
+        Columns(bench("tx40").model, names),
         plain,
         decimated_torque(record.tau, selection),
         selection,
-        columns=names,
     )
 
 

@@ -39,7 +39,7 @@ from rounds import Clock, Times, interleave, user_time
 
 from runtime import identify, load_model
 from runtime.compose import observe
-from runtime.core.cestac.run import one_run
+from runtime.core.cestac.cestac import one_run
 from runtime.core.essential import essential_of
 from runtime.core.model import GeneratedModel
 from runtime.reading.datasets import dataset_study, fetch

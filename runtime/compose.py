@@ -23,23 +23,31 @@ from runtime.advisor.advice import NoAdvice
 from runtime.agreement import agreement
 from runtime.commands import commands_for_torques
 from runtime.controller.fitted import doubt_of_gains, law_of_controller
-from runtime.core import estimation
 from runtime.core import identify as identification
 from runtime.core.arrays import kind_of, require_kind
 from runtime.core.automatic import automatic_cutoff
 from runtime.core.errors import InputError, SettingsError
-from runtime.core.essential import Essential
-from runtime.core.gone import gone
+from runtime.core.essential import Essential, essential_of
 from runtime.core.identify import Extra, OnRequest
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import ordinary
-from runtime.core.least_squares.method import LINEAR, Method
+from runtime.core.least_squares.method import LINEAR, Method, linear_companion
 from runtime.core.least_squares.wls import by_weights, weighted
 from runtime.core.model import GeneratedModel, require_emitted
-from runtime.core.problem import RECORD_EXPECTED, Note, Problem, Step, prepared
+from runtime.core.problem import (
+    RECORD_EXPECTED,
+    Note,
+    Problem,
+    Step,
+    estimated,
+    observe_rows,
+    prepared,
+)
+from runtime.core.problem import estimate_of as estimate_by
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
-from runtime.core.signals.states import SignalReader, lowpassed
+from runtime.core.settings_errors import gone
+from runtime.core.signals.filters import SignalReader, lowpassed
 from runtime.core.study import EstimateSettings
 from runtime.counts.encoder_advice import EncoderSteps
 from runtime.counts.own_encoder import own_encoder
@@ -146,7 +154,7 @@ EXTRAS: list[Extra] = [
     EncoderSteps,
     agreement,
     ExpectedError,
-    OnRequest("friction", "friction", later("runtime.friction.curves", "friction")),
+    OnRequest("friction", "friction", later("runtime.friction", "friction")),
     OnRequest("physical", "physical consistency", consistency, as_fitted),
     OnRequest(
         "advice", "resolution advice", later("runtime.advisor.advisor", "advice_of"), NoAdvice
@@ -285,7 +293,7 @@ def observe(
 
     The study specifies filters, decimation and selection of rows.
     """
-    return estimation.observe_rows(problem(model, records, study, simulator=simulator))
+    return observe_rows(problem(model, records, study, simulator=simulator))
 
 
 @single_threaded
@@ -321,7 +329,8 @@ def estimate(
     SettingsError
         A method that needs settings or data that the study or the records lack.
     """
-    return estimation.estimate(problem(model, records, study, simulator=simulator))
+    whole = problem(model, records, study, simulator=simulator)
+    return estimated(whole, observe_rows(whole), provenance=whole.provenance)
 
 
 def estimate_of(
@@ -336,9 +345,7 @@ def estimate_of(
     The default method is ols.
     """
     settings = settings or EstimateSettings()
-    return estimation.estimate_of(
-        observation, settings, METHODS, model=model, provenance=provenance
-    )
+    return estimate_by(observation, settings, METHODS, model=model, provenance=provenance)
 
 
 @single_threaded
@@ -354,7 +361,15 @@ def essential(
     The method of the study is used; a method that is not linear is replaced by least squares with
     the same weights.
     """
-    return estimation.essential(problem(model, records, study, simulator=simulator))
+    whole = problem(model, records, study, simulator=simulator)
+    settings = whole.settings
+    return essential_of(
+        observe_rows(whole),
+        settings.essential,
+        linear_companion(settings.estimate),
+        model=whole.model,
+        provenance=whole.provenance,
+    )
 
 
 @single_threaded

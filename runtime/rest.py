@@ -14,8 +14,7 @@ from runtime.core.missing import COUNTS, require_positions
 from runtime.core.problem import Note, Problem
 from runtime.core.record import Record
 from runtime.core.rows.prepared import stacked
-from runtime.core.signals.filters import States
-from runtime.core.signals.states import require_motion
+from runtime.core.signals.filters import States, require_motion
 from runtime.core.study import Signals
 
 ROUNDING = 1e-9  # of the largest entry of W: a column below it is zero

@@ -31,9 +31,9 @@ from runtime.documents.yaml_text import yaml_text
 from runtime.excitation.settings import ExcitationSettings
 from runtime.loop.settings import Controller
 from runtime.payload import settings as load
-from runtime.reading import drafts
 from runtime.reading.datasets import DATASETS, dataset_study
-from runtime.reading.formats import endings, is_measured
+from runtime.reading.formats import endings, is_measured, read_table
+from runtime.reading.likely_columns import candidates, known_columns
 from runtime.reading.records import read_records
 from runtime.reading.settings import Records, RecordSettings, with_law
 from runtime.reading.units import speed
@@ -288,11 +288,27 @@ def _starts_anew(settings: RecordSettings, model: GeneratedModel, missing: bool)
 def draft(study: Study, model: GeneratedModel) -> str:
     """Write a study file with gaps for the user to fill, from the column names of the first record.
 
-    The text is "" if the column names show nothing.
+    `# ?` marks settings that the user must fill; candidates for a column follow the mark. The text
+    is "" if the file cannot be read.
     """
-    record = study.record[0]
+    settings = study.record[0]
+    if not settings.files:
+        return ""
+    try:
+        names = read_table(Path(settings.files[0]), settings.topic, settings.decimal).names
+    except InputError:
+        return ""
     joints = tuple(getattr(model, "LABELS", {}).values())
-    return drafts.draft(record, Path(record.files[0]), joints) if record.files else ""
+    known, open_ = known_columns(names, joints), candidates(names, joints)
+    columns = known.get("columns", {})
+    record = {"files": list(settings.files), **known}
+    if settings.decimal != ".":
+        record["decimal"] = settings.decimal
+    lines = [yaml_text({"symgen": 1, "record": record}).rstrip()]
+    for key, listed in open_.items():
+        if key not in columns:
+            lines.append(f"# ? record.columns.{key}: {', '.join(listed or names[:8])}")
+    return "\n".join([*lines, "# ? record: units, side (joint, motor), torque_constant"]) + "\n"
 
 
 def located(study: Study, folder: Path) -> Study:

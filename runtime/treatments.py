@@ -26,11 +26,10 @@ from typing import Any
 import numpy as np
 
 from runtime.core.errors import InputError
-from runtime.core.estimation import estimated
 from runtime.core.identify import Extra, identify, with_parts
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.parameter_sets import ORDER, SetName, best_set
-from runtime.core.problem import Problem, Step, prepared
+from runtime.core.problem import Problem, Step, estimated, prepared
 from runtime.core.progress import at
 from runtime.core.record import Record
 from runtime.core.result import Identification

@@ -29,9 +29,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from runtime.core.bound import BoundModel
 from runtime.core.errors import InputError
-from runtime.core.model import GeneratedModel, channels_of, elements_of, joint_units
+from runtime.core.model import BoundModel, GeneratedModel, channels_of, elements_of, joint_units
 from runtime.core.problem import Problem
 from runtime.core.record import JOINT_CHANNELS, WRENCH, Record
 from runtime.core.rows.selection import UNMEASURED, per_joint

@@ -34,16 +34,15 @@ from runtime import Cestac, Estimate, Identification, Record, Study
 from runtime.core.cestac.result import LevelResult
 from runtime.core.drives import Drives
 from runtime.core.errors import DataUnavailableError
-from runtime.core.markup import number
 from runtime.core.study import CestacSettings
-from runtime.core.table import Table
+from runtime.core.table import Table, number
 from runtime.files import Files, identification_files, part_files
 from runtime.loop.reference import Reference, point_to_point
 from runtime.loop.settings import Points
 from runtime.reading.datasets import dataset_study
 from runtime.reading.settings import Columns, RecordSettings
 from runtime.reporting.page import Section
-from runtime.reporting.resolution import resolution_section
+from runtime.reporting.pages import resolution_section
 from runtime.study import located, study_from_mapping
 
 # Table 2 with its %sigma; Table 3 at Delta 1 ... 4; Table 4 at Phi 1 ... 4, each five times the one

@@ -568,7 +568,7 @@ def answer(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer
     share : share of the mean square of an acceleration that these steps make.
     """
     if advice is None:
-        ask = "ask with symgen report, or symgen cestac --advise"
+        ask = "ask with symgen report --encoder STEP, or symgen cestac --advise"
         if not steps:
             return Answer("open", "Not asked", ask)
         text = f"{steps}, which make {100 * share:.2g} % of the mean square of an acceleration"

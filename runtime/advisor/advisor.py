@@ -171,9 +171,7 @@ def advise(
     names = study_columns(problem, as_measured, columns)
     parts = tuple(perturbation(model, own, study, names, drives=drives) for own in as_measured)
     linear = replace(study.estimate, columns="all")
-    measured = (
-        stack([part.observation for part in parts]) if len(parts) > 1 else parts[0].observation
-    )
+    measured = stack([part.observation for part in parts])
     rows = stacked(model, as_measured, names)
     origins = {**problem.provenance, **names_judged(study.cestac), **(provenance or {})}
     reference = linear_estimate(rows, linear, model=model, provenance=origins)

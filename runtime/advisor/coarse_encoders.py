@@ -36,8 +36,7 @@ from runtime.core.problem import Problem
 from runtime.core.rows.observation import stack
 from runtime.core.rows.prepared import observation_of
 from runtime.core.rows.selection import certain_rows
-from runtime.core.signals.filters import SpeedErrors, States, filtered_states
-from runtime.core.signals.states import Reader, lowpassed
+from runtime.core.signals.filters import Reader, SpeedErrors, States, filtered_states, lowpassed
 from runtime.counts.own_encoder import own_encoder
 from runtime.counts.reader import counted as counted_states
 from runtime.counts.reader import encoder_position
@@ -325,8 +324,7 @@ class CoarseEncoders:
             )
             for (states, mask), record in zip(parts, self.task.records, strict=True)
         ]
-        whole = rows[0] if len(rows) == 1 else stack(rows)
-        return linear_system(whole, self.task.estimate).solve().X
+        return linear_system(stack(rows), self.task.estimate).solve().X
 
 
 def mean_change(ratios: Array) -> Array:

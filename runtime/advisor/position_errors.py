@@ -36,9 +36,8 @@ from runtime.core.rows.regressor import in_time
 from runtime.core.rows.selection import Selection
 from runtime.core.rows.switches import Switch, switches
 from runtime.core.settings import to_mapping
-from runtime.core.signals.filters import States
+from runtime.core.signals.filters import States, lowpassed
 from runtime.core.signals.noise_gain import Bandwidth, bandwidth
-from runtime.core.signals.states import lowpassed
 from runtime.core.study import Study
 
 Array = np.ndarray

@@ -29,7 +29,7 @@ from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.method import linear_estimate
 from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel, joint_labels
-from runtime.core.part import Part
+from runtime.core.part import Doubt
 from runtime.core.problem import Note, Problem
 from runtime.core.record import Record
 from runtime.core.result import Identification
@@ -100,27 +100,13 @@ def law_of_controller(problem: Problem) -> Problem:
     )
 
 
-@dataclass(frozen=True)
-class GainDoubt(Part):
-    """Warning that velocity gains kd other than the given ones fit the records much better."""
-
-    sentence: str
-
-    name = "gain_doubt"
-    title = "Law of the controller"
-
-    def warnings(self) -> tuple[str, ...]:
-        """Return the only warning: a question whether the gains in the settings are right."""
-        return (self.sentence,)
-
-
-def doubt_of_gains(result: Identification) -> GainDoubt | None:
+def doubt_of_gains(result: Identification) -> Doubt | None:
     """Return a warning if the records fit much better with other velocity gains than the given.
 
     None if there is no such doubt.
     """
     sentence = gain_doubt(result.problem, result.estimate.relative_error)
-    return GainDoubt(sentence) if sentence else None
+    return Doubt("gain_doubt", "Law of the controller", sentence) if sentence else None
 
 
 def gain_doubt(problem: Problem, error: float) -> str:

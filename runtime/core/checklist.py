@@ -28,6 +28,7 @@ from runtime.core.check import (
 from runtime.core.documents import Result
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.limits import LIMIT
+from runtime.core.model import SIGNED, GeneratedModel, is_form
 from runtime.core.part import About, Part
 from runtime.core.table import Table, notebook
 
@@ -437,3 +438,21 @@ def separate(fit: Estimate) -> Answer:
 def rounded(cond: float) -> str:
     """Write a condition number with three digits, for instance 1230 or 1.23e+06."""
     return f"{float(f'{cond:.3g}'):.0f}" if 100 <= cond < 1e6 else f"{cond:.3g}"
+
+
+def negative_elements(model: GeneratedModel, fit: Estimate) -> tuple[str, ...]:
+    """Return the friction parameters and motor inertias of a fit that are certainly below zero.
+
+    Certainly means by LIMIT.CERTAIN_SIGN standard deviations, of which the larger kind is used.
+    Parameters that are regrouped with others are not tested.
+    """
+    elements: Mapping[str, Any] = getattr(model, "ELEMENTS", {})
+    signed = {
+        name for name, (kind, _, acts) in elements.items() if kind in SIGNED and not is_form(acts)
+    }
+    sigma = np.fmax(fit.sigma, fit.sigma_corrected)
+    return tuple(
+        name
+        for i, name in enumerate(fit.names)
+        if name in signed and fit.X[i] < -LIMIT.CERTAIN_SIGN * sigma[i]
+    )

@@ -12,10 +12,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 from runtime.core.errors import InputError, SettingsError
-from runtime.core.estimation import observe_rows, observed_unseen
-from runtime.core.fits import fit_problem, validated
+from runtime.core.parameter_sets import fit_problem, validated
 from runtime.core.part import Part
-from runtime.core.problem import SIGNALS, Problem
+from runtime.core.problem import SIGNALS, Problem, observe_rows, observed_unseen
 from runtime.core.provenance import record_names
 from runtime.core.result import Identification
 from runtime.core.uncertainty import uncertainty

@@ -7,7 +7,6 @@ no formula can insert markup.
 
 from __future__ import annotations
 
-import math
 import re
 from html import escape
 
@@ -92,8 +91,3 @@ def formula(text: str) -> Markup:
 def unit(text: str) -> str:
     """Write a unit as in print: kg*m**2 becomes kg m², N*m*s/rad becomes N m s/rad."""
     return text.replace("**2", "²").replace("*", "\u00a0")
-
-
-def number(value: float, form: str = ".4g") -> str:
-    """Write a number as text, with four digits by default; "-" if it is not finite."""
-    return format(value, form) if math.isfinite(value) else "-"

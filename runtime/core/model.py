@@ -10,7 +10,9 @@ from __future__ import annotations
 import copyreg
 import re
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from importlib import import_module
+from inspect import signature
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Protocol, cast
@@ -40,6 +42,8 @@ TRANSMITTED = "tau_model"
 """Beginning of the channels that are torques of the model, before the number of the joint."""
 OWN_KINDS = ("column", "dissipative")  # of the user's own columns
 SLIDING = frozenset({"kg", "N", "N*s/m", "N/m"})  # units of elements along a joint that slides
+SIGNED = ("inertia", "viscous", "coulomb", "dissipative")
+"""Kinds of elements whose parameter is not negative."""
 FUNCTIONS = (
     "store",
     "regressor",
@@ -280,6 +284,15 @@ def is_axis(joint: int | str) -> bool:
     return isinstance(joint, str)
 
 
+def is_form(acts: Mapping[Any, float]) -> bool:
+    """Whether an element on the joints, such as a spring, is given by a quadratic form q'Bq.
+
+    Other elements act along a combination s = G q of joints. acts : coefficients of the element, by
+    joint; in a quadratic form by pair of joints.
+    """
+    return any(isinstance(key, tuple) for key in acts)
+
+
 def elements_of(
     model: GeneratedModel, constants: Mapping[str, float] | None = None
 ) -> Mapping[str, Any]:
@@ -440,3 +453,33 @@ def check_states(model: GeneratedModel, **states: Array) -> None:
             )
         if not np.issubdtype(x.dtype, np.floating) and not np.issubdtype(x.dtype, np.integer):
             raise InputError(f"{model.NAME}: {name} has dtype {x.dtype}; expected real numbers")
+
+
+class BoundModel:
+    """A model in which new values replace some constants of the robot file.
+
+    Every function of the model has the new values as default arguments.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+        An emitted module.
+    constants : mapping of str to float
+        New values of some of its CONSTANTS, by name.
+    """
+
+    def __init__(self, model: GeneratedModel, constants: Mapping[str, float]) -> None:
+        self._model, self._given = model, dict(constants)
+        self.CONSTANTS = {**model.CONSTANTS, **constants}
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        value = getattr(self._model, name)
+        if name == "ELEMENTS":
+            return self._model.elements(**self._given)  # type: ignore[attr-defined]
+        if not callable(value) or isinstance(value, type):
+            return value
+        own = signature(value).parameters
+        rest = any(p.kind is p.VAR_KEYWORD for p in own.values())
+        return partial(value, **{key: x for key, x in self._given.items() if rest or key in own})

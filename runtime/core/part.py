@@ -145,6 +145,19 @@ class Part:
         return {}
 
 
+@dataclass(frozen=True)
+class Doubt(Part):
+    """A part with one sentence that the user should read before the values are used."""
+
+    name: str
+    title: str
+    sentence: str
+
+    def warnings(self) -> tuple[str, ...]:
+        """Return a tuple of one text: the sentence."""
+        return (self.sentence,)
+
+
 def printed(part: Part) -> str:
     """Write the title, text and tables of an analysis (Part); "" without text and tables."""
     tables = [table.to_text() for table in part.tables()]

@@ -28,7 +28,7 @@ from scipy.stats import f as fisher
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.limits import LIMIT
 from runtime.core.rows.observation import Observation
-from runtime.core.validation import JointComparison
+from runtime.core.validation import JointComparison, direct_comparison
 
 Array = np.ndarray
 
@@ -175,12 +175,8 @@ def unseen_by_blocks(observation: Observation, fit: Estimate) -> float:
 
     m = 2 tau is the correlation time of the joint with the median correlation time.
     """
-    predicted = observation.columns(fit.names).W @ fit.X
-    joints = [
-        JointComparison(str(j), observation.t[rows], observation.Y[rows], predicted[rows])
-        for j, rows in enumerate(map(observation.joint, range(observation.n)))
-    ]
-    memory = [one.rows / one.effective_rows for one in whiteness(joints, observation.rate)]
+    joints = whiteness(direct_comparison(observation, fit), observation.rate)
+    memory = [one.rows / one.effective_rows for one in joints]
     ratio = float(np.median(memory)) / observation.rate / (2 * observation.residual_block)
     if not (np.isfinite(ratio) and ratio > 0):  # no residuals
         return 1.0

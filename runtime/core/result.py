@@ -10,14 +10,13 @@ from typing import Any, Literal
 
 import numpy as np
 
-from runtime.core.checklist import Checklist, checklist_of, lost_joints
+from runtime.core.checklist import Checklist, checklist_of, lost_joints, negative_elements
 from runtime.core.documents import json_text
 from runtime.core.errors import InputError
 from runtime.core.essential import Essential
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.method import LINEAR
 from runtime.core.limits import LIMIT
-from runtime.core.markup import number
 from runtime.core.model import GeneratedModel, joint_labels, joint_torque_units
 from runtime.core.parameter_sets import (
     ORDER,
@@ -35,9 +34,8 @@ from runtime.core.record import UNNAMED, Record
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared
 from runtime.core.rows.selection import unused_joints
-from runtime.core.signs import negative_elements
 from runtime.core.study import Study
-from runtime.core.table import Table, in_lines, notebook, with_intervals
+from runtime.core.table import Table, in_lines, notebook, number, with_intervals
 from runtime.core.uncertainty import Uncertainty
 from runtime.core.validation import (
     CrossValidation,
@@ -224,7 +222,7 @@ class Identification:
         linear = self.study.estimate.method in LINEAR
         if self.model_columns != "essential" or "feasible" in self.sets or not linear:
             return self.sets
-        if not physical_possible(self.observation, self.study.estimate, self.estimate):
+        if not physical_possible(self.study.estimate, self.estimate):
             return self.sets
         try:
             fit, _ = physical_set(self.problem, self.observation)

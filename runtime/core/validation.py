@@ -21,17 +21,15 @@ from scipy.sparse.csgraph import connected_components
 
 from runtime.core.documents import Result
 from runtime.core.errors import InputError, instant
-from runtime.core.estimation import estimated, point_estimate
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import percent
 from runtime.core.least_squares.method import linear_companion, linear_system
 from runtime.core.least_squares.solution import unit_columns
 from runtime.core.limits import LIMIT
-from runtime.core.markup import number
-from runtime.core.problem import Problem
+from runtime.core.problem import Problem, estimated, point_estimate
 from runtime.core.rows.observation import Observation, Window
 from runtime.core.study import EstimateSettings
-from runtime.core.table import Table
+from runtime.core.table import Table, number
 
 Array = np.ndarray
 

@@ -97,11 +97,6 @@ class Smoothed:
     origin: float
     said: str
 
-    @property
-    def density(self) -> float:
-        """Mean power spectral density of the jerk, steps^2/s^5."""
-        return float(self.read.density.mean())
-
     def state(self, order: int) -> tuple[Array, Array]:
         """Return the mean and standard deviation of the position, or of a derivative.
 

@@ -18,8 +18,8 @@ from pydantic_core import core_schema
 from runtime.core.cestac.result import SCHEMA as CESTAC
 from runtime.core.cestac.result import LevelResult, Verdict
 from runtime.core.cestac.runs import Run
+from runtime.core.documents import NanIfNull, Vector, Whole, from_text
 from runtime.core.errors import InputError
-from runtime.core.json_results import NanIfNull, Vector, Whole, from_text
 from runtime.core.least_squares.estimate import SCHEMA as ESTIMATE
 from runtime.core.least_squares.estimate import Estimate, JointFit
 from runtime.core.parameter_sets import SetName, whole_set

@@ -27,8 +27,7 @@ from runtime.core.rows.predicted import Weights
 from runtime.excitation.criteria import MotionLimits
 from runtime.excitation.result import Start
 from runtime.excitation.settings import ExcitationSettings
-from runtime.loop.families import Fourier
-from runtime.loop.trajectories import Motion, Part
+from runtime.loop.trajectories import Fourier, Motion, Part
 
 Array = np.ndarray
 

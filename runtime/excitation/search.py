@@ -20,12 +20,11 @@ import numpy as np
 
 from runtime.core.errors import InputError
 from runtime.core.essential import essential_of
-from runtime.core.estimation import estimated, observe_rows
 from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel, require, require_no_channels
-from runtime.core.problem import Problem
+from runtime.core.problem import Problem, estimated, observe_rows
 from runtime.core.rows.predicted import Weights, kept_correlation
-from runtime.core.signals.states import require_motion
+from runtime.core.signals.filters import require_motion
 from runtime.core.study import Study
 from runtime.excitation.criteria import criterion_of, excesses, limits_of, plan_rows, weights_of
 from runtime.excitation.optimiser import Search, improve, one_start
@@ -34,8 +33,6 @@ from runtime.excitation.settings import ExcitationSettings
 from runtime.loop.control_law import parameters_of
 from runtime.loop.dry_friction import dry_friction
 from runtime.loop.trajectories import Motion, motion_from_mapping
-
-Array = np.ndarray
 
 
 def excite(

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from runtime.core.settings import Many, Positive, Real, Seed, Settings, Text, Whole, require
-from runtime.loop.families import AnyFamily, Fourier, PointToPoint
+from runtime.loop.trajectories import AnyFamily, Fourier, PointToPoint
 
 MOST_INSTANTS = {"grid": 2e4, "rate": 2e7}
 """Largest number of instants of a motion, on the grid of the optimiser and at the controller's rate."""

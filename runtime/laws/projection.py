@@ -21,8 +21,7 @@ from typing import Any, cast
 import numpy as np
 from scipy.optimize import least_squares
 
-from runtime.core.bound import BoundModel
-from runtime.core.model import GeneratedModel, channels_of
+from runtime.core.model import BoundModel, GeneratedModel, channels_of
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared
 

@@ -14,12 +14,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from runtime.core.bound import BoundModel
 from runtime.core.errors import InputError
 from runtime.core.least_squares.block_covariance import block_covariance
 from runtime.core.least_squares.linear import percent
-from runtime.core.markup import number
-from runtime.core.model import GeneratedModel
+from runtime.core.model import BoundModel, GeneratedModel
 from runtime.core.part import Part
 from runtime.core.problem import Note, Problem
 from runtime.core.progress import at
@@ -27,7 +25,7 @@ from runtime.core.residuals import correlation_time, p_value, residual_correlati
 from runtime.core.result import Identification
 from runtime.core.rows.observation import split_rows
 from runtime.core.rows.prepared import Prepared
-from runtime.core.table import Table
+from runtime.core.table import Table, number
 from runtime.laws.projection import LawProblem, Projection, basis
 from runtime.laws.transmitted import transmitted_torque
 
@@ -219,20 +217,19 @@ def fit_laws(
     groups: dict[str, list[int]] = {}
     for k, name in enumerate(problem.scalars):
         groups.setdefault(str(problem.table[name][2]), []).append(k)
-    members = list(groups.values())
     projection = Projection(problem, every, scale)
     if weights:
         r = projection.residual(problem.start)
         by_joint = [np.sqrt(np.mean(r[problem.joint == j] ** 2)) for j in np.unique(problem.joint)]
         scale = np.array(by_joint)[problem.joint]
         projection = Projection(problem, every, scale)
-    u, cost, others = projection.fitted(members)
+    u, cost, others = projection.fitted(list(groups.values()))
     A, X, sigma = _joint_deviations(problem, u, scale)
     r = problem.Y - A @ X
     count = len(r) / correlation_time(residual_correlation(r))
     b = len(problem.names)
     even = problem.block % 2 == 0
-    halves = [(rows, _half(problem, rows, scale, members, u)) for rows in (even, ~even)]
+    halves = [(rows, Projection(problem, rows, scale).polished(u)[0]) for rows in (even, ~even)]
     tests, scalars = [], []
     for g, (parameter, group) in enumerate(groups.items()):
         own = sorted({c for k in group for c in problem.varying[k]})
@@ -264,13 +261,6 @@ def _joint_deviations(problem: LawProblem, u: Array, scale: Array) -> tuple[Arra
     blocks = split_rows(np.column_stack([whole, residual]), problem.block)
     C = block_covariance(blocks, np.zeros(whole.shape[1]), T)
     return A, X, np.sqrt(np.diag(C))
-
-
-def _half(
-    problem: LawProblem, rows: Array, scale: Array, members: Sequence[Sequence[int]], u: Array
-) -> Array:
-    """Fit the nonlinear constants of laws to a subset of the rows, starting from the values u."""
-    return Projection(problem, rows, scale).polished(u)[0]
 
 
 def _squares(A: Array, Y: Array, scale: Array) -> float:

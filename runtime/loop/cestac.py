@@ -36,10 +36,11 @@ from runtime.core.errors import SettingsError
 from runtime.core.model import GeneratedModel
 from runtime.core.problem import Problem
 from runtime.core.rows.observation import LoopRows, Observation
+from runtime.core.rows.prepared import Prepared
 from runtime.core.settings import to_mapping
-from runtime.core.signals.states import lowpassed
+from runtime.core.signals.filters import lowpassed
 from runtime.core.study import EstimateSettings
-from runtime.loop.closed_loop import ClosedLoop, LoopPart, closed_loop
+from runtime.loop.closed_loop import ClosedLoop, closed_loop
 from runtime.loop.control_law import parameters_of
 from runtime.loop.reference import Reference, reference_of
 
@@ -117,9 +118,9 @@ class Loop:
         return self._of(self.simulator, self.simulator.controller.seed, 0.0)
 
     @property
-    def parts(self) -> tuple[LoopPart, ...]:
-        """Data of each record to simulate: reference motion, filtered states, rows of W to use."""
-        return tuple(self.closed.parts)
+    def records(self) -> tuple[Prepared, ...]:
+        """Records of the loop with their filtered states and the rows of W to use."""
+        return tuple(part.prepared for part in self.closed.parts)
 
     @property
     def estimate(self) -> EstimateSettings:

@@ -40,7 +40,8 @@ from runtime.core.problem import Problem
 from runtime.core.progress import at
 from runtime.core.record import Record
 from runtime.core.rows.observation import LoopRows, Observation, stack
-from runtime.core.rows.prepared import Prepared, decimated_torque, observation_from_states, stacked
+from runtime.core.rows.prepared import Prepared, observation_of, stacked
+from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import Selection, certain_rows, select_rows
 from runtime.core.settings import NotNegative, Settings, structure
 from runtime.core.signals.filters import States, decimated, filtered_states
@@ -85,13 +86,9 @@ class LoopPart:
     Attributes
     ----------
     prepared : Prepared
-        The record with its filtered states.
+        The record with its filtered states and the rows used.
     reference : Reference
         Reference that the controller followed, at its rate; T ticks.
-    selection : Selection
-        Rows used.
-    torque : ndarray, shape (n, K), N m or N
-        Y before rows are left out.
     feedforward, disturbance : ndarray, shape (T, n), N m or N, or None
         Recorded feed-forward torque; and the known torque with the opposite sign, which acts on the
         arm in addition to the torque of the drives.
@@ -99,8 +96,6 @@ class LoopPart:
 
     prepared: Prepared
     reference: Reference
-    selection: Selection
-    torque: Array
     feedforward: Array | None = None
     disturbance: Array | None = None
 
@@ -108,6 +103,11 @@ class LoopPart:
     def record(self) -> Record:
         """Record of measured or simulated positions and torques."""
         return self.prepared.record
+
+    @property
+    def selection(self) -> Selection:
+        """Rows used."""
+        return self.prepared.selection
 
     @property
     def given(self) -> dict[str, Any]:
@@ -139,6 +139,11 @@ class ClosedLoop:
     parts: tuple[LoopPart, ...]
     assumption: str = ""
     law: tuple[LawFit, ...] = ()
+
+    def all_of(self, names: Sequence[str], X: Array) -> Array:
+        """Extend the values X of the parameters `names` to all base parameters; the others are zero."""
+        by_name = dict(zip(names, X, strict=True))
+        return np.array([by_name.get(name, 0.0) for name in self.model.BASE_PARAMETERS])
 
     def run(self, X: Array, g: Array | float = 1.0) -> list[Simulation]:
         """Simulate every record with base parameters X, shape (b,), without noise or quantisation.
@@ -227,13 +232,15 @@ class ClosedLoop:
         return np.asarray(np.einsum("tjj->j", functions.inertia_matrix(q, X)) / len(q))
 
     def _observed(self, states: Sequence[States]) -> Observation:
-        observation = [
-            observation_from_states(
-                self.model, s, part.torque, part.selection, files=part.record.files
-            )
-            for s, part in zip(states, self.parts, strict=True)
-        ]
-        return observation[0] if len(observation) == 1 else stack(observation)
+        columns = Columns(self.model)
+        return stack(
+            [
+                observation_of(
+                    columns, s, part.prepared.torque, part.selection, files=part.record.files
+                )
+                for s, part in zip(states, self.parts, strict=True)
+            ]
+        )
 
 
 def observed_loop(problem: Problem, simulator: Simulator | None = None) -> Observation:
@@ -262,14 +269,11 @@ def closed_loop(
     problem: Problem,
     measured: Sequence[Prepared],
     simulator: Simulator,
-    *,
-    keep: Sequence[Array] = (),
     **options: Any,
 ) -> ClosedLoop:
     """Prepare the closed loop of the records: find references and rows, check the control law.
 
     measured : the records with filtered states.
-    keep : bool, shape (N,) or (N, n) per record: samples that may be used.
     options : the options of LoopOptions.
     """
     asked = structure(LoopOptions, options, ("estimate", "options"))
@@ -300,14 +304,15 @@ def closed_loop(
             minimum_filter1d(speed, around, axis=0, mode="nearest"),
             study.signals,
             study.rows,
-            keep=_usable(simulator, record, keep[k] if k < len(keep) else None),
+            keep=_usable(simulator, record),
         )
         torques = [
             None if x is None else _at_ticks(x, every, len(followed))
             for x in (fed, None if record.tau_known is None else -record.tau_known)
         ]
-        torque = decimated_torque(record.torque, selection)
-        parts.append(LoopPart(own, followed, selection, torque, *torques))
+        chosen = replace(own, selected=selection)
+        chosen.take_states(own)
+        parts.append(LoopPart(chosen, followed, *torques))
     if asked.reference == "measured":
         return ClosedLoop(model, simulator, tuple(parts), ASSUMED)
     fits = law_fits(simulator.law, parts, controller, joint_labels(model))
@@ -376,22 +381,20 @@ def slips(qd: Array, G: Array) -> Array:
     return speed
 
 
-def _usable(simulator: Simulator, record: Record, keep: Array | None) -> Array | None:
+def _usable(simulator: Simulator, record: Record) -> Array | None:
     """Select the samples whose torque is below its limit, and that are not near a long gap.
 
-    A gap is a time without measured positions.
-
-    keep : samples that may be used; None: all.
+    A gap is a time without measured positions. None: all samples.
     """
     bound = np.broadcast_to(np.asarray(simulator.law.saturation, dtype=float), (record.n,))
     if not np.isfinite(bound).any() and record.missing is None:
-        return keep
+        return None
     free: Array = np.abs(record.tau) <= LIMIT.CLIPPED * bound
     if record.missing is not None:
         free &= ~record.missing.near_gaps(
             round(REACH / 2 * record.rate), round(REACH * record.rate)
         )[:, None]
-    return free if keep is None else free & (keep if keep.ndim == 2 else keep[:, None])
+    return free
 
 
 def loop_of(observation: Observation, method: str) -> ClosedLoop:

@@ -17,7 +17,6 @@ from __future__ import annotations
 import ctypes
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -45,40 +44,6 @@ FLAGS = (
     "-fPIC",
 )
 CVODES = {"abstol": 1e-10, "reltol": 1e-9}
-
-
-@dataclass(frozen=True, eq=False)
-class LoopInputs:
-    """Input arrays of one simulation of the closed loop.
-
-    Attributes
-    ----------
-    x : ndarray, shape (6n,)
-        State of the loop at the first tick: q, qd, y1, y2, I, u.
-    signals : ndarray, shape (S + N, 5n)
-        q_r, qd_r, feed-forward, encoder noise, disturbance at every tick; during the first S =
-        `settling` ticks the loop only settles.
-    settling : int
-    X : ndarray, shape (b,)
-        Base parameters.
-    g : ndarray, shape (n,)
-        Factor on everything between position error and torque.
-    law : ndarray, shape (n, columns)
-        Result of `ControlLaw.matrix`.
-    substeps : int
-        Integration steps per tick.
-    torque_noise : ndarray, shape (N, n), N m or N
-        Noise of the recorded torque.
-    """
-
-    x: Array
-    signals: Array
-    settling: int
-    X: Array
-    g: Array
-    law: Array
-    substeps: int
-    torque_noise: Array
 
 
 def blocks(rows: Array, size: int) -> Iterator[tuple[Array, int]]:

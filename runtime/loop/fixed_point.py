@@ -86,12 +86,6 @@ class Fixed:
     message: str = ""
 
 
-def full(names: Sequence[str], X: Array, every: Sequence[str]) -> Array:
-    """Extend the values X of the parameters `names` to all base parameters; the others are zero."""
-    by_name = dict(zip(names, X, strict=True))
-    return np.array([by_name.get(name, 0.0) for name in every])
-
-
 def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]) -> Array:
     """Choose the parameters X from which the iteration of IV or DIDIM starts.
 
@@ -143,17 +137,17 @@ def iterate(
     X holds the parameters of the columns of the rows.
     """
     options: FixedPointOptions = start.options
-    names, every = start.observation.names, loop.model.BASE_PARAMETERS
+    names = start.observation.names
     X = initial(loop, start, options.start)
     reference = X if options.gains in ("start", "one") else initial(loop, start, options.gains)
-    J = None if options.gains == "one" else loop.inertia(full(names, reference, every))
+    J = None if options.gains == "one" else loop.inertia(loop.all_of(names, reference))
     if J is not None and not np.all(J > 0):
         raise InputError(
             f"gains: {options.gains}: the parameters that this option selects do not give a positive inertia about joint "
             f"{joint_labels(loop.model)[int(np.argmin(J))]}; {_physical_start(loop, start)}"
         )
     remedy = _physical_start(loop, start)
-    if options.start not in ("ols", "unit") and np.all(loop.inertia(full(names, X, every)) > 0):
+    if options.start not in ("ols", "unit") and np.all(loop.inertia(loop.all_of(names, X)) > 0):
         remedy = "check the controller of the study: law, gains, rate, delay, reference"
     trail: list[dict[str, Any]] = []
     step: Step | None = None
@@ -168,7 +162,6 @@ def iterate(
             X, g, runs, message = _simulated(
                 loop,
                 names,
-                every,
                 X,
                 trail[-1]["X"] if trail else None,
                 J if rescaled else None,
@@ -202,9 +195,7 @@ def _physical_start(loop: ClosedLoop, start: Beginning) -> str:
     else the parameters of method feasible.
     """
     try:
-        X = full(
-            start.observation.names, initial(loop, start, "values"), loop.model.BASE_PARAMETERS
-        )
+        X = loop.all_of(start.observation.names, initial(loop, start, "values"))
         if np.all(loop.inertia(X) > 0):
             return (
                 "set estimate.options: {start: values, gains: values}, the values of the robot file"
@@ -220,7 +211,6 @@ def _physical_start(loop: ClosedLoop, start: Beginning) -> str:
 def _simulated(
     loop: ClosedLoop,
     names: Sequence[str],
-    every: Sequence[str],
     X: Array,
     before: Array | None,
     J: Array | None,
@@ -238,11 +228,11 @@ def _simulated(
         g = np.ones(len(loop.model.JOINTS))
         try:
             if J is not None:
-                g = loop.inertia(full(names, X, every)) / J
+                g = loop.inertia(loop.all_of(names, X)) / J
                 if not np.all(g > 0):
                     least = joint_labels(loop.model)[int(np.argmin(g))]
                     raise InputError(f"the inertia about joint {least} is negative")
-            return X, g, loop.run(full(names, X, every), g), ""
+            return X, g, loop.run(loop.all_of(names, X), g), ""
         except InputError as e:
             reason = str(e)
             if before is None:

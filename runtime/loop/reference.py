@@ -23,7 +23,7 @@ from runtime.core.model import GeneratedModel, joint_labels
 from runtime.core.record import Record
 from runtime.core.signals.filters import derivative
 from runtime.loop.settings import Controller, Points
-from runtime.loop.trajectories import motion_from_mapping
+from runtime.loop.trajectories import motion_from_mapping, ramp
 from runtime.reading.formats import read_table
 
 Array = np.ndarray
@@ -287,7 +287,7 @@ def point_to_point(model: GeneratedModel, settings: Points, rate: float) -> Refe
         if start and start + T > settings.duration:
             break
         piece = (t >= start) & (t < start + T)
-        s, v, a = _unit_piece((t[piece] - start) / T)
+        s, v, a = ramp((t[piece] - start) / T, RAMP / 2, 1 - RAMP / 2, RAMP)
         q[piece], qd[piece], qdd[piece] = (
             begin + s[:, None] * way,
             v[:, None] * way / T,
@@ -296,16 +296,3 @@ def point_to_point(model: GeneratedModel, settings: Points, rate: float) -> Refe
         start, begin = start + T, end
     moved = t < start
     return Reference(rate, q[moved], qd[moved], qdd[moved])
-
-
-def _unit_piece(x: Array) -> tuple[Array, Array, Array]:
-    """Compute position, velocity, acceleration of a normalised move 0 to 1 at x = t/T in [0, 1]."""
-    top = 1 / (1 - RAMP)
-    up, down = np.clip(x / RAMP, 0, 1), np.clip((1 - x) / RAMP, 0, 1)
-    v = top * np.minimum(up**2 * (3 - 2 * up), down**2 * (3 - 2 * down))
-    a = top * 6 / RAMP * np.where(x < 0.5, up * (1 - up), -down * (1 - down))
-    rise = top * RAMP * (up**3 - up**4 / 2)
-    fall = 1 - top * RAMP * (down**3 - down**4 / 2)
-    steady = top * (x - RAMP / 2)
-    s = np.where(x < RAMP, rise, np.where(x > 1 - RAMP, fall, steady))
-    return s, v, a

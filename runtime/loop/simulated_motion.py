@@ -26,7 +26,6 @@ from runtime.core.limits import LIMIT
 from runtime.core.model import joint_labels
 from runtime.core.rows.observation import Observation
 from runtime.loop.closed_loop import ClosedLoop, loop_of
-from runtime.loop.fixed_point import full
 from runtime.loop.law_check import law_text
 
 Array = np.ndarray
@@ -150,7 +149,7 @@ def beside_record(fit: Callable[[Beginning], Fitted], start: Beginning) -> Fitte
     """
     fitted = fit(start)
     loop = loop_of(start.observation, start.settings.method)
-    X = full(start.system.names, fitted.solution.X, loop.model.BASE_PARAMETERS)
+    X = loop.all_of(start.system.names, fitted.solution.X)
     status, note, motion = judge_motion(loop, start.observation, X)
     return replace(
         fitted,

@@ -33,7 +33,7 @@ from runtime.loop.control_law import (
     discrete_poles,
     parameters_of,
 )
-from runtime.loop.controller_tick import LoopInputs, blocks, compiled, tick_function
+from runtime.loop.controller_tick import blocks, compiled, tick_function
 from runtime.loop.dry_friction import DryFriction, dry_friction
 from runtime.loop.reference import Reference, reference_of
 from runtime.loop.result import Simulation, SimulationError
@@ -109,27 +109,6 @@ class Simulator:
             An inertia that is not positive definite, a loop that is not stable, or a motion that
             leaves its reference.
         """
-        seed = self.controller.seed if seed is None else seed
-        inputs = self._inputs(
-            X, reference, g, start, disturbance, feedforward, None if ideal else seed
-        )
-        states, out = self._iterated(inputs)
-        return self._result(inputs, states, out, reference, ideal=ideal, name=name)
-
-    def _inputs(
-        self,
-        X: Array,
-        reference: Reference,
-        g: Array | float,
-        start: Array | None,
-        disturbance: Array | None,
-        feedforward: Array | None,
-        seed: int | None,
-    ) -> LoopInputs:
-        """Prepare the inputs of a run: signals with noise, first state, gains, number of substeps.
-
-        seed : None for an ideal run.
-        """
         n, b, N = len(self.model.JOINTS), len(self.model.BASE_PARAMETERS), len(reference)
         X, g = np.asarray(X, dtype=float), np.broadcast_to(np.asarray(g, dtype=float), (n,)).copy()
         if X.shape != (b,) or not np.isfinite(X).all():
@@ -139,57 +118,48 @@ class Simulator:
             )
         _check_shapes(reference, self.controller.rate, n, N, disturbance, feedforward)
         substeps = self.substeps(X, reference, g)
-        noise, pushed, torque_noise = (
-            (np.zeros((N, n)),) * 3 if seed is None else self._noise(np.random.default_rng(seed), N)
-        )
+        rng = np.random.default_rng(self.controller.seed if seed is None else seed)
+        noise, pushed, torque_noise = (np.zeros((N, n)),) * 3 if ideal else self._noise(rng, N)
         pushed = pushed if disturbance is None else pushed + np.asarray(disturbance)
-        known: Array = (
-            np.zeros_like(reference.q) if feedforward is None else np.asarray(feedforward)
-        )
-        if feedforward is None and self.controller.feedforward == "values":
-            X_file = parameters_of(self.model, self.controller)
-            known = self.model.inverse_dynamics(reference.q, reference.qd, reference.qdd, X_file)
+        known = self._feedforward(reference) if feedforward is None else np.asarray(feedforward)
         signals = np.hstack(
             [reference.q, reference.qd, known + self.law.ca * reference.qdd, noise, pushed]
         )
         settling = round(self.controller.settle * self.controller.rate) if self.law.K.any() else 0
         still = np.concatenate([reference.q[0], np.zeros(n), known[0], np.zeros(2 * n)])
-        return LoopInputs(
-            x=self._start(reference, start, ideal=seed is None),
-            signals=np.vstack([np.tile(still, (settling, 1)), signals]),
-            settling=settling,
-            X=X,
-            g=g,
-            law=self.law.matrix(g, ideal=seed is None),
-            substeps=substeps,
-            torque_noise=torque_noise,
-        )
-
-    def _result(
-        self, inputs: LoopInputs, states: Array, out: Array, reference: Reference, **said: Any
-    ) -> Simulation:
-        n, every = len(self.model.JOINTS), self.controller.record_every
-        _check_motion(states[inputs.settling :, :n], reference)
-        before = np.vstack([inputs.x, states[:-1]])[inputs.settling :]
-        y, tau, qdd = np.split(out[inputs.settling :], 3, axis=1)
-        qd = before[::every, n : 2 * n]
+        signals = np.vstack([np.tile(still, (settling, 1)), signals])
+        x = self._start(reference, start, ideal=ideal)
+        states, out = self._iterated(x, signals, X, self.law.matrix(g, ideal=ideal), substeps)
+        _check_motion(states[settling:, :n], reference)
+        every = self.controller.record_every
+        before = np.vstack([x, states[:-1]])[settling::every]
+        y, tau, qdd = np.split(out[settling:], 3, axis=1)
+        qd = before[:, n : 2 * n]
         return Simulation(
             t=reference.t[::every],
-            q=before[::every, :n],
+            q=before[:, :n],
             qd=np.where(np.abs(qd) <= LIMIT.SLIP_REST, 0.0, qd),
             qdd=qdd[::every],
             tau=tau[::every],
             q_measured=y[::every],
-            tau_measured=(tau + inputs.torque_noise)[::every],
+            tau_measured=(tau + torque_noise)[::every],
             q_r=reference.q[::every],
             rate=self.controller.rate / every,
-            saturated=(np.abs(tau) >= inputs.g * self.law.saturation * (1 - 1e-9)).mean(axis=0),
-            substeps=inputs.substeps,
+            saturated=(np.abs(tau) >= g * self.law.saturation * (1 - 1e-9)).mean(axis=0),
+            substeps=substeps,
             state=states[-1],
             model=self.model,
-            X=inputs.X,
-            **said,
+            X=X,
+            ideal=ideal,
+            name=name,
         )
+
+    def _feedforward(self, reference: Reference) -> Array:
+        """Compute the feed-forward torques of the settings along the reference, shape (N, n)."""
+        if self.controller.feedforward != "values":
+            return np.zeros_like(reference.q)
+        X = parameters_of(self.model, self.controller)
+        return self.model.inverse_dynamics(reference.q, reference.qd, reference.qdd, X)
 
     def substeps(self, X: Array, reference: Reference, g: Array) -> int:
         """Compute the integration steps per sampling period from the fastest closed-loop pole.
@@ -242,18 +212,37 @@ class Simulator:
             self._compiled[substeps] = (compiled(tick) if self._in_c else tick).mapaccum(BLOCK)
         return self._compiled[substeps]
 
-    def _iterated(self, inputs: LoopInputs) -> tuple[Array, Array]:
+    def _iterated(
+        self, x: Array, signals: Array, X: Array, law: Array, substeps: int
+    ) -> tuple[Array, Array]:
         """Simulate all sampling periods (ticks) of a run, in calls of BLOCK ticks each.
 
-        Returns the states after each tick, shape (S + N, 6n), and the outputs y, tau, qdd, shape
-        (S + N, 3n).
+        Parameters
+        ----------
+        x : ndarray, shape (6n,)
+            State of the loop at the first tick: q, qd, y1, y2, I, u.
+        signals : ndarray, shape (S + N, 5n)
+            q_r, qd_r, feed-forward, encoder noise, disturbance at every tick; during the first S
+            ticks the loop only settles.
+        X : ndarray, shape (b,)
+            Base parameters.
+        law : ndarray, shape (n, columns)
+            Result of `ControlLaw.matrix`.
+        substeps : int
+            Integration steps per tick.
+
+        Returns
+        -------
+        ndarray, shape (S + N, 6n)
+            States after each tick.
+        ndarray, shape (S + N, 3n)
+            Outputs y, tau, qdd.
         """
-        function = self._ticks(inputs.substeps)
-        x = inputs.x
+        function = self._ticks(substeps)
         states = []
         out = []
-        for rows, used in blocks(inputs.signals, BLOCK):
-            after, outputs = function(x, rows.T, inputs.X, inputs.law, self.law.flags)
+        for rows, used in blocks(signals, BLOCK):
+            after, outputs = function(x, rows.T, X, law, self.law.flags)
             states.append(after.full().T[:used])
             out.append(outputs.full().T[:used])
             x = states[-1][-1]

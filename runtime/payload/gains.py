@@ -37,13 +37,12 @@ from runtime.core.errors import InputError
 from runtime.core.least_squares.block_covariance import gram_root, scatter
 from runtime.core.least_squares.linear import LinearOptions, assemble, ordinary
 from runtime.core.limits import LIMIT
-from runtime.core.markup import number
 from runtime.core.model import GeneratedModel, joint_labels
 from runtime.core.rows.factor import triangularise
 from runtime.core.rows.observation import Observation, split_rows, stack
 from runtime.core.rows.prepared import Prepared, decimated_torque
 from runtime.core.study import EstimateSettings
-from runtime.core.table import Table
+from runtime.core.table import Table, number
 from runtime.payload.load import load_columns
 from runtime.payload.settings import PayloadSettings
 from runtime.physical.inertia import physical_model

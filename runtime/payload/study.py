@@ -21,12 +21,10 @@ from runtime.core.record import Record
 from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared
-from runtime.core.signals.states import require_motion
+from runtime.core.signals.filters import require_motion
 from runtime.core.table import Table, in_lines, with_intervals
 from runtime.payload.gains import DriveGains, drive_gains, scaled
 from runtime.payload.load import Payload, payload
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

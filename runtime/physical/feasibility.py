@@ -2,7 +2,7 @@
 
     feasibility(X)            t* = max t: every condition of `runtime.physical.inertia` holds with
                               margin t, and K chi = X. t* < 0: no robot has X
-    standard_parameters(X)    chi with K chi = X that fulfils every condition, nearest to the values
+    nearest_standard(X)       chi with K chi = X that fulfils every condition, nearest to the values
                               of the robot file (or to zero)
 
 If t* is negative, the condition with the largest multiplier is blamed and released, and the problem
@@ -191,23 +191,6 @@ def within_noise(
     if far > chi2.ppf(LIMIT.NOISE_LEVEL, freedom):
         return judged
     return replace(judged, feasible=True, physical=True, margin=0.0, chi=nearest.chi)
-
-
-def standard_parameters(
-    physical: PhysicalModel, names: Sequence[str], X: Array, limits: RobotLimits | None = None
-) -> Array:
-    """Find standard parameters chi, shape (p,), with K chi = X that fulfil every condition.
-
-    Of all such chi the result is the nearest to the values of the robot file, or to zero if it has
-    none, in units of their size. K chi = X holds to rounding. Raises InputError if X is infeasible.
-    """
-    answer = feasibility(physical, names, X, limits)
-    if not answer.feasible:
-        raise InputError(
-            f"the estimate has no standard parameters: {answer.text}; identify "
-            "with estimate.method: feasible"
-        )
-    return nearest_standard(physical, names, X, answer.chi, limits)
 
 
 def nearest_standard(

@@ -66,9 +66,8 @@ from runtime.physical.feasibility import (
     units,
     unsolved,
 )
-from runtime.physical.inertia import PhysicalModel, physical_model
+from runtime.physical.inertia import PhysicalModel, physical_model, reach_of
 from runtime.physical.semidefinite import Distance, LinearBounds, Optimum, closest, everything
-from runtime.physical.signs import reach_of
 
 WEIGHTS = 10.0 ** np.arange(0.0, -9.5, -0.5)
 DECADES = WEIGHTS[::2]  # of the search for the weight of smallest held-out error

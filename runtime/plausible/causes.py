@@ -301,7 +301,9 @@ class Row:
             robot.n,
             kind=self.kind,
             says=says,
-            remedy=self.remedy.format(**words) + f" (record.scale: {{{scale}}})" * bool(scale),
+            remedy=self.remedy.format(**words)
+            + f" (record.scale: {{{scale}}}; multiply factors that the study gives there)"
+            * bool(scale),
             subject=self.subject.format(**words) or says,
             change=change,
             **self.maps(robot, item, *xi),

@@ -23,12 +23,11 @@ from scipy.interpolate import CubicSpline, PPoly
 from runtime.core.documents import Result
 from runtime.core.errors import InputError
 from runtime.core.limits import LIMIT
-from runtime.core.markup import number
 from runtime.core.model import GeneratedModel, is_axis, joint_labels
 from runtime.core.problem import Problem
 from runtime.core.rows.regressor import in_time
-from runtime.core.signals.states import require_motion
-from runtime.core.table import Table
+from runtime.core.signals.filters import require_motion
+from runtime.core.table import Table, number
 from runtime.plausible.bodies import Grams, solve_scaled
 from runtime.plausible.samples import Filtered, filtered, usable
 

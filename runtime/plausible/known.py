@@ -27,12 +27,11 @@ import numpy as np
 
 from runtime.core.documents import Result
 from runtime.core.limits import LIMIT
-from runtime.core.markup import number
 from runtime.core.model import GeneratedModel, elements_of, is_axis, joint_labels
-from runtime.core.part import Part
+from runtime.core.part import Doubt
 from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
-from runtime.core.table import Table
+from runtime.core.table import Table, number
 from runtime.physical.inertia import INERTIAL
 
 if TYPE_CHECKING:
@@ -181,25 +180,11 @@ def known_values(baseline: Baseline) -> KnownValues | None:
     return KnownValues(joints, ratios[:, 0], ratios[:, 1], errors, all(given))
 
 
-@dataclass(frozen=True)
-class TorqueUnit(Part):
-    """A warning that the measured torques may have another unit, for instance that of currents."""
-
-    sentence: str
-
-    name = "torque_unit"
-    title = "Unit of the torques"
-
-    def warnings(self) -> tuple[str, ...]:
-        """Return a tuple of one text: the warning that the torques may have another unit."""
-        return (self.sentence,)
-
-
-def torque_unit(result: Identification) -> TorqueUnit | None:
+def torque_unit(result: Identification) -> Doubt | None:
     """Make a warning if the unit of the measured torques is doubtful; None if it is not."""
     by_law = any(record.origin.by_law for record in result.records)
     doubt = torque_unit_doubt(result.model, result.observation, by_law)
-    return TorqueUnit(f"{doubt}.") if doubt else None
+    return Doubt("torque_unit", "Unit of the torques", f"{doubt}.") if doubt else None
 
 
 def torque_unit_doubt(model: GeneratedModel, observation: Observation, by_law: bool) -> str:

@@ -21,10 +21,9 @@ import numpy as np
 
 from runtime.core.check import Answer, Question, State, first_names
 from runtime.core.errors import InputError
-from runtime.core.estimation import estimate_of
 from runtime.core.least_squares.method import LINEAR
 from runtime.core.limits import LIMIT
-from runtime.core.problem import Problem
+from runtime.core.problem import Problem, estimate_of
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.predicted import Weights, kept_correlation
 from runtime.core.rows.prepared import stacked

@@ -24,7 +24,7 @@ from runtime.core.part import Part
 from runtime.core.problem import Problem
 from runtime.core.progress import at
 from runtime.core.result import Identification
-from runtime.core.signals.states import require_motion
+from runtime.core.signals.filters import require_motion
 from runtime.core.table import Table
 from runtime.counts.reader import unwrapped
 from runtime.plausible.case import Case

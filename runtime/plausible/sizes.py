@@ -15,8 +15,7 @@ from runtime.core.check import Answer, Question, State
 from runtime.core.limits import LIMIT
 from runtime.core.model import joint_torque_units
 from runtime.core.record import Record
-from runtime.physical.inertia import INERTIAL, PhysicalModel
-from runtime.physical.signs import frame_origins
+from runtime.physical.inertia import INERTIAL, PhysicalModel, frame_origins
 from runtime.plausible.case import Case
 from runtime.plausible.causes import changed_unit
 from runtime.plausible.trials import reach
@@ -97,9 +96,10 @@ def positions(case: Case) -> Answer:
     text = case.reaching(largest, case.units, out)
     if not out.any():
         return Answer("good", text, "", limit)
-    turns = largest[turning]
+    turns, units = largest[turning], case.column_units.get("q", ())
     if (
         (out & turning).any()
+        and (not units or "rad" in units)
         and float(np.median(turns)) * np.pi / 180 < 2 * np.pi
         and float(turns.max()) > 2 * LIMIT.LARGEST_ANGLE[0]
     ):
@@ -108,7 +108,6 @@ def positions(case: Case) -> Answer:
             f"degrees read as rad? set record.units.q: deg{which}; or motor side read as joint side "
             "(record.side)"
         )
-        units = case.column_units.get("q", ())
         change = changed_unit("q", units, turning, ("rad",), "deg")
         return Answer("no", text, remedy, limit, change)
     return Answer("no" if far.any() else "doubtful", text, limit=limit)

@@ -30,8 +30,7 @@ from scipy.optimize import minimize_scalar
 
 from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel, drives_of
-from runtime.physical.inertia import INERTIAL, PhysicalModel, physical_model
-from runtime.physical.signs import frame_origins
+from runtime.physical.inertia import INERTIAL, PhysicalModel, frame_origins, physical_model
 from runtime.plausible.bodies import (
     Bodies,
     Fit,

@@ -15,10 +15,10 @@ import numpy as np
 
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.limits import LIMIT
-from runtime.core.markup import element, formula, number, symbol, unit
+from runtime.core.markup import element, formula, symbol, unit
 from runtime.core.model import GeneratedModel
 from runtime.core.result import Identification
-from runtime.core.table import Table, csv_text, interval
+from runtime.core.table import Table, csv_text, interval, number
 from runtime.reporting.page import Matrix, Section
 
 FILE_NOTE = (

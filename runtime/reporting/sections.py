@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from runtime.core.markup import number
 from runtime.core.part import Part
 from runtime.core.result import Identification
 from runtime.core.signals.decimation import CUTOFF
-from runtime.core.table import Table
+from runtime.core.table import Table, number
 from runtime.core.validation import JointComparison
 from runtime.reporting import figures as plots
 from runtime.reporting.page import Section

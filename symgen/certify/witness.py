@@ -14,9 +14,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -42,8 +42,7 @@ SPREADS = ((0.25, 0.3), (0.25, 0.0), (0.03, 0.03), (0.03, 0.0))  # of constants,
 RANDOM, OF_THE_FILE = "random constants", "the constants of the file"
 
 
-@dataclass(frozen=True)
-class Check:
+class Check(NamedTuple):
     """One test call of an emitted function: its arguments, and the result that it must return.
 
     Attributes
@@ -63,7 +62,7 @@ class Check:
     arguments: tuple[Array, ...]
     expected: Array
     scale: Array | float
-    keywords: Mapping[str, int] = field(default_factory=dict)
+    keywords: Mapping[str, int] = MappingProxyType({})
     compared: Callable[[Array], Array] = np.asarray
 
 
@@ -166,6 +165,11 @@ class Witness:
         return np.concatenate([base, self.model.poses(self.x)], axis=1)
 
     @cached_property
+    def jacobians(self) -> Array:
+        """Jacobians of all frames in frame 0, by the actuated joints, shape (N, frames, 6, n)."""
+        return self.model.jacobians(self.x) @ self.G[:, None]
+
+    @cached_property
     def tau(self) -> Array:
         """Torques Gamma of the actuated joints, shape (N, n)."""
         return np.asarray(self.D @ self.chi)
@@ -223,12 +227,11 @@ class Witness:
                 )
         whole, first = checks["forward_dynamics"]  # as good as A is regular: by its torque
         checks["forward_dynamics"] = [
-            replace(
-                whole,
+            whole._replace(
                 expected=self.tau,
                 compared=lambda qdd: _torque(A, qdd, H),
             ),
-            replace(first, expected=self.tau[0], compared=lambda qdd: _torque(A[0], qdd, H[0])),
+            first._replace(expected=self.tau[0], compared=lambda qdd: _torque(A[0], qdd, H[0])),
         ]
         if self.robot.passive:
             place = [self.robot.moving.index(j) for j in self.robot.passive]
@@ -258,8 +261,8 @@ class Witness:
             return np.concatenate([R @ twist[:, :3], R @ twist[:, 3:]], axis=1)
 
         def jacobian() -> Array:
-            J = self.model.jacobian(self.x, of) if of else np.zeros((N, 6, self.x.shape[1]))
-            return turned(J @ self.G)
+            still = np.zeros((N, 6, self.q.shape[1]))
+            return turned(self.jacobians[:, of - 1] if of else still)
 
         def acceleration(qdd: Array) -> Array:
             motion = self.model.motion(self.q, self.qd, qdd)[:3]

@@ -15,7 +15,6 @@ import typer
 from runtime.reporting.result_files import write_all
 from symgen.cli import options
 from symgen.cli.session import NEGATIVE, described_robot, fail, reported_errors
-from symgen.derive.models import OPTIONS
 from symgen.emit.targets import TARGETS
 
 
@@ -63,6 +62,8 @@ def generate(
     none.
     """
     with reported_errors():
+        from symgen.derive.models import OPTIONS
+
         targets = _among(TARGETS, "target", target)
         requested = _among(OPTIONS, "--with", with_) if with_ else ()
         modules = emitted(robots, targets, requested, at_values=at_values, exact=exact)

@@ -103,8 +103,10 @@ def inertia_of(torque: Callable[[Array], Array], q: Array) -> Array:
     Column i is torque(e_i) - torque(0) for the unit acceleration e_i; q only gives the shape of
     qdd.
     """
-    rest = torque(0 * q)
-    return np.stack([torque(0 * q + e) - rest for e in np.eye(q.shape[-1])], axis=-1)
+    n, samples = q.shape[-1], tuple(range(1, q.ndim))
+    units = np.eye(n + 1, n, -1)  # zero, then the unit accelerations
+    tau = torque(0 * q + np.expand_dims(units, samples))
+    return np.moveaxis(tau[1:] - tau[0], 0, -1)
 
 
 def newton(

@@ -14,8 +14,8 @@ some inputs replaced (`derive.rewrite`); the table of models (`derive.models`) d
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 from symgen.derive.closure import Closure
 from symgen.derive.composite import CompositeLinks
@@ -34,8 +34,7 @@ ABSORBED = ("YY", "MZ", "M")
 """Inertial parameters that base parameters take in: derived last, so they name no shared step."""
 
 
-@dataclass(frozen=True)
-class Derivation:
+class Derivation(NamedTuple):
     """The formulas of a robot (torques, regressor, inertia matrix, poses) as nodes of one graph.
 
     Models may later add nodes to this graph, but change none.

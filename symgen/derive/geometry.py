@@ -11,8 +11,8 @@ from the carrier in one step: from there are C23 and S23.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
+from typing import NamedTuple
 
 from symgen.derive.closure import Closure
 from symgen.derive.graph import Turn
@@ -29,8 +29,7 @@ from symgen.description.expression import Expression, call
 from symgen.description.robot import PRISMATIC, REVOLUTE, Frame, Robot
 
 
-@dataclass(frozen=True)
-class Rotation:
+class Rotation(NamedTuple):
     """The rotation iRj = A Rot(z, theta) of frame j in frame i, with a constant matrix A.
 
     Attributes
@@ -56,8 +55,7 @@ class Rotation:
         return array((self.c * u[0] + self.s * u[1], self.c * u[1] - self.s * u[0], u[2]))
 
 
-@dataclass(frozen=True)
-class Carrier:
+class Carrier(NamedTuple):
     """Frame m before a series of parallel joint axes up to frame j, and the rotation from m to j.
 
     All joint axes after frame m, up to joint j, are parallel, so that their angles add up.

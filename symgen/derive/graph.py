@@ -340,28 +340,31 @@ def interpret(
     known : {index of a node: its value}; the values that are computed here are added to this
     mapping.
     """
-    value: dict[int, Any] = {} if known is None else known
+    values: dict[int, Any] = {} if known is None else known
+    for node in reachable(outputs, values):
+        values[node.index] = value_of(node, domain, values)
+    return [s if isinstance(s, int) else _signed(s, values) for s in outputs]
 
-    def signed(s: Scalar | int) -> Any:
-        if isinstance(s, int):
-            return s
-        return value[s.node.index] if s.sign > 0 else -value[s.node.index]
 
-    for node in reachable(outputs, value):
-        x = [signed(operand) for operand in node.operands]
-        match node.op:
-            case "sym":
-                made = domain.symbol(node.value)
-            case "const":
-                made = domain.number(node.value)
-            case "add":
-                made = x[0] + x[1]
-            case "mul":
-                made = x[0] * x[1]
-            case _:
-                made = domain.function(node, x)
-        value[node.index] = made
-    return [signed(s) for s in outputs]
+def value_of(node: Node, domain: Domain, values: Mapping[int, Any] | Sequence[Any]) -> Any:
+    """Compute the value of one node; `values` has those of its operands, by their index."""
+    match node.op:
+        case "sym":
+            return domain.symbol(node.value)
+        case "const":
+            return domain.number(node.value)
+    x = [_signed(operand, values) for operand in node.operands]
+    match node.op:
+        case "add":
+            return x[0] + x[1]
+        case "mul":
+            return x[0] * x[1]
+    return domain.function(node, x)
+
+
+def _signed(s: Scalar, values: Mapping[int, Any] | Sequence[Any]) -> Any:
+    value = values[s.node.index]
+    return value if s.sign > 0 else -value
 
 
 def rates(

@@ -38,9 +38,9 @@ University, 1965.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -160,6 +160,11 @@ class Lagrange:
         self.robot, self.names = robot, robot.parameters
         self.constants = {**robot.constants, **(constants or {})}
         self._functions, self._values = _functions(robot), np.array([*self.constants.values(), 1.0])
+        self._elements = {
+            parameter(e.family, j): (e, *self._row_and_form(e, j))
+            for e in robot.elements
+            for j in e.keys
+        }
         start = robot.start
         self._home = (
             np.array([start[j] for j in robot.moving]) if set(robot.moving) <= set(start) else None
@@ -186,35 +191,27 @@ class Lagrange:
 
     def regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
         """Return the standard regressor D of Gamma = D chi, shape (..., n, p)."""
-        robot = self.robot
-        dT, ddT = (
-            self.slopes(q),
-            _matrices(self._floats("accelerations", q, qd, qdd))[..., 0, :, :, :],
-        )
-        g = np.array([e.value(self.constants) for e in robot.gravity] + [0.0])
+        robot, dT = self.robot, self.slopes(q)
+        ddT = _matrices(self._floats("accelerations", q, qd, qdd))
+        ddT[..., :3, 3] -= [e.value(self.constants) for e in robot.gravity]
+        products = np.swapaxes(dT, -1, -2) @ ddT
+        by_link = products.reshape(*products.shape[:-2], 16) @ LINK.reshape(-1, 16).T
         column = {name: k for k, name in enumerate(self.names)}
-        D = np.zeros((*dT.shape[:-3], len(self.names)))
+        D = np.zeros((*by_link.shape[:-2], len(self.names)))
         for j in robot.links:
-            slope, first = dT[..., j - 1, :, :], column[parameter(INERTIAL[0], j)]
-            inertia = np.einsum("...iab,...ac->...ibc", slope, ddT[..., j - 1, :, :])
-            D[..., first : first + len(INERTIAL)] = np.einsum("...ibc,sbc->...is", inertia, LINK)
-            D[..., first : first + len(INERTIAL)] -= np.einsum(
-                "a,...iab,sb->...is", g, slope, LINK[:, :, 3]
-            )
-        for e in robot.elements:
-            for j in e.keys:
-                D[..., column[parameter(e.family, j)]] = self._element(e, j, q, qd, qdd)
+            first = column[parameter(INERTIAL[0], j)]
+            D[..., first : first + len(INERTIAL)] = by_link[..., j - 1, :]
+        for name in self._elements:
+            D[..., column[name]] = self._element(name, q, qd, qdd)
         return D
 
-    def _element(self, e: Element, j: int, q: Array, qd: Array, qdd: Array) -> Array:
+    def _element(self, name: str, q: Array, qd: Array, qdd: Array) -> Array:
         """Return the joint torques, shape (..., n), of an element (friction, spring, ...) whose
-        parameter is 1.
-
-        j is the number in the name of the parameter, for instance 2 for FV2.
+        parameter `name`, such as FV2, is 1.
         """
+        e, G, B = self._elements[name]
         if e.is_own:
-            return np.asarray(self._floats(parameter(e.family, j), q, qd)[..., 0])
-        G, B = self._row(e, j), self._form(e, j)
+            return np.asarray(self._floats(name, q, qd)[..., 0])
         if e.kind in ("inertia", "stiffness"):
             return np.asarray({"inertia": qdd, "stiffness": q}[e.kind] @ B)
         if e.kind == "offset":
@@ -223,29 +220,22 @@ class Lagrange:
         force = np.asarray(qd @ B if e.kind == "viscous" else np.sign(sd) * G)
         return force if e.when is None else force * (sd > 0 if e.when == "positive" else sd < 0)
 
-    def _row(self, e: Element, j: int) -> Array:
+    def _row_and_form(self, e: Element, j: int) -> tuple[Array, Array]:
         """Return the coefficients G, shape (n,), of the motion s = G q on which an element
-        (friction, spring, ...) acts.
-
-        j is the number in the name of the element parameter.
-        """
-        G = np.zeros(len(self.robot.moving))
-        for i, x in e.along.get(j, {}).items():
-            G[self.robot.moving.index(i)] = x.value(self.constants)
-        return G
-
-    def _form(self, e: Element, j: int) -> Array:
-        """Return the matrix B of an element with parameter c: torque c B q of a spring, c B qd of
-        viscous friction, c B qdd of an inertia.
+        (friction, spring, ...) acts, and the matrix B of an element with parameter c: torque c B q
+        of a spring, c B qd of viscous friction, c B qdd of an inertia.
 
         B has shape (n, n). It is G'G if the element acts along a row G. j is the number in the name
         of the parameter c, for instance 2 for FV2.
         """
-        G, moving = self._row(e, j), self.robot.moving
+        moving = self.robot.moving
+        G = np.zeros(len(moving))
+        for i, x in e.along.get(j, {}).items():
+            G[moving.index(i)] = x.value(self.constants)
         B = np.outer(G, G)
         for (i, l), x in e.form.get(j, {}).items():
             B[moving.index(i), moving.index(l)] = x.value(self.constants)
-        return B
+        return G, B
 
     def torque(self, q: Array, qd: Array, qdd: Array, chi: Array) -> Array:
         """Return the joint torques Gamma = D chi, shape (..., n)."""
@@ -264,10 +254,13 @@ class Lagrange:
         Rows 1 to 3 are the velocity of the origin, rows 4 to 6 the angular velocity w from
         hat(w) = Rdot R'.
         """
-        j = frame or self.robot.frames[-1].j
-        slope, R = self.slopes(q)[..., j - 1, :3, :], self.poses(q)[..., j - 1, :3, :3]
-        W = slope[..., :3] @ np.swapaxes(R, -1, -2)[..., None, :, :]
-        return np.swapaxes(np.concatenate([slope[..., 3], _axial(W)], axis=-1), -1, -2)
+        return self.jacobians(q)[..., (frame or self.robot.frames[-1].j) - 1, :, :]
+
+    def jacobians(self, q: Array) -> Array:
+        """Return the Jacobians of all frames in frame 0, shape (..., frames, 6, n)."""
+        slopes, R = self.slopes(q)[..., :3, :], self.poses(q)[..., :3, :3]
+        W = slopes[..., :3] @ np.swapaxes(R, -1, -2)[..., None, :, :, :]
+        return np.moveaxis(np.concatenate([slopes[..., 3], _axial(W)], axis=-1), -3, -1)
 
     def acceleration(self, q: Array, qd: Array, qdd: Array, frame: int) -> Array:
         """Return the linear and angular acceleration of a frame, in frame 0, shape (..., 6).
@@ -313,16 +306,13 @@ class Lagrange:
         for j in self.robot.links:
             first = np.array([value[parameter(name, j)] for name in ("MX", "MY", "MZ", "M")])
             U -= T[..., j - 1, :, :] @ first @ g
-        for e in self.robot.elements:
-            for j in e.keys:
-                if e.kind == "offset":
-                    U += value[parameter(e.family, j)] * (q @ self._row(e, j))
-                elif e.kind == "stiffness":
-                    Bq = q @ self._form(e, j) * q / 2
-                    U += value[parameter(e.family, j)] * Bq.sum(axis=-1)
-                elif e.energy is not None:
-                    own = self._floats(f"U_{parameter(e.family, j)}", q)[..., 0, 0]
-                    U += value[parameter(e.family, j)] * own
+        for name, (e, G, B) in self._elements.items():
+            if e.kind == "offset":
+                U += value[name] * (q @ G)
+            elif e.kind == "stiffness":
+                U += value[name] * (q @ B * q / 2).sum(axis=-1)
+            elif e.energy is not None:
+                U += value[name] * self._floats(f"U_{name}", q)[..., 0, 0]
         return U
 
     def motion(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array, Array]:
@@ -511,8 +501,7 @@ def _symbolic(e: Expression, q: Mapping[str, SX], constants: Mapping[str, SX]) -
     return ca.SX(e.evaluate(values.__getitem__, function, float))
 
 
-@dataclass(frozen=True)
-class Sample:
+class Sample(NamedTuple):
     """Random states of a robot, and its standard regressor at these states.
 
     Attributes

@@ -8,7 +8,8 @@ table of all models is `derive.models`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import NamedTuple
 
 from symgen.derive.derivation import Derivation
 from symgen.derive.graph import Scalar, Symbol
@@ -23,8 +24,7 @@ LOOP_RESIDUALS = 6  # of a loop: three of position, three of orientation
 TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")  # of an origin, and the angular velocity
 
 
-@dataclass(frozen=True)
-class Request:
+class Request(NamedTuple):
     """The choices of a user for one model: its parameters, its frames, and values of inputs.
 
     Attributes
@@ -40,11 +40,10 @@ class Request:
     parameters: Mapping[str, str]
     of: int = 0
     frame: int = 0
-    inputs: Inputs = field(default_factory=dict)
+    inputs: Inputs = MappingProxyType({})
 
 
-@dataclass(frozen=True)
-class Entry:
+class Entry(NamedTuple):
     """One entry of a model array, such as A or Gamma: its index, value, heading and comment."""
 
     place: Place
@@ -53,8 +52,7 @@ class Entry:
     comment: str = ""
 
 
-@dataclass(frozen=True)
-class Case:
+class Case(NamedTuple):
     """Entries of a model that are derived with the same values of some inputs, for instance qdd =
     0.
 
@@ -62,12 +60,11 @@ class Case:
     """
 
     entries: Sequence[Entry]
-    inputs: Inputs = field(default_factory=dict)
+    inputs: Inputs = MappingProxyType({})
     tag: str = ""
 
 
-@dataclass(frozen=True)
-class Values:
+class Values(NamedTuple):
     """The entries of one model, as nodes of a graph made for this model."""
 
     entries: tuple[Entry, ...]
@@ -78,8 +75,7 @@ class Values:
         return [entry.value for entry in self.entries]
 
 
-@dataclass(frozen=True)
-class Model:
+class Model(NamedTuple):
     """One model of a robot, such as the inertia matrix: its name, arguments, shape and formulas.
 
     Attributes

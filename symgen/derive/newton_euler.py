@@ -18,7 +18,7 @@ Robots, 2002, ch. 9.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from symgen.derive.geometry import Geometry
 from symgen.derive.scalar import (
@@ -40,8 +40,7 @@ ZERO33 = array((ZERO3, ZERO3, ZERO3))
 TWO = Expression.number(2)
 
 
-@dataclass(frozen=True)
-class LinkMotion:
+class LinkMotion(NamedTuple):
     """Velocities and accelerations of one link, in its frame.
 
     Attributes
@@ -102,7 +101,7 @@ class Motion:
     def _base(self) -> LinkMotion:
         """Return the motion of the base: at rest, but accelerated by minus gravity."""
         x, y, z = (self.algebra.gravity(axis) for axis in range(3))
-        return REST if is_zero((x, y, z)) else replace(REST, a=array((x, y, z)))
+        return REST if is_zero((x, y, z)) else REST._replace(a=array((x, y, z)))
 
     def q(self, j: int) -> Scalar:
         """Return the position of any moving joint j."""

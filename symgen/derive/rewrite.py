@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
+from functools import lru_cache
 from itertools import product
 from typing import Any
 
@@ -29,14 +30,16 @@ from symgen.derive.graph import (
     Node,
     Scalar,
     Symbol,
-    interpret,
     reachable,
+    value_of,
 )
 from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.names import families_of
 from symgen.description.expression import FUNCTIONS, Expression
+from symgen.description.robot import Robot
 
 SAMPLES = 3
+NUMBERS = ((0,) * SAMPLES, (1,) * SAMPLES)  # the values of 0 and 1
 RECURSIVE = {"W", "WP", "DV", "DW", "U", "VSP", "VP"}
 """Families whose line is their definition in the recursion, or absent."""
 
@@ -52,6 +55,11 @@ class ByNode(Draw):
 
     def forward(self, node: Node, rate: Fp) -> Fp:
         return self._opaque(SIGN, [rate])
+
+
+@lru_cache(maxsize=8)
+def _draw(robot: Robot) -> ByNode:
+    return ByNode(robot, 7, SAMPLES)
 
 
 class Rewrite:
@@ -72,8 +80,8 @@ class Rewrite:
         self.algebra = GraphAlgebra(source.robot, written=False)
         self.algebra.labels |= source.labels  # one name, one angle, here as there
         self.graph = self.algebra.graph
-        self.draw = ByNode(source.robot, 7, SAMPLES)
-        self._value: dict[int, Any] = {}  # of the nodes of self.graph, over F_p
+        self.draw = _draw(source.robot)
+        self._values: list[Any] = []  # of the nodes of self.graph, over F_p
         self._first: dict[tuple[int, ...], Scalar] = {}  # by value
         self._same: dict[int, Scalar | int] = {}  # of a node: the first one of the same value
         self._image: dict[int, Scalar | int] = {}
@@ -97,8 +105,8 @@ class Rewrite:
         for node in reachable(outputs):
             while headings and headings[0][0] <= node.index:
                 self.algebra.section(headings.pop(0)[1])
-            if node.value in self._case or any(
-                x.node.index in self._replaced for x in node.operands
+            if inputs and (
+                node.value in inputs or any(x.node.index in self._replaced for x in node.operands)
             ):
                 self._replaced.add(node.index)
             if node.index not in self._image:
@@ -200,16 +208,18 @@ class Rewrite:
 
     def _first_of(self, node: Node) -> Scalar | int:
         """Return 0, 1 or -1 if the node has this value, else the first node of equal value."""
+        for new in self.graph.nodes[len(self._values) :]:
+            self._values.append(value_of(new, self.draw, self._values))
         p = self.draw.p
-        (value,) = interpret([self.graph.scalar(node.index, 1)], self.draw, self._value)
-        residues = self.draw.residues(value).tolist()
-        residues = residues if len(residues) == SAMPLES else residues * SAMPLES
-        number = {0: 0, 1: 1, p - 1: -1}.get(residues[0])
-        if number is not None and len({*residues}) == 1 and node.op != CONST:
-            return number
+        residues = tuple(self.draw.residues(self._values[node.index]).tolist())
+        if len(residues) < SAMPLES:
+            residues *= SAMPLES
         sign = -1 if residues[0] > p // 2 else 1
-        key = tuple(sign * x % p for x in residues)
-        first = self._first.setdefault(key, self.graph.scalar(node.index, sign))
+        if sign < 0:
+            residues = tuple(-x % p for x in residues)
+        if residues in NUMBERS and node.op != CONST:
+            return sign if residues[0] else 0
+        first = self._first.setdefault(residues, Scalar(self.graph, node, sign))
         return first if sign > 0 else -first
 
 

@@ -10,14 +10,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from fractions import Fraction
 from functools import partial
-from typing import TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from symgen.description.expression import PI, Expression, twelfths
 from symgen.description.parts import ANGLES, GEOMETRY
-from symgen.description.robot import PRISMATIC, REVOLUTE, Frame, Robot
+from symgen.description.robot import PRISMATIC, REVOLUTE, Element, Frame, Robot
 from symgen.errors import DescriptionError
 
 K = TypeVar("K")
+Item = TypeVar("Item", Frame, Element, Robot)
 Change: TypeAlias = Callable[[Expression], Expression]
 WITHIN = 1e-6  # rad, of a multiple of pi/12: rounding of 1.570796
 
@@ -96,20 +97,25 @@ def mapped(robot: Robot, length: Change, angle: Change = lambda e: e) -> Robot:
 
     def frame(f: Frame) -> Frame:
         changes = {name: angle if name in ANGLES else length for name in GEOMETRY}
-        fields = {name: change(getattr(f, name)) for name, change in changes.items()}
-        return replace(f, **fields)  # type: ignore[arg-type]
+        return _with(f, **{name: change(getattr(f, name)) for name, change in changes.items()})
 
     x, y, z = map(length, robot.gravity)
-    return replace(
+    return _with(
         robot,
         frames=tuple(map(frame, robot.frames)),
         gravity=(x, y, z),
-        elements=tuple(replace(e, along=rows(e.along), form=rows(e.form)) for e in robot.elements),
+        elements=tuple(_with(e, along=rows(e.along), form=rows(e.form)) for e in robot.elements),
         constraints={
             j: (length if robot.frame(j).sigma == PRISMATIC else angle)(e)
             for j, e in robot.constraints.items()
         },
     )
+
+
+def _with(item: Item, **fields: Any) -> Item:
+    """Return the item with these fields: itself if it has them, else a copy, which is checked."""
+    same = all(getattr(item, name) == value for name, value in fields.items())
+    return item if same else replace(item, **fields)
 
 
 def _numbers(robot: Robot) -> dict[str, Expression]:

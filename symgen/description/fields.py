@@ -32,6 +32,7 @@ from symgen.errors import DescriptionError, ExpressionError, SymgenError
 
 Path = tuple[str | int, ...]  # keys that lead to a field of a robot file
 Problem = tuple[object, str, Path]  # whether a field is wrong, the message, and the field
+LARGEST = 1e60  # number that expressions may have
 CONFIG = ConfigDict(extra="forbid", arbitrary_types_allowed=True, defer_build=True)
 
 
@@ -154,6 +155,8 @@ def _expression(names: str, value: Any, info: ValidationInfo) -> Expression:
 
 
 def _number(value: Any) -> float:
+    if isinstance(value, float) and 1 / LARGEST <= abs(value) <= LARGEST:
+        return value
     text = _text(value)
     try:
         number = float(parse(text, ()))

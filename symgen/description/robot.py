@@ -339,7 +339,7 @@ class Robot:
         """Names of the parameters whose laws contain a channel (a function of time, such as
         temperature), by channel.
         """
-        read = [(c, parameter(e.family, j)) for e in self.elements for j in e.keys
+        read = [(c, parameter(e.family, j)) for e in self.elements if e.is_own for j in e.keys
                 for c in e.channels(j)]  # fmt: skip
         return {c: tuple(name for own, name in read if own == c) for c, _ in read}
 

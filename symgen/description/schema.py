@@ -20,6 +20,7 @@ from symgen.description.robot import Robot
 from symgen.errors import DescriptionError, SymgenError
 
 SCHEMA = 1  # version of the robot file
+READER = TypeAdapter(Robot)  # its validators are built when the first file is read
 CONVENTIONS = {
     "proximal": "Khalil and Kleinfinger",
     "distal": "classic DH, with its a as d and its d as r",
@@ -58,7 +59,7 @@ def robot_of(data: Mapping[str, Any], file: str, sha256: str) -> Robot:
     data = {"distal": Given(len(rows) * distal), **data}
     declared = Declared(frozenset(constants), frozenset(joints.union(constants)), len(rows), distal)
     try:
-        robot = TypeAdapter(Robot).validate_python(data, context=declared)
+        robot = READER.validate_python(data, context=declared)
         if distal and robot.values:
             from symgen.description.distal_values import khalil_values
 
@@ -94,7 +95,7 @@ def _with_columns(data: dict[str, Any]) -> dict[str, Any]:
 @cache
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of robot files, by which editors check and complete a file."""
-    schema = TypeAdapter(Robot).json_schema()
+    schema = READER.json_schema()
     version = {"description": "schema version", "title": "Symgen", "type": "integer"}
     convention = {
         "default": "proximal",

@@ -6,7 +6,7 @@ For each function: its arguments, its lines, and the entries of its result.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from symgen.derive.graph import SYM, Node, Scalar
 from symgen.derive.model import Entry
@@ -15,8 +15,7 @@ from symgen.emit.printers import Language, Section, Text, under_titles
 from symgen.emit.spec import STATES, Function, ModuleSpec
 
 
-@dataclass(frozen=True)
-class Block:
+class Block(NamedTuple):
     """One function, such as the inverse dynamics, as source text: arguments, lines, result array.
 
     Attributes

@@ -19,11 +19,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 from math import prod
-from typing import Any
+from typing import Any, NamedTuple
 
 from symgen.derive.graph import CONST, COS, SIN, SYM, Node, Scalar, reachable
 from symgen.derive.loop_equations import loop_system
@@ -138,8 +137,7 @@ def _needed(outputs: Iterable[Node]) -> Iterator[int]:
 # --- arguments: one pointer for each of q, qd, qdd, or one struct with all of them ---
 
 
-@dataclass(frozen=True)
-class CStates:
+class CStates(NamedTuple):
     """The arguments by which the C functions of one robot receive the joint states q, qd, ...
 
     Attributes
@@ -196,8 +194,7 @@ class CStates:
 Titled = tuple[str, Sequence[str]]  # lines that belong together, under a title
 
 
-@dataclass(frozen=True)
-class Part:
+class Part(NamedTuple):
     """One part of a long C function body: its lines, and the names that occur in these lines."""
 
     sections: tuple[Section, ...]
@@ -540,7 +537,7 @@ def _signals(
             distinct.append(entry)
         elif entry.comment:
             comment = f"{distinct[signal].comment}, {entry.comment}".removeprefix(", ")
-            distinct[signal] = replace(distinct[signal], comment=comment)
+            distinct[signal] = distinct[signal]._replace(comment=comment)
         places += [(place, signal, own * sign) for place in f.places(entry)]
     return distinct, places
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from symgen.description.robot import Robot
 from symgen.emit import c_target, python_target
@@ -14,8 +14,7 @@ from symgen.emit.targets import TARGETS
 from symgen.regroup.regrouping import Regrouping
 
 
-@dataclass(frozen=True)
-class Emitter:
+class Emitter(NamedTuple):
     """Code generator for one kind of file, such as C: its language and its writing function."""
 
     language: Language

@@ -13,12 +13,12 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 from itertools import count, groupby
 from operator import itemgetter
 from string import ascii_lowercase
+from typing import NamedTuple
 
 from symgen.derive.graph import (
     ADD,
@@ -43,8 +43,7 @@ def number(c: Fraction) -> str:
     return str(c.numerator) if c.denominator == 1 and abs(c) < 2**53 else repr(float(c))
 
 
-@dataclass(frozen=True)
-class Language:
+class Language(NamedTuple):
     """Rules by which a programming language writes operations, assignments and comments.
 
     Attributes
@@ -110,8 +109,7 @@ PLAIN = Language(
 """The grammar of robot files, numbers exact."""
 
 
-@dataclass(frozen=True)
-class Section:
+class Section(NamedTuple):
     """A heading in source text, and the lines under it."""
 
     title: str

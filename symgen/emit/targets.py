@@ -5,11 +5,10 @@ Nothing is derived or printed here, so that the import of this module is fast.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class Target:
+class Target(NamedTuple):
     """One kind of file that the code generator can write, such as a NumPy module or a C file.
 
     Attributes

@@ -15,7 +15,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -44,8 +44,7 @@ from symgen.time_limit import limited
 Signed = tuple[bool, str]  # whether a term is added, and the term
 
 
-@dataclass(frozen=True)
-class Formula:
+class Formula(NamedTuple):
     """A sum of parameters with coefficients, sum_k c_k chi_k.
 
     Attributes

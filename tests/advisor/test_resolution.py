@@ -16,11 +16,10 @@ from runtime.advisor.advisor import ALL, Predictor, torque_sigma
 from runtime.advisor.position_errors import perturbation
 from runtime.advisor.sign_errors import kernels, switch_with_error
 from runtime.compose import advise, observe
-from runtime.core.bound import BoundModel
 from runtime.core.drives import encoder_drives
 from runtime.core.errors import InputError, ModelError, SettingsError
 from runtime.core.limits import LIMIT
-from runtime.core.model import load_model
+from runtime.core.model import BoundModel, load_model
 from runtime.core.record import Record
 from runtime.core.rows.prepared import decimated_torque
 from runtime.core.rows.switches import Switch, switches

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -70,6 +69,6 @@ def test_formulas_that_are_numbers_are_checked_at_the_constants_of_the_file(tmp_
 def test_every_model_of_the_targets_has_a_witness(monkeypatch: pytest.MonkeyPatch) -> None:
     regrouping = regroup(load_robot("planar_2r"))
     assert {*EMITTED} <= {*Witness(regrouping).checks}
-    monkeypatch.setitem(EMITTED, "new", replace(EMITTED["bias"], name="new"))
+    monkeypatch.setitem(EMITTED, "new", EMITTED["bias"]._replace(name="new"))
     with pytest.raises(KeyError, match="new"):
         _ = Witness(regrouping).checks

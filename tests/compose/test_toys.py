@@ -11,15 +11,14 @@ from features import arm, record
 from typer.testing import CliRunner
 
 from runtime import compose
-from runtime.core import gone
+from runtime.core import settings_errors
 from runtime.core.errors import SettingsError
 from runtime.core.least_squares.linear import ordinary
 from runtime.core.least_squares.method import Beginning, Fitted, Method
 from runtime.core.problem import Note, Problem
 from runtime.core.record import Record
 from runtime.core.settings import Count, Positive, Settings
-from runtime.core.signals.filters import States
-from runtime.core.signals.states import SignalReader, lowpassed
+from runtime.core.signals.filters import SignalReader, States, lowpassed
 from runtime.core.study import Signals
 from runtime.reading import formats
 from runtime.reading.formats import Format
@@ -204,7 +203,7 @@ def test_a_format_is_one_line_of_a_list(tmp_path, log, monkeypatch):
 def test_a_method_that_went_is_told_from_one_that_is_unknown(
     tmp_path, log, monkeypatch, name, said
 ):
-    monkeypatch.setattr(gone, "WENT", {"estimate.method: magic": "use ols"})
+    monkeypatch.setattr(settings_errors, "WENT", {"estimate.method: magic": "use ols"})
     done, _ = identified(tmp_path, f"estimate: {{method: {name}}}\n")
     assert done.exit_code == 2
     assert f"study.yaml, line 3: estimate.method: {said}" in done.stderr

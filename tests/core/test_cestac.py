@@ -19,7 +19,8 @@ from runtime.core.cestac.runs import Level, Run, Runs
 from runtime.core.drives import Drives
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.rows.observation import Observation
-from runtime.core.rows.prepared import decimated_torque, observation_from_states
+from runtime.core.rows.prepared import decimated_torque, observation_of
+from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import select_rows
 from runtime.core.signals.filters import filtered_states
 from runtime.core.study import CestacSettings, EstimateSettings, Lowpass, Signals
@@ -64,8 +65,8 @@ def test_one_run_is_equations_15_to_17(small):
     states = filtered_states(RECORD.q + 2e-3 * noise, 1000.0, SIGNALS)
     clean = filtered_states(RECORD.q, 1000.0, SIGNALS)
     selection = select_rows(RECORD, clean.qd, SIGNALS, Study().rows)
-    seen = observation_from_states(
-        planar, states, decimated_torque(RECORD.tau, selection), selection
+    seen = observation_of(
+        Columns(planar), states, decimated_torque(RECORD.tau, selection), selection
     )
     X, *_ = np.linalg.lstsq(seen.W, seen.Y, rcond=None)
     run = small.levels[1].runs[2]
@@ -81,8 +82,8 @@ def test_statistics_are_equations_18_to_22(small):
     sigma = np.sqrt(sum((X - mean) ** 2) / 2)
     clean = filtered_states(RECORD.q, 1000.0, SIGNALS)
     selection = select_rows(RECORD, clean.qd, SIGNALS, Study().rows)
-    seen = observation_from_states(
-        planar, clean, decimated_torque(RECORD.tau, selection), selection
+    seen = observation_of(
+        Columns(planar), clean, decimated_torque(RECORD.tau, selection), selection
     )
     rho_ls, rho = (np.linalg.norm(seen.Y - seen.W @ x) for x in (X_ls, mean))
     own = np.mean([run.residual_norm for run in result.runs])
@@ -126,8 +127,8 @@ def test_common_random_numbers_are_filtered_once_for_all_steps():
     selection = select_rows(RECORD, clean.qd, SIGNALS, Study().rows)
     for level in found.levels:
         q = perturbed_position(RECORD.q, level.level, common.cestac, drives, (2,))
-        seen = observation_from_states(
-            planar,
+        seen = observation_of(
+            Columns(planar),
             filtered_states(q, 1000.0, SIGNALS),
             decimated_torque(RECORD.tau, selection),
             selection,

@@ -96,7 +96,7 @@ def test_work_is_done_once(model, monkeypatch):
     coupled = SimpleNamespace(**{**vars(model), "DRIVES": drives, "regressor": regressor})
     keep = {"filtered_states": filtered, "factor": factored}
     for place in (
-        "runtime.core.signals.states.filtered_states",
+        "runtime.core.signals.filters.filtered_states",
         "runtime.core.rows.observation.factor",
     ):
         calls, real = keep[place.rpartition(".")[2]], pydoc.locate(place)
@@ -124,13 +124,13 @@ def test_a_record_is_filtered_once_for_all_checks(model, monkeypatch):
     """Identification, plausibility, delay, friction, and the advice on encoders share what the
     filters of the study made of the record; none is filtered twice by the same settings.
     """
-    passes, real = [], runtime.core.signals.states.filtered_states
+    passes, real = [], runtime.core.signals.filters.filtered_states
 
     def counted(q, rate, signals, v=None):
         passes.append((signals.median, signals.lowpass))
         return real(q, rate, signals, v)
 
-    monkeypatch.setattr("runtime.core.signals.states.filtered_states", counted)
+    monkeypatch.setattr("runtime.core.signals.filters.filtered_states", counted)
     lowpass = Lowpass(cutoff=5)
     study = replace(STUDY, signals=Signals(median=1, lowpass=lowpass))
     result = assess(model, measured(model, 0), study)

@@ -16,13 +16,13 @@ from planar_data import TRUE, motion
 
 from runtime import Record, estimate, load_model, observe
 from runtime.compose import estimate_of, problem
-from runtime.core.bound import BoundModel
 from runtime.core.errors import InputError
 from runtime.core.essential import essential_of
+from runtime.core.model import BoundModel
 from runtime.core.record import Origin
 from runtime.core.rows.factor import factor
 from runtime.core.rows.observation import stack
-from runtime.core.rows.prepared import decimated_torque, observation_from_states
+from runtime.core.rows.prepared import decimated_torque, observation_of
 from runtime.core.rows.regressor import Columns, distinct_entries
 from runtime.core.rows.selection import select_rows
 from runtime.core.signals.filters import States, decimated, decimation_plan, filtered_states
@@ -211,7 +211,9 @@ def test_mask_of_samples_and_joints(record):
 
     def masked(keep, sections):
         reading = problem(planar, record, study(**sections)).prepared[0]
-        return replace(reading, keep=keep).observation(planar)
+        s, qd = reading.study, reading.states.qd
+        selected = select_rows(reading.record, qd, s.signals, s.rows, keep=keep)
+        return replace(reading, selected=selected).observation(planar)
 
     o = masked(keep, {"rows": {"trim": 0}})
     assert o.dropped["mask"] == (0, 375) and o.t[o.joint(1)].min() == pytest.approx(3.0)
@@ -240,12 +242,12 @@ def test_steps_of_a_resolution_study(record):
     selection = select_rows(record, states.qd, s.signals, s.rows)
     torque = decimated_torque(record.tau, selection)
     whole = observe(planar, record, s)
-    same = observation_from_states(planar, states, torque, selection, files=record.files)
+    same = observation_of(Columns(planar), states, torque, selection, files=record.files)
     np.testing.assert_array_equal(same.W, whole.W)
     np.testing.assert_array_equal(same.Y, whole.Y)
     noise = 1e-3 * np.random.default_rng(1).choice([-1, 1], size=record.q.shape)
-    noisy = observation_from_states(
-        planar, filtered_states(record.q + noise, RATE, s.signals), torque, selection
+    noisy = observation_of(
+        Columns(planar), filtered_states(record.q + noise, RATE, s.signals), torque, selection
     )
     np.testing.assert_array_equal(noisy.Y, whole.Y)
     assert noisy.rows == whole.rows and not np.allclose(noisy.W, whole.W, atol=1e-6)

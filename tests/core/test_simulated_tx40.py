@@ -17,7 +17,8 @@ from campaign import campaign
 from runtime.compose import estimate_of
 from runtime.core.model import load_model
 from runtime.core.record import Record
-from runtime.core.rows.prepared import decimated_torque, observation_from_states
+from runtime.core.rows.prepared import decimated_torque, observation_of
+from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import select_rows
 from runtime.core.signals.filters import States
 from runtime.core.study import EstimateSettings
@@ -62,7 +63,7 @@ def clean(tx40, states, truth):
     return (
         tau,
         selection,
-        observation_from_states(tx40, states, decimated_torque(tau, selection), selection),
+        observation_of(Columns(tx40), states, decimated_torque(tau, selection), selection),
     )
 
 

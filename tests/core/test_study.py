@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from runtime.compose import METHODS, complete_study
-from runtime.core import gone
-from runtime.core.arithmetic import number
+from runtime.core import settings_errors
 from runtime.core.errors import InputError, SettingsError
-from runtime.core.gone import WENT
-from runtime.core.settings import to_mapping
+from runtime.core.settings import number, to_mapping
+from runtime.core.settings_errors import WENT
 from runtime.core.study import CestacSettings, Lowpass, Signals
 from runtime.reading.datasets import DATASETS, dataset_study
 from runtime.study import Rows, Study, load_study, study_from_mapping, study_from_text, study_of
@@ -200,7 +199,7 @@ def test_a_setting_that_went_names_what_to_use_instead():
 )
 def test_what_went_is_told_from_what_is_unknown(monkeypatch, text, said):
     went = {"old": "read whole", "record.old": "by name"}
-    monkeypatch.setattr(gone, "WENT", went)
+    monkeypatch.setattr(settings_errors, "WENT", went)
     with pytest.raises(SettingsError, match=re.escape(said)):
         study_from_text(text)
 

@@ -12,7 +12,8 @@ from runtime.compose import cestac
 from runtime.core.cestac.rounding import rounded, stream
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.record import Record
-from runtime.core.rows.prepared import decimated_torque, observation_from_states
+from runtime.core.rows.prepared import decimated_torque, observation_of
+from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import select_rows
 from runtime.core.signals.filters import filtered_states
 from runtime.core.study import CestacSettings, Lowpass, Signals
@@ -50,8 +51,8 @@ def test_a_run_reads_the_counts_of_its_draw():
     selection = select_rows(
         RECORD, filtered_states(RECORD.q, RECORD.rate, SIGNALS).qd, SIGNALS, Rows(trim=20)
     )
-    seen = observation_from_states(
-        planar, states, decimated_torque(RECORD.tau, selection), selection, columns=found.names
+    seen = observation_of(
+        Columns(planar, found.names), states, decimated_torque(RECORD.tau, selection), selection
     )
     X, *_ = np.linalg.lstsq(seen.W, seen.Y, rcond=None)
     assert np.allclose(found.levels[0].runs[1].X, X, rtol=1e-8)

@@ -20,7 +20,8 @@ from runtime.compose import observe, problem
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.model import drives_of
 from runtime.core.record import Record
-from runtime.core.rows.prepared import decimated_torque, observation_from_states
+from runtime.core.rows.prepared import decimated_torque, observation_of
+from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import UNCERTAIN, certain_rows, select_rows
 from runtime.core.signals.filters import filtered_states
 from runtime.core.study import CestacSettings, Lowpass, Signals
@@ -522,8 +523,11 @@ def test_measured_record_at_a_coarse_step(tx40_data):
 
     def fitted(states, keep=None):
         selection = select_rows(full, states.qd, study.signals, study.rows, keep=keep)
-        rows = observation_from_states(
-            model, replace(states, errors=None), decimated_torque(full.tau, selection), selection
+        rows = observation_of(
+            Columns(model),
+            replace(states, errors=None),
+            decimated_torque(full.tau, selection),
+            selection,
         )
         X, *_ = np.linalg.lstsq(rows.W / np.linalg.norm(rows.W, axis=0), rows.Y, rcond=None)
         return (X / np.linalg.norm(rows.W, axis=0))[

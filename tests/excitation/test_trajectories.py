@@ -8,8 +8,16 @@ import pytest
 
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.settings import structure
-from runtime.loop.families import AnyFamily, Fourier, PointToPoint, Sinusoids, Triangular
-from runtime.loop.trajectories import Motion, Part, motion_from_mapping
+from runtime.loop.trajectories import (
+    AnyFamily,
+    Fourier,
+    Motion,
+    Part,
+    PointToPoint,
+    Sinusoids,
+    Triangular,
+    motion_from_mapping,
+)
 
 EVERY = [
     Fourier(4.0, 3, 2),

@@ -14,7 +14,7 @@ from runtime import InputError, Record, observe
 from runtime.compose import estimate_of, problem
 from runtime.core.model import load_model
 from runtime.core.residuals import correlation_time, residual_correlation
-from runtime.friction.curves import Friction, friction_curves, friction_figure, own_friction
+from runtime.friction import Friction, friction_curves, friction_figure, own_friction
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.reporting import figures as plots

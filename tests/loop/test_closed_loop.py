@@ -487,7 +487,7 @@ def test_a_fit_survives_a_validation_that_fails(arm, clean, monkeypatch):
     own = replace(study, estimate=EstimateSettings("didim"))
     kept = tuple(name for name in model.BASE_PARAMETERS if name not in ("ZZ1R", "ZZ2"))
     monkeypatch.setattr(
-        "runtime.core.fits.essential_of",
+        "runtime.core.parameter_sets.essential_of",
         lambda *given, **named: replace(essential_of(*given, **named), names=kept),
     )
     result = identify(model, record, own, simulator=simulator)

@@ -14,8 +14,7 @@ from test_payload import STUDY as PAYLOAD_STUDY
 
 from runtime import InputError, load_model
 from runtime.core.errors import SettingsError
-from runtime.payload.load import payload
-from runtime.payload.mount import load_effect, load_of_body, mount, ten_parameters
+from runtime.payload.load import load_effect, load_of_body, mount, payload, ten_parameters
 from runtime.physical.inertia import INERTIAL, physical_model, pseudo_inertia
 from runtime.study import PayloadSettings
 from symgen.description import load_robot, parse, parse_robot

@@ -4,6 +4,7 @@ physical robots, and the TX40 record.
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,12 +17,12 @@ import symgen
 from oracles.pinocchio_model import PinocchioModel
 from runtime import InputError, observe
 from runtime.compose import estimate_of, state_problem
+from runtime.core.checklist import negative_elements
 from runtime.core.errors import SettingsError
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.method import linear_companion, linear_system
 from runtime.core.model import load_model
 from runtime.core.rows.observation import Observation
-from runtime.core.signs import negative_elements
 from runtime.core.study import EstimateSettings
 from runtime.core.validation import split_validation
 from runtime.physical.feasibility import (
@@ -29,9 +30,9 @@ from runtime.physical.feasibility import (
     RobotLimits,
     feasibility,
     limit_rows,
+    nearest_standard,
     pull_to_file,
     scales,
-    standard_parameters,
 )
 from runtime.physical.feasible import (
     FeasibleOptions,
@@ -40,9 +41,8 @@ from runtime.physical.feasible import (
     solve_with_weight,
     within_limits,
 )
-from runtime.physical.inertia import INERTIAL, physical_model, pseudo_inertia
+from runtime.physical.inertia import INERTIAL, physical_model, pseudo_inertia, reach_of
 from runtime.physical.semidefinite import closest, everything
-from runtime.physical.signs import reach_of
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.study import study_from_mapping
@@ -95,6 +95,13 @@ def simulated(model, X: np.ndarray, noise: float, seed: int = 0, N: int = 300) -
 
 def values(model) -> np.ndarray:
     return np.array([model.VALUES[name] for name in model.STANDARD_PARAMETERS])
+
+
+def standard_parameters(physical, X: np.ndarray, limits: RobotLimits | None = None) -> np.ndarray:
+    """Standard parameters of X, nearest to the robot file, from those of the largest margin."""
+    judged = feasibility(physical, physical.base, X, limits)
+    assert judged.feasible, judged.text
+    return nearest_standard(physical, physical.base, X, judged.chi, limits)
 
 
 def test_pseudo_inertia_is_the_second_moment_of_point_masses() -> None:
@@ -234,16 +241,14 @@ def test_infeasible_parameters_are_blamed_on_what_contradicts(arm) -> None:
     judged = feasibility(physical, physical.base, X, RobotLimits(bounds={"M2": (None, 2.0)}))
     assert not judged.feasible and [name for name, _ in judged.blocking] == ["FV2", "link 2"]
     assert judged.margin == pytest.approx(-0.2, abs=1e-6)
-    with pytest.raises(InputError, match=r"NOT physically feasible.*FV2"):
-        standard_parameters(physical, physical.base, X)
+    text = feasibility(physical, physical.base, X).text
+    assert re.search(r"NOT physically feasible.*FV2", text)
 
 
 def test_standard_parameters_have_the_same_torques(tx40) -> None:
     physical = physical_model(tx40)
     X = tx40.base_parameters(tx40.VALUES)
-    chi = standard_parameters(
-        replace(physical, values={}), physical.base, X
-    )  # nothing known of the robot
+    chi = standard_parameters(replace(physical, values={}), X)  # nothing known of the robot
     assert np.abs(chi - values(tx40)).max() > 1e-2  # another robot
     assert min(physical.smallest(chi).values()) >= 0
     np.testing.assert_allclose(physical.K @ chi, X, atol=1e-12)
@@ -257,7 +262,7 @@ def test_limits_hold(arm) -> None:
         centre={"2": ((0.0, 0.3), (-0.1, 0.1), (-0.1, 0.1))},
         ellipsoid={"2": Ellipsoid((0.25, 0.0, 0.0), (0.5, 0.2, 0.2))},
     )
-    chi = standard_parameters(physical, physical.base, arm.base_parameters(arm.VALUES), limits)
+    chi = standard_parameters(physical, arm.base_parameters(arm.VALUES), limits)
     value = physical.named(chi)
     assert value["M1"] <= 1.5 + 1e-8 and 3.0 - 1e-8 <= value["M1"] + value["M2"] <= 3.5 + 1e-8
     assert -1e-8 <= value["MX2"] / value["M2"] <= 0.3 + 1e-8
@@ -550,7 +555,7 @@ def test_standard_parameters_where_a_friction_is_zero(tx40) -> None:
     for j in (2, 3):  # denser links, so that the nearest set is another one
         chi[physical.link(j)] *= 1.1
     X = physical.K @ chi
-    found = standard_parameters(physical, physical.base, X)
+    found = standard_parameters(physical, X)
     values = np.array([tx40.VALUES.get(name, 0.0) for name in physical.standard])
     scale = scales(physical)
     np.testing.assert_allclose(physical.K @ found, X, atol=1e-9)

@@ -18,7 +18,7 @@ from oracles.random_robots import random_parameters, random_robot
 from runtime.compose import estimate_of
 from runtime.core.limits import LIMIT
 from runtime.core.rows.prepared import Prepared
-from runtime.core.signals.states import lowpassed
+from runtime.core.signals.filters import lowpassed
 from runtime.physical.inertia import physical_model
 from runtime.physical.semidefinite import LinearBounds, closest, everything
 from runtime.plausible.bodies import Bodies, Grams, least_squares, physical_fit

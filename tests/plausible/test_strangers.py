@@ -604,3 +604,19 @@ def test_friction_that_the_model_lacks_is_no_slip() -> None:
     assert found.named == () and found.trials[0].cause.kind == "friction"
     assert check.state == "good"
     assert check.finding.startswith("Friction alone: the friction of joint 2 at low speed is not")
+
+
+@pytest.mark.parametrize(("unit", "asked"), [("rad", True), ("deg", False)])
+def test_degrees_that_the_study_states_are_not_guessed_again(unit, asked) -> None:
+    """Angles of motors in degrees, read as joint angles: only the side is wrong."""
+    model = symgen.model("planar_2r")
+    t, q, tau = motion(model)
+    record = runtime.Record(t, 100 * q, tau, name="run")
+    study = runtime.Study(record={"units": {"q": unit}})
+    found = runtime.plausibility(model, record, study)
+    check = next(
+        c for c in found.checks() if c.question == "Are the positions those of this robot?"
+    )
+    assert check.state == "no"
+    assert ("degrees read as rad?" in check.remedy) is asked
+    assert "side" in check.remedy

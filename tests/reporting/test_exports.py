@@ -22,8 +22,8 @@ from runtime import InputError
 from runtime.compose import estimate_of, json_schema
 from runtime.core.cestac.result import Cestac, cestac_arrays, cestac_csv, level_result
 from runtime.core.cestac.runs import Level, Run, Runs
-from runtime.core.latex import escaped, name_cell, number_cell, unit_cell
 from runtime.core.least_squares.estimate import Estimate
+from runtime.core.table import escaped, name_cell, number_cell, unit_cell
 from runtime.documents.estimates import load_estimate
 from runtime.reporting.arrays import (
     array_files,

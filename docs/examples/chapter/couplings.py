@@ -13,8 +13,7 @@ from dataclasses import replace
 import runtime
 from runtime import Estimate, Record
 from runtime.core.drives import Coupling, Drives
-from runtime.core.markup import number
-from runtime.core.table import Table
+from runtime.core.table import Table, number
 from symgen.demo import Prepared, prepare
 
 COUPLINGS: dict[Coupling, str] = {

@@ -8,7 +8,7 @@ Chapter, section 3.
     X_CESTAC = least squares of Y on W_CESTAC, Y as measured: eq. (17)
     X_LS     = the estimate of the identification on these columns, with the median of its signals
 
-N runs per Delta (`runtime.core.cestac.run`) give the mean (18), the standard deviation (19), %sigma
+N runs per Delta (`one_run`) give the mean (18), the standard deviation (19), %sigma
 (20), %e (21) and the residual (22); `runtime.core.cestac.result` holds these numbers and the
 verdict. Every run uses the rows that were selected on the measured record. Steps of the motor
 torque (`torque`, section 4.1.3) are studied alone and with the first Delta. By default the columns
@@ -18,6 +18,9 @@ side, which reproduces the figures of the chapter.
 
 The result depends above all on the bandwidth of the noise. The settings of the result therefore
 include the sampling rate, the cut-off and the median window.
+
+The filters and the method are those of the identification, for every method alike. Data that do
+not change from run to run are computed once for each block of runs. Times: benchmarks/performance.md, `benchmarks/cestac_run.py`.
 """
 
 from __future__ import annotations
@@ -35,21 +38,23 @@ from runtime.core.cestac.perturbed import (
     PreparedRecord,
     Task,
     measured_rows,
-    prepared_records,
+    perturbed,
+    prepared_record,
     study_columns,
 )
 from runtime.core.cestac.result import Cestac, level_result, names_judged
-from runtime.core.cestac.run import USABLE, run_block
-from runtime.core.cestac.runs import Level, Runs
+from runtime.core.cestac.runs import Level, Run, Runs
 from runtime.core.cestac.sources import Checkpoint, EncoderOf, LoopOf
 from runtime.core.errors import InputError, SettingsError
-from runtime.core.estimation import estimate_of, point_estimate
 from runtime.core.least_squares.estimate import Estimate
+from runtime.core.least_squares.method import LINEAR, linear_system
 from runtime.core.limits import LIMIT
-from runtime.core.problem import Problem
+from runtime.core.problem import Problem, estimate_of, point_estimate
 from runtime.core.provenance import processor
 from runtime.core.result import Identification
+from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import common_drives
+from runtime.core.rows.regressor import Columns
 from runtime.core.settings import to_mapping
 from runtime.core.study import CestacSettings
 
@@ -129,14 +134,13 @@ def cestac(
             path=("cestac", "rounding"),
         )
     loop = loop_of(problem)
-    if settings.place == "loop":
-        assert loop is not None
-        as_measured = [part.prepared for part in loop.parts]
     asked = to_mapping(study.estimate)
     if loop is not None:
+        as_measured = list(loop.records)
         study = replace(study, estimate=loop.estimate)
+    rounded = () if settings.place == "loop" else as_measured
     task = Task(
-        records=prepared_records(as_measured, study, own_encoder, drives, loop),
+        records=tuple(prepared_record(own, study, own_encoder, drives) for own in rounded),
         model=model,
         names=study_columns(problem, as_measured, columns, loop),
         estimate=replace(study.estimate, columns="all"),
@@ -324,3 +328,47 @@ def resolution(result: Identification, own_encoder: EncoderOf, loop_of: LoopOf) 
         loop_of=loop_of,
         columns=result.essential.names if essential else None,
     )
+
+
+Array = np.ndarray
+
+USABLE = ("ok", "weak-instruments")  # Status of an estimate that counts as a run
+
+
+def run_block(task: Task, keys: Sequence[tuple[int, int]]) -> Runs:
+    """Compute the runs of a study with the given (level, run) numbers, one after the other."""
+    columns = task.columns
+    return Runs.of([one_run(columns, task, key) for key in keys], len(task.names))
+
+
+def one_run(columns: Columns, task: Task, key: tuple[int, int]) -> Run:
+    """Estimate the parameters once from randomly rounded measurements, eq. (17).
+
+    key : number of the level and of the run. X is nan if the method finds no estimate.
+    """
+    level = task.levels[key[0]]
+    draw = key[1:] if task.settings.common else key
+    with np.errstate(over="ignore", invalid="ignore"):
+        observation = perturbed(columns, task, level, draw)
+    if not np.isfinite(observation.W).all():
+        raise InputError(
+            f"the regressor of {task.model.NAME} is not finite at rounded positions; "
+            "use smaller steps"
+        )
+    X = _estimated(task, observation)
+    norm = float(np.linalg.norm(observation.Y - observation.W @ X))
+    return Run(*key, tuple(X.tolist()), norm)
+
+
+def _estimated(task: Task, observation: Observation) -> Array:
+    """Estimate X, shape (b,), from the system of one run; nan if the method finds no estimate."""
+    if task.estimate.method in LINEAR:
+        return linear_system(observation, task.estimate).solve().X
+    try:
+        settings = point_estimate(task.estimate, task.methods)
+        estimate = estimate_of(observation, settings, task.methods, model=task.model)
+        if estimate.status in USABLE:
+            return estimate.X
+    except InputError:
+        pass
+    return np.full(len(observation.names), np.nan)

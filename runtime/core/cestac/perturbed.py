@@ -20,7 +20,7 @@ import numpy as np
 
 from runtime.core.cestac.rounding import rounded, stream
 from runtime.core.cestac.runs import Level
-from runtime.core.cestac.sources import EncoderOf, Loop, LoopRecord, RecordEncoder
+from runtime.core.cestac.sources import EncoderOf, Loop, RecordEncoder
 from runtime.core.drives import Drives
 from runtime.core.errors import InputError
 from runtime.core.essential import essential_of
@@ -33,8 +33,14 @@ from runtime.core.rows.observation import Observation, stack
 from runtime.core.rows.prepared import Prepared, decimated_torque, observation_of, stacked
 from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import Selection, select_rows
-from runtime.core.signals.filters import States, derivative, filtered_states
-from runtime.core.signals.states import Reader, lowpassed, require_motion
+from runtime.core.signals.filters import (
+    Reader,
+    States,
+    derivative,
+    filtered_states,
+    lowpassed,
+    require_motion,
+)
 from runtime.core.study import CestacSettings, EstimateSettings, Signals, Study
 
 Array = np.ndarray
@@ -131,15 +137,13 @@ def prepared_record(
     study: Study,
     own_encoder: EncoderOf,
     drives: Drives | None = None,
-    part: LoopRecord | None = None,
 ) -> PreparedRecord:
     """Filter one measured record and select its rows, once for all runs of a study.
 
-    The filters are those of study.signals, with the median window of study.cestac.
+    The filters are those of study.signals, with the median window of study.cestac. Rows are
+    selected by the measured velocities, unless `own` has selected rows.
 
     own_encoder : function that returns the encoder that measured the record, or None.
-    part : record of a simulated loop, whose rows and torque are used; default: rows are selected by
-        the measured velocities.
     """
     signals, record = replace(study.signals, median=study.cestac.median), own.record
     encoder, counts, note = own_encoder(record, study, drives), None, ""
@@ -160,8 +164,8 @@ def prepared_record(
         )
     if counts is None:
         require_positions(record.missing, "reader: lowpass", record.file, COUNTS)
-    if part is not None:
-        selection, torque = part.selection, part.torque
+    if own.selected is not None:
+        selection, torque = own.selected, own.torque
     else:  # without a limit any speed will do
         speeds = record.q
         if np.any(study.rows.low_speed):
@@ -191,27 +195,6 @@ def _slip(record: Record, signals: Signals) -> Array | None:
         return None
     slip: Array = v - derivative(record.q, record.rate, signals.ends)
     return slip
-
-
-def prepared_records(
-    records: Sequence[Prepared],
-    study: Study,
-    own_encoder: EncoderOf,
-    drives: Drives | None = None,
-    loop: Loop | None = None,
-) -> tuple[PreparedRecord, ...]:
-    """Filter every measured record and select its rows, once for all runs of a study.
-
-    The result is empty if the study rounds the encoder of a simulated loop, because the loop makes
-    new records.
-    """
-    if study.cestac.place == "loop":
-        return ()
-    parts = [None] * len(records) if loop is None else list(loop.parts)
-    return tuple(
-        prepared_record(record, study, own_encoder, drives, part)
-        for record, part in zip(records, parts, strict=True)
-    )
 
 
 def study_columns(
@@ -405,4 +388,4 @@ def system_of(
         )
         for record, q, torque in zip(task.records, positions, torques, strict=True)
     ]
-    return observations[0] if len(observations) == 1 else stack(observations)
+    return stack(observations)

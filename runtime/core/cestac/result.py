@@ -37,13 +37,11 @@ import numpy as np
 from scipy.special import stdtrit
 
 from runtime.core.cestac.runs import Level, Runs
-from runtime.core.documents import Result, json_text
+from runtime.core.documents import Result, Vector, json_text
 from runtime.core.errors import InputError
-from runtime.core.json_results import Vector
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.method import LINEAR
 from runtime.core.limits import LIMIT
-from runtime.core.markup import number
 from runtime.core.part import (
     BLACK,
     BLUE,
@@ -58,7 +56,7 @@ from runtime.core.part import (
 )
 from runtime.core.rows.observation import Observation
 from runtime.core.study import CestacSettings
-from runtime.core.table import Table, csv_text, notebook
+from runtime.core.table import Table, csv_text, notebook, number
 
 Array = np.ndarray
 

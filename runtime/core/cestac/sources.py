@@ -17,7 +17,6 @@ from runtime.core.problem import Problem
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared
-from runtime.core.rows.selection import Selection
 from runtime.core.study import EstimateSettings, Study
 
 Array = np.ndarray
@@ -42,22 +41,6 @@ class RecordEncoder(Protocol):
         """
 
 
-class LoopRecord(Protocol):
-    """One record of a simulated control loop: prepared data, selected rows and torques.
-
-    torque : ndarray, shape (n, K), before the selection of rows.
-    """
-
-    @property
-    def prepared(self) -> Prepared: ...
-
-    @property
-    def selection(self) -> Selection: ...
-
-    @property
-    def torque(self) -> Array: ...
-
-
 class Loop(Protocol):
     """Control loop of robot and controller that a study of encoders simulates again in each run.
 
@@ -66,7 +49,7 @@ class Loop(Protocol):
     """
 
     @property
-    def parts(self) -> Sequence[LoopRecord]: ...
+    def records(self) -> Sequence[Prepared]: ...
 
     @property
     def estimate(self) -> EstimateSettings: ...

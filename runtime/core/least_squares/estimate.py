@@ -21,13 +21,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from runtime.core.documents import json_text
-from runtime.core.json_results import InfIfNull, Matrix, NanIfNull, Vector, Whole, from_text
-from runtime.core.latex import parameter_table
-from runtime.core.markup import number
-from runtime.core.table import Table, notebook
-
-Array = np.ndarray
+from runtime.core.documents import InfIfNull, Matrix, NanIfNull, Vector, Whole, from_text, json_text
+from runtime.core.table import Table, notebook, number, parameter_table
 
 SCHEMA = "symgen-estimate/1"
 """Kind and version of the JSON layout; `symgen schema --of estimate` prints its JSON Schema."""

@@ -51,10 +51,6 @@ class Solution:
     cond_unit: float
     groups: tuple[tuple[str, ...], ...]
 
-    def variances(self) -> Array:
-        """Return the diagonal of (W'W)^-1, shape (b,); variances of X are proportional to it."""
-        return np.asarray(np.einsum("ij,ij->i", self.T, self.T))
-
 
 def unit_columns(R11: Array) -> tuple[Array, Array]:
     """Scale the columns of the QR factor R_11 of W to norm 1; return the result and the norms.

@@ -360,6 +360,8 @@ def stack(observations: Sequence[Observation]) -> Observation:
     if not observations:
         raise InputError("no observation to stack; give at least one")
     first = observations[0]
+    if len(observations) == 1:
+        return first
     for o in observations:
         if o.names != first.names or o.n != first.n:
             raise InputError(

@@ -28,8 +28,7 @@ from runtime.core.rows.observation import Observation, stack
 from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import Selection, certain_rows, nothing_left, select_rows
 from runtime.core.signals.decimation import decimate
-from runtime.core.signals.filters import States, median_filtered
-from runtime.core.signals.states import Reader
+from runtime.core.signals.filters import Reader, States, median_filtered
 from runtime.core.study import Study
 
 Array = np.ndarray
@@ -47,14 +46,14 @@ class Prepared:
         Settings of signals and rows, with numbers in place of "auto".
     reader : Reader
         Function that computes the states of the record.
-    keep : ndarray of bool, shape (N,) or (N, n), or None
-        Samples (and joints) that may be used; None: all.
+    selected : Selection or None
+        Rows to use; None: the settings choose them.
     """
 
     record: Record
     study: Study
     reader: Reader
-    keep: Array | None = None
+    selected: Selection | None = None
 
     @property
     def drives(self) -> Drives | None:
@@ -78,9 +77,10 @@ class Prepared:
 
     @cached_property
     def selection(self) -> Selection:
-        """Used rows of the record, chosen by time, decimation, speed and the mask `keep`."""
-        signals, rows = self.study.signals, self.study.rows
-        return select_rows(self.record, self.states.qd, signals, rows, keep=self.keep)
+        """Used rows of the record: those selected, or chosen by time, decimation and speed."""
+        if self.selected is not None:
+            return self.selected
+        return select_rows(self.record, self.states.qd, self.study.signals, self.study.rows)
 
     @cached_property
     def torque(self) -> Array:
@@ -95,14 +95,9 @@ class Prepared:
         self, model: GeneratedModel, columns: Sequence[str] | None = None
     ) -> Observation:
         """Build the system Y = W X + rho of the selected rows."""
-        return observation_from_states(
-            model,
-            self.states,
-            self.torque,
-            self.selection,
-            files=self.record.files,
-            columns=columns,
-        )
+        wanted = Columns(model, columns)
+        files = self.record.files
+        return observation_of(wanted, self.states, self.torque, self.selection, files=files)
 
     def by(self, study: Study) -> Prepared:
         """Return the same record prepared with the settings of another study.
@@ -150,23 +145,6 @@ def decimated_torque(tau: Array, selection: Selection) -> Array:
     tau = median_filtered(tau, selection.signals.window_of_torques)
     windowed = np.ascontiguousarray(tau[selection.samples].T)
     return windowed if selection.plan is None else decimate(windowed, selection.plan)
-
-
-def observation_from_states(
-    model: GeneratedModel,
-    states: States,
-    torque: Array,
-    selection: Selection,
-    *,
-    files: Mapping[str, str] | None = None,
-    columns: Sequence[str] | None = None,
-) -> Observation:
-    """Build the system Y = W X + rho from given states, shape (N, n), and torques Y, shape (n, K).
-
-    columns : names of the columns wanted; the others are neither filtered nor stored. Default: all.
-    """
-    wanted = Columns(model, columns)
-    return observation_of(wanted, states, torque, selection, files=files)
 
 
 def observation_of(
@@ -247,8 +225,7 @@ def stacked(
     """
     if not records:
         raise InputError("no record is given; expected at least one")
-    parts = [record.observation(model, columns) for record in records]
-    return parts[0] if len(parts) == 1 else stack(parts)
+    return stack([record.observation(model, columns) for record in records])
 
 
 def with_torques(

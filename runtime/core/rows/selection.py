@@ -78,29 +78,6 @@ class Selection:
         return decimation_plan(window.stop - window.start, self.factor, settings, int(self.kept[0]))
 
 
-@dataclass(frozen=True)
-class Instants:
-    """Time window of a record, and the samples of the window that decimation keeps.
-
-    Attributes
-    ----------
-    start, stop : int
-        Raw samples of the window, [start, stop).
-    factor, first, kept : int
-        Decimation keeps one sample in `factor`, from sample `first` of the window on; `kept` is
-        the number of samples kept.
-    trim : int
-        Kept instants whose rows are left out at each end.
-    """
-
-    start: int
-    stop: int
-    factor: int
-    first: int
-    kept: int
-    trim: int
-
-
 def window_of(
     t: Array, window: tuple[float | None, float | None], file: str, margin: int = 0
 ) -> tuple[int, int]:
@@ -134,10 +111,11 @@ def excerpt(record: Record, rows: Rows) -> slice:
     return slice(start, min(stop, start + EXCERPT))
 
 
-def instants_of(t: Array, rate: float, signals: Signals, rows: Rows, file: str) -> Instants:
+def instants_of(record: Record, signals: Signals, rows: Rows) -> tuple[slice, int, Array, int]:
     """Choose the time window of a record, and the samples in it that decimation keeps.
 
-    t : times, shape (N,), s. rate : Hz.
+    Returns the raw samples of the window, the factor of the decimation, the samples of the window
+    that it keeps, shape (K,), and the number of these whose rows are left out at each end.
 
     The regressor near an end of the record is that of a low-pass which starts there. Decimation
     spreads this error over 27 instants (benchmarks/truth.md, Ends of records), so that rows.trim:
@@ -146,9 +124,9 @@ def instants_of(t: Array, rate: float, signals: Signals, rows: Rows, file: str) 
     auto, low = rows.trim == "auto", signals.lowpass
     trim = LIMIT.TRIM if rows.trim == "auto" else rows.trim
     trim = 0 if signals.reader == "static" else trim
-    margin = ceil(LIMIT.END_PERIODS * rate / low.hertz) if auto and low is not None else 0
-    start, stop = window_of(t, rows.window, file, margin)
-    factor = decimation_factor(signals, rate)
+    margin = ceil(LIMIT.END_PERIODS * record.rate / low.hertz) if auto and low is not None else 0
+    start, stop = window_of(record.t, rows.window, record.file, margin)
+    factor = decimation_factor(signals, record.rate)
     kept = kept_samples(
         stop - start, factor, signals.decimate.phase if signals.decimate else "first"
     )
@@ -157,9 +135,9 @@ def instants_of(t: Array, rate: float, signals: Signals, rows: Rows, file: str) 
         raise InputError(
             f"after decimation by {factor}, the record has {K} rows per joint, of which rows.trim "
             f"leaves out {2 * trim}; use a longer record or window, or a smaller rows.trim",
-            file=file,
+            file=record.file,
         )
-    return Instants(start, stop, factor, int(kept[0]), K, trim)
+    return slice(start, stop), factor, kept, trim
 
 
 def select_rows(
@@ -171,14 +149,13 @@ def select_rows(
 
     qd : ndarray, shape (N, n), filtered velocities.
     """
-    at = instants_of(record.t, record.rate, signals, rows, record.file)
+    samples, factor, kept, trim = instants_of(record, signals, rows)
     usable = None if keep is None else _keep(keep, record)
-    kept = np.arange(at.first, at.stop - at.start, at.factor)
-    instants, number = kept + at.start, np.arange(at.kept)
+    instants, number = kept + samples.start, np.arange(len(kept))
     mask = np.ones((record.n, len(kept)), dtype=bool)
     dropped, slow = {}, per_joint(rows.low_speed, record.n, "rows.low_speed")[:, None]
     for reason, allowed in (
-        ("trim", (number >= at.trim) & (number < at.kept - at.trim)),
+        ("trim", (number >= trim) & (number < len(kept) - trim)),
         *([("torque", slow < UNMEASURED)] if slow.max() >= UNMEASURED else ()),
         ("low_speed", np.abs(qd[instants].T) >= slow),
         ("mask", True if usable is None else usable[instants].T),
@@ -187,14 +164,14 @@ def select_rows(
         mask &= allowed
         dropped[reason] = tuple(int(k) for k in before - mask.sum(axis=1))
     if not mask.any():
-        raise InputError(nothing_left(dropped, at.kept), file=record.file)
+        raise InputError(nothing_left(dropped, len(kept)), file=record.file)
     return Selection(
-        samples=slice(at.start, at.stop),
+        samples=samples,
         kept=kept,
         mask=mask,
-        factor=at.factor,
+        factor=factor,
         t=record.t[instants],
-        rate=record.rate / at.factor,
+        rate=record.rate / factor,
         signals=signals,
         rows=rows,
         dropped=dropped,

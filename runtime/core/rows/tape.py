@@ -19,6 +19,7 @@ from inspect import signature
 from typing import Any
 
 import numpy as np
+from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from runtime.core.model import GeneratedModel, channels_of
 
@@ -34,7 +35,7 @@ class NotRecordedError(Exception):
 
 
 @dataclass(eq=False)
-class Row:
+class Row(NDArrayOperatorsMixin):
     """A symbolic signal that records its computation: an input q, qd, qdd or an operation.
 
     function : None for a state, whose arguments are its array (0 for q) and its joint.
@@ -43,61 +44,17 @@ class Row:
     function: np.ufunc | None
     arguments: tuple[Any, ...]
 
-    __array_ufunc__ = None  # NumPy's numbers leave operations to this class
+    def __array_ufunc__(self, function: np.ufunc, method: str, *arguments: Any) -> Row:
+        """Record a function of NumPy that is called with rows; operators call it too."""
+        if function is np.power and arguments[1] in POWERS:
+            return Row(POWERS[arguments[1]], arguments[:1])
+        return Row(function, arguments)
 
-    def __add__(self, x: Any) -> Row:
-        return Row(np.add, (self, x))
-
-    def __radd__(self, x: Any) -> Row:
-        return Row(np.add, (x, self))
-
-    def __sub__(self, x: Any) -> Row:
-        return Row(np.subtract, (self, x))
-
-    def __rsub__(self, x: Any) -> Row:
-        return Row(np.subtract, (x, self))
-
-    def __mul__(self, x: Any) -> Row:
-        return Row(np.multiply, (self, x))
-
-    def __rmul__(self, x: Any) -> Row:
-        return Row(np.multiply, (x, self))
-
-    def __truediv__(self, x: Any) -> Row:
-        return Row(np.divide, (self, x))
-
-    def __rtruediv__(self, x: Any) -> Row:
-        return Row(np.divide, (x, self))
-
-    def __neg__(self) -> Row:
-        return Row(np.negative, (self,))
-
-    def __pow__(self, exponent: Any) -> Row:
-        if exponent in POWERS:
-            return Row(POWERS[exponent], (self,))
-        return Row(np.power, (self, exponent))
+    def __array_function__(self, function: Any, *called: Any) -> Any:
+        raise NotRecordedError(f"{function.__name__} is no operation on the elements of signals")
 
     def __bool__(self) -> bool:
         raise NotRecordedError("the function branches on the value of a signal")
-
-
-class Functions:
-    """Replacement for NumPy that records every function of symbolic signals instead of computing
-    it.
-    """
-
-    def __getattr__(self, name: str) -> Any:
-        function = getattr(np, name)
-        if isinstance(function, float):
-            return function
-        if not isinstance(function, np.ufunc):
-            raise NotRecordedError(name)
-
-        def called(*arguments: Any) -> Any:
-            of_rows = any(isinstance(x, Row) for x in arguments)
-            return Row(function, arguments) if of_rows else function(*arguments)
-
-        return called
 
 
 class Tape:
@@ -194,7 +151,7 @@ def recorded(model: GeneratedModel, places: Sequence[tuple[int, int]]) -> Tape |
     if block is None or channels_of(model):
         return None
     table: dict[tuple[int, int], Any] = {}
-    known: dict[str, Any] = {**model.CONSTANTS, **states, "xp": Functions(), "D": table}
+    known: dict[str, Any] = {**model.CONSTANTS, **states, "xp": np, "D": table}
     names = tuple(signature(block).parameters)
     if not known.keys() >= set(names):
         return None

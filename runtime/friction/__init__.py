@@ -1,1 +1,0 @@
-"""Friction of each joint against its velocity, and the friction law that describes it."""
