@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property, lru_cache
+from heapq import heappop, heappush
 from typing import Any, NamedTuple, TypeAlias
 
 from symgen.errors import DescriptionError
@@ -573,27 +574,43 @@ def simplified(e: Expression) -> Expression:
 
         cos(a)**2 m + sin(a)**2 m = m,   m - cos(a)**2 m = sin(a)**2 m
     """
-    terms = dict(e.terms)
-    while _shortened(terms):
-        pass
-    return Expression(terms)
+    terms: dict[Monomial, Fraction] = {}
+    monomials: list[Monomial] = []  # by their place
+    places: dict[Monomial, int] = {}
+    partners: dict[Monomial, list[Monomial]] = {}  # terms that a monomial may be taken with
+    waiting: list[int] = []  # places of terms that may have a partner
 
+    def add(m: Monomial, c: Fraction) -> None:
+        if m not in terms:
+            places[m] = len(monomials)
+            monomials.append(m)
+            for pair in _sine_and_rest(m):
+                for other in pair:
+                    partners.setdefault(other, []).append(m)
+        terms[m] = terms.get(m, Fraction(0)) + c
+        if not terms[m]:
+            del terms[m]
+        for changed in (m, *partners.get(m, ())):
+            heappush(waiting, places[changed])
 
-def _shortened(terms: dict[Monomial, Fraction]) -> bool:
-    """Apply the rules of `simplified` to the first two terms that they join; False if there are none."""
-    for m, c in terms.items():
+    def shorten(m: Monomial, c: Fraction) -> None:
         for sine, rest in _sine_and_rest(m):
             for partner, shorter, value in ((sine, rest, c), (rest, sine, -c)):
                 if terms.get(partner) == value:
                     del terms[m], terms[partner]
-                    terms[shorter] = terms.get(shorter, Fraction(0)) + value
-                    if not terms[shorter]:
-                        del terms[shorter]
-                    return True
-    return False
+                    add(shorter, value)
+                    return
+
+    for m, c in e.terms.items():
+        add(m, c)
+    while waiting:
+        place = heappop(waiting)
+        m = monomials[place]
+        if m in terms and places[m] == place:
+            shorten(m, terms[m])
+    return Expression(terms)
 
 
-@lru_cache(maxsize=65536)
 def _sine_and_rest(m: Monomial) -> list[tuple[Monomial, Monomial]]:
     """Return two products for each cos(a)**2 in the product m: m with sin(a)**2 in its place, and m
     without it.
