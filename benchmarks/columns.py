@@ -28,8 +28,7 @@ import runtime
 import symgen
 from oracles.pinocchio_model import PinocchioModel
 from runtime.compose import estimate_of, problem
-from runtime.laws.projection import LawProblem
-from runtime.laws.scalars import fit_laws, fitted_laws
+from runtime.laws.scalars import fit_laws
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.study import study_from_mapping
@@ -102,28 +101,27 @@ def truth(records, kinds, robots):
             columns = [plain.joints.index(j) for j in joints]
             tau[:, columns] += 1.0 * law_torque(kind, q[:, columns], qd[:, columns])
             noise = NOISE * tau.std(axis=0)
-            own = problem(model, runtime.Record(t, q, tau, rate=RATE), PLAIN).prepared[0]
             bare = (
                 problem(without, runtime.Record(t, q, tau, rate=RATE), PLAIN)
                 .prepared[0]
                 .observation(without)
             )
-            laws = LawProblem(model, [own], model.BASE_PARAMETERS)
-            Y, sigma = laws.Y.copy(), noise[laws.joint]
+            sigma = noise[bare.joints]
             j = joints[0]
-            scalar = next(s for s in laws.scalars if s.endswith(str(j)))
+            scalar = next(s for s in model.FIT if s.endswith(str(j)))
             told = {scalar: TRUE[kind][scalar.rstrip("0123456789")], f"LAW{j}": 1.0}
             found = {key: [] for key in told}
             usual = {f"FS{j}": [], f"FV{j}": []}
             pseudo = np.linalg.pinv(bare.W / sigma[:, None])
             for k in range(records):
-                laws.Y = Y + sigma * np.random.default_rng([k, 5]).standard_normal(len(Y))
-                fit = fitted_laws(laws, weights=True)
+                noisy = tau + noise * np.random.default_rng([k, 5]).standard_normal(tau.shape)
+                own = problem(model, runtime.Record(t, q, noisy, rate=RATE), PLAIN).prepared[0]
+                fit = fit_laws(model, [own], weights=True)
                 s = next(x for x in fit.scalars if x.name == scalar)
                 test = next(x for x in fit.tests if x.parameter == f"LAW{j}")
                 found[scalar].append((s.value, s.sigma))
                 found[f"LAW{j}"].append((test.value, test.sigma))
-                X = pseudo @ (laws.Y / sigma)
+                X = pseudo @ (own.observation(without).Y / sigma)
                 for key, values in usual.items():
                     values.append(X[bare.names.index(key)])
             for key, true in told.items():
