@@ -249,8 +249,8 @@ def test_a_classic_table_of_a_textbook_is_typed(page: Browser, running: Callable
     file = studio.work / "robot.yaml"
     go(page, studio.address + "robot")
     page.click("button[value='new']")
-    until(page, "!!document.getElementById('f-2-d')")
-    page.click("#cells > .row > [data-act^='add']")
+    until(page, "!!document.getElementById('f-2-d') && document.readyState === 'complete'")
+    page.run("document.querySelector('#cells > .row > [data-act^=add]').click()")  # it may move
     until(page, "!!document.getElementById('f-3-d')")
     heads = "[...document.querySelectorAll('.cells thead th')].map((n) => n.textContent)"
     assert page.run(heads)[7:10] == ["d, m", "θ, rad", "r, m"]
