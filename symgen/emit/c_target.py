@@ -430,7 +430,7 @@ def _kernel(spec: ModuleSpec, states: CStates, f: Function, names: Namespace) ->
         names,
         [label(f, e) for e in entries],
     )
-    distinct, places = _signals(f, entries)
+    distinct, places = signals(f, entries)
     results = [
         (e.heading, _result(result, k, text.expression(e.value), e.comment))
         for k, e in enumerate(distinct)
@@ -513,7 +513,7 @@ def _kernel(spec: ModuleSpec, states: CStates, f: Function, names: Namespace) ->
     return laid | _signatures(states, f, laid, [name for name, lines in given.items() if lines])
 
 
-def _signals(
+def signals(
     f: Function, entries: Sequence[Entry]
 ) -> tuple[list[Entry], list[tuple[Place, int, int]]]:
     """Collect the distinct values among entries of a result; x and -x count as one value.

@@ -31,7 +31,7 @@ from runtime.core.uncertainty import block_bootstrap
 from runtime.core.validation import weak_directions
 from runtime.study import study_from_mapping
 from symgen.description import load_robot
-from symgen.emit import spec
+from symgen.emit import c_target, spec
 from symgen.regroup.regrouping import regroup
 
 RATE, N = 1000.0, 6000
@@ -165,7 +165,7 @@ def test_signals_are_those_found_over_a_finite_field():
     are one signal there as here.
     """
     f = spec.function(regroup(load_robot("tx40")), "regressor")
-    places = spec.signals(f, [e for e in f.values.entries if e.value != 0]).places
+    _, places = c_target.signals(f, [e for e in f.values.entries if e.value != 0])
     exact = {place: (s, sign) for place, s, sign in places}
     folder = Path(__file__).parents[2] / "generated"
     e = distinct_entries(load_model(folder / "tx40.py", trust=True))
