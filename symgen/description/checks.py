@@ -278,7 +278,7 @@ def _check_element(e: Element, robot: Any) -> Iterator[Problem]:
         (
             e.form and e.when,
             "`when` needs a direction of motion; use `along` instead of `form`",
-            (*where, "form"),
+            (*where, "when"),
         ),
         (
             both,
