@@ -7,10 +7,7 @@ node contains the description that exact arithmetic needs (see `graph.Node`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from fractions import Fraction
-
-import numpy as np
 
 from symgen.derive.graph import (
     COS,
@@ -174,11 +171,6 @@ class GraphAlgebra:
     def name(self, value: Scalar | int, name: str) -> Scalar | int:
         """Give a name, such as W12, to the node of a value, and return the value."""
         return self.graph.name(value, name)
-
-    def vector(self, family: str, value: Iterable[Scalar | int], *indices: int) -> np.ndarray:
-        """Name the components of a vector, such as W12 (component 1, link 2); return the vector."""
-        named = [self.name(x, self.named(family, k, *indices)) for k, x in enumerate(value, 1)]
-        return np.array(named, dtype=object)
 
     def hint(self, value: Scalar | int, name: str) -> Scalar | int:
         """Suggest a name for a value, used if it is needed more than once, and return the value."""

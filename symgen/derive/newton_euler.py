@@ -31,6 +31,7 @@ from symgen.derive.scalar import (
     dot,
     is_zero,
     linear,
+    named_vector,
     turned,
 )
 from symgen.description.expression import Expression
@@ -117,7 +118,7 @@ class Motion:
 
     def vector(self, family: str, value: Iterable[Scalar], *indices: int) -> Vector:
         """Name the components of a vector, such as W12 (component 1, link 2); return the vector."""
-        return self.algebra.vector(family, value, *indices, *self.tag)
+        return named_vector(self.algebra, family, value, *indices, *self.tag)
 
     def _link(self, j: int) -> LinkMotion:
         f, geometry = self.robot.frame(j), self.geometry

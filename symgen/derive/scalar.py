@@ -48,6 +48,14 @@ def dot(u: Iterable[Scalar], v: Iterable[Scalar]) -> Scalar:
     return total
 
 
+def named_vector(
+    algebra: GraphAlgebra, family: str, value: Iterable[Scalar], *indices: int
+) -> Vector:
+    """Name the components of a vector, such as W12 (component 1, link 2); return the vector."""
+    named = algebra.named
+    return array([algebra.name(x, named(family, k, *indices)) for k, x in enumerate(value, 1)])
+
+
 def linear(algebra: GraphAlgebra, row: Mapping[K, Expression], x: Mapping[K, Scalar]) -> Scalar:
     """Return sum_i row_i x_i, with constant expressions row_i and scalars x_i."""
     return dot([algebra.constant(g) for g in row.values()], [x[i] for i in row])
