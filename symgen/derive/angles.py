@@ -190,10 +190,3 @@ def roots_of(robot: Robot) -> tuple[Call, ...]:
     (friction, springs, ...) of a robot, each once.
     """
     return tuple(dict.fromkeys(a for a in _calls(robot) if a.function == "sqrt"))
-
-
-def is_prime(n: int) -> bool:
-    """Whether n = 3 mod 4, n > 7, is prime, by the Miller-Rabin test with bases 2, 3, 5, 7: exact
-    below 3.2e9.
-    """
-    return all(pow(base, (n - 1) // 2, n) in (1, n - 1) for base in (2, 3, 5, 7))

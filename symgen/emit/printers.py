@@ -266,6 +266,8 @@ class Text:
         names = (f"{of}{ascii_lowercase[k % 26] * (k // 26 + 1)}" for k in count())
         return self.names.own(next(name for name in names if not self.names.has(name)))
 
+    # --- lines ---
+
     def sections_of(self, nodes: Collection[int]) -> tuple[Section, ...]:
         """Write the lines that compute the given graph nodes, grouped under headings."""
         circular = [self._positive(n) for n in self.nodes if n.op in (COS, SIN)]
