@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from itertools import combinations
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from symgen.certify.importing import without_certificate
 from symgen.cli.generate import emitted
 from symgen.cli.main import app
 from symgen.description import packaged_robots, skeleton
+from symgen.emit.targets import TARGETS
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 
@@ -86,6 +88,22 @@ def test_no_folder_of_this_machine_in_emitted_files(tmp_path, file):
         assert (
             str(tmp_path) not in path.read_text() and f"symgen generate {file}" in path.read_text()
         )
+
+
+@pytest.mark.parametrize(
+    "targets",
+    [(name,) for name in TARGETS] + [*combinations(TARGETS, 2)],
+    ids=",".join,
+)
+def test_each_target_alone_and_each_pair(targets, tmp_path):
+    result = run("emps", "--target", ",".join(targets), "-o", tmp_path)
+    assert result.exit_code == 0, result.output
+    kinds = {*targets, *["h"] * ("c" in targets)}
+    files = {TARGETS[name].file.replace("{}", "emps") for name in kinds}
+    assert {path.name for path in tmp_path.iterdir()} == files
+    said = result.stderr.splitlines()
+    assert len(said) == sum(bool(TARGETS[name].use) for name in targets)
+    assert all("emps" in line and "{" not in line for line in said)
 
 
 def test_default_folder_is_generated(tmp_path, monkeypatch):
