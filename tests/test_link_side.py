@@ -79,6 +79,6 @@ def test_a_sensor_behind_the_gear_sees_no_drive(model):
 
 def test_sides_of_records_that_are_fitted_together_agree(model):
     one, other = study("link").record[0], study("joint").record[0]
-    with pytest.raises(SettingsError, match="in one record and not in another"):
+    with pytest.raises(SettingsError, match="side: link. in .* and not in"):
         both = replace(study("link"), record=(one, other))
         runtime.identify(model, record(model, "link"), both, plausible=False)

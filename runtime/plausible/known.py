@@ -131,10 +131,13 @@ class KnownValues(Result):
         return tuple(texts)
 
 
-def known_values(baseline: Baseline) -> KnownValues | None:
+def known_values(baseline: Baseline, *, rotors: bool = True) -> KnownValues | None:
     """Compare torques computed from the inertial values of the robot file with measured torques.
 
     None if the file does not give all ten values of any link.
+
+    rotors : whether the measured torques include those that accelerate the rotors of the motors;
+        false for sensors behind the gears.
     """
     physical, s = baseline.physical, baseline.samples
     given = [all(f"{family}{j}" in physical.values for family in INERTIAL) for j in physical.links]
@@ -146,7 +149,7 @@ def known_values(baseline: Baseline) -> KnownValues | None:
     chi = np.zeros(len(physical.standard))
     chi[inertial] = [physical.values[physical.standard[k]] for k in inertial]
     for k, name in enumerate(physical.standard):
-        if name.startswith("Ia"):
+        if rotors and name.startswith("Ia"):
             chi[k] = physical.values.get(name) or baseline.given.X[k]  # a URDF has no place for it
     X = physical.K @ chi
     at_rest = np.zeros_like(s.q)
