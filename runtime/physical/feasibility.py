@@ -154,9 +154,7 @@ def feasibility(
         raise InputError(
             unsolved(first.status, rows, lambda other: margin(physical.conditions, other, space))
         )
-    blocking = tuple(
-        islice(blocked(physical.conditions, rows, space, first), None if blame else 1)
-    )
+    blocking = tuple(islice(blocked(physical.conditions, rows, space, first), None if blame else 1))
     return Feasibility(first.margin, not blocking, blocking, first.chi, not blocking)
 
 

@@ -57,6 +57,8 @@ ROTORS = 1e6  # size of a motor inertia beside that of the file
 NEAR = 1e-6  # of the size of a number: nearer to the file is rounding
 BARRIER = 2 * LIMIT.LEAST_EIGENVALUE  # what the program keeps an element from zero
 STRANGE = 2.0  # mass over that of the file
+NO_MASS = 1e-15  # kg; a link with no more has no mass, as in MuJoCo
+SMALL = 0.1, 0.1  # kg, m: mass and extent of a small body
 TINY = 1e-15  # SI; an eigenvalue so little below zero is rounding
 
 
@@ -238,11 +240,12 @@ def _of_file(
     """Collect the unknowns of `nearest` from the file, sorted by the attempt that may change them.
 
     Return the unknowns, the index of each element, and for each attempt how many numbers may
-    change. The first attempt has the first link with mass of each body, and the elements. The second adds
-    elements that the file does not have and that other parameters can replace; the third adds the
-    other links.
+    change. The first attempt has the first link with mass of each body, and the elements. The
+    second adds elements that the file does not have and that other parameters can replace; the
+    third adds the other links.
     """
-    leading = {link.j: link for link in sorted(reversed(links), key=lambda link: link.ten[-1] > 0)}
+    massless_last = sorted(links, key=lambda link: link.ten[-1] <= NO_MASS)
+    leading = {link.j: link for link in reversed(massless_last)}
     led = [leading[j] for j in physical.links if j in leading]
     others = [link for link in links if link is not leading[link.j]]
     inertial = {f"{family}{j}" for j in physical.links for family in INERTIAL}
@@ -294,13 +297,13 @@ def _of_file(
 def _sizes_of(x: Array) -> Array:
     """Estimate typical sizes of mass, centre of mass and inertia tensor of a link, shape (10,).
 
-    The sizes of centre and tensor follow from the extent of the link. A link without mass has the
-    extent 1 m, and the mass that has its tensor at this distance.
+    The sizes of centre and tensor follow from the extent of the link. A link without mass has no
+    extent; its sizes are those of a small body.
     """
     M, moments = x[0], float(np.abs(x[[4, 7, 9]]).sum()) / 2
-    if M <= 0:
-        size = moments or float(np.abs(x).max())
-        return np.array([size, 1.0, 1.0, 1.0, *[size] * 6])
+    if M <= NO_MASS:
+        mass, extent = SMALL
+        return np.array([mass, *[extent] * 3, *[max(moments, mass * extent**2)] * 6])
     extent = max(np.sqrt(x[1:4] @ x[1:4] + moments / M), 1e-3)
     return np.array([M, *[extent] * 3, *[max(moments, 1e-3 * M * extent**2)] * 6])
 
@@ -407,10 +410,8 @@ def _physical(part: Numbers, K: Array, rest: Array, u: Array, start: Array) -> A
         W, w = _linear(part, u)
         space = _holding(part, K, rest, u, held)
         criterion = W / part.ease[:, None], w / part.ease
-        before, u = (
-            u,
-            _numbers(part, nearest_in(space, part.physical, rows, start, criterion)),
-        )
+        chi = nearest_in(space, part.physical, rows, start, criterion)
+        before, u = u, _numbers(part, chi)
         if (far := float(np.linalg.norm((u - part.u0) / S))) < distance:
             distance, best = far, u
         if np.all(np.abs(u - before)[~rotors] <= STILL * part.size[~rotors]):
