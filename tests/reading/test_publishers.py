@@ -97,7 +97,9 @@ def test_what_the_bag_tells_of_publishers(tmp_path, told, tau):
     values = [next(counter[k]) if names is None else names[k] for k in of]
     path = written(tmp_path, messages, "ros1", **{told: values})
     if tau(np.ones(1)).sum():
-        with pytest.raises(InputError, match=r"2 publishers .* the messages of both would be mixed"):
+        with pytest.raises(
+            InputError, match=r"2 publishers .* the messages of both would be mixed"
+        ):
             read(path)
         return
     other = "counts to 3079" if names is None else names[1]
