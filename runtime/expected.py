@@ -8,7 +8,7 @@ torque errors of motions within the range of the robot.
     C       covariance S C_10 S of least squares with joints weighted by their residuals: C_10 of
             eq. (10), and S the diagonal matrix of corrected over stated standard deviations, times
             a factor for correlations longer than a block
-    V       the same, if the fit uses the values of the robot file, known to LIMIT.VALUES_KNOWN:
+    V       the same, if the fit uses the values of the robot file, known to VALUES_KNOWN:
             (K'C^-1 K + S^-1)^-1 over the standard parameters, X = K chi, S diagonal; the estimate
             of the standard parameters is then chi_V
     a       share of the accelerations that is an error of the encoder's steps
@@ -25,7 +25,7 @@ that the model lacks are included only as far as they are in the residuals of C.
 The squared error of one record is a sum of b squares, a few of which are large: with
 M = K'D'D K V it is distributed as chi^2/nu with nu = tr(M)^2/tr(M^2) degrees of freedom. The
 interval of the expected error has the first two terms times quantiles of this distribution, and the
-third times LIMIT.STEPS_MOVE. If one direction is undetermined, nu is 1: 30 % expected may be 2 %.
+third times STEPS_MOVE. If one direction is undetermined, nu is 1: 30 % expected may be 2 %.
 
 Reference: Satterthwaite (1946) for nu.
 """
@@ -54,6 +54,21 @@ from runtime.core.rows.prepared import Prepared
 from runtime.core.study import EstimateSettings
 from runtime.counts.encoder_advice import acceleration_error
 from runtime.physical.inertia import INERTIAL, PhysicalModel, physical_model
+
+EXPECTED_INTERVAL = (0.05, 0.95)
+"""Probabilities of the ends of that interval. Measured: benchmarks/truth.md."""
+RANGE_ROUNDING = 1e-13
+"""Eigenvalues of a scaled matrix that are rounding."""
+REFERENCE_RANGE = (0.2, 0.8)
+"""Amplitudes of the reference motion over half of the range of a joint. Measured: benchmarks/truth.md."""
+REFERENCE_SPEED = (0.1, 0.5)
+"""Speeds of the reference motion over the largest of a joint. Measured: benchmarks/truth.md."""
+REFERENCE_STATES = 400
+"""States of the reference motion."""
+STEPS_MOVE = (0.25, 2.0)
+"""What the steps of the encoders may do to predictions, over the share of the accelerations that they make: ends of the interval. Measured: benchmarks/truth_classes.py."""
+VALUES_KNOWN = 0.3
+"""Relative deviation to which the values of a robot file are taken as known, of a link by its mass and its inertia. Measured: benchmarks/truth.md."""
 
 Array = np.ndarray
 
@@ -193,8 +208,8 @@ def expected_error(
     spread = max(np.trace(M), 0.0)
     nu = max(np.trace(M) ** 2 / np.sum(M * M.T), 1.0)
     open_part = (spread + np.sum((A @ (X - near)) ** 2)) / size**2
-    times = np.array([1.0, *(chi2.ppf(p, nu) / nu for p in LIMIT.EXPECTED_INTERVAL)])
-    part = np.array([1.0, *LIMIT.STEPS_MOVE]) * inertial * steps / (1 + steps)
+    times = np.array([1.0, *(chi2.ppf(p, nu) / nu for p in EXPECTED_INTERVAL)])
+    part = np.array([1.0, *STEPS_MOVE]) * inertial * steps / (1 + steps)
     errors = 100 * np.sqrt(open_part * times + part**2)
     motions = (
         "motions over limits.q of the robot file at up to half of limits.qd"
@@ -268,11 +283,11 @@ def with_values(physical: PhysicalModel, K: Array, R: Array, y: Array) -> tuple[
     chosen = [name.startswith((*INERTIAL, "Ia")) for name in physical.standard]
     given = np.isfinite(deviation) & (deviation > 0) & chosen
     known, precision = np.where(given, known, 0.0), np.zeros(len(known))
-    precision[given] = (LIMIT.VALUES_KNOWN * deviation[given]) ** -2.0
+    precision[given] = (VALUES_KNOWN * deviation[given]) ** -2.0
     rows = R @ K
     A, g = rows.T @ rows + np.diag(precision), rows.T @ (y - rows @ known)
     d = np.sqrt(np.where(np.diag(A) > 0, np.diag(A), 1.0))
-    V = np.linalg.pinv(A / np.outer(d, d), rcond=LIMIT.RANGE_ROUNDING, hermitian=True)
+    V = np.linalg.pinv(A / np.outer(d, d), rcond=RANGE_ROUNDING, hermitian=True)
     V = V / np.outer(d, d)
     return known + V @ g, V
 
@@ -311,12 +326,12 @@ def reference_states(
             np.array([max(x[j], np.median(x[alike[j]])) for j in range(n)]) for x in (half, speed)
         )  # a joint that hardly moves: as its neighbours
         middle = (q.max(axis=0) + q.min(axis=0)) / 2
-        half, speed = half / LIMIT.REFERENCE_RANGE[1], speed / LIMIT.REFERENCE_SPEED[1]
+        half, speed = half / REFERENCE_RANGE[1], speed / REFERENCE_SPEED[1]
     else:
         span, speed = limits
         middle, half = span.mean(axis=1), np.ptp(span, axis=1) / 2
-    rng, shape = np.random.default_rng(0), (LIMIT.REFERENCE_STATES, n)
-    (least, most), (slow, fast) = LIMIT.REFERENCE_RANGE, LIMIT.REFERENCE_SPEED
+    rng, shape = np.random.default_rng(0), (REFERENCE_STATES, n)
+    (least, most), (slow, fast) = REFERENCE_RANGE, REFERENCE_SPEED
     a = half * rng.uniform(least, most, shape)
     w = np.minimum(speed * rng.uniform(slow, fast, shape) / np.where(a > 0, a, np.inf), 2 * np.pi)
     phase = rng.uniform(0, 2 * np.pi, shape)

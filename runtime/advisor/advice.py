@@ -15,11 +15,13 @@ from runtime.core.cestac.runs import Level
 from runtime.core.check import Answer, Check, Question, state_of
 from runtime.core.documents import Result, json_text
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.part import BLACK, BLUE, DOTTED, GREY, ORANGE, Figure, Part
 from runtime.core.result import Identification
 from runtime.core.table import Table, percentage
 from runtime.counts.encoder_advice import visible_steps
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 

@@ -27,7 +27,7 @@ from runtime.controller.law import late, torque_law
 from runtime.core.documents import Result
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.method import linear_estimate
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, elements_of, joint_labels, joint_units
 from runtime.core.part import Doubt
 from runtime.core.problem import Note, Problem
@@ -37,6 +37,8 @@ from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared, stacked, with_torques
 from runtime.core.study import EstimateSettings
 from runtime.loop.settings import Law
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from runtime.core.errors import InputError, SettingsError
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, base_columns, joint_labels, require
 from runtime.core.problem import Problem
 from runtime.core.record import Record
@@ -37,6 +37,8 @@ from runtime.core.signals.filters import lowpassed
 from runtime.excitation.settings import ExcitationSettings
 from runtime.loop.dry_friction import dry_friction
 from runtime.loop.trajectories import Motion
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 

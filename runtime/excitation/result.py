@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from runtime.core.documents import Result
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, joint_labels
 from runtime.core.rows.predicted import Weights
 from runtime.core.settings import to_mapping
@@ -21,6 +21,8 @@ from runtime.excitation.criteria import MotionLimits, usage
 from runtime.excitation.settings import ExcitationSettings
 from runtime.loop.result import csv_text
 from runtime.loop.trajectories import Motion
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 

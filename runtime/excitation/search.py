@@ -20,7 +20,7 @@ import numpy as np
 
 from runtime.core.errors import InputError
 from runtime.core.essential import essential_of
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, require, require_no_channels, require_no_wrench
 from runtime.core.problem import Problem, estimated, observe_rows
 from runtime.core.rows.predicted import Weights, kept_correlation
@@ -33,6 +33,8 @@ from runtime.excitation.settings import ExcitationSettings
 from runtime.loop.control_law import parameters_of
 from runtime.loop.dry_friction import dry_friction
 from runtime.loop.trajectories import Motion, motion_from_mapping
+
+LIMIT = limits(__package__)
 
 
 def excite(

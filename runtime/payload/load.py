@@ -32,13 +32,15 @@ from runtime.core.documents import Result
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.method import linear_estimate
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, elements_of, require
 from runtime.core.rows.observation import Observation, stack
 from runtime.core.study import EstimateSettings
 from runtime.core.table import Table, number
 from runtime.payload.settings import PayloadSettings
 from runtime.physical.inertia import INERTIAL, PhysicalModel, physical_model, pseudo_inertia
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 

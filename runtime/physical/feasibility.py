@@ -20,7 +20,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from runtime.core.errors import InputError, SettingsError
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.settings import Positive, Real, Settings, Text
 from runtime.physical.inertia import INERTIAL, Condition, PhysicalModel
 from runtime.physical.semidefinite import (
@@ -34,6 +34,8 @@ from runtime.physical.semidefinite import (
     margin,
     solutions,
 )
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 Bounds = tuple[Real | None, Real | None]

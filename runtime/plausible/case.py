@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from runtime.core.errors import InputError
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, joint_labels, joint_units
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
@@ -26,6 +26,8 @@ from runtime.plausible.delay import Delay, delay_of
 from runtime.plausible.known import KnownValues, known_values
 from runtime.plausible.samples import Filtered, Samples, excerpts, samples_of
 from runtime.plausible.trials import Baseline, baseline_of, regressor
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 

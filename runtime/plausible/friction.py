@@ -14,9 +14,11 @@ from __future__ import annotations
 import numpy as np
 
 from runtime.core.check import Answer, Question, State
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import elements_of
 from runtime.plausible.case import Case
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 

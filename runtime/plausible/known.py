@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from runtime.core.documents import Result
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, elements_of, is_axis, joint_labels
 from runtime.core.part import Doubt
 from runtime.core.result import Identification
@@ -38,6 +38,8 @@ from runtime.physical.inertia import INERTIAL
 
 if TYPE_CHECKING:
     from runtime.plausible.trials import Baseline
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 

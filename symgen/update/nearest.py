@@ -33,7 +33,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.physical.feasibility import (
     blocked,
     feasibility,
@@ -47,6 +47,8 @@ from runtime.physical.semidefinite import LinearBounds, Space, margin, solutions
 from symgen.description.tree import Array
 from symgen.errors import DescriptionError
 from symgen.update.places import FileLink
+
+LIMIT = limits("runtime.physical")
 
 NONE = "no physical robot with the links of this file has the estimated parameters"
 MISSED = 1e-9  # of the size of a base parameter: more is not reached
