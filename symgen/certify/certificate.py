@@ -20,7 +20,7 @@ General loops: the same identities are checked at random points of the closed me
 checked at random lengths.
 
 Numeric, in floating point at the lengths of the robot file: the standard regressor W is that of a
-dynamics by energies (`derive.lagrange`), which shares no code with the recursions. W has the rank
+dynamics by energies (`certify.lagrange`), which shares no code with the recursions. W has the rank
 of the base parameters (by SVD), and W chi = W_base X for random chi and the X that the formulas
 give.
 """
@@ -53,7 +53,7 @@ from symgen.regroup.regrouping import EXACT, Regrouping
 from symgen.regroup.residues import sample, states_for
 
 if TYPE_CHECKING:
-    from symgen.derive.lagrange import Sample
+    from symgen.certify.lagrange import Sample
 
 Sampler = Callable[[Draw, tuple[str, ...]], Array]
 LOST = 1e12  # sums of numbers as large keep less than three decimals of numbers of size 1
@@ -474,7 +474,7 @@ def _false_in_floats(regrouping: Regrouping, W: Array, base: list[int]) -> list[
 @lru_cache(maxsize=4)
 def independent(robot: Robot) -> Sample:
     """Compute the regressor of `robot` from its energies, at random states; cache the result."""
-    from symgen.derive.lagrange import (
+    from symgen.certify.lagrange import (
         in_one_mode,
         sampled,
     )  # CasADi, loaded late

@@ -7,7 +7,7 @@ import pytest
 
 from oracles.test_urdf_agrees import Pinocchio, legend
 from oracles.urdf_robots import joint, link, robot
-from symgen.derive.lagrange import Lagrange
+from symgen.certify.lagrange import Lagrange
 from symgen.description import parse_robot
 from symgen.description.robot import INERTIAL
 from symgen.description.tree import TreePart
