@@ -20,9 +20,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import lcm, prod
 
+from symgen.derive.algebra import GraphAlgebra, Scalar
 from symgen.derive.graph import ActiveRow, Turn
-from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.derive.scalar import Scalar
 from symgen.description.expression import ONE, ZERO, Expression
 from symgen.description.robot import REVOLUTE, Robot
 from symgen.errors import DescriptionError

@@ -22,9 +22,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from symgen.derive.algebra import Scalar, Vector, array, cross, dot
 from symgen.derive.geometry import Geometry, Rotation
 from symgen.derive.regressor import element_names
-from symgen.derive.scalar import Scalar, Vector, array, cross, dot, named_vector
 from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, parameter
 
 Tensor = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]  # 11, 12, 13, 22, 23, 33
@@ -74,14 +74,14 @@ class CompositeLinks:
         """
         for (k, m), x in zip(PLACES, self.JP[j], strict=True):
             self.algebra.name(x, self.named("JP", k, m, j))
-        named_vector(self.algebra, "MSP", self.MSP[j], j)
+        self.algebra.vector("MSP", self.MSP[j], j)
         self.algebra.name(self.MP[j], self.named("MP", j))
 
     def _take(self, j: int, i: int) -> None:
         """Add the inertia of link j and all links after it to the inertia of its antecedent i."""
         R = self.geometry.rotation[j]
         P = self.geometry.P[j]
-        AS = named_vector(self.algebra, "AS", R.up(self.MSP[j]), j)
+        AS = self.algebra.vector("AS", R.up(self.MSP[j]), j)
         moved = AS + P * self.MP[j]
         AJA = turned(R, self.JP[j])
         for (k, m), x in zip(PLACES, AJA, strict=True):
@@ -126,8 +126,8 @@ class CompositeLinks:
         column: dict[int, Scalar] = {}
         for i in reversed(self.robot.path(k)):
             frame = self.robot.frame(i)
-            named_vector(self.algebra, "E", E, i, k)
-            named_vector(self.algebra, "NE", NE, i, k)
+            self.algebra.vector("E", E, i, k)
+            self.algebra.vector("NE", NE, i, k)
             if frame.sigma != FIXED:
                 column[i] = E[2] if frame.sigma == PRISMATIC else NE[2]
             rotation = self.geometry.rotation[i]

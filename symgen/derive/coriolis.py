@@ -34,10 +34,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from symgen.derive.composite import CompositeLinks
-from symgen.derive.derivation import Derivation, projected_twice
-from symgen.derive.geometry import Rotation
-from symgen.derive.scalar import (
+from symgen.derive.algebra import (
     E3,
     Matrix,
     Scalar,
@@ -45,8 +42,10 @@ from symgen.derive.scalar import (
     array,
     cross,
     dot,
-    named_vector,
 )
+from symgen.derive.composite import CompositeLinks
+from symgen.derive.derivation import Derivation, projected_twice
+from symgen.derive.geometry import Rotation
 from symgen.description.expression import Expression
 from symgen.description.robot import FIXED, PRISMATIC
 
@@ -77,10 +76,10 @@ class CompositeRates(CompositeLinks):
             PP = cross(self.motion.link[f.ant].w, self.geometry.P[f.j])
             if f.sigma == PRISMATIC:
                 PP = PP + self.geometry.rotation[f.j].up(E3) * self.motion.qd(f.j)
-            self.PP[f.j] = named_vector(self.algebra, "PP", PP, f.j)
+            self.PP[f.j] = self.algebra.vector("PP", PP, f.j)
         for f in reversed(self.robot.frames):
             self.algebra.section(f"Rates of composite link {f.j}")
-            named_vector(self.algebra, "HP", self.HP[f.j], f.j)
+            self.algebra.vector("HP", self.HP[f.j], f.j)
             for a, row in enumerate(self.BP[f.j], start=1):
                 for b, x in enumerate(row, start=1):
                     self.algebra.name(x, self.named("BP", a, b, f.j))
@@ -147,7 +146,7 @@ class CompositeRates(CompositeLinks):
                 if i != k:
                     below = dot(self._axis_rate(i), F if slides else N)
                     C[k, i] = below if slides else below + ND[2]
-            E, F = named_vector(self.algebra, "E", R.up(E), i, k), R.up(F)
+            E, F = self.algebra.vector("E", R.up(E), i, k), R.up(F)
             NE, N = R.up(NE) + cross(P, E), R.up(N) + cross(P, F)
             ND = R.up(ND) + cross(self.PP[i], F)
         return C

@@ -17,17 +17,16 @@ from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import NamedTuple
 
+from symgen.derive.algebra import GraphAlgebra, Matrix, Scalar, Vector
 from symgen.derive.closure import Closure
 from symgen.derive.composite import CompositeLinks
 from symgen.derive.elements import element_column
 from symgen.derive.frames import frame_poses
 from symgen.derive.geometry import Geometry
-from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.loops import close
 from symgen.derive.newton_euler import Motion, joint_torques
 from symgen.derive.numbers import numbered
 from symgen.derive.regressor import columns, element_names
-from symgen.derive.scalar import Matrix, Scalar, Vector
 from symgen.description.robot import Robot
 
 ABSORBED = ("YY", "MZ", "M")

@@ -14,10 +14,10 @@ arithmetic identifies only by its operands.
 
 from __future__ import annotations
 
+from symgen.derive.algebra import Scalar
 from symgen.derive.angles import varies
 from symgen.derive.graph import Turn
 from symgen.derive.newton_euler import Motion
-from symgen.derive.scalar import Scalar, linear
 from symgen.description.expression import FUNCTIONS, ONE, ZERO, Atom, Call, Expression
 from symgen.description.kinds import CHANNEL, STATE
 from symgen.description.robot import Element, Form, Row, parameter
@@ -92,7 +92,7 @@ class _Law:
         coordinate = getattr(self.motion, state)
         if joint:
             return coordinate(int(joint))
-        rate = linear(self.motion.algebra, self.row, {i: coordinate(i) for i in self.row})
+        rate = self.motion.algebra.linear(self.row, {i: coordinate(i) for i in self.row})
         if state == "qd" and len(self.row) > 1:
             rate = self.motion.algebra.name(rate, self.name)
         return rate

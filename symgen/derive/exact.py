@@ -42,6 +42,7 @@ from math import lcm
 
 import numpy as np
 
+from symgen.derive.algebra import GraphAlgebra, Scalar
 from symgen.derive.angles import (
     LARGEST_RADICAND,
     PI,
@@ -52,9 +53,7 @@ from symgen.derive.angles import (
 )
 from symgen.derive.closure import parts
 from symgen.derive.graph import INV, POS, SIGN, SIN, SQRT, Angle, Node, Symbol, Velocity, interpret
-from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.numbers import numbered
-from symgen.derive.scalar import Scalar
 from symgen.description.expression import Call, Expression, Number, quarter_turns
 from symgen.description.robot import Robot
 from symgen.errors import SymgenError

@@ -8,20 +8,19 @@ formulas have cosines of sums and differences of angles instead of products of c
 
 from __future__ import annotations
 
-from symgen.derive.geometry import Geometry, Rotation, summed
-from symgen.derive.graph import Turn
-from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.derive.scalar import (
+from symgen.derive.algebra import (
     E3,
     IDENTITY,
     ZERO3,
+    GraphAlgebra,
     Matrix,
     Vector,
     array,
     cross,
     dot,
-    named_vector,
 )
+from symgen.derive.geometry import Geometry, Rotation, summed
+from symgen.derive.graph import Turn
 from symgen.description.expression import Expression
 from symgen.description.robot import REVOLUTE
 
@@ -44,7 +43,7 @@ def frame_poses(geometry: Geometry) -> dict[int, tuple[Matrix, Vector]]:
             for k, row in enumerate(rows, 1)
         ]
         P = [P_0i[k] + dot(A_0i[k], geometry.P[f.j]) for k in range(3)]
-        pose[f.j] = (array(A), named_vector(algebra, "P", P, f.j, *own))
+        pose[f.j] = (array(A), algebra.vector("P", P, f.j, *own))
     pose.pop(0, None)
     return pose
 

@@ -14,17 +14,16 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import NamedTuple
 
-from symgen.derive.closure import Closure
-from symgen.derive.graph import Turn
-from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.derive.scalar import (
+from symgen.derive.algebra import (
+    GraphAlgebra,
     Matrix,
     Scalar,
     Vector,
     array,
     is_zero,
-    linear,
 )
+from symgen.derive.closure import Closure
+from symgen.derive.graph import Turn
 from symgen.description.expression import Expression, call
 from symgen.description.robot import PRISMATIC, REVOLUTE, Frame, Robot
 
@@ -142,7 +141,7 @@ class Geometry:
     def position(self, j: int) -> Scalar:
         """Return the position q_j of any moving joint as a function of the independent joints."""
         q = {i: self.algebra.q(i) for i in self.closure.row[j]}
-        return linear(self.algebra, self.closure.row[j], q) + self.algebra.constant(
+        return self.algebra.linear(self.closure.row[j], q) + self.algebra.constant(
             self.closure.offset[j]
         )
 

@@ -19,6 +19,7 @@ from itertools import product
 
 import numpy as np
 
+from symgen.derive.algebra import GraphAlgebra
 from symgen.derive.assembly import (
     STEPS,
     TOLERANCE,
@@ -35,7 +36,6 @@ from symgen.derive.floats import Floats, states_of
 from symgen.derive.frames import frame_poses
 from symgen.derive.geometry import Geometry
 from symgen.derive.graph import interpret
-from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.description.expression import ONE, PI, ZERO, Expression, quarter_turns
 from symgen.description.robot import PRISMATIC, REVOLUTE, Loop, Robot
 from symgen.errors import DescriptionError

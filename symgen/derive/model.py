@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
+from symgen.derive.algebra import GraphAlgebra
 from symgen.derive.derivation import Derivation
 from symgen.derive.graph import Scalar, Symbol
-from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.loop_equations import loop_system
 from symgen.derive.rewrite import Input, Inputs, Rewrite
 from symgen.description.expression import ZERO

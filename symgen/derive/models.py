@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
+from symgen.derive.algebra import Matrix, Vector
 from symgen.derive.coriolis import coriolis
 from symgen.derive.derivation import Derivation
 from symgen.derive.energies import (
@@ -25,7 +26,6 @@ from symgen.derive.loop_equations import LoopSystem
 from symgen.derive.model import Case, Entry, Model, Place, Request, equations
 from symgen.derive.regressor import element_names
 from symgen.derive.rewrite import Input
-from symgen.derive.scalar import Matrix, Vector
 from symgen.description.expression import ONE, ZERO
 from symgen.description.robot import Element
 from symgen.errors import SymgenError

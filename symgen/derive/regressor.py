@@ -17,9 +17,9 @@ from collections.abc import Iterable
 from functools import lru_cache
 from typing import Any
 
+from symgen.derive.algebra import E3, ZERO3, Scalar, Vector, cross, dot
 from symgen.derive.elements import element_column
 from symgen.derive.newton_euler import LinkMotion, Motion, force, moment
-from symgen.derive.scalar import E3, ZERO3, Scalar, Vector, cross, dot
 from symgen.description.expression import Expression
 from symgen.description.robot import (
     FIXED,

@@ -19,6 +19,7 @@ from functools import lru_cache
 from itertools import product
 from typing import Any
 
+from symgen.derive.algebra import GraphAlgebra
 from symgen.derive.exact import Draw, Fp
 from symgen.derive.graph import (
     ADD,
@@ -33,7 +34,6 @@ from symgen.derive.graph import (
     reachable,
     value_of,
 )
-from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.names import families_of
 from symgen.description.expression import FUNCTIONS, Expression
 from symgen.description.robot import Robot

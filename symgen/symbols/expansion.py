@@ -23,8 +23,8 @@ import sympy
 from sympy.polys.orderings import lex
 from sympy.polys.rings import PolyRing
 
+from symgen.derive.algebra import GraphAlgebra
 from symgen.derive.graph import Angle, Node, Scalar, reachable
-from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.numbers import numbered, numbers_of
 from symgen.description.expression import FUNCTIONS, PI, Expression, call
 from symgen.errors import SymgenError

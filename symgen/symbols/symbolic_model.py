@@ -13,9 +13,9 @@ from functools import cached_property
 from itertools import product
 from typing import Any
 
+from symgen.derive.algebra import GraphAlgebra
 from symgen.derive.frames import Frames
 from symgen.derive.graph import SYM, Angle, Domain, Scalar, Symbol, interpret
-from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.model import TWIST, Model, Place, Request, labels, rewriting
 from symgen.derive.models import MODELS
 from symgen.description.expression import Expression
