@@ -38,12 +38,11 @@ import numpy as np
 
 from symgen.certify.texts import TOLERANCE, TextCheck
 from symgen.certify.witness import base_values, is_assumed
-from symgen.derive.angles import roots_of, rows_of, units_of
 from symgen.derive.closure import parts
+from symgen.derive.constants import kept_angle, numbered, roots_of, rows_of, units_of
 from symgen.derive.doubts import nearly_round
 from symgen.derive.exact import Array, Draw, primes_for
 from symgen.derive.loops import close
-from symgen.derive.numbers import kept_angle, numbered
 from symgen.description.at_values import WITHIN
 from symgen.description.expression import Call, Expression, Number, quarter_turns
 from symgen.description.robot import REVOLUTE, Frame, Robot

@@ -19,8 +19,7 @@ import numpy as np
 from symgen.derive.algebra import GraphAlgebra, Matrix, Scalar, Vector, dot
 from symgen.derive.closure import Closure, open_tree
 from symgen.derive.floats import Floats, states_of
-from symgen.derive.frames import frame_poses
-from symgen.derive.geometry import Geometry
+from symgen.derive.geometry import Geometry, frame_poses
 from symgen.derive.graph import interpret
 from symgen.description.expression import ZERO, Expression
 from symgen.description.parts import row_of

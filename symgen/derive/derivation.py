@@ -20,12 +20,11 @@ from typing import NamedTuple
 from symgen.derive.algebra import GraphAlgebra, Matrix, Scalar, Vector
 from symgen.derive.closure import Closure
 from symgen.derive.composite import CompositeLinks
+from symgen.derive.constants import numbered
 from symgen.derive.elements import element_column
-from symgen.derive.frames import frame_poses
-from symgen.derive.geometry import Geometry
+from symgen.derive.geometry import Geometry, frame_poses
 from symgen.derive.loops import close
 from symgen.derive.newton_euler import Motion, joint_torques
-from symgen.derive.numbers import numbered
 from symgen.derive.regressor import columns, element_names
 from symgen.description.robot import Robot
 

@@ -15,7 +15,7 @@ arithmetic identifies only by its operands.
 from __future__ import annotations
 
 from symgen.derive.algebra import Scalar
-from symgen.derive.angles import varies
+from symgen.derive.constants import varies
 from symgen.derive.graph import Turn
 from symgen.derive.newton_euler import Motion
 from symgen.description.expression import FUNCTIONS, ONE, ZERO, Atom, Call, Expression

@@ -45,7 +45,7 @@ from symgen.derive.algebra import (
 )
 from symgen.derive.derivation import Derivation
 from symgen.derive.elements import law_value
-from symgen.derive.frames import Frames
+from symgen.derive.geometry import Frames
 from symgen.derive.graph import Symbol
 from symgen.derive.newton_euler import LinkMotion, Motion
 from symgen.derive.regressor import columns, element_names, inertial_names, unit_wrench

@@ -43,17 +43,17 @@ from math import lcm
 import numpy as np
 
 from symgen.derive.algebra import GraphAlgebra, Scalar
-from symgen.derive.angles import (
+from symgen.derive.closure import parts
+from symgen.derive.constants import (
     LARGEST_RADICAND,
     PI,
     Unit,
     Variable,
+    numbered,
     radicands,
     units_of,
 )
-from symgen.derive.closure import parts
 from symgen.derive.graph import INV, POS, SIGN, SIN, SQRT, Angle, Node, Symbol, Velocity, interpret
-from symgen.derive.numbers import numbered
 from symgen.description.expression import Call, Expression, Number, quarter_turns
 from symgen.description.robot import Robot
 from symgen.errors import SymgenError

@@ -32,12 +32,11 @@ from typing import Any
 import numpy as np
 
 from symgen.derive.algebra import GraphAlgebra, Scalar
-from symgen.derive.angles import Variable
 from symgen.derive.assembly import coincidence, loop_ends
+from symgen.derive.constants import Variable, numbered
 from symgen.derive.exact import Array, Draw, Point, power, primes_for
 from symgen.derive.graph import Symbol, interpret
 from symgen.derive.loop_equations import loop_system
-from symgen.derive.numbers import numbered
 from symgen.description.expression import Call, Number
 from symgen.description.robot import PRISMATIC, REVOLUTE, Robot
 from symgen.regroup.finite_field import solve_each

@@ -19,10 +19,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from symgen.derive.constants import numbered
 from symgen.derive.elements import is_opaque
 from symgen.derive.exact import Draw
 from symgen.derive.loops import close
-from symgen.derive.numbers import numbered
 from symgen.derive.regressor import element_names, inertial_names
 from symgen.description.angles import InertiaWarning
 from symgen.description.expression import (

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from symgen.derive.angles import Variable
+from symgen.derive.constants import Variable
 from symgen.derive.derivation import derive
 from symgen.derive.exact import Array, Draw
 from symgen.derive.graph import interpret

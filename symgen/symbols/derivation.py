@@ -19,7 +19,7 @@ from symgen.derive.closure import Closure, open_tree
 from symgen.derive.derivation import Derivation, derive, derived
 from symgen.derive.graph import Symbol
 from symgen.derive.loops import close
-from symgen.derive.model import Request
+from symgen.derive.models import Request
 from symgen.derive.names import Names
 from symgen.derive.rewrite import Input
 from symgen.description.at_values import at_values, exact, substituted
