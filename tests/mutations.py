@@ -51,7 +51,7 @@ FAULTS = (
     Fault("symgen/derive/newton_euler.py", "dot((YY, XX - ZZ, XZ, XY, -YZ)", "dot((YY, ZZ - XX, XZ, XY, -YZ)", "sign in w x (J w)", EMITTED),
     Fault("symgen/derive/newton_euler.py", "cross(geometry.P[j], fi)", "cross(fi, geometry.P[j])", "lever of the force on the link before, turned", EMITTED),
     Fault("symgen/derive/geometry.py", "self.turn[f.ant][1] + offset", "self.turn[f.ant][1]", "constant of an angle sum of parallel axes lost", EMITTED),
-    Fault("symgen/derive/elements.py", 'return speed if law == Expression.symbol("qd") else direction', 'return direction if law == Expression.symbol("qd") else speed', "one-sided Coulomb and viscous friction exchanged", EMITTED),
+    Fault("symgen/derive/regressor.py", 'return speed if law == Expression.symbol("qd") else direction', 'return direction if law == Expression.symbol("qd") else speed', "one-sided Coulomb and viscous friction exchanged", EMITTED),
     # regroup
     Fault("symgen/regroup/rules.py", '{("XX", 0): -ONE}', '{("XX", 0): ONE}', "YY goes into XX with the wrong sign", REGROUPED),
     Fault("symgen/regroup/rules.py", "- p[k] * u[m] -", "+ p[k] * u[m] -", "sign in the parallel axis rule", REGROUPED),

@@ -123,6 +123,15 @@ class Closure:
                 total[i] = total[i] + algebra.rate(u, i) * total[u]
         return {i: total[i] for i in self.robot.joints}
 
+    def project_twice(
+        self, algebra: GraphAlgebra, A: Mapping[tuple[int, int], Scalar]
+    ) -> dict[tuple[int, int], Scalar]:
+        """Return G' A G of the actuated joints from the matrix A of all moving joints; G = dq/dq_a."""
+        joints, moving = self.robot.joints, self.robot.moving
+        AG = {j: self.project(algebra, {k: A[j, k] for k in moving}) for j in moving}
+        columns = {k: self.project(algebra, {j: AG[j][k] for j in moving}) for k in joints}
+        return {(i, k): columns[k][i] for k in joints for i in joints}
+
 
 def parts(robot: Robot) -> int:
     """Return a common denominator D of the ratios between passive and independent joint angles.

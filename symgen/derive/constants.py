@@ -28,6 +28,7 @@ from functools import lru_cache
 from math import gcd, lcm
 
 from symgen.description.at_values import mapped
+from symgen.description.element import STATE, varies
 from symgen.description.expression import (
     Call,
     Expression,
@@ -36,7 +37,6 @@ from symgen.description.expression import (
     call,
     quarter_turns,
 )
-from symgen.description.kinds import CHANNEL, STATE
 from symgen.description.robot import REVOLUTE, Robot
 
 PI: Monomial = (("pi", 1),)
@@ -156,17 +156,6 @@ def _angles_of_laws(robot: Robot) -> Iterator[Expression]:
                             if not any(varies(b) for b, _ in m)
                         }
                     )
-
-
-def varies(a: str | Number | Call) -> bool:
-    """Whether a symbol or function call in a torque law depends on the joint state or on time.
-
-    A function other than cos, sin and 1/x counts as varying, even if its operand is constant.
-    """
-    if isinstance(a, Call):
-        exact = a.function in ("cos", "sin", "inv")
-        return not exact or any(varies(b) for e in a.operands for b in e.atoms)
-    return not isinstance(a, Number) and (a.startswith(CHANNEL) or bool(STATE.match(a)))
 
 
 def rows_of(robot: Robot) -> list[Expression]:

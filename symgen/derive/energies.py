@@ -44,11 +44,10 @@ from symgen.derive.algebra import (
     dot,
 )
 from symgen.derive.derivation import Derivation
-from symgen.derive.elements import law_value
 from symgen.derive.geometry import Frames
 from symgen.derive.graph import Symbol
 from symgen.derive.newton_euler import LinkMotion, Motion
-from symgen.derive.regressor import columns, element_names, inertial_names, unit_wrench
+from symgen.derive.regressor import Law, columns, element_names, inertial_names, unit_wrench
 from symgen.description.expression import Expression
 from symgen.description.robot import INERTIAL, PRISMATIC, Element, parameter
 
@@ -109,7 +108,7 @@ def potential_energy(d: Derivation) -> Scalar:
         elif e.kind == "offset":
             total = total + d.chi[name] * d.algebra.linear(e.along[j], positions)
         elif e.energy is not None:
-            total = total + d.chi[name] * law_value(d.motion, e, j, e.potential(j))
+            total = total + d.chi[name] * Law(d.motion, e, j).of(e.potential(j))
     return total
 
 

@@ -32,9 +32,8 @@ from symgen.derive.assembly import (
 )
 from symgen.derive.closure import Closure, Relation, open_tree
 from symgen.derive.exact import Draw
-from symgen.derive.floats import Floats, states_of
 from symgen.derive.geometry import Geometry, frame_poses
-from symgen.derive.graph import interpret
+from symgen.derive.graph import Floats, interpret, states_of
 from symgen.description.expression import ONE, PI, ZERO, Expression, quarter_turns
 from symgen.description.robot import PRISMATIC, REVOLUTE, Loop, Robot
 from symgen.errors import DescriptionError

@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from symgen.derive.algebra import GraphAlgebra, Matrix, Vector
-from symgen.derive.coriolis import coriolis
+from symgen.derive.composite import CompositeRates
 from symgen.derive.derivation import Derivation
 from symgen.derive.energies import (
     Columns,
@@ -360,7 +360,9 @@ def _require_closed_form(d: Derivation) -> None:
 def _coriolis(d: Derivation, r: Request) -> Iterator[Case]:
     _require_closed_form(d)
     row = {j: k for k, j in enumerate(d.robot.joints)}
-    yield Case([Entry((row[i], row[k]), x) for (i, k), x in coriolis(d).items()])
+    C = CompositeRates(d.motion, d.chi).coriolis()
+    projected = d.geometry.closure.project_twice(d.algebra, C)  # of a constant G
+    yield Case([Entry((row[i], row[k]), x) for (i, k), x in projected.items()])
 
 
 def _regressor(d: Derivation, r: Request) -> Iterator[Case]:

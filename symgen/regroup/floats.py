@@ -15,8 +15,7 @@ import numpy as np
 
 from symgen.derive.derivation import derive
 from symgen.derive.exact import Array
-from symgen.derive.floats import Floats, states_of
-from symgen.derive.graph import Symbol, interpret
+from symgen.derive.graph import Floats, Symbol, interpret, states_of
 from symgen.derive.loop_equations import LoopSystem, loop_system
 from symgen.derive.loops import close
 from symgen.description.expression import Expression

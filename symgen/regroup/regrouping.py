@@ -20,11 +20,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symgen.derive.constants import numbered
-from symgen.derive.elements import is_opaque
 from symgen.derive.exact import Draw
 from symgen.derive.loops import close
-from symgen.derive.regressor import element_names, inertial_names
+from symgen.derive.regressor import element_names, inertial_names, is_opaque
 from symgen.description.angles import InertiaWarning
+from symgen.description.element import OWN_LAWS
 from symgen.description.expression import (
     ONE,
     ZERO,
@@ -32,7 +32,6 @@ from symgen.description.expression import (
     simplified,
     with_known_cosines,
 )
-from symgen.description.kinds import OWN_LAWS
 from symgen.description.robot import INERTIAL, PRISMATIC, Robot, parameter
 from symgen.regroup.finite_field import rref
 from symgen.regroup.floats import float_relations, numeric_coefficients
