@@ -45,7 +45,7 @@ from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import assemble
 from runtime.core.least_squares.method import linear_companion, linear_system
 from runtime.core.limits import LIMIT
-from runtime.core.model import GeneratedModel, channels_of, joint_units
+from runtime.core.model import TRANSMITTED, GeneratedModel, channels_of, joint_units
 from runtime.core.part import Part
 from runtime.core.residuals import unseen_by_blocks
 from runtime.core.result import Identification
@@ -141,8 +141,8 @@ def expected_error(
 ) -> Expected:
     """Compute the expected error of torques predicted for other motions, with its interval, %.
 
-    The error is nan if neither the robot file nor the records give a range, or if a loop cannot
-    close in the range.
+    The error is nan if neither the robot file nor the records give a range, if a loop cannot close
+    in the range, or if the records lack a signal of the model.
 
     Parameters
     ----------
@@ -160,11 +160,10 @@ def expected_error(
         Share of the accelerations that is an error of the encoder's steps.
     """
     states = reference_states(model, records)
-    if states is None or channels_of(model):
+    if states is None or not has_channels(model, records):
         return Expected(*3 * (float("nan"),))
     try:
-        q, qd, qdd = states
-        D, still = (np.asarray(model.regressor(q, qd, x)) for x in (qdd, np.zeros_like(qdd)))
+        D, still = regressors(model, states, records, fit)
     except ValueError:  # a loop that does not close
         return Expected(*3 * (float("nan"),))
     linear = linear_companion(settings)
@@ -204,6 +203,54 @@ def expected_error(
     )
     error, low, high = np.minimum(errors, LIMIT.LARGEST_EXPECTED).tolist()
     return Expected(error, low, high, motions)
+
+
+def has_channels(model: GeneratedModel, records: Sequence[Prepared]) -> bool:
+    """Whether every record has the channels of the model that the model does not compute."""
+    recorded = [c for c in channels_of(model) if not c.startswith(TRANSMITTED)]
+    return not recorded or bool(records and all({*recorded} <= {*r.channels} for r in records))
+
+
+def regressors(
+    model: GeneratedModel,
+    states: tuple[Array, Array, Array],
+    records: Sequence[Prepared],
+    fit: Estimate,
+) -> tuple[Array, Array]:
+    """Compute D and D_0, the regressors at the states with and without accelerations, (K, n, b).
+
+    A channel, such as a temperature, has random values of the records; a torque that a joint
+    transmits is that of the other parameters of `fit` at the states.
+    """
+    q, qd, qdd = states
+    rng, channels = np.random.default_rng(0), channels_of(model)
+    timed = {
+        c: rng.choice(np.concatenate([record.channels[c] for record in records]), len(q))
+        for c in channels
+        if not c.startswith(TRANSMITTED)
+    }
+    transmitted = {
+        c: model.JOINTS.index(int(c.removeprefix(TRANSMITTED)))
+        for c in channels
+        if c.startswith(TRANSMITTED)
+    }
+    laws = {name for c in transmitted for name in channels[c]}
+    X = np.array(
+        [
+            fit[name] if name in fit.names and name not in laws else 0.0
+            for name in model.BASE_PARAMETERS
+        ]
+    )
+
+    def at(qdd: Array) -> Array:
+        none = {c: np.zeros(len(q)) for c in transmitted}
+        D = np.asarray(model.regressor(q, qd, qdd, **timed, **none))  # type: ignore[arg-type]
+        if not transmitted:
+            return D
+        tau = {c: (D @ X)[:, j] for c, j in transmitted.items()}
+        return np.asarray(model.regressor(q, qd, qdd, **timed, **tau))  # type: ignore[arg-type]
+
+    return at(qdd), at(np.zeros_like(qdd))
 
 
 def with_values(physical: PhysicalModel, K: Array, R: Array, y: Array) -> tuple[Array, Array]:

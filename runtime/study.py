@@ -211,12 +211,14 @@ def read_record(
         Files that cannot be read or have other content, several records, or one record that
         `resample` splits.
     """
+    bare = False
     if isinstance(path, RecordSettings):
         settings: tuple[RecordSettings, ...] = (path,)
     else:
         require_kind(path, (str, Path), "path", "the name of a file, or RecordSettings")
         named = Path(folder) / path
         study, folder = study_of(named if named.exists() else path)
+        bare = is_measured(named)
         settings = study.record
         missing = missing or study.signals.admits_missing
     records = read_records(settings, model, folder=folder, missing=missing)
@@ -226,7 +228,8 @@ def read_record(
             f"the study has {len(records)} records (or pieces between gaps), but this function "
             f"returns only one; use read_records, which returns all: {names}"
         )
-    return records[0]
+    record = records[0]
+    return replace(record, origin=replace(record.origin, sides=None)) if bare else record
 
 
 def suggested(study: Study, model: GeneratedModel) -> tuple[Study, list[str]]:

@@ -84,6 +84,7 @@ def shared_object(
     key = hashlib.sha256(b"\0".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        folder = folder.resolve()
         if is_writable_by_others(folder):
             raise NotCompiledError(
                 f"anyone may write to the cache folder {folder}; choose another folder by the variable SYMGEN_CACHE"

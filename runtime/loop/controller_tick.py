@@ -319,7 +319,11 @@ def compiled(function: Any, cache: Path | None = None) -> Any:
         shared_object(
             Path(f"{function.name()}.c"), text, cache or cache_folder("compiled"), opened, FLAGS
         )
-    except (NotCompiledError, OSError) as e:
+    except (
+        NotCompiledError,
+        OSError,
+        RuntimeError,
+    ) as e:  # RuntimeError: no home folder, a circle of links
         warnings.warn(
             f"the simulation runs in the interpreter of CasADi, because it cannot run as compiled C: {e}",
             FallbackWarning,

@@ -165,6 +165,11 @@ def payload(
         Y = rows.Y - mounted * (rows.W @ load.torque)
         return replace(rows, W=np.asfortranarray(np.hstack([rows.W, of_load])), Y=Y, names=names)
 
+    method = method or EstimateSettings()
+    if method.columns != "all":
+        left_out = {*model.BASE_PARAMETERS} - {*method.columns}
+        used = tuple(name for name in names if name.removesuffix(LOAD) not in left_out)
+        method = replace(method, columns=used)
     both = stack([extended(stack(without), 0.0), extended(stack(loaded), 1.0)])
     fit = linear_estimate(both, method, model=model, provenance=provenance)
     units = {**fit.units, **{f"{family}{LOAD}": _unit(family) for family in load.unknown}}

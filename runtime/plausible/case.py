@@ -174,7 +174,8 @@ class Case:
         The side of the torques is "law" if the control law of a controller computed them.
         """
         settings: Any = self.study
-        q, tau = settings.record[0].sides if settings.record else ("joint", "joint")
+        stated = settings.record[0].sides if settings.record else ("joint", "joint")
+        q, tau = self.records[0].origin.sides or stated
         return q, "law" if any(record.origin.by_law for record in self.records) else tau
 
     @cached_property
@@ -245,7 +246,9 @@ class Case:
         if self.unfit:
             return None
         baseline = self.baseline or self._baseline(values=True)
-        return known_values(baseline) if baseline and baseline.bodies.near_values else None
+        if not baseline.bodies.near_values:
+            return None
+        return known_values(baseline, rotors=self.sides[1] != "link")
 
     @cached_property
     def noise_floor(self) -> float:
