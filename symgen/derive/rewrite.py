@@ -160,7 +160,8 @@ class Rewrite:
                     if isinstance(value := given[j], Expression):
                         offset = offset + value * n
                 turn = tuple((j, n) for j, n in turn if given[j] is None)
-                return self.algebra.cos_sin(turn, offset)[node.op == SIN]
+                image: Scalar | int = self.algebra.cos_sin(turn, offset)[node.op == SIN]
+                return image
             case "pos" if x[0] == 0:
                 return 0
             case op if op in FUNCTIONS and x[0] == 0:
