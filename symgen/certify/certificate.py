@@ -43,9 +43,9 @@ from symgen.derive.constants import kept_angle, numbered, roots_of, rows_of, uni
 from symgen.derive.doubts import nearly_round
 from symgen.derive.exact import Array, Draw, primes_for
 from symgen.derive.loops import close
-from symgen.description.at_values import WITHIN
 from symgen.description.expression import Call, Expression, Number, quarter_turns
 from symgen.description.robot import REVOLUTE, Frame, Robot
+from symgen.description.values import WITHIN
 from symgen.regroup.closed_draw import closed_draw
 from symgen.regroup.finite_field import rref
 from symgen.regroup.regrouping import EXACT, Regrouping

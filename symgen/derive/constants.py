@@ -27,7 +27,6 @@ from fractions import Fraction
 from functools import lru_cache
 from math import gcd, lcm
 
-from symgen.description.at_values import mapped
 from symgen.description.element import STATE, varies
 from symgen.description.expression import (
     Call,
@@ -38,6 +37,7 @@ from symgen.description.expression import (
     quarter_turns,
 )
 from symgen.description.robot import REVOLUTE, Robot
+from symgen.description.values import mapped
 
 PI: Monomial = (("pi", 1),)
 # roots of larger primes are drawn by themselves: their fields share nothing with angles of small denominator

@@ -185,7 +185,7 @@ def write_robot(
     if suffix not in WRITTEN:
         raise DescriptionError(f"{file}: expected a file name that ends in {', '.join(WRITTEN)}")
     if suffix == ".urdf":
-        from symgen.description.urdf_write import write_urdf  # numpy, which robot files do without
+        from symgen.description.urdf import write_urdf  # numpy, which robot files do without
 
         return write_urdf(robot)
     return write_yaml(robot, comments=comments), ()

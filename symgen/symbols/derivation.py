@@ -22,10 +22,10 @@ from symgen.derive.loops import close
 from symgen.derive.models import Request
 from symgen.derive.names import Names
 from symgen.derive.rewrite import Input
-from symgen.description.at_values import at_values, exact, substituted
 from symgen.description.expression import ONE, Expression
 from symgen.description.grammar import parse
 from symgen.description.robot import Robot
+from symgen.description.values import at_values, exact, substituted
 from symgen.errors import SymgenError
 from symgen.regroup.regrouping import Formula, Regrouping, regroup
 from symgen.symbols.expressions import in_decimals

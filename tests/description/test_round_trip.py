@@ -96,7 +96,7 @@ def test_packaged_robots_are_written(name: str) -> None:
 
 def test_limits_as_numbers_are_to_either_side() -> None:
     """A robot made in Python: its limits in the module, the page, the URDF and the file."""
-    from symgen.description.urdf_write import write_urdf
+    from symgen.description.urdf import write_urdf
     from symgen.pages.page import robot_page
 
     robot = replace(load_robot("planar_2r"), limits={"q": (1.5, (-0.5, 2)), "qd": (3.0, 3.0)})

@@ -18,8 +18,8 @@ from symgen import Robot, SymgenError, load_robot, parse_robot, regrouping
 from symgen.certify.certificate import Certificate, certify_formulas
 from symgen.certify.modules import certified_files, certify
 from symgen.derive.constants import keep_rationals, units_of
-from symgen.description.at_values import at_values, exact
 from symgen.description.expression import Expression, Number, call
+from symgen.description.values import at_values, exact
 from symgen.regroup.regrouping import EXACT, BaseParameter, Regrouping
 
 HEAD = "symgen: 1\nname: x\ngravity: {gravity}\nconstants: {{{constants}}}\nframes:\n"
