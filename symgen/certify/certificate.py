@@ -16,7 +16,7 @@ are not random: a false identity between numbers is a fixed nonzero number, whic
 prime factors divide.
 
 General loops: the same identities are checked at random points of the closed mechanism
-(`regroup.closed_draw`), with the values of lengths that are numbers in the robot file. The rank is
+(`regroup.states`), with the values of lengths that are numbers in the robot file. The rank is
 checked at random lengths.
 
 Numeric, in floating point at the lengths of the robot file: the standard regressor W is that of a
@@ -46,10 +46,9 @@ from symgen.derive.loops import close
 from symgen.description.expression import Call, Expression, Number, quarter_turns
 from symgen.description.robot import REVOLUTE, Frame, Robot
 from symgen.description.values import WITHIN
-from symgen.regroup.closed_draw import closed_draw
 from symgen.regroup.finite_field import rref
 from symgen.regroup.regrouping import EXACT, Regrouping
-from symgen.regroup.residues import sample, states_for
+from symgen.regroup.states import closed_draw, sample, states_for
 
 if TYPE_CHECKING:
     from symgen.certify.lagrange import Sample

@@ -52,15 +52,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from fractions import Fraction
 
-from symgen.derive.algebra import (
-    E3,
-    Matrix,
-    Scalar,
-    Vector,
-    array,
-    cross,
-    dot,
-)
+from symgen.derive.algebra import E3, Matrix, Scalar, Vector, array, cross, dot
 from symgen.derive.geometry import Geometry, Rotation
 from symgen.derive.newton_euler import Motion
 from symgen.derive.regressor import element_names

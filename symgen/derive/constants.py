@@ -28,14 +28,7 @@ from functools import lru_cache
 from math import gcd, lcm
 
 from symgen.description.element import STATE, varies
-from symgen.description.expression import (
-    Call,
-    Expression,
-    Monomial,
-    Number,
-    call,
-    quarter_turns,
-)
+from symgen.description.expression import Call, Expression, Monomial, Number, call, quarter_turns
 from symgen.description.robot import REVOLUTE, Robot
 from symgen.description.values import mapped
 

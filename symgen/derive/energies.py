@@ -34,15 +34,7 @@ from collections.abc import Mapping
 from copy import copy
 from fractions import Fraction
 
-from symgen.derive.algebra import (
-    E3,
-    ZERO3,
-    Scalar,
-    Vector,
-    array,
-    cross,
-    dot,
-)
+from symgen.derive.algebra import E3, ZERO3, Scalar, Vector, array, cross, dot
 from symgen.derive.derivation import Derivation
 from symgen.derive.geometry import Frames
 from symgen.derive.graph import Symbol

@@ -167,7 +167,7 @@ def _angle_sum(
 
     In a planar loop all hinges have parallel axes, in equal or opposite directions, with or without
     prismatic joints between them. The axes are compared in two configurations of the open tree;
-    `regroup.closed_draw` proves the sum over F_p.
+    `regroup.states` proves the sum over F_p.
     """
     robot = assembly.robot
     if robot.frame(loop.cut).sigma != REVOLUTE:

@@ -20,16 +20,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-from symgen.derive.algebra import (
-    ZERO3,
-    Matrix,
-    Scalar,
-    Vector,
-    array,
-    cross,
-    dot,
-    is_zero,
-)
+from symgen.derive.algebra import ZERO3, Matrix, Scalar, Vector, array, cross, dot, is_zero
 from symgen.derive.geometry import Geometry
 from symgen.description.expression import Expression
 from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, REVOLUTE, parameter

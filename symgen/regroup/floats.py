@@ -21,7 +21,7 @@ from symgen.derive.loops import close
 from symgen.description.expression import Expression
 from symgen.description.robot import PRISMATIC, Robot
 from symgen.errors import DescriptionError, SymgenError
-from symgen.regroup.residues import states_for
+from symgen.regroup.states import states_for
 
 # singular values of unit columns: those below are rounding where a gap says so, at most here
 LARGEST_ROUNDING, SMALLEST = 1e-9, 1e-14

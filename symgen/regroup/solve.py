@@ -38,7 +38,7 @@ from symgen.derive.exact import Array, Draw, primes_for
 from symgen.description.expression import Call, Expression, Number
 from symgen.description.robot import Robot
 from symgen.regroup.finite_field import rref, small_rational, solve_each
-from symgen.regroup.residues import draw_states, sample, states_for
+from symgen.regroup.states import draw_states, sample, states_for
 from symgen.time_limit import require_time
 
 MAX_UNKNOWNS = 500

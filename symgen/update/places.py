@@ -38,13 +38,7 @@ from symgen.description.tree import (
     part_of,
     ten_of,
 )
-from symgen.description.tree_robot import (
-    JOINT_TERMS,
-    Table,
-    parse_tree,
-    placed,
-    robot_of_tree,
-)
+from symgen.description.tree_robot import JOINT_TERMS, Table, parse_tree, placed, robot_of_tree
 from symgen.description.xml_text import XmlElement, read_elements
 from symgen.errors import DescriptionError
 from symgen.update.xml_edits import XmlEdits, numbers, same
