@@ -11,13 +11,12 @@ this script and this style sheet, by their hashes.
 from __future__ import annotations
 
 import json
-import math
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from hashlib import sha256
 from importlib.resources import files
-from math import prod
+from math import pi, prod
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
@@ -38,7 +37,6 @@ from symgen.symbols import expressions
 from symgen.symbols.documents import shown_models
 from symgen.symbols.printers import MathML, math, math_terms
 from symgen.version import VERSION
-
 
 SCRIPTS = ("kinematics.js", "drawing.js", "page.js")
 HEADINGS = {"ant": "a", "mu": "μ", "sigma": "σ", "gamma": "γ", "alpha": "α", "theta": "θ"}
@@ -305,7 +303,7 @@ def joint_ranges(robot: Robot, closure: Closure, size: float) -> list[dict[str, 
     ranges = []
     for row, j in enumerate(robot.joints):
         slides = robot.frame(j).sigma == PRISMATIC
-        half = (size / 2 or 0.5) if slides else math.pi
+        half = (size / 2 or 0.5) if slides else pi
         low, high = robot.limits["q"][row] if "q" in robot.limits else (-half, half)  # type: ignore[misc]
         start = closure.start[j] if closure.tied else 0.0 if low <= 0 <= high else (low + high) / 2
         ranges.append(
