@@ -52,7 +52,6 @@ from runtime.core.study import EstimateSettings
 from runtime.counts.encoder_advice import EncoderSteps
 from runtime.counts.own_encoder import own_encoder
 from runtime.counts.reader import counted
-from runtime.elastic import elastic_gears
 from runtime.expected import ExpectedError
 from runtime.laws.scalars import fitted_scalars, scalars_of_laws
 from runtime.laws.transmitted import transmitted_torque
@@ -150,7 +149,6 @@ EXTRAS: list[Extra] = [
     ),
     scalars_of_laws,
     load_of_study,
-    elastic_gears,
     EncoderSteps,
     agreement,
     ExpectedError,
