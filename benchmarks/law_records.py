@@ -58,7 +58,12 @@ def go2_study(
         {
             "record": {"files": files[0], "also": files[1:], "columns": columns, "rate": 200},
             "controller": {"law": law, "torque": {"saturation": None}},
-            "signals": {"median": median, "lowpass": {"cutoff": cutoff}, "velocity": velocity},
+            "signals": {
+                "median": median,
+                "torque_median": median,
+                "lowpass": {"cutoff": cutoff},
+                "velocity": velocity,
+            },
         }
     )
 
@@ -138,7 +143,7 @@ def go2() -> None:
         print(problem(model, records, study).noted("law").text, "\n")
     print("Error on each run, %, of a fit of the other seven\n")
     cases: list[tuple[str, Study]] = [
-        ("defaults (median 5, cut-off auto)", go2_study(cutoff="auto", median=5)),
+        ("median 5, cut-off auto", go2_study(cutoff="auto", median=5)),
         (
             "the same, differences of q alone",
             go2_study(cutoff="auto", median=5, velocity="differences"),
@@ -168,7 +173,7 @@ def calf() -> None:
     for title, study in (
         ("median off, low-pass 10 Hz", go2_study()),
         ("the same, torques 10 ms later", go2_study(delay=0.01)),
-        ("defaults: median 5, cut-off auto", go2_study(cutoff="auto", median=5)),
+        ("median 5, cut-off auto", go2_study(cutoff="auto", median=5)),
     ):
         values = spread(model, observed(model, study), [f"Ia{j}" for j in CALVES])
         rows.append((title, *(f"{m:.4f}, {s:.4f} ({d:.4f})" for _, m, s, d in values)))

@@ -61,7 +61,7 @@ from runtime.loop.cestac import loop_of
 from runtime.loop.closed_loop import observed_loop
 from runtime.loop.fixed_point import FixedPointOptions
 from runtime.loop.simulated_motion import beside_record
-from runtime.median import torque_median
+from runtime.median import pulses_in_torques
 from runtime.payload.study import LOADED, load_of_study, payload_study
 from runtime.physical import feasible
 from runtime.physical.consistency import as_fitted, consistency
@@ -91,7 +91,7 @@ STEPS: list[Step] = [
     commands_for_torques,
     force_sensors,
     torques_of_links,
-    torque_median,
+    pulses_in_torques,
     recorded_speeds,
     automatic_cutoff,
     poses_at_rest,
