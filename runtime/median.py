@@ -2,7 +2,7 @@
 
 A controller that reacts to each count of an encoder drives the motor in pulses. The mean of these
 pulses moves the robot, but a median removes them. Let d be the change of the torque tau of a joint
-by the median. With means over blocks of LIMIT.TORQUE_BLOCK,
+by the median. With means over blocks of TORQUE_BLOCK,
 
     d = a tau + b qd + c sign(qd) + rest       taken = ||d - rest|| / ||tau||
 
@@ -19,6 +19,13 @@ from runtime.core.problem import SIGNALS, Note, Problem
 from runtime.core.rows.selection import excerpt
 from runtime.core.signals.filters import median_filtered
 
+FEWEST_BLOCKS = 20
+"""Such means of a record from which it is asked."""
+MEDIAN_TAKES = 0.015
+"""Share of a torque in time with the motion from which it is told: loops 0.022 to 0.18, TX40 0.007, noise of 15 % 0.003. Measured: benchmarks/truth.md."""
+TORQUE_BLOCK = 0.1
+"""Length of the means that tell what a median takes from torques, s. Measured: benchmarks/truth.md."""
+
 Array = np.ndarray
 
 
@@ -31,10 +38,10 @@ def share_taken(tau: Array, q: Array, rate: float, window: int) -> Array:
     tau, q : torques and positions, shape (N, n).
     window : samples of the median.
     """
-    block = max(1, round(LIMIT.TORQUE_BLOCK * rate))
+    block = max(1, round(TORQUE_BLOCK * rate))
     count, n = len(tau) // block, tau.shape[1]
     share = np.zeros(n)
-    if window == 1 or count < LIMIT.FEWEST_BLOCKS:
+    if window == 1 or count < FEWEST_BLOCKS:
         return share
     off = median_filtered(tau, window) - tau
     off = np.where(np.abs(off) > LIMIT.SPIKE * np.sqrt(np.mean(off**2, axis=0)), 0.0, off)
@@ -62,7 +69,7 @@ def pulses_in_torques(problem: Problem) -> Problem:
     for record in problem.records:
         samples = excerpt(record, problem.settings.rows)
         shares.append(share_taken(record.tau[samples], record.q[samples], record.rate, window))
-    if np.max(shares, initial=0.0) <= LIMIT.MEDIAN_TAKES:
+    if np.max(shares, initial=0.0) <= MEDIAN_TAKES:
         return problem
     worst = np.max(shares, axis=0)
     text = (
