@@ -71,7 +71,7 @@ FAULTS = (
     Fault("runtime/core/signals/filters.py", "np.minimum(np.maximum(a, b), shifted[-1])", "np.minimum(np.minimum(a, b), shifted[-1])", "the running median is the smaller of two", SIGNALS),
     Fault("runtime/core/rows/selection.py", "np.abs(qd[instants].T) >= slow", "np.abs(qd[instants]).max(axis=1) >= slow", "low speed judged by the fastest joint", ("core/test_observation.py",)),
     Fault("runtime/core/rows/selection.py", 'np.searchsorted(t, t1, side="right"', 'np.searchsorted(t, t1, side="left"', "the last sample of a window is lost", ("core/test_observation.py",)),
-    Fault("runtime/core/rows/prepared.py", "median_filtered(tau, selection.signals.window_of_torques)", "tau", "torques without their median filter", ("core/test_observation.py", "core/test_cestac.py")),
+    Fault("runtime/core/rows/prepared.py", "median_filtered(tau, selection.signals.torque_median)", "tau", "torques without their median filter", ("core/test_observation.py", "core/test_cestac.py")),
     Fault("runtime/core/rows/factor.py", "R=joint.R * w)", "R=joint.R * w**2)", "weights of the joints squared", ESTIMATES),
     Fault("runtime/core/rows/observation.py", "start = sum(self.rows[:j])", "start = sum(self.rows[: j + 1]) - self.rows[0]", "rows of a joint looked for at another place", ("core/test_observation.py", *ESTIMATES)),
     # model: units and drives

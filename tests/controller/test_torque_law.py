@@ -248,7 +248,7 @@ def test_the_saturation_is_in_force_where_kd_is_found(tmp_path, moving):
             tmp_path,
             log,
             controller={"law": {"kp": KP.tolist(), "kd": kd}, "torque": {"saturation": list(cut)}},
-            signals={"median": 1, "torque_median": 1, "lowpass": {"cutoff": 40}},
+            signals={"median": 1, "lowpass": {"cutoff": 40}},
         )
         result = identified(study)
         errors[str(kd)] = result.estimate.relative_error
