@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from campaign import some
+from hang import HANG
 from typer.testing import CliRunner
 
 import symgen
@@ -306,7 +307,7 @@ def test_two_processes_at_once_and_others_that_load_the_file(cache) -> None:
         )
         for _ in range(2)
     ]
-    files = {process.communicate(timeout=120)[0] for process in started}
+    files = {process.communicate(timeout=HANG)[0] for process in started}
     assert [process.returncode for process in started] == [0, 0] and len(files) == 1
     file, name = files.pop().split()
     assert load_model(Path(file)).NAME == name == "planar_2r"

@@ -26,6 +26,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 from campaign import campaign, some
+from hang import HANG
 from ruamel.yaml import YAML
 from typer.main import get_command
 
@@ -110,7 +111,7 @@ def run(command: list[str], folder: Path) -> None:
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=HANG,
         check=False,
     )
     assert ended.returncode == 0, (ended.stdout[-2000:] + ended.stderr[-4000:]).strip()

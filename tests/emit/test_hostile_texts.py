@@ -18,6 +18,7 @@ from xml.parsers import expat
 
 import pytest
 from campaign import campaign, some
+from hang import HANG
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
@@ -151,7 +152,7 @@ def tokens(text, folder):
     file = folder / "a.c"
     file.write_text(text, encoding="utf-8")
     command = ["gcc", "-std=c11", "-fpreprocessed", "-dD", "-E", "-P", str(file)]
-    said = subprocess.run(command, capture_output=True, text=True, check=True, timeout=20).stdout
+    said = subprocess.run(command, capture_output=True, text=True, check=True, timeout=HANG).stdout
     return re.sub(r'"(\\.|[^"\\])*"', '""', said)
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import distributed as dask
 import planar_2r_model as planar
 import pytest
+from hang import HANG
 from planar_data import record
 
 from runtime.compose import cestac
@@ -33,7 +34,7 @@ def cluster(processes):
     come back on a busy machine.
     """
     with dask.Client(processes) as client:
-        client.wait_for_workers(2, timeout=300)
+        client.wait_for_workers(2, timeout=HANG)
     return processes
 
 
@@ -83,7 +84,7 @@ def failing(key):
 def test_same_bits_as_one_process(cluster):
     here = cestac(planar, RECORD, STUDY)
     calls = []
-    with mapped(cluster.scheduler_address) as dask_map:
+    with mapped(cluster.scheduler_address, timeout=HANG) as dask_map:
         there = cestac(
             planar,
             RECORD,
@@ -104,14 +105,14 @@ def test_a_worker_killed_halfway_changes_nothing(cluster):
             killed.append(next(iter(cluster.workers.values())).pid)
             os.kill(killed[0], signal.SIGKILL)
 
-    with mapped(cluster.scheduler_address) as dask_map:
+    with mapped(cluster.scheduler_address, timeout=HANG) as dask_map:
         there = cestac(planar, RECORD, STUDY, map=dask_map, progress=kill_one)
     assert killed and there.to_json() == cestac(planar, RECORD, STUDY).to_json()
 
 
 @pytest.mark.campaign
 def test_a_dead_worker_loses_nothing(cluster, tmp_path):
-    with mapped(cluster.scheduler_address) as dask_map:
+    with mapped(cluster.scheduler_address, timeout=HANG) as dask_map:
         found = list(dask_map(partial(dying_once, tmp_path), range(20)))
     assert found == [(key, tmp_path) for key in range(20)]
     assert (tmp_path / "died").exists()
@@ -121,7 +122,7 @@ def test_a_dead_worker_loses_nothing(cluster, tmp_path):
 def test_a_failing_task_is_the_callers_error(cluster):
     with (
         pytest.raises(ValueError, match="key 2"),
-        mapped(cluster.scheduler_address) as dask_map,
+        mapped(cluster.scheduler_address, timeout=HANG) as dask_map,
     ):
         list(dask_map(failing, range(5)))
 
