@@ -36,7 +36,7 @@ Array = np.ndarray[Any, Any]
 GENERAL = ("four_bar", "five_bar")
 PACKAGED = ("haptic", "sr400", *GENERAL)
 NAMES = (*PACKAGED, *(f"parallelogram_{seed}" for seed in SEEDS))
-SAMPLE = sampled(NAMES, 10, always=PACKAGED)
+SAMPLE = sampled(NAMES, 10, always=PACKAGED, more=6)
 PARALLELOGRAMS = [case for case in SAMPLE if case not in GENERAL]
 Emitted = Callable[[str], ModuleType]
 
