@@ -469,9 +469,7 @@ def assess(
 @single_threaded
 def compare(
     model: GeneratedModel,
-    candidates: Study
-    | tuple[Study, Records, Records]
-    | Mapping[str, Study | tuple[Study, Records, Records]],
+    candidates: Mapping[str, Study | tuple[Study, Records, Records]],
     *,
     variants: GeneratedModel | None = None,
 ) -> Ranking:
@@ -481,27 +479,21 @@ def compare(
     ----------
     model : GeneratedModel
         Emitted module.
-    candidates : Study, (study, records, validation records), or mapping of str to them
-        By name of the treatment; a Study names its records. All validation records are of the same
-        instants. For a single candidate, treatments that its data suggest are compared.
+    candidates : mapping of str to Study, or to (study, records, validation records)
+        By name; a Study names its records. All validation records are of the same instants.
     variants : GeneratedModel, optional
         The module of `symgen.variants`: the plausibility of the best treatment is then judged.
 
     Raises
     ------
     InputError
-        A candidate without validation records, or with other validation records than the first; no
-        candidate that can be identified.
+        No candidate; one without validation records, or with other validation records than the
+        first; no candidate that can be identified.
     """
     from runtime import treatments as comparing
-    from runtime.plausible.motion import speed_of_rest
 
-    if isinstance(candidates, Mapping):
-        problems = {
-            name: prepared(_candidate(model, one), STEPS) for name, one in candidates.items()
-        }
-    else:
-        problems = comparing.treatments(_candidate(model, candidates), STEPS, speed_of_rest)
+    require_kind(candidates, Mapping, "candidates", "a mapping of names to studies")
+    problems = {name: prepared(_candidate(model, one), STEPS) for name, one in candidates.items()}
     of_the_best = []
     if variants is not None:
         plausible = later("runtime.plausible.plausibility", "plausibility_of")

@@ -19,7 +19,7 @@ unseen data for it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,14 +29,12 @@ from runtime.core.errors import InputError
 from runtime.core.identify import Extra, identify, with_parts
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.parameter_sets import ORDER, SetName, best_set
-from runtime.core.problem import Problem, Step, estimated, prepared
+from runtime.core.problem import Problem, estimated
 from runtime.core.progress import at
 from runtime.core.record import Record
 from runtime.core.result import Identification
 from runtime.core.rows.prepared import stacked
 from runtime.core.table import Table
-
-STATED = "as stated"
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,9 +159,11 @@ def compare(
     Raises
     ------
     InputError
-        A treatment without validation records, or with other validation records than the first; no
-        treatment that can be identified.
+        No treatment; a treatment without validation records, or with other validation records than
+        the first; no treatment that can be identified.
     """
+    if not problems:
+        raise InputError("no study to compare; expected two or more")
     first = next(iter(problems.values())).unseen
     for name, problem in problems.items():
         _require_alike(name, problem.unseen, first)
@@ -176,11 +176,7 @@ def compare(
         except InputError as e:
             missing.append(f"{name}: {e}")
     if not results:
-        raise InputError(
-            f"no treatment can be identified; {missing[0]}"
-            if missing
-            else "no treatment; expected one or more to compare"
-        )
+        raise InputError(f"no treatment can be identified; {missing[0]}")
     standing = {name: standing_set(result) for name, result in results.items()}
     errors = {
         name: {other: _error(problems[name], fit, problems[other]) for other in results}
@@ -195,36 +191,6 @@ def compare(
         standing,
         tuple(missing),
     )
-
-
-def treatments(
-    problem: Problem,
-    steps: Sequence[Step],
-    speed_of_rest: Callable[[Problem], float | tuple[float, ...] | None],
-) -> dict[str, Problem]:
-    """Make one to three variants of a problem, which use different rows or torques of its records.
-
-    The variants are: as stated, without the rows of resting joints, and without known torques (also
-    without the resting rows, if there is a variant without them). All steps are applied to each.
-
-    speed_of_rest : function that returns rows.low_speed of a prepared problem to leave out the rows
-        of resting joints; None if few joints rest.
-    """
-    stated = prepared(problem, steps)
-    found = {STATED: stated}
-    low = speed_of_rest(stated)
-    if low is not None:
-        settings = problem.settings
-        settings = replace(settings, rows=replace(settings.rows, low_speed=low))
-        problem = problem.changed(settings=settings)
-        found["without rest"] = prepared(problem, steps)
-    if any(record.tau_known is not None for record in (*problem.records, *problem.unseen)):
-        unknown = problem.changed(
-            records=tuple(replace(record, tau_known=None) for record in problem.records),
-            unseen=tuple(replace(record, tau_known=None) for record in problem.unseen),
-        )
-        found["known torques left out"] = prepared(unknown, steps)
-    return found
 
 
 def standing_set(result: Identification) -> tuple[SetName, Estimate]:

@@ -23,7 +23,7 @@ from runtime.core.check import Answer, Question, State, first_names
 from runtime.core.errors import InputError
 from runtime.core.least_squares.method import LINEAR
 from runtime.core.limits import limits
-from runtime.core.problem import Problem, estimate_of
+from runtime.core.problem import estimate_of
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.predicted import Weights, kept_correlation
 from runtime.core.rows.prepared import stacked
@@ -31,7 +31,7 @@ from runtime.core.rows.selection import per_joint
 from runtime.core.signals.velocities import agreement
 from runtime.core.study import EstimateSettings, Signals, Study
 from runtime.plausible.case import Case
-from runtime.plausible.samples import Samples, samples_of
+from runtime.plausible.samples import Samples
 
 LIMIT = limits(__package__)
 
@@ -98,15 +98,6 @@ def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ..
         for v, x in zip(np.where(samples.still, 0.0, samples.standing()), low, strict=True)
     )
     return max(wanted) if max(wanted) <= 3 * min(wanted) else wanted
-
-
-def speed_of_rest(problem: Problem) -> float | tuple[float, ...] | None:
-    """Propose the speed below which the samples of a joint are left out, for an identification
-    problem.
-
-    See `low_speed_of_rest`.
-    """
-    return low_speed_of_rest(samples_of(problem.prepared, problem.settings), problem.settings)
 
 
 def _rounded_up(x: float) -> float:

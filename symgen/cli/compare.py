@@ -15,7 +15,7 @@ def compare(
     study: Annotated[
         list[str],
         typer.Argument(
-            help="Study files to compare, all with the same validate.record. A single study is compared with changed copies of itself: without the samples of joints at rest, and without subtracting known torques (record.columns.tau_known)."
+            help="Two or more study files to compare, all with the same validate.record."
         ),
     ],
     output: Annotated[
@@ -28,26 +28,23 @@ def compare(
     """Identify ROBOT with the settings of each STUDY, and rank the studies by how well they predict
     the validation record.
 
-    A single study gives up to three treatments: as stated, without the rows of resting joints, and
-    without its known torques. Each treatment uses the set of parameters that predicts best. Exit
-    code 1 if the best one cannot be used.
+    Each study uses the set of parameters that predicts best. Exit code 1 if the best study cannot
+    be used.
     """
     with session.progress_lines(), session.results_in(output) as results:
         import runtime
         from runtime.core.documents import json_text
+        from runtime.core.errors import InputError
 
         described = session.robot_of(robot, trust=trust, exact=exact)
         model = session.model_of(described)
+        if len(study) < 2:
+            raise InputError(f"{study[0]}: one study; name two or more study files to compare")
         short = len({Path(one).stem for one in study}) == len(study)
         candidates = {
             Path(one).stem if short else one: session.study_of_arguments([one]) for one in study
         }
-        alone = next(iter(candidates.values()))
-        ranking = runtime.compare(
-            model,
-            candidates if len(candidates) > 1 else alone,
-            variants=session.variants_of(described),
-        )
+        ranking = runtime.compare(model, candidates, variants=session.variants_of(described))
         if results is not None:
             runtime.report(ranking, results)
         checklist = ranking.best.checklist

@@ -146,7 +146,7 @@ def identify(case: Case, result: Any) -> None:
 
 
 def compare(case: Case, result: Any) -> None:
-    ranking = compose.compare(case.model, (case.study, case.records, case.unseen))
+    ranking = compose.compare(case.model, {"as stated": (case.study, case.records, case.unseen)})
     found = ranking.results["as stated"]
     assert found.model.CONSTANTS == result.model.CONSTANTS
     same_rows(found.observation, result.observation)

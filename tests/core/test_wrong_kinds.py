@@ -109,7 +109,7 @@ def _pairs() -> list[tuple[str, str, Callable[[Any], Any], Any]]:
         "simulate(model)": (lambda x: runtime.simulate(x, study), OTHERS),
         "simulate(study)": (lambda x: runtime.simulate(model, x), OTHERS),
         "compare(candidate)": (lambda x: runtime.compare(model, x), _without("dict", OTHERS)),
-        "compare(model)": (lambda x: runtime.compare(x, (study, record, record)), OTHERS),
+        "compare(model)": (lambda x: runtime.compare(x, {"a": (study, record, record)}), OTHERS),
         "symgen.model": (symgen.model, NAMES),
         "load_robot": (symgen.load_robot, NAMES),
         "symbolic": (symgen.symbolic, NAMES),
