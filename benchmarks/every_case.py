@@ -42,6 +42,7 @@ TESTS = {
     "core/test_simulated_tx40.py::test_stated_sigma_is_the_scatter_over_records": "40 or 200 simulated records: stated deviations against their scatter",
     "plausible/test_delay.py::test_two_deviations_hold_95_percent": "50 simulated records with a delay: how often two deviations hold it",
     "plausible/test_plausibility.py::test_a_slip_of_the_palletiser_is_named": "a slip of the palletiser is named",
+    "plausible/test_plausibility.py::test_slips_of_the_kr300_are_named": "a slip of the measured KR300 is named",
     "plausible/test_plausibility.py::test_right_studies_of_random_robots_are_left_alone": "a right study of a random robot is told no cause",
     "plausible/test_truth_benchmark.py::test_slips_of_strangers_are_named": "a slip of a wrist or a Panda is named",
     "cli/test_long_record.py::test_an_hour_of_seven_joints_takes_less_than_4_gb": "an hour of seven joints at 1 kHz",
