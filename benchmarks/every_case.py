@@ -37,6 +37,7 @@ TESTS = {
     "oracles/test_loops_agree.py::test_never_an_antiparallelogram": "the same: opposite sides stay parallel",
     "oracles/test_random_loops.py::test_more_of_each_kind": "8 loops of a kind against Lagrange multipliers",
     "oracles/test_turned_loops.py::test_more_behind_turning_joints": "8 loops of a kind behind one to three hinges",
+    "oracles/test_turned_loops.py::test_coefficients_of_no_moderate_degree": "a loop behind hinges whose coefficients are read at the numbers of its file",
     "symbols/test_random_robots.py::test_random_robot": "a random robot: every symbolic model against Lagrange",
     "symbols/test_printed_back.py::test_every_model_holds_in_every_form_and_format": "a model of a robot, read back from every format",
     "core/test_simulated_tx40.py::test_stated_sigma_is_the_scatter_over_records": "40 or 200 simulated records: stated deviations against their scatter",
