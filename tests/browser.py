@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hang import HANG
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 FLAGS = (
@@ -73,7 +74,7 @@ def started_browser() -> Browser:
 class Browser:
     """One Chromium with one page. A context manager; `timeout` in seconds holds for each step."""
 
-    def __init__(self, executable: str, *, timeout: float = 60.0) -> None:
+    def __init__(self, executable: str, *, timeout: float = HANG) -> None:
         self.timeout = timeout
         self.profile = tempfile.TemporaryDirectory(prefix="chromium-", ignore_cleanup_errors=True)
         commands, self._send = os.pipe()

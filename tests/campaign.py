@@ -1,8 +1,9 @@
 """Campaigns: checks over hundreds of cases. The default run takes a seeded sample of each; `pytest
 -m campaign` runs the rest.
 
-SYMGEN_FULL=1 multiplies what a campaign draws anew (fuzz cases, seeds); CONTRIBUTING.md says what
-each costs.
+Of simulations and forgeries by the hundred a campaign runs a fixed sample. SYMGEN_FULL=1 runs every
+case and multiplies what is drawn anew (fuzz cases, seeds): `benchmarks/every_case.py` does, and keeps
+the table. CONTRIBUTING.md says what each costs.
 """
 
 from __future__ import annotations

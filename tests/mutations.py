@@ -47,11 +47,11 @@ FAULTS = (
     # derive
     Fault("symgen/derive/newton_euler.py", "off(1, 2, DV[0][1] - wd[2])", "off(1, 2, DV[0][1] + wd[2])", "sign in U = skew(wd) + skew(w)**2", EMITTED),
     Fault("symgen/derive/newton_euler.py", "a[1] - qd2 * w[0]", "a[1] + qd2 * w[0]", "sign of the Coriolis term of a prismatic joint", EMITTED),
-    Fault("symgen/derive/model.py", "-e for k, e in enumerate(d.robot.gravity)", "e for k, e in enumerate(d.robot.gravity)", "gravity turned", EMITTED),
+    Fault("symgen/derive/models.py", "-e for k, e in enumerate(d.robot.gravity)", "e for k, e in enumerate(d.robot.gravity)", "gravity turned", EMITTED),
     Fault("symgen/derive/newton_euler.py", "dot((YY, XX - ZZ, XZ, XY, -YZ)", "dot((YY, ZZ - XX, XZ, XY, -YZ)", "sign in w x (J w)", EMITTED),
     Fault("symgen/derive/newton_euler.py", "cross(geometry.P[j], fi)", "cross(fi, geometry.P[j])", "lever of the force on the link before, turned", EMITTED),
     Fault("symgen/derive/geometry.py", "self.turn[f.ant][1] + offset", "self.turn[f.ant][1]", "constant of an angle sum of parallel axes lost", EMITTED),
-    Fault("symgen/derive/elements.py", 'return speed if law == Expression.symbol("qd") else direction', 'return direction if law == Expression.symbol("qd") else speed', "one-sided Coulomb and viscous friction exchanged", EMITTED),
+    Fault("symgen/derive/regressor.py", 'return speed if law == Expression.symbol("qd") else direction', 'return direction if law == Expression.symbol("qd") else speed', "one-sided Coulomb and viscous friction exchanged", EMITTED),
     # regroup
     Fault("symgen/regroup/rules.py", '{("XX", 0): -ONE}', '{("XX", 0): ONE}', "YY goes into XX with the wrong sign", REGROUPED),
     Fault("symgen/regroup/rules.py", "- p[k] * u[m] -", "+ p[k] * u[m] -", "sign in the parallel axis rule", REGROUPED),

@@ -5,21 +5,30 @@
 It takes from the claim the frame table, the elements and the formulas, and nothing that it can make
 itself: primes of 61 bits, random points, and the names of the standard parameters are its own. At
 these points it computes the columns of Newton and Euler in frame 0 over F_p: angles are rational
-points of the circle, constants, rates and pi random residues, directions of motion random signs, and
-a function such as tanh is one random residue for each argument. It verifies that the loops close,
-the rank of the base columns, every formula (the column of every standard parameter), and what has no
-effect. A false formula passes with probability below 2 d/p for each prime, d the degree of the claim.
-Not judged: joints that only closure equations tie, roots, columns that are energies, and angles that
-are no quarter turns of pi, constants or numbers.
+points of the circle, constants, rates and pi random residues, directions of motion random signs. It
+verifies that the loops close, the rank of the base columns, every formula (the column of every
+standard parameter), and what has no effect. A false formula passes with probability below 2 d/p for
+each prime, d the degree of the claim.
+
+Only what is listed here is read; all else is not judged. An expression has numbers, names, + - * /,
+** with a whole exponent, and functions of one argument: SIMPLE ones, in a law of a column also
+those of LAWS. sin and cos are of sums of whole multiples of joints and constants, quarter turns of
+pi, and numbers; sign and abs of the coordinate of the law or of its rate; exp and tanh of arguments
+that are linearly independent of each other and of 1, so that their values are independent of
+each other and of the state (J. Ax, On Schanuel's conjectures, Annals of Mathematics 93, 1971).
+Not judged are joints that only closure equations tie, roots, and columns that are energies.
 """
 
 import ast
 import json
+import math
 import random
 import re
 import sys
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 INERTIAL = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 
@@ -27,39 +36,114 @@ INERTIAL = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 KINDS = ("inertia", "viscous", "coulomb", "stiffness", "offset", "column")
 LONGEST, MOST, POWER = 2000, 300, 64  # characters of an expression, entries of a list, an exponent
 FRAME = ("gamma", "b", "alpha", "d", "theta", "r")
+SIMPLE = ("sin", "cos")
+LAWS = (*SIMPLE, "sign", "abs", "exp", "tanh")
+CHARACTERS = re.compile(r"[A-Za-z0-9_ .+*/()-]*")
+NUMBER = re.compile(r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,2})?")
+OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow)
+UNIT = 10**60 * math.lcm(*range(1, 361))  # an angle that is a number is a multiple of 1/UNIT rad
 
 
 class SkipError(Exception):
     """Nothing that can be judged: malformed, or beyond this script."""
 
 
+class NotJudgedError(SkipError):
+    """A claim that may hold, of which this script does not know the mathematics."""
+
+
 class RefutedError(Exception):
     pass
 
 
+@cache
 def parsed(text):
-    if not isinstance(text, str) or len(text) > LONGEST:
-        raise SkipError(f"an expression is a text of at most {LONGEST} characters")
-    return ast.parse(text, mode="eval").body
+    """The tree of an expression of the listed syntax; its numbers are fractions, exact."""
+    require(isinstance(text, str), "an expression is a text")
+    require(len(text) <= LONGEST, f"an expression is a text of at most {LONGEST} characters")
+    require(CHARACTERS.fullmatch(text), f"{text!r} is no expression")
+    tree = ast.parse(text, mode="eval").body
+    for node in ast.walk(tree):
+        match node:
+            case ast.Constant():
+                number = text[node.col_offset : node.end_col_offset]
+                require(NUMBER.fullmatch(number), f"{number!r} is no number")
+                node.value = Fraction(number)
+            case ast.BinOp(op=op):
+                require(isinstance(op, OPERATORS), f"an operator of {text!r}")
+            case ast.UnaryOp(op=ast.USub()) | ast.Name():
+                pass
+            case ast.Call(func=ast.Name(), args=[_], keywords=[]):
+                pass
+            case ast.expr():
+                raise SkipError(f"{text!r} is no expression")
+        if isinstance(node, ast.expr):
+            node.text = text[node.col_offset : node.end_col_offset]
+    return tree
 
 
-def whole(x):
-    """An exponent or a multiple, an int of moderate size."""
-    if not isinstance(x, ast.Constant) or type(x.value) is not int or abs(x.value) > POWER:
-        raise SkipError("an exponent is a whole number up to 64")
-    return x.value
+def known(text, names, functions=SIMPLE):
+    """SkipError where an expression has other names or functions."""
+    nodes = [*ast.walk(parsed(text))]
+    called = [node.func for node in nodes if isinstance(node, ast.Call)]
+    for node in nodes:
+        if isinstance(node, ast.Name) and not any(node is other for other in called):
+            require(node.id in names, f"an expression has the name {node.id} that is no constant")
+    for name in called:
+        if name.id not in functions:
+            raise NotJudgedError(f"the function {name.id} of {text!r}")
+
+
+def joints_of(text):
+    """The joint variables in an expression."""
+    names = {node.id for node in ast.walk(parsed(text)) if isinstance(node, ast.Name)}
+    return {name for name in names if re.fullmatch("q[0-9]+", name)}
+
+
+def whole(node):
+    """An exponent, an int of moderate size."""
+    negative = isinstance(node, ast.UnaryOp)
+    x = node.operand if negative else node
+    if not isinstance(x, ast.Constant) or x.value.denominator != 1 or x.value > POWER:
+        raise SkipError(f"an exponent is a whole number up to {POWER}, not {node.text}")
+    return -int(x.value) if negative else int(x.value)
+
+
+def real(node, constants):
+    """The value of an expression at the constants of the robot file, in floats."""
+    here = lambda other: real(other, constants)  # noqa: E731
+    match node:
+        case ast.Constant():
+            return float(node.value)
+        case ast.Name():
+            return math.pi if node.id == "pi" else float(constants[node.id])
+        case ast.UnaryOp():
+            return -here(node.operand)
+        case ast.Call():
+            return {"sin": math.sin, "cos": math.cos}[node.func.id](here(node.args[0]))
+        case ast.BinOp(op=ast.Pow()):
+            return here(node.left) ** whole(node.right)
+    u, v = here(node.left), here(node.right)
+    match node.op:
+        case ast.Add():
+            return u + v
+        case ast.Sub():
+            return u - v
+        case ast.Mult():
+            return u * v
+    return u / v
 
 
 def linear(node):
     """{atom: factor} of an angle: atoms are names, pi, joints, or 1."""
     if isinstance(node, ast.Constant):
-        return {1: Fraction(str(node.value))}
+        return {1: node.value}
     if isinstance(node, ast.Name):
         return {node.id: Fraction(1)}
     if isinstance(node, ast.UnaryOp):
         return {a: -x for a, x in linear(node.operand).items()}
     if not isinstance(node, ast.BinOp):
-        raise SkipError(f"the angle {ast.unparse(node)}")
+        raise NotJudgedError(f"the angle {node.text}")
     u, v = linear(node.left), linear(node.right)
     if isinstance(node.op, (ast.Add, ast.Sub)):
         sign = 1 if isinstance(node.op, ast.Add) else -1
@@ -69,16 +153,37 @@ def linear(node):
     if isinstance(node.op, ast.Mult) and ({*u} == {1} or {*v} == {1}):
         factor, other = (u[1], v) if {*u} == {1} else (v[1], u)
         return {a: x * factor for a, x in other.items()}
-    raise SkipError(f"the angle {ast.unparse(node)}")
+    raise NotJudgedError(f"the angle {node.text}")
+
+
+def fraction(node):
+    """The value of an expression of numbers alone."""
+    terms = linear(node)
+    if {*terms} != {1}:
+        raise NotJudgedError(f"an angle with the factor {node.text}")
+    return terms[1]
+
+
+class Coordinate(NamedTuple):
+    """The coordinate of a law at a state: position and rate, and the signs of both.
+
+    The position is the sum of factors times joints, {joint: factor}.
+    """
+
+    name: str
+    row: dict
+    q: int
+    qd: int
+    signs: tuple
 
 
 class Field:
     """A random geometry over F_p, and random states in it."""
 
     def __init__(self, claim, p):
-        self.claim, self.p, self.circle, self.values, self.sign = claim, p, {}, {}, {}
-        self.tree, self.functions = parsed, {}
-        self.passive = {int(j): linear(self.tree(e)) for j, e in claim["passive"].items()}
+        self.claim, self.p, self.circle, self.values = claim, p, {}, {}
+        self.sign, self.exponentials, self.arguments = {}, {}, []
+        self.passive = {int(j): linear(parsed(e)) for j, e in claim["passive"].items()}
 
     def point(self, atom):
         while atom not in self.circle:
@@ -86,103 +191,175 @@ class Field:
             if (1 + t * t) % self.p:
                 below = pow(1 + t * t, -1, self.p)
                 self.circle[atom] = ((1 - t * t) * below % self.p, 2 * t * below % self.p)
+        if self.circle[atom] is None:
+            raise NotJudgedError(f"the angle {atom}, of which its joints have no whole multiple")
         return self.circle[atom]
+
+    def around(self, point, n):
+        """The point n times around, by squaring."""
+        (a, b), (c, s), p = point, (1, 0), self.p
+        while n:
+            if n % 2:
+                c, s = (c * a - s * b) % p, (s * a + c * b) % p
+            a, b, n = (a * a - b * b) % p, 2 * a * b % p, n // 2
+        return c, s
+
+    def number(self, n):
+        """The point of an angle of n rad, n > 0: all such angles are multiples of one unit."""
+        if (n * UNIT).denominator != 1:
+            raise NotJudgedError(f"an angle of {n} rad")
+        if n not in self.circle:
+            self.circle[n] = self.around(self.point("rad/UNIT"), int(n * UNIT))
+        return self.circle[n]
 
     def cos_sin(self, angle):
         c, s = 1, 0
         for atom, n in angle.items():
+            if not n:
+                continue
             n *= 2 if atom == "pi" else 1
-            if atom == 1:  # an angle that is a number has a point of its own
-                a, b = self.point(abs(n))
-                b, n = (b if n > 0 else -b), int(n != 0)
+            if atom == 1:
+                (a, b), n = self.number(abs(n)), 1 if n > 0 else -1
             else:
                 a, b = (0, 1) if atom == "pi" else self.point(atom)
-            if n.denominator != 1 if isinstance(n, Fraction) else False:
-                raise SkipError(
+            if Fraction(n).denominator != 1:
+                raise NotJudgedError(
                     f"{n} of the angle {atom}" if atom != "pi" else f"an angle of {n / 2}*pi"
                 )
-            n, b = abs(int(n)), b if n > 0 else -b
-            while n:  # the point n times around, by squaring
-                if n % 2:
-                    c, s = (c * a - s * b) % self.p, (s * a + c * b) % self.p
-                a, b, n = (a * a - b * b) % self.p, 2 * a * b % self.p, n // 2
+            a, b = self.around((a, b if n > 0 else -b), abs(int(n)))
+            c, s = c * a - s * b, s * a + c * b
         return c % self.p, s % self.p
 
-    def value(self, node):
-        """The residue of an expression."""
-        p = self.p
+    def value(self, node, at=None):
+        """The residue of an expression, in a law at a coordinate."""
+        p, here = self.p, lambda other: self.value(other, at)
         if isinstance(node, str):
-            node = self.tree(node)
-        if isinstance(node, ast.Constant):
-            x = Fraction(str(node.value))
-            return x.numerator * pow(x.denominator, -1, p) % p
-        if isinstance(node, ast.Name):
-            return self.values.setdefault(node.id, random.randrange(1, p))
-        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-            return -self.value(node.operand) % p
-        if isinstance(node, ast.Call) and node.func.id in ("cos", "sin"):
-            return self.cos_sin(linear(node.args[0]))[node.func.id == "sin"]
-        if not isinstance(node, ast.BinOp):
-            raise SkipError(ast.unparse(node))
-        u = self.value(node.left)
-        v = 0 if isinstance(node.op, ast.Pow) else self.value(node.right)
-        if isinstance(node.op, ast.Div):
-            return u * pow(v, -1, p) % p
-        if isinstance(node.op, ast.Pow):
-            return pow(u, whole(node.right), p)
-        add, sub = isinstance(node.op, ast.Add), isinstance(node.op, ast.Sub)
-        return (u + v if add else u - v if sub else u * v) % p
+            node = parsed(node)
+        match node:
+            case ast.Constant():
+                return node.value.numerator * pow(node.value.denominator, -1, p) % p
+            case ast.Name(id="q") if at:
+                return at.q
+            case ast.Name(id="qd") if at:
+                return at.qd
+            case ast.Name():
+                return self.values.setdefault(node.id, random.randrange(1, p))
+            case ast.UnaryOp():
+                return -here(node.operand) % p
+            case ast.Call():
+                return self.function(node, at)
+            case ast.BinOp(op=ast.Pow()):
+                return pow(here(node.left), whole(node.right), p)
+        u, v = here(node.left), here(node.right)
+        match node.op:
+            case ast.Add():
+                return (u + v) % p
+            case ast.Sub():
+                return (u - v) % p
+            case ast.Mult():
+                return u * v % p
+        return u * pow(v, -1, p) % p
+
+    def function(self, node, at):
+        """The residue of a function of one argument."""
+        name, argument, p = node.func.id, node.args[0], self.p
+        if name in ("sin", "cos"):
+            return self.cos_sin(self.angle(argument, at))[name == "sin"]
+        if name in ("sign", "abs"):
+            x = self.value(argument, at)
+            for own, s in zip((at.q, at.qd), at.signs, strict=True):
+                if x in (own, -own % p):
+                    s = s if x == own else -s
+                    return (s if name == "sign" else s * x) % p
+            raise NotJudgedError(f"{node.text}, where {argument.text} is neither q nor qd")
+        return self.exponential(node, at)
+
+    def angle(self, node, at):
+        """{atom: factor} of an angle; in a law the coordinate is that of its joints."""
+        angle = {}
+        row = {f"q{j}": parsed(x) for j, x in at.row.items()} if at else {}
+        for atom, n in linear(node).items():
+            if atom == "qd" or re.fullmatch("qd[0-9]+", str(atom)):
+                raise NotJudgedError(f"the angle {node.text}, a rate")
+            terms = {atom: 1}
+            if at and atom == "q":
+                terms = {joint: fraction(factor) for joint, factor in row.items()}
+            for other, m in terms.items():
+                angle[other] = angle.get(other, 0) + n * m
+        return angle
+
+    def exponential(self, node, at):
+        """The residue of exp or tanh: E or (E^2 - 1)/(E^2 + 1), E random for each argument."""
+        argument, p = node.args[0], self.p
+        inside = [x.func.id for x in ast.walk(argument) if isinstance(x, ast.Call)]
+        if {"exp", "tanh"} & {*inside}:
+            raise NotJudgedError(f"{node.text}, a function within a function")
+        x = self.value(argument, at)
+        either = {self.value(argument, at._replace(signs=(s, t))) for s in (1, -1) for t in (1, -1)}
+        if not either <= {x, -x % p}:
+            raise NotJudgedError(f"{node.text}, whose argument is another one after a stop")
+        at_plus = self.value(argument, at._replace(signs=(1, 1)))
+        self.arguments[-1][f"{node.text} of {at.name}"] = at_plus
+        if -x % p in self.exponentials:
+            E = pow(self.exponentials[-x % p], -1, p)
+        else:
+            E = self.exponentials.setdefault(x, random.randrange(1, p))
+        return E if node.func.id == "exp" else (E * E - 1) * pow(E * E + 1, -1, p) % p
 
     def move(self):
         """A random state: points and values of all joints, their rates; {joint: {actuated: n}}."""
         names = {f"q{j}" for j in self.claim["joints"]}
-        self.circle = {a: x for a, x in self.circle.items() if not str(a).startswith("q")}
+        of_joints = names | {f"q{j}" for j in self.passive}
+        self.circle = {a: x for a, x in self.circle.items() if a not in of_joints}
         rows = {j: {j: 1} for j in self.claim["joints"]}
         self.q, self.qd, self.qdd = ({j: random.randrange(self.p) for j in rows} for _ in range(3))
         self.values |= {f"q{j}": x for j, x in self.q.items()}
         for j, angle in self.passive.items():
             n = {a: x.numerator * pow(x.denominator, -1, self.p) for a, x in angle.items()}
             rows[j] = {int(a[1:]): x for a, x in n.items() if a in names}
-            rest = sum(x * (1 if a == 1 else self.value(a)) for a, x in n.items() if a not in names)
-            self.q[j] = self.values[f"q{j}"] = sum(x * self.q[i] for i, x in rows[j].items()) + rest
+            rest = sum(
+                x * (1 if a == 1 else self.value(str(a))) for a, x in n.items() if a not in names
+            )
+            self.q[j] = sum(x * self.q[i] for i, x in rows[j].items()) + rest
+            self.values[f"q{j}"] = self.q[j]
             for rate in (self.qd, self.qdd):
                 rate[j] = sum(x * rate[i] for i, x in rows[j].items())
-            if all(x.denominator == 1 for a, x in angle.items() if a != "pi"):
+            try:
                 self.circle[f"q{j}"] = self.cos_sin(angle)
-        self.sign, self.functions = {}, {}
+            except NotJudgedError:
+                self.circle[f"q{j}"] = None
+        self.values |= {f"qd{j}": x for j, x in self.qd.items()}
+        self.sign, self.exponentials = {}, {}
+        self.arguments.append({})
         return rows
 
-    def law(self, node, along, s, sd):
-        """The residue of a law: q, qd are position and rate along a row, `along` its angle."""
-        here = lambda other: self.law(other, along, s, sd)  # noqa: E731
-        if isinstance(node, ast.Name) and node.id in ("q", "qd"):
-            return s if node.id == "q" else sd
-        if isinstance(node, ast.Name) and re.fullmatch(r"qd?[0-9]+", node.id):
-            rate = self.qd if node.id[1] == "d" else self.q
-            return rate[int(node.id.strip("qd"))]
-        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-            return -here(node.operand) % self.p
-        if isinstance(node, ast.BinOp):
-            if isinstance(node.op, ast.Pow):
-                return pow(here(node.left), whole(node.right), self.p)
-            u, v = here(node.left), here(node.right)
-            if isinstance(node.op, ast.Div):
-                return u * pow(v, -1, self.p) % self.p
-            signs = {ast.Add: u + v, ast.Sub: u - v, ast.Mult: u * v}
-            return signs[type(node.op)] % self.p
-        if not isinstance(node, ast.Call):
-            return self.value(node)
-        name, arguments = node.func.id, [here(x) for x in node.args]
-        if name in ("sin", "cos"):
-            angle = {}
-            for atom, n in linear(node.args[0]).items():
-                for other, m in (along if atom == "q" else {atom: 1}).items():
-                    angle[other] = angle.get(other, 0) + n * m
-            return self.cos_sin(angle)[name == "sin"]
-        if name == "sign" and arguments in ([sd], [-sd % self.p]):
-            sign = self.sign.setdefault(("law", sd), random.choice((1, -1)))
-            return sign if arguments == [sd] else -sign
-        return self.functions.setdefault((name, *arguments), random.randrange(self.p))
+    def signs(self, actuated, row, sign):
+        """Signs of position and rate along a row, (0, 0) where no actuated joint moves it.
+
+        Proportional rows have one direction, up to the sign of the first factor in the robot file.
+        """
+        p, constants = self.p, self.claim["constants"]
+        first = next((i for i in sorted(actuated) if actuated[i]), None)
+        if first is None:
+            return 0, 0
+        leading = sum(
+            real(parsed(x), constants)
+            * (
+                int(j) == first
+                if int(j) not in self.passive
+                else self.passive[int(j)].get(f"q{first}", 0)
+            )
+            for j, x in row.items()
+        )
+        require(sign == (-1 if leading < 0 else 1), "a sign is not that of the first factor")
+        scale = pow(actuated[first], -1, p)
+        ratio = tuple((i, x * scale % p) for i, x in sorted(actuated.items()) if x)
+        place = sum(self.value(x) * self.q[int(j)] for j, x in row.items())
+        rest = (place - sum(x * self.q[i] for i, x in actuated.items())) * scale % p
+        return tuple(
+            self.sign.setdefault(key, random.choice((1, -1))) * sign
+            for key in (("q", ratio, rest), ("qd", ratio))
+        )
 
 
 def cross(u, v):
@@ -227,7 +404,7 @@ def regressor(F):
     for f in claim["frames"]:
         R, P, w, wd, a, axes = at[f["ant"]]
         for angle, shift, axis in (("gamma", "b", 2), ("alpha", "d", 0), ("theta", "r", 2)):
-            A, step = screw(F, linear(F.tree(f[angle])), F.value(f[shift]), axis)
+            A, step = screw(F, F.angle(parsed(f[angle]), None), F.value(f[shift]), axis)
             P = reduced(add(P, [dot(row, step) for row in R]))
             R = [reduced(row) for row in product(R, A)]
         z, j, sigma = [row[2] for row in R], f["j"], f["sigma"]
@@ -288,26 +465,19 @@ def elements(F, rows):
             for j, x in G.items():
                 for i, n in rows[j].items():
                     actuated[i] = (actuated.get(i, 0) + x * n) % p
-            first = next((i for i in sorted(actuated) if actuated[i]), None)
-            s = 0
-            if (
-                first is not None
-            ):  # proportional rows have one direction, up to the sign of the file
-                ratio = tuple(
-                    (i, x * pow(actuated[first], -1, p) % p)
-                    for i, x in sorted(actuated.items())
-                    if x
-                )
-                s = F.sign.setdefault(ratio, random.choice((1, -1))) * e["signs"][key]
-            force = s if e["kind"] == "coulomb" else 1
+            signs = F.signs(actuated, row, e["signs"][key])
+            force = signs[1] if e["kind"] == "coulomb" else 1
             if e["kind"] in state:
                 force = sum(x * state[e["kind"]][j] for j, x in G.items())
-            force *= {"positive": int(s > 0), "negative": int(s < 0)}.get(e["when"], 1)
+            force *= {"positive": int(signs[1] > 0), "negative": int(signs[1] < 0)}.get(
+                e["when"], 1
+            )
             if e["kind"] == "column":
+                name = f"{e['family']}{key}"
                 place = sum(x * F.q[j] for j, x in G.items()) % p
                 speed = sum(x * F.qd[j] for j, x in G.items()) % p
-                along = {f"q{j}": linear(F.tree(x))[1] for j, x in row.items()}
-                force = F.law(F.tree(e["laws"][list(e["along"]).index(key)]), along, place, speed)
+                law = e["laws"][[*e["along"]].index(key)]
+                force *= F.value(law, Coordinate(name, row, place, speed, signs))
             torque[f"{e['family']}{key}"] = {j: x * force % p for j, x in G.items()}
         for key, form in e["form"].items():
             by_joint = torque.setdefault(f"{e['family']}{key}", {})
@@ -329,6 +499,23 @@ def rank(rows, p):
             inverse = pow(row[pivot], -1, p)
             found.append((pivot, [x * inverse % p for x in row]))
     return len(found)
+
+
+def independent(F):
+    """NotJudgedError unless the arguments of exp and tanh are linearly independent, with 1."""
+    columns = {}
+    for place in F.arguments[0]:
+        column = tuple(state[place] for state in F.arguments)
+        if tuple(-x % F.p for x in column) not in columns:
+            columns.setdefault(column, place)
+    if rank([[1] * len(F.arguments), *columns], F.p) != 1 + len(columns):
+        raise NotJudgedError(f"the independence of {', '.join(columns.values())}"[:150])
+
+
+def once(pairs):
+    """An object of JSON; SkipError where a key stands twice."""
+    require(len(dict(pairs)) == len(pairs), "a key stands twice")
+    return dict(pairs)
 
 
 def is_prime(n):
@@ -367,41 +554,83 @@ def well_formed(claim):
     require(all(type(p) is int and p > 1 for p in claim["primes"]), "a prime is a whole number")
     require(claim["valid"] is True and claim["failures"] == [], "it says itself that it fails")
     require(len(claim["frames"]) <= MOST, "too many frames")
-    seen = {0}
+    constants = claim["constants"]
+    for name, x in constants.items():
+        require(re.fullmatch("[A-Za-z_][A-Za-z0-9_]*", name), "a constant has no name")
+        require(not re.fullmatch("(q|qd)[0-9]*|pi", name), f"a constant is called {name}")
+        require(type(x) in (int, float) and math.isfinite(x), f"{name} has no value")
+    constants = {*constants, "pi"}
+    seen, moving = {0}, set()
     for f in claim["frames"]:
+        require(all(type(f[key]) is int for key in ("j", "ant", "sigma")), "a frame is incomplete")
         require(f["ant"] in seen and f["j"] not in seen, "frames are not in the order of a tree")
         require(f["sigma"] in (0, 1, 2) and type(f["link"]) is bool, "a frame is incomplete")
-        require(all(isinstance(f[key], str) for key in FRAME), "a frame is incomplete")
         variable = {0: "theta", 1: "r"}.get(f["sigma"])
         for key in FRAME:
-            joints = {n.id for n in ast.walk(parsed(f[key])) if isinstance(n, ast.Name)}
-            joints = {name for name in joints if re.fullmatch("q[0-9]+", name)}
-            require(joints == ({f"q{f['j']}"} if key == variable else set()), "a joint variable")
+            own = {f"q{f['j']}"} if key == variable else set()
+            require(joints_of(f[key]) == own, "a joint variable")
+            known(f[key], constants | own)
         if variable:
             require(linear(parsed(f[variable]))[f"q{f['j']}"] == 1, "a joint variable")
+            moving.add(f["j"])
         seen.add(f["j"])
-    moving = [f["j"] for f in claim["frames"] if f["sigma"] != 2]
-    passive = [int(j) for j in claim["passive"]]
-    given = [*claim["joints"], *passive, *claim["tied"]]
+    given = [*claim["joints"], *numbers(claim["passive"]), *claim["tied"]]
     require(sorted(given) == sorted(moving), "joints are not those of the frames")
     require(not claim["tied"], f"only closure equations tie joints {claim['tied']}")
-    names = {*claim["constants"], "pi", *(f"q{j}" for j in moving)}
-    texts = [*claim["gravity"], *(f[key] for f in claim["frames"] for key in FRAME)]
-    texts += [c for b in claim["base_parameters"] for c in b["coefficients"].values()]
-    for text in [*texts, *claim["passive"].values()]:
-        for node in ast.walk(parsed(text)):
-            known = not isinstance(node, ast.Name) or node.id in {*names, "sin", "cos"}
-            require(known, "an expression has a name that is no constant")
+    for pair in claim["loops"]:
+        require(len(pair) == 2 and {*pair} <= seen - {0}, "a loop of frames that are none")
+    actuated = {f"q{j}" for j in claim["joints"]}
+    for text in claim["passive"].values():
+        known(text, constants | actuated)
+    for text in [
+        *claim["gravity"],
+        *(c for b in claim["base_parameters"] for c in b["coefficients"].values()),
+    ]:
+        known(text, constants)
     for e in claim["elements"]:
-        require(e["kind"] in KINDS and e["when"] in (None, "positive", "negative"), "an element")
-        require(not e.get("energies"), "a column that is an energy")
+        element(e, moving, constants)
+
+
+def numbers(keys):
+    """The joints that are keys, each written in one way."""
+    require(all(re.fullmatch("[1-9][0-9]*", key, re.ASCII) for key in keys), "a key is no number")
+    return {int(key) for key in keys}
+
+
+def element(e, moving, constants):
+    """SkipError where an element is none."""
+    require(re.fullmatch("[A-Za-z_][A-Za-z0-9_]*", e["family"]), "an element has no name")
+    if e["kind"] not in KINDS:
+        raise NotJudgedError(f"elements of the kind {e['kind']}")
+    require(e["when"] in (None, "positive", "negative"), "an element")
+    require(not e.get("energies"), "a column that is an energy")
+    along, form, laws = e["along"], e["form"], e.get("laws", [])
+    require(numbers(along).isdisjoint(numbers(form)), f"{e['family']} stands twice")
+    require({*e["signs"]} == {*along}, "an element without signs")
+    require(all(type(s) is int and s in (1, -1) for s in e["signs"].values()), "a sign is 1 or -1")
+    require(len(laws) == len(along) * (e["kind"] == "column"), "an element without its laws")
+    require(
+        not form or (e["kind"] in ("inertia", "viscous", "stiffness") and not e["when"]), "a form"
+    )
+    places = [numbers(row) for row in along.values()]
+    places += [numbers(place.split(",")) for row in form.values() for place in row]
+    require(all(joints <= moving for joints in places), "an element of no joint")
+    for row in (*along.values(), *form.values()):
+        for text in row.values():
+            known(text, constants)
+    state = {name + j for name in ("q", "qd") for j in ("", *map(str, moving))}
+    for text in laws:
+        known(text, constants | state, LAWS)
 
 
 def parameters(claim):
-    """Names of the standard parameters of a robot, by its links and elements."""
+    """Names of the standard parameters of a robot, by its links and elements, each of them once."""
     of_links = [f"{name}{f['j']}" for f in claim["frames"] if f["link"] for name in INERTIAL]
     keys = [(e["family"], key) for e in claim["elements"] for key in {**e["along"], **e["form"]}]
-    return {*of_links, *(f"{family}{key}" for family, key in keys)}
+    names = [*of_links, *(f"{family}{key}" for family, key in keys)]
+    twice = {name for name in names if names.count(name) > 1}
+    require(not twice, f"several parameters are called {', '.join(sorted(twice))}")
+    return {*names}
 
 
 def check(claim):
@@ -409,6 +638,8 @@ def check(claim):
     well_formed(claim)
     base, own_names, wrong = claim["base_parameters"], parameters(claim), set()
     own = [b["own"] for b in base]
+    for key in ("standard_parameters", "no_effect"):
+        require(len({*claim[key]}) == len(claim[key]), f"a name of {key} stands twice")
     used = {*own, *(name for b in base for name in b["coefficients"])}
     if used - own_names or {*claim["standard_parameters"]} != own_names:
         return ["it names other parameters than the robot has"]
@@ -420,6 +651,7 @@ def check(claim):
     for p in (prime(), prime()):
         F = Field(claim, p)
         states = [regressor(F) for _ in range(2 * len(base) // len(claim["joints"]) + 15)]
+        independent(F)
         W = [[D[name][i] for name in own] for D in states for i in claim["joints"]]
         if (found := rank(W, p)) != len(base):
             wrong.add(f"the rank is {found}, not {len(base)}")
@@ -441,10 +673,12 @@ def main(file):
     """Exit status, and what to print."""
     try:
         require(file.stat().st_size < 20_000_000, "it is too long")
-        claim = json.loads(file.read_text("utf-8"))
+        claim = json.loads(file.read_text("utf-8"), object_pairs_hook=once)
         wrong = check(claim)
     except RefutedError as what:
         return 1, f"refuted: {what}"
+    except NotJudgedError as what:
+        return 2, f"not judged: {ascii(str(what))[1:-1][:200]}"
     except Exception as what:  # whatever is wrong with a file, it is no certificate
         return 2, f"no certificate: {ascii(str(what))[1:-1][:200] or type(what).__name__}"
     if wrong:

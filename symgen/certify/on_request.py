@@ -15,7 +15,7 @@ from symgen.description.robot import Element, Robot, parameter
 from symgen.regroup.regrouping import Regrouping
 
 if TYPE_CHECKING:
-    from symgen.derive.lagrange import Lagrange
+    from symgen.certify.lagrange import Lagrange
 
 ANGLE_STEP = 1e-2  # rad or m
 SIX_POINTS = {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}  # central differences of sixth order

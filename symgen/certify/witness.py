@@ -1,7 +1,7 @@
 """Independent expected values of every emitted function, at random states and parameters.
 
 The dynamics follow from energies, the poses from products of the matrices of the frames
-(`derive.lagrange`). Neither shares code with the recursions, the regrouping or the printers. The
+(`certify.lagrange`). Neither shares code with the recursions, the regrouping or the printers. The
 formulas give X from random standard parameters of real bodies, so that A is positive definite.
 
 Constants are drawn around their values in the robot file. They are drawn closer to these values if
@@ -32,7 +32,7 @@ from symgen.errors import DescriptionError
 from symgen.regroup.regrouping import EXACT, BaseParameter, Regrouping, sign_conditions
 
 if TYPE_CHECKING:
-    from symgen.derive.lagrange import Sample
+    from symgen.certify.lagrange import Sample
 
 STATES = 20  # of every function: more than a tile of C, the last one at rest
 BLOCKS = 8200
@@ -358,7 +358,7 @@ def base_values(regrouping: Regrouping, chi: Array, constants: Mapping[str, floa
 
 
 def _at(robot: Robot, constants: Mapping[str, float]) -> Sample:
-    from symgen.derive.lagrange import in_one_mode, sampled  # CasADi, loaded late
+    from symgen.certify.lagrange import in_one_mode, sampled  # CasADi, loaded late
 
     return sampled(in_one_mode(robot), STATES, seed=7, constants=constants)
 

@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+import sympy
+
 from symgen.derive.models import SYMBOLIC
 from symgen.derive.names import Names
 from symgen.description.expression import Expression
@@ -28,13 +30,14 @@ from symgen.symbols.derivation import source_of
 from symgen.symbols.expressions import Tree
 from symgen.symbols.printers import MathML, latex, latex_symbol, math, math_terms
 from symgen.symbols.printers import text as plain
-from symgen.symbols.symbolic_model import SymbolicModel
-from symgen.symbols.sympy_objects import Objects, of_listing, of_model, source_text
+from symgen.symbols.symbolic_model import Objects, SymbolicModel, of_listing, of_model
 
 FORMS = ("closed", "recursive")
 FORMATS = ("text", "latex", "latex-fragment", "sympy", "json")
 
 
+OF_SYMPY = re.compile(r"\b(?=[A-Za-z]\w*\(|pi\b)")  # before a name that is none of the robot
+RATIONAL = re.compile(r"(?<![\w*).])(\d+)/(\d+)\b")
 LATEX_WIDTH = 76  # characters of a line as they are printed
 HEADINGS = {
     "ant": "a(j)",
@@ -450,6 +453,36 @@ def sympy_lines(model: SymbolicModel, form: str) -> str:
     else:
         steps, value = of_listing(model)
     return source_text(model.model.letter.replace(" ", "_"), steps, value)
+
+
+def source_text(name: str, steps: list[tuple[Any, Any]], value: Any) -> str:
+    """Write Python code with SymPy that computes `value` and stores it under the name `name`.
+
+    The code defines the symbols, then the intermediate variables in `steps`, then the value.
+    Rational numbers stay exact.
+    """
+    made = {x for x, _ in steps}
+    atoms = set().union(value.free_symbols, *(e.free_symbols for _, e in steps))
+    free = sorted(str(x) for x in atoms - made)
+    package = "sympy"
+    while package in {*free, *map(str, made)}:
+        package += "_"
+    lines = ["import sympy" if package == "sympy" else f"import sympy as {package}", ""]
+    if free:
+        made_by = f"{package}.symbols({' '.join(free)!r}, real=True, seq=True)"
+        lines.append(f"{', '.join(free)}{',' * (len(free) == 1)} = {made_by}")
+    for x, e in [*steps, (name, value)]:
+        exact = RATIONAL.sub(r"Rational(\1, \2)", _sympy_text(e))
+        lines.append(f"{x} = {OF_SYMPY.sub(f'{package}.', exact)}")
+    return "\n".join(lines)
+
+
+def _sympy_text(e: Any) -> str:
+    """Write a SymPy expression as text; a matrix is written row by row, without aligned columns."""
+    if not isinstance(e, sympy.MatrixBase):
+        return str(sympy.printing.sstr(e))
+    rows = (f"[{', '.join(map(sympy.printing.sstr, row))}]" for row in e.tolist())
+    return "Matrix([\n" + ",\n".join(rows) + "])"
 
 
 # --- JSON ---

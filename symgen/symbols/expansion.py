@@ -23,15 +23,14 @@ import sympy
 from sympy.polys.orderings import lex
 from sympy.polys.rings import PolyRing
 
+from symgen.derive.algebra import GraphAlgebra
+from symgen.derive.constants import numbered, numbers_of
 from symgen.derive.graph import Angle, Node, Scalar, reachable
-from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.derive.numbers import numbered, numbers_of
 from symgen.description.expression import FUNCTIONS, PI, Expression, call
 from symgen.errors import SymgenError
 from symgen.symbols import expressions
+from symgen.symbols.coefficients import Coefficient, Factors, Identities, forward, whole
 from symgen.symbols.expressions import Tree
-from symgen.symbols.factors import Factors
-from symgen.symbols.identities import Coefficient, Identities, forward, number
 
 Polynomial = Any  # of the ring of the parameters
 CONSTANT, SLIDE, TURN, RATE, DIRECTION = 1, 2, 3, 4, 5  # ranks: the order of factors in a product
@@ -170,7 +169,7 @@ class Expansion:
                     self.generator[expressions.symbol(name)]
                 )
             case "const":
-                return self._lifted(self.K.one.mul_ground(number(node.value)))
+                return self._lifted(self.K.one.mul_ground(whole(node.value)))
             case "add":
                 return self.checked(x[0] + x[1])
             case "mul":
@@ -182,7 +181,7 @@ class Expansion:
             case "cos" | "sin" | "sqrt" if node.value is not None:
                 return self._constants(self._constant(node))
             case "inv" if self.decimals and (c := self._number(x[0])):
-                return self._lifted(self.K.one.mul_ground(number(shortened(1 / c, GUARDED))))
+                return self._lifted(self.K.one.mul_ground(whole(shortened(1 / c, GUARDED))))
         inside, made = self.written(x[0]), self.generator[node.op, node.index]
         k = self.K.gens.index(made)
         if node.op == "inv":
@@ -206,7 +205,7 @@ class Expansion:
                         self.generator[expressions.power(a, 1 if n > 0 else -1)] ** abs(n)
                         for a, n in m
                     ),
-                    start=self.K.one.mul_ground(number(c)),
+                    start=self.K.one.mul_ground(whole(c)),
                 )
                 for m, c in e.terms.items()
             )
@@ -247,14 +246,14 @@ class Expansion:
         largest = max((abs(n) for c in a.values() for n in c.values()), default=0)
         kept = {
             m: c.new(
-                {k: number(shortened(n, digits)) for k, n in c.items() if abs(n) > NOISE * largest}
+                {k: whole(shortened(n, digits)) for k, n in c.items() if abs(n) > NOISE * largest}
             )
             for m, c in a.items()
         }
         return self.ring.from_dict({m: c for m, c in kept.items() if c})
 
     def halved(self, a: Polynomial) -> Polynomial:
-        return self._each(a, lambda c: c.new({m: number(Fraction(n) / 2) for m, n in c.items()}))
+        return self._each(a, lambda c: c.new({m: whole(Fraction(n) / 2) for m, n in c.items()}))
 
     def determinant(self, rows: Sequence[Sequence[Polynomial]]) -> Polynomial:
         """Compute the determinant of a square matrix of polynomials by Laplace's expansion.

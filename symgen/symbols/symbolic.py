@@ -16,8 +16,7 @@ from symgen.errors import SymgenError
 from symgen.symbols.derivation import Source, source_of
 from symgen.symbols.documents import Formulas, printed
 from symgen.symbols.expressions import symbol
-from symgen.symbols.symbolic_model import LARGEST, SymbolicModel
-from symgen.symbols.sympy_objects import of_listing, of_model
+from symgen.symbols.symbolic_model import LARGEST, SymbolicModel, of_listing, of_model
 
 
 def symbolic(

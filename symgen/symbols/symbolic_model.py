@@ -3,22 +3,28 @@
 The equations are listed in the order in which they are computed. Intermediate variables have the
 names of SYMORO. As in emitted code, an expression has an equation of its own if it has a name or is
 used more than once; any other expression is written inside the only equation that uses it.
+
+As SymPy objects, every symbol is real and has the name used in the robot file or in the recursion:
+q1, QP1 and QDP1 for position, velocity and acceleration of joint 1, GAM1 for its torque. Numbers
+are exact. Cosines and sines are written with their angles: C23 is cos(q2 + q3).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cached_property
 from itertools import product
 from typing import Any
 
-from symgen.derive.frames import Frames
-from symgen.derive.graph import SYM, Angle, Domain, Scalar, Symbol, interpret
-from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.derive.model import TWIST, Model, Place, Request, labels, rewriting
-from symgen.derive.models import MODELS
-from symgen.description.expression import Expression
+import sympy
+
+from symgen.derive.algebra import GraphAlgebra
+from symgen.derive.geometry import Frames
+from symgen.derive.graph import INV, POS, SYM, Angle, Domain, Node, Scalar, Symbol, interpret
+from symgen.derive.models import MODELS, TWIST, Model, Place, Request, labels, rewriting
+from symgen.description.expression import FUNCTIONS, Expression
 from symgen.description.grammar import parse
 from symgen.description.naming import Namespace
 from symgen.emit.printers import PLAIN, Text
@@ -26,7 +32,7 @@ from symgen.errors import SymgenError
 from symgen.symbols import expressions
 from symgen.symbols.derivation import Source
 from symgen.symbols.expansion import Expansion, Polynomial, TooManyTermsError, length
-from symgen.symbols.expressions import Tree, rounded
+from symgen.symbols.expressions import Tree, angle, evaluated, rational, rounded, symbol
 
 
 @dataclass(frozen=True)
@@ -402,3 +408,67 @@ class SymbolicModel:
             self.source.parameters,
             decimals=self.source.decimals,
         )
+
+
+FACTORED = 300  # terms of a determinant, up to which it is factored over the rationals
+
+
+def of_model(model: SymbolicModel) -> Any:
+    """Convert the closed form of a model to a SymPy object.
+
+    A matrix is a Matrix, a vector a Matrix of one column, a scalar an expression.
+    """
+    closed = model.closed
+    angles = {name: evaluated(angle(name[0], e), {}) for name, e in closed.angles.items()}
+    values = {place: evaluated(x, angles) for place, x in closed.entries.items()}
+    if closed.denominator is not None:
+        below = evaluated(closed.denominator, angles)
+        values = {place: x / below for place, x in values.items()}
+    if not model.axes and model.model.cases is None and closed.size <= FACTORED:
+        values = {place: sympy.factor(x) for place, x in values.items()}
+    return _shaped(model, values)
+
+
+def of_listing(model: SymbolicModel) -> tuple[list[tuple[Any, Any]], Any]:
+    """Return a model in SymPy: its recursive equations, and the model in terms of the variables
+    that the equations define.
+
+    As from `sympy.cse`, an equation is a pair (symbol, expression).
+    """
+    steps, outputs = model.listing.steps(Objects(), symbol)
+    values = dict(zip(model.listing.places, map(sympy.sympify, outputs), strict=True))
+    return [(symbol(name), x) for name, x in steps.items()], _shaped(model, values)
+
+
+def _shaped(model: SymbolicModel, values: Mapping[tuple[int, ...], Any]) -> Any:
+    shape = [len(labels) for labels in model.axes]
+    if not shape:
+        return values.get((), sympy.Integer(0))
+    if model.model.symmetric:
+        values = {**values, **{place[::-1]: x for place, x in values.items()}}
+    rows, columns = (*shape, 1)[:2]
+    return sympy.Matrix(
+        rows, columns, lambda k, m: values.get((k, m)[: len(shape)], sympy.Integer(0))
+    )
+
+
+class Objects:
+    """Operations that convert the nodes of an expression graph to SymPy objects.
+
+    `rational` is the function that converts a rational number.
+    """
+
+    def __init__(self, rational: Callable[[Fraction], Any] = rational) -> None:
+        self.number = rational
+
+    def symbol(self, symbol_: Symbol) -> Any:
+        """Make a SymPy symbol with the name of an input (joint variable, parameter, constant)."""
+        return symbol(symbol_.name)
+
+    def function(self, node: Node, x: list[Any]) -> Any:
+        """Apply the function of a graph node, such as cos, to its operands x in SymPy."""
+        if node.op == INV:
+            return 1 / x[0]
+        if node.op == POS:
+            return sympy.Max(x[0], 0)
+        return getattr(sympy, FUNCTIONS[node.op].sympy)(*x, evaluate=node.value is not None)

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from campaign import some
+from hang import HANG
 from typer.testing import CliRunner
 
 import symgen
@@ -24,10 +25,10 @@ from runtime import load_model
 from runtime.core import loading
 from symgen.certify import importing
 from symgen.certify.importing import without_certificate
+from symgen.certify.lagrange import Lagrange
 from symgen.certify.modules import certified_files, certify, model, require_valid
 from symgen.certify.texts import DERIVATIVES, TextCheck
 from symgen.cli.main import app
-from symgen.derive.lagrange import Lagrange
 from symgen.derive.loops import close
 from symgen.description import load_robot, packaged_robots
 from symgen.emit.generate import generate_files, generate_module
@@ -306,7 +307,7 @@ def test_two_processes_at_once_and_others_that_load_the_file(cache) -> None:
         )
         for _ in range(2)
     ]
-    files = {process.communicate(timeout=120)[0] for process in started}
+    files = {process.communicate(timeout=HANG)[0] for process in started}
     assert [process.returncode for process in started] == [0, 0] and len(files) == 1
     file, name = files.pop().split()
     assert load_model(Path(file)).NAME == name == "planar_2r"

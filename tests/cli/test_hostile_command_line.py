@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from campaign import sampled, some
+from hang import HANG
 from typer.testing import CliRunner
 
 from fuzz.seeds import csv_file, model_files
@@ -257,7 +258,7 @@ def symgen(*arguments, **settings):
     return subprocess.run(
         [sys.executable, "-c", "from symgen.cli.main import main; main()", *arguments],
         capture_output=True,
-        timeout=60,
+        timeout=HANG,
         check=False,
         **settings,
     )

@@ -9,6 +9,7 @@ import subprocess
 import sys
 
 import pytest
+from hang import HANG
 
 from runtime.reporting.result_files import FINISHED, UNFINISHED, OutputError, results_in, write_all
 
@@ -222,7 +223,7 @@ from symgen.cli import main as command, session
 def wait():
     with session.results_in(Path(sys.argv[1])):
         print("ready", flush=True)
-        time.sleep(60)
+        time.sleep(3600)
 
 command.app = wait
 command.main()
@@ -233,7 +234,7 @@ command.main()
     )
     assert child.stdout.readline() == b"ready\n" and folder.is_dir()
     child.send_signal(number)
-    child.communicate(timeout=30)
+    child.communicate(timeout=HANG)
     assert child.returncode != 0 and not folder.exists()
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from campaign import campaign
+from campaign import sampled
 
 from runtime.compose import estimate_of
 from runtime.core.model import load_model
@@ -73,7 +73,7 @@ def test_noise_free_records_give_the_parameters_back(clean, truth) -> None:
     assert np.abs(found.X - truth).max() <= 1e-9 * np.abs(truth).max()
 
 
-@pytest.mark.parametrize("runs", [40, pytest.param(200, marks=campaign)])
+@pytest.mark.parametrize("runs", [40, *sampled([200], 0, more=0)])
 @pytest.mark.parametrize("method", ["ols", "wls"])
 def test_stated_sigma_is_the_scatter_over_records(clean, truth, method: str, runs: int) -> None:
     """z = (X - truth)/sigma has variance 1. OLS with unequal joints: the correlation-corrected

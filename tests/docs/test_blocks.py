@@ -26,12 +26,13 @@ from pathlib import Path
 import jsonschema
 import pytest
 from campaign import campaign, some
+from hang import HANG
 from ruamel.yaml import YAML
 from typer.main import get_command
 
 from runtime.study import study_from_text
 from symgen.cli.main import app
-from symgen.description.schema import json_schema
+from symgen.description.robot_file import json_schema
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
@@ -108,7 +109,7 @@ def run(command: list[str], folder: Path) -> None:
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=HANG,
         check=False,
     )
     assert ended.returncode == 0, (ended.stdout[-2000:] + ended.stderr[-4000:]).strip()

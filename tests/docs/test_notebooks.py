@@ -11,6 +11,7 @@ import nbclient
 import nbformat
 import pytest
 from campaign import campaign
+from hang import HANG
 
 ROOT = Path(__file__).resolve().parents[2]
 NOTEBOOK = ROOT / "docs" / "examples" / "notebook.ipynb"
@@ -39,7 +40,7 @@ def test_runs_to_a_verdict_a_table_and_a_figure(
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     nbclient.NotebookClient(
         notebook,
-        timeout=300,
+        timeout=HANG,
         kernel_name="python3",
         resources={"metadata": {"path": str(tmp_path)}},
     ).execute()
@@ -69,7 +70,7 @@ def test_two_link_arm_proves_what_it_says(tmp_path: Path, monkeypatch: pytest.Mo
     notebook = nbformat.read(TEACHING, as_version=4)
     nbclient.NotebookClient(
         notebook,
-        timeout=300,
+        timeout=HANG,
         kernel_name="python3",
         resources={"metadata": {"path": str(tmp_path)}},
     ).execute()

@@ -10,6 +10,7 @@ from urllib.parse import unquote, urlsplit
 
 from browser import started_browser
 from campaign import campaign
+from hang import HANG
 
 from symgen.description import packaged_robots
 
@@ -50,7 +51,7 @@ def built(out: Path) -> Path:
         ROOT / "docs",
         out / "html",
     ]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=HANG, check=False)
     assert ended.returncode == 0, ended.stderr[-4000:]
     return out / "html"
 

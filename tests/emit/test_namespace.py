@@ -171,8 +171,8 @@ WORDS = sorted(
 
 OF_NUMPY = sorted({w for w in dir(np) if not w.startswith("_")} - {*WORDS})
 SAMPLE = [
-    *sampled(WORDS, 5, always=("C1", "D", "T", "double", "self")),
-    *sampled(OF_NUMPY, 2, more=60),
+    *sampled(WORDS, 5, always=("C1", "D", "T", "double", "self"), more=30),
+    *sampled(OF_NUMPY, 2, more=10),
 ]
 
 
@@ -189,7 +189,7 @@ def test_a_word_as_a_constant_is_kept_or_refused(word: str, tmp_path: Path) -> N
 
 @pytest.mark.parametrize(
     "family",
-    sampled([*"SrWU", "CA", *families()[::287]], 3, always=("S", "CA", "U"), more=100),
+    sampled([*"SrWU", "CA", *families()[::287]], 3, always=("S", "CA", "U"), more=10),
 )
 @some(3)
 def test_a_family_is_kept_or_refused(family: str, tmp_path: Path) -> None:

@@ -22,9 +22,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from time import monotonic
 
+from hang import HANG
+
 SECONDS = 5.0  # of processor time
 START = 10.0  # s of processor time that a new process takes to import what it needs, at most
-WAIT = 60.0  # s on the clock, for a reader that waits for something
+WAIT = HANG  # for a reader that waits for something
 MEMORY = 1_000_000_000  # bytes, the interpreter and its libraries included
 LIFE = 5000  # cases of one process: caches of expressions grow by design
 LONGEST = 2500  # characters of a message

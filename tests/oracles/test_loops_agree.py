@@ -22,7 +22,7 @@ from oracles.multipliers import Multipliers
 from oracles.random_parallelograms import SEEDS, random_parallelogram
 from oracles.random_robots import random_parameters
 from symgen.certify.certificate import certify_formulas
-from symgen.derive.lagrange import Lagrange
+from symgen.certify.lagrange import Lagrange
 from symgen.derive.loops import close as close_loops
 from symgen.description import load_robot
 from symgen.description.expression import Expression
@@ -36,7 +36,7 @@ Array = np.ndarray[Any, Any]
 GENERAL = ("four_bar", "five_bar")
 PACKAGED = ("haptic", "sr400", *GENERAL)
 NAMES = (*PACKAGED, *(f"parallelogram_{seed}" for seed in SEEDS))
-SAMPLE = sampled(NAMES, 10, always=PACKAGED)
+SAMPLE = sampled(NAMES, 10, always=PACKAGED, more=6)
 PARALLELOGRAMS = [case for case in SAMPLE if case not in GENERAL]
 Emitted = Callable[[str], ModuleType]
 

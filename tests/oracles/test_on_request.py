@@ -30,7 +30,7 @@ from symgen.regroup.regrouping import regroup
 
 Array = np.ndarray
 STEP, SIX_POINTS = 0.002, {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}
-ROBOTS = sampled([random_robot(seed) for seed in range(30)], 8)
+ROBOTS = sampled([random_robot(seed) for seed in range(30)], 8, more=4)
 
 
 def slope(f: Callable[[float], Array]) -> Array:

@@ -8,13 +8,13 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import planar_2r_model as planar
 import pytest
+from hang import HANG
 from planar_data import record
 
 from runtime.compose import cestac
@@ -103,14 +103,18 @@ SCRIPT = """
 import os, resource, sys, time
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ[name] = "1"
-sys.path[:0] = [sys.argv[1], os.path.join(sys.argv[1], "..", "support")]
+sys.path[:0] = [sys.argv[1], *(os.path.join(sys.argv[1], "..", x) for x in ("", "support"))]
 from pathlib import Path
 from test_checkpoint import RECORD, Checkpoint, cestac, planar, study
 if sys.argv[3] != "0":
     resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[3]), int(sys.argv[3])))
 print("ready", flush=True)
-slowly = (lambda done, total: time.sleep(0.05)) if sys.argv[3] == "0" else None
-cestac(planar, RECORD, study(), checkpoint=Checkpoint(Path(sys.argv[2]), every=0.0), progress=slowly)
+def held(done, total):
+    if (Path(sys.argv[2]) / "runs.npz").exists():
+        print("saved", flush=True)
+        time.sleep(3600)
+progress = held if sys.argv[3] == "0" else None
+cestac(planar, RECORD, study(), checkpoint=Checkpoint(Path(sys.argv[2]), every=0.0), progress=progress)
 """
 
 
@@ -122,9 +126,7 @@ def started(folder, limit=0):
 @pytest.mark.campaign  # a process of its own imports this file
 def test_killed_and_resumed(tmp_path, whole):
     process = started(tmp_path)
-    limit = time.monotonic() + 60
-    while files(tmp_path) != ["runs.npz"] and process.poll() is None and time.monotonic() < limit:
-        time.sleep(0.01)
+    assert [process.stdout.readline() for _ in range(2)] == ["ready\n", "saved\n"]
     process.send_signal(signal.SIGKILL)
     process.communicate()
     assert process.returncode == -signal.SIGKILL
@@ -141,7 +143,7 @@ def test_killed_and_resumed(tmp_path, whole):
 def test_full_disk(tmp_path, whole):
     """A limit on the size of files, below that of the file."""
     process = started(tmp_path, limit=1000)
-    _, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=HANG)
     assert process.returncode == 1
     assert "InputError" in errors and "File too large; 0 runs are saved" in errors
     assert list(tmp_path.iterdir()) == []

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from campaign import campaign
+from hang import HANG
 from threadpoolctl import threadpool_info
 
 from runtime.core.errors import InputError
@@ -93,7 +94,7 @@ def test_processes_end_with_the_one_that_started_them(tmp_path):
     """Killed, it cannot tell them to."""
     code = (
         "from runtime.parallel.processes import processes\nimport test_processes\nif __name__ == '__main__':\n"
-        "    with processes(2) as several:\n        list(several(test_processes.telling, [60.0, 60.0]))\n"
+        "    with processes(2) as several:\n        list(several(test_processes.telling, [3600.0, 3600.0]))\n"
     )
     script = tmp_path / "script.py"
     script.write_text(code)
@@ -107,7 +108,7 @@ def test_processes_end_with_the_one_that_started_them(tmp_path):
     worker = int(process.stdout.readline())
     process.kill()
     process.communicate()
-    limit = time.monotonic() + 20
+    limit = time.monotonic() + HANG
     while Path(f"/proc/{worker}").exists() and time.monotonic() < limit:
         time.sleep(0.05)
     assert not Path(f"/proc/{worker}").exists()

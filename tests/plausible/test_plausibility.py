@@ -26,7 +26,7 @@ from runtime.plausible.motion import excited, low_speed_of_rest, standing_share,
 from runtime.plausible.samples import Samples, excerpts, samples_of
 from runtime.reading.records import read_records
 from runtime.study import Rows, Study, study_from_mapping
-from symgen.description.yaml import parse_robot
+from symgen.description.robot_file import parse_robot
 
 LIMIT = limits("runtime.plausible")
 
@@ -44,7 +44,9 @@ def test_a_right_study_is_left_alone(right: slip_cases.Case) -> None:
     assert abs(found.delay.common) < 1e-3
 
 
-@pytest.mark.parametrize("slip", sampled(slip_cases.SIMULATED, 3), ids=lambda slip: slip.name)
+@pytest.mark.parametrize(
+    "slip", sampled(slip_cases.SIMULATED, 3, more=6), ids=lambda slip: slip.name
+)
 @some(1)
 def test_a_slip_of_the_palletiser_is_named(right: slip_cases.Case, slip: slip_cases.Slip) -> None:
     state, text = slip_cases.told(right, slip.change(right), slip, set())
@@ -290,7 +292,7 @@ def test_parameters_that_the_motion_cannot_tell_are_named_before_the_fit() -> No
     )
 
 
-@pytest.mark.parametrize("seed", sampled(RANDOM, 2))
+@pytest.mark.parametrize("seed", sampled(RANDOM, 2, more=6))
 def test_right_studies_of_random_robots_are_left_alone(seed: int) -> None:
     robot, model, record = random_record(seed)
     found = runtime.plausibility(model, record, Study(), variants=symgen.variants(robot))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
-from campaign import sampled
+from campaign import FULL, campaign, sampled
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
@@ -151,15 +152,26 @@ NAMED = [
 SILENT = [("wrist", 3)]  # the wrist logged 40 ms late: nothing is named, and nothing wrong
 
 
-@pytest.mark.parametrize(
-    "slip_of",
-    sampled(NAMED, 0),
-)
+SOME = [  # one of each kind; all of them, and those of two measured robots: benchmarks/slips.md
+    ("wrist", 1), ("panda", 2), ("wrist", 3), ("panda", 8), ("panda", 10), ("wrist", 12),
+    ("panda", 13), ("wrist", 16), ("wrist", 19),
+]  # fmt: skip
+
+
+@cache
+def simulated(name: str) -> slips_simulated.Simulated:
+    """A right study, of which nothing is told."""
+    robot = slips_simulated.Simulated(name)
+    assert robot.right.judged().worst is None
+    return robot
+
+
+@campaign
+@pytest.mark.parametrize("slip_of", NAMED if FULL else SOME)
 def test_slips_of_strangers_are_named(slip_of: tuple[str, int]) -> None:
     name, number = slip_of
-    robot = slips_simulated.Simulated(name)
+    robot = simulated(name)
     (slip,) = (slip for slip in robot.slips() if slip.number == number)
-    assert robot.right.judged().worst is None
     state, text = slip_cases.told(robot.right, slip.change(robot.right), slip, set())
     assert state == ("silent" if slip_of in SILENT else "named"), text
 

@@ -16,6 +16,7 @@ import numpy as np
 import planar_2r_model as planar
 import pytest
 import scipy.io
+from hang import HANG
 from planar_data import OLS, WLS, observation, one_joint_at_rest
 
 from runtime import InputError
@@ -328,7 +329,7 @@ def test_latex_sets_the_tables(found, tmp_path):
         cwd=tmp_path,
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=HANG,
     )
     assert run.returncode == 0, run.stdout[-2000:]
     assert (tmp_path / "t.pdf").stat().st_size > 1000

@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 import nbformat
 import numpy as np
+from hang import HANG
 from nbclient import NotebookClient
 
 from runtime.core.cestac.result import Cestac, level_result
@@ -121,7 +122,7 @@ def test_a_notebook_shows_them():
         ),
         nbformat.v4.new_code_cell("from runtime.core.markup import symbol\nprint(symbol('ZZ1R'))"),
     ]
-    NotebookClient(book, timeout=120, kernel_name="python3").execute()
+    NotebookClient(book, timeout=int(HANG), kernel_name="python3").execute()
     data = book.cells[0].outputs[0]["data"]
     assert {"text/latex", "text/plain"} <= set(data)
     assert re.search(r"ZZ_\{1R\}", data["text/latex"])

@@ -13,12 +13,14 @@ from typing import Any
 
 import pytest
 from browser import Browser, started_browser
+from hang import HANG
 from starlette.testclient import TestClient
 
 from symgen.studio import folder, server, serving
 from symgen.studio.child import ViewProcess
 
 COMMAND = "from symgen.cli.main import main; main()"
+PATIENT = f"from symgen.studio import server; server.VIEW_PATIENCE = {HANG}; "  # on a busy machine
 PROGRAMS = {
     "symgen": [sys.executable, "-P", "-c", "from symgen.studio.child import watched; watched(); " + COMMAND],
     "check": [sys.executable, "-P", "-c", "from symgen.studio.child import watched; watched(); from symgen.studio.views import check; check()"],
@@ -58,7 +60,10 @@ def process() -> Iterator[ViewProcess]:
 
 
 @pytest.fixture
-def studio(tmp_path: Path, process: ViewProcess) -> Iterator[Studio]:
+def studio(
+    tmp_path: Path, process: ViewProcess, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Studio]:
+    monkeypatch.setattr(server, "VIEW_PATIENCE", HANG)
     own = Studio(tmp_path / "work")
     own.server.process = own.server.deriving = process
     with own.client:
@@ -77,7 +82,7 @@ class Running:
 
     def __init__(self, *arguments: str, work: Path) -> None:
         self.process = subprocess.Popen(
-            [sys.executable, "-c", COMMAND, "studio", *arguments, "-o", str(work), "--no-browser"],
+            [sys.executable, "-c", PATIENT + COMMAND, "studio", *arguments, "-o", str(work), "--no-browser"],
             stderr=subprocess.PIPE, text=True, env={**os.environ},
         )  # fmt: skip
         line = self.process.stderr.readline()  # type: ignore[union-attr]
@@ -87,7 +92,7 @@ class Running:
 
     def end(self, number: int = signal.SIGINT) -> int:
         self.process.send_signal(number)
-        return self.process.wait(120)
+        return self.process.wait(HANG)
 
 
 @pytest.fixture

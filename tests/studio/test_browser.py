@@ -18,6 +18,7 @@ import kr300
 import numpy as np
 import pytest
 from browser import WEAK_CONTRAST, Browser
+from hang import HANG
 
 import symgen
 from runtime.documents.yaml_text import yaml_text
@@ -79,7 +80,7 @@ def go(page: Browser, address: str, width: int = 1280) -> None:
             page.events.append(page._next())
 
 
-def until(page: Browser, script: str, seconds: float = 120.0) -> Any:
+def until(page: Browser, script: str, seconds: float = HANG) -> Any:
     end = time.monotonic() + seconds
     while not (value := page.run(script)):
         assert time.monotonic() < end, script
@@ -355,11 +356,11 @@ def test_from_urdf_and_csv_to_verdict_report_and_applied_urdf(
     assert "scale" not in (studio.work / "study.yaml").read_text()  # nothing was said of it
     go(page, studio.address + "check")
     page.click("#findings button.main")
-    until(page, "document.querySelectorAll('.checks li').length > 10", 60)
+    until(page, "document.querySelectorAll('.checks li').length > 10")
     go(page, studio.address + "solve")
     page.run("document.querySelector('[value=feasible]').checked = true")
     page.click("#solve button.main")
-    until(page, "document.querySelector('#jobs').dataset.runs.split(' ').length === 2", 90)
+    until(page, "document.querySelector('#jobs').dataset.runs.split(' ').length === 2")
     until(page, "document.querySelectorAll('#compared tbody tr').length === 13")
     page.run("location.reload()")
     until(page, "document.querySelector('#jobs')?.dataset.runs.split(' ').length === 2")
@@ -563,7 +564,7 @@ def alive(pid: int) -> bool:
         return False
 
 
-def wait_for(holds: Callable[[], bool], seconds: float = 120.0) -> None:
+def wait_for(holds: Callable[[], bool], seconds: float = HANG) -> None:
     end = time.monotonic() + seconds
     while not holds():
         assert time.monotonic() < end
@@ -600,7 +601,7 @@ def test_the_numbers_are_those_of_the_command_line(studio: Any, tmp_path: Path, 
         == 200
     )
     run = studio.path / "runs" / "01-ols"
-    wait_for(lambda: (run / "estimate.json").is_file() or "failed" in studio.get("jobs").text, 120)
+    wait_for(lambda: (run / "estimate.json").is_file() or "failed" in studio.get("jobs").text)
     (tmp_path / "by_hand").mkdir()
     (tmp_path / "by_hand" / "study.yaml").write_text(yaml_text(values))
     (tmp_path / "by_hand" / "record").mkdir()

@@ -10,8 +10,9 @@ from typing import Any
 
 import pytest
 from browser import FRAME, WEAK_CONTRAST, Browser
+from hang import HANG
 from test_browser import choose, go, quiet, until
-from test_mishaps import lever, solved
+from test_mishaps import OWN_CLOCK, lever, solved
 
 pytestmark = pytest.mark.campaign
 
@@ -39,7 +40,7 @@ def zoomed(page: Browser) -> tuple[list[str], list[str]]:
 
 def point(page: Browser) -> None:
     """The pointer on the middle of the first figure, until the cursor has left the first instant."""
-    start, end = page.run(CURSOR), time.monotonic() + 10
+    start, end = page.run(CURSOR), time.monotonic() + HANG
     while page.run(CURSOR) == start:
         assert time.monotonic() < end
         page.hover(".plot")
@@ -52,7 +53,7 @@ def results(page: Browser, running: Callable[..., Any], tmp_path: Path) -> Brows
     studio = running(*lever(tmp_path))
     solved(studio, "ols")
     go(page, studio.address + "results")
-    until(page, "document.querySelectorAll('.plot > svg').length === 4", 20)
+    until(page, "document.querySelectorAll('.plot > svg').length === 4")
     return page
 
 
@@ -101,8 +102,9 @@ def test_play_repeats_the_span_that_is_shown(results: Browser) -> None:
     zoomed(results)
     end = results.run(CURSOR)
     results.run("document.querySelector('#cursor').value = 0")
+    results.run(OWN_CLOCK)
     results.click("#play")
-    results.run("new Promise((done) => setTimeout(done, 1000))")
+    results.run("passed(1.0)")
     assert start <= results.run(CURSOR) <= end
     results.click("#play")
 
@@ -113,7 +115,7 @@ def test_a_record_shows_its_columns_and_zooms(
     studio = running(lever(tmp_path)[0])
     go(page, studio.address + "record")
     choose(page, "#record-file", tmp_path / "run.csv")
-    until(page, "document.querySelectorAll('#preview .plot > svg').length === 2", 20)
+    until(page, "document.querySelectorAll('#preview .plot > svg').length === 2")
     assert page.run(KINDS) == [["c0", "c1"]] * 2
     assert "q, deg" in page.run(TEXTS)[0] and "time, s" in page.run(TEXTS)[1]
     whole, near = zoomed(page)

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bag_files import joint_states, write_bag
+from hang import HANG
 
 import symgen
 from symgen.studio import guard, server, serving, table, views
@@ -508,15 +509,25 @@ def test_a_study_of_the_browser_names_no_file_of_another_folder(studio: Any, fil
             assert not (studio.path / "study.yaml").exists()
 
 
-def test_news_that_come_while_others_are_sent_are_told(tmp_path: Path) -> None:
+def test_news_that_come_while_others_are_sent_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A page that reads slowly learns of every change at once, not at the next one."""
+
+    async def at_once(news: Any, seconds: float) -> None:
+        """Wait for news as `asyncio.wait_for` does, but only for those that are there."""
+        waiting = asyncio.ensure_future(news)
+        await asyncio.sleep(0)
+        assert waiting.done()
+
+    monkeypatch.setattr(serving.asyncio, "wait_for", at_once)
 
     async def versions() -> list[int]:
         own = server.Server(WorkFolder(tmp_path), {})
         events = serving.told(own)
         parts = [await anext(events)]
         own.changed()  # the stream waits for its reader
-        parts.append(await asyncio.wait_for(anext(events), 5))
+        parts.append(await anext(events))
         await events.aclose()
         return [json.loads(part.removeprefix("data: "))["version"] for part in parts]
 
@@ -636,7 +647,7 @@ def test_the_server_ends_some_time_after_its_last_page(
         loop = asyncio.get_running_loop()
         start = loop.time()
         loop.call_later(seconds, lambda: setattr(own, "pages", 0))
-        await asyncio.wait_for(serving.idle(own, lambda: ended.append(loop.time() - start)), 5)
+        await asyncio.wait_for(serving.idle(own, lambda: ended.append(loop.time() - start)), HANG)
 
     asyncio.run(closed_after(0.3))
     assert ended[0] >= 0.45
@@ -687,7 +698,7 @@ def test_a_run_that_was_cancelled_while_it_waited_leaves_nothing(studio: Any) ->
 
 def test_a_studio_that_ends_closes_the_pipes_of_its_run(tmp_path: Path) -> None:
     """Else the garbage collector closes them, anywhere, with an error and no one to catch it."""
-    sleep = "import time; print(1, flush=True); time.sleep(60)"
+    sleep = "import time; print(1, flush=True); time.sleep(3600)"
 
     async def interrupted() -> None:
         jobs = Jobs(tmp_path, {"sleep": [sys.executable, "-c", sleep]}, lambda: None)
@@ -735,16 +746,31 @@ def test_a_model_of_thirty_joints_is_its_recursion(tmp_path: Path) -> None:
     assert len(shown["typeset"].steps) > 1 and process_time() - start < server.VIEW_PATIENCE / 2
 
 
+class Held(ViewProcess):
+    """A process of views that begins with the first view when `released` is set."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.asked, self.released = threading.Event(), threading.Event()
+        self.thread = ThreadPoolExecutor(1)
+
+    def submit(self, view: Any, *args: Any) -> Any:
+        self.asked.set()
+        return self.thread.submit(self._late, view, args)
+
+    def _late(self, view: Any, args: tuple[Any, ...]) -> Any:
+        self.released.wait(HANG)
+        return view(*args)
+
+
 def test_pages_do_not_wait_for_formulas(studio: Any) -> None:
-    """Those of a long chain take seconds; an edit of the table meanwhile is read in a blink."""
-    studio.upload("robot", "chain.yaml", chain(18).encode())
-    studio.server.deriving = ViewProcess()
-    try:
-        studio.server.deriving.start()
-        with ThreadPoolExecutor() as pool:
-            formulas = pool.submit(studio.get, "view/formulas")
-            assert "chain" in studio.get("robot").text
-            assert not formulas.done()
-        assert "ZZ18" in formulas.result().text
-    finally:
-        studio.server.deriving.end()
+    """A page of the robot comes while formulas are derived, however long they take."""
+    studio.upload("robot", "chain.yaml", chain(3).encode())
+    deriving = studio.server.deriving = Held()
+    with ThreadPoolExecutor(1) as pool:
+        formulas = pool.submit(studio.get, "view/formulas")
+        assert deriving.asked.wait(HANG)
+        assert "chain" in studio.get("robot").text
+        assert not formulas.done()
+        deriving.released.set()
+        assert "ZZ3" in formulas.result().text
