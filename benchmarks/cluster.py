@@ -26,7 +26,7 @@ import platform
 import signal
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -40,7 +40,6 @@ from runtime.compose import cestac
 from runtime.core.cestac.cestac import Cestac
 from runtime.core.essential import essential_of
 from runtime.core.model import GeneratedModel
-from runtime.parallel.cluster import cluster as mapped
 from runtime.parallel.processes import processes
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
@@ -104,9 +103,12 @@ def main() -> None:
             dashboard_address="127.0.0.1:0",
             host="127.0.0.1",
         ) as cluster,
+        distributed.Client(cluster) as client,
     ):
         model, record, study, names = prepared(Path(folder), settings.runs)
-        address = cluster.scheduler_address
+
+        def dask_map(function: Callable, keys: Iterable) -> Iterator:
+            return (future.result() for future in client.map(function, keys))
 
         def way(**how: object) -> Cestac:
             return cestac(model, record, study, columns=names, **how)
@@ -118,11 +120,9 @@ def main() -> None:
                 return way(map=own_map)
 
         def on_cluster(**how: object) -> Cestac:
-            with mapped(address) as own_map:
-                return way(map=own_map, **how)
+            return way(map=dask_map, **how)
 
-        with mapped(address) as own_map:  # workers import and compile once
-            cestac(model, record, few, columns=names, map=own_map)
+        cestac(model, record, few, columns=names, map=dask_map)  # workers import once
         ways: dict[str, Callable[[], Cestac]] = {
             "one process": way,
             "2 workers": several,

@@ -514,8 +514,7 @@ def cestac(
     """Compute how coarser encoders and torque sensors change the estimate, eqs. (15) to (22), (28).
 
     map : like the built-in map; makes the runs, in processes
-        (`runtime.parallel.processes.processes`) or on a Dask cluster
-        (`runtime.parallel.cluster.cluster`).
+        (`runtime.parallel.processes.processes`) or on a Dask cluster (docs/many_runs.md).
     options : columns, progress, checkpoint, provenance, as of `runtime.core.cestac.cestac.cestac`.
     """
     from runtime.core.cestac import cestac as resolution

@@ -43,7 +43,6 @@ def cestac(
     columns: options.Columns = None,
     seed: options.Seed = None,
     workers: options.Workers = 0,
-    scheduler: options.Scheduler = None,
     advise: options.Advise = False,
     trust: options.Trust = False,
     exact: options.Exact = False,
@@ -72,6 +71,7 @@ def cestac(
         import runtime
         from runtime.advisor.coarse_encoders import READERS
         from runtime.parallel.checkpoint import Checkpoint
+        from runtime.parallel.processes import processes
         from runtime.reading.records import read_records
 
         described = session.robot_of(robot, trust=trust, exact=exact)
@@ -107,7 +107,7 @@ def cestac(
                     )
                     said, good = advice.verdict, not advice.negative
                 else:
-                    with session.map_of(workers, scheduler) as own_map:
+                    with processes(workers) as own_map:
                         result = resolution = runtime.cestac(
                             model,
                             records,

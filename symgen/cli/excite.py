@@ -66,6 +66,7 @@ def excite(
     with session.results_in(output) as results:
         import runtime
         from runtime.core.documents import json_text
+        from runtime.parallel.processes import processes
         from runtime.reading.records import read_records
 
         model = session.model_of(session.robot_of(robot, trust=trust, exact=exact))
@@ -81,7 +82,7 @@ def excite(
             },
         )
         records = read_records(study.record, model, missing=study.signals.admits_missing)
-        with session.progress_bar("starts") as progress, session.map_of(workers) as own_map:
+        with session.progress_bar("starts") as progress, processes(workers) as own_map:
             seek: Any = partial(runtime.excite, map=own_map, progress=progress)
             still = study.excitation is not None and study.excitation.poses is not None
             result = (runtime.static_poses if still else seek)(model, records, study)

@@ -344,22 +344,6 @@ def names_of(text: str | None) -> str | list[str] | None:
     return text if text in (None, "essential", "all") else text.split(",")
 
 
-@contextmanager
-def map_of(workers: int, scheduler: str | None = None) -> Iterator[Any]:
-    """Yield a function like `map` that runs its calls in worker processes or on a Dask cluster.
-
-    The options --workers and --scheduler specify which.
-    """
-    from runtime.core.errors import InputError
-    from runtime.parallel.cluster import cluster
-    from runtime.parallel.processes import processes
-
-    if scheduler and workers:
-        raise InputError("a scheduler uses its own workers; leave out --workers")
-    with cluster(scheduler) if scheduler else processes(workers) as own_map:
-        yield own_map
-
-
 def stopped(checkpoint: Checkpoint | None) -> NoReturn:
     """End the command after Ctrl-C with exit code 130; say how many runs of a study are saved."""
     rest = (

@@ -93,8 +93,7 @@ def cestac(
         if settings.cestac.columns is "all".
     map : callable, optional
         Works like the built-in map and computes the runs, for instance in processes
-        (`runtime.parallel.processes.processes`) or on a Dask cluster
-        (`runtime.parallel.cluster.cluster`). The results are the same in every bit.
+        (`runtime.parallel.processes.processes`) or on a Dask cluster (docs/many_runs.md). The results are the same in every bit.
     progress : callable, optional
         Called with the number of runs done and their total.
     checkpoint : Checkpoint, optional
