@@ -8,7 +8,7 @@ standard deviations,
 
 s_k is the corrected standard deviation. It is multiplied by the root of a factor c if residuals
 stay correlated for longer than a block (`runtime.core.residuals.unseen_by_blocks`). A parameter
-differs if |d| exceeds LIMIT.DIFFERS. This limit is a convention, not a statistical test
+differs if |d| exceeds DIFFERS. This limit is a convention, not a statistical test
 (benchmarks/truth.md). Differences up to LIMIT.RELEVANT_DIFFERENCE of the value do not change the
 verdict.
 
@@ -37,6 +37,9 @@ from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
 from runtime.core.study import EstimateSettings
 from runtime.core.table import Table
+
+DIFFERS = 3.0
+"""Distance of a parameter of one record from that of the others, from which it differs, deviations. Measured: benchmarks/truth.md."""
 
 Array = np.ndarray
 
@@ -158,8 +161,7 @@ class Homogeneity(Result, Part, keys="records parameters agree disagreements unt
 
 @Question(
     "Do the records agree?",
-    f"no parameter differs by {LIMIT.DIFFERS:g} standard deviations "
-    f"and {LIMIT.RELEVANT_DIFFERENCE:g} %",
+    f"no parameter differs by {DIFFERS:g} standard deviations and {LIMIT.RELEVANT_DIFFERENCE:g} %",
     "check the load and the temperature of the record that differs; its motion may also show an "
     "effect that the model lacks",
 )
@@ -236,7 +238,7 @@ def homogeneity(
         d
         for record in list(fits)[len(fits) == 2 :]  # of two, the second against the first
         for d in _apart(record, fits)
-        if abs(d.z) > LIMIT.DIFFERS
+        if abs(d.z) > DIFFERS
     ]
     found.sort(key=lambda d: -abs(d.z))
     return Homogeneity(tuple(fits), tuple(names), tuple(found), tuple(untested))

@@ -24,13 +24,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from runtime.core.documents import Result
-from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel, joint_labels
 from runtime.core.part import Part
 from runtime.core.problem import Problem
 from runtime.core.result import Identification
 from runtime.core.rows.prepared import Prepared
 from runtime.core.signals.filters import filtered_states, lowpass_filtered, median_filtered
+
+GEAR_BLOCKS = 30
+"""Blocks of time behind the deviation of a stiffness, by record. Measured: tests/test_elastic.py."""
+GEAR_CERTAIN = 3.0
+"""Deviations of its compliance from which a gear has a stiffness, deviations. Measured: tests/test_elastic.py."""
+RIGID_ENOUGH = 0.05
+"""Error of a rigid model at the cut-off, of the inertia torque, below which it is enough."""
 
 Array = np.ndarray
 
@@ -96,7 +102,7 @@ class Elasticity(Result, Part):
             )
             if np.isfinite(f):
                 share = (self.cutoff / f) ** 2
-                rigid = "is enough" if share < LIMIT.RIGID_ENOUGH else "is no longer enough"
+                rigid = "is enough" if share < RIGID_ENOUGH else "is no longer enough"
                 text += (
                     f"; resonance near {f:.3g} Hz: a rigid model {rigid} at the cut-off of "
                     f"{self.cutoff:g} Hz, an error of {100 * share:.1f} % of the inertia torque"
@@ -163,9 +169,12 @@ def _gear(records: Sequence[Prepared], j: int, Ia: float | None) -> tuple[float,
         columns = [tau, link.qd - motor.qd, motor.qd, sign, np.ones_like(sign), gap]
         A = np.hstack([*columns[:-1], *([] if Ia else [motor.qdd]), gap])
         kept = prepared.selection.samples
-        moving = np.abs(motor.qd[kept, 0]) > LIMIT.STANDING * np.abs(motor.qd).max()
+        moving = (
+            np.abs(motor.qd[kept, 0])
+            > limits("runtime.plausible").STANDING * np.abs(motor.qd).max()
+        )
         rows.append(A[kept][moving])
-        blocks += np.array_split(np.arange(len(rows[-1])), LIMIT.GEAR_BLOCKS)
+        blocks += np.array_split(np.arange(len(rows[-1])), GEAR_BLOCKS)
     A = np.vstack(rows)
     Z = A[:, :-1]
     y = A[:, -1]
@@ -174,12 +183,12 @@ def _gear(records: Sequence[Prepared], j: int, Ia: float | None) -> tuple[float,
     x, *_ = np.linalg.lstsq(Z, y, rcond=None)
     inverse = np.linalg.pinv(Z.T @ Z, hermitian=True)
     e = y - Z @ x
-    first = np.repeat(np.cumsum([0, *map(len, rows[:-1])]), LIMIT.GEAR_BLOCKS)
+    first = np.repeat(np.cumsum([0, *map(len, rows[:-1])]), GEAR_BLOCKS)
     g = np.array([Z[k + a].T @ e[k + a] for a, k in zip(first, blocks, strict=True)])
     C = inverse @ (g.T @ g) @ inverse * len(g) / (len(g) - 1)
     x = x / scale
     s = np.sqrt(np.diag(C)) / scale
-    if x[0] < LIMIT.GEAR_CERTAIN * s[0]:
+    if x[0] < GEAR_CERTAIN * s[0]:
         return (np.nan, np.nan, np.nan, np.nan, float(x[2]))
     K = 1 / x[0]
     damping = x[1] / x[0]

@@ -8,7 +8,7 @@ torque errors of motions within the range of the robot.
     C       covariance S C_10 S of least squares with joints weighted by their residuals: C_10 of
             eq. (10), and S the diagonal matrix of corrected over stated standard deviations, times
             a factor for correlations longer than a block
-    V       the same, if the fit uses the values of the robot file, known to LIMIT.VALUES_KNOWN:
+    V       the same, if the fit uses the values of the robot file, known to VALUES_KNOWN:
             (K'C^-1 K + S^-1)^-1 over the standard parameters, X = K chi, S diagonal; the estimate
             of the standard parameters is then chi_V
     a       share of the accelerations that is an error of the encoder's steps
@@ -25,7 +25,7 @@ that the model lacks are included only as far as they are in the residuals of C.
 The squared error of one record is a sum of b squares, a few of which are large: with
 M = K'D'D K V it is distributed as chi^2/nu with nu = tr(M)^2/tr(M^2) degrees of freedom. The
 interval of the expected error has the first two terms times quantiles of this distribution, and the
-third times LIMIT.STEPS_MOVE. If one direction is undetermined, nu is 1: 30 % expected may be 2 %.
+third times STEPS_MOVE. If one direction is undetermined, nu is 1: 30 % expected may be 2 %.
 
 Reference: Satterthwaite (1946) for nu.
 """
@@ -45,7 +45,7 @@ from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import assemble
 from runtime.core.least_squares.method import linear_companion, linear_system
 from runtime.core.limits import LIMIT
-from runtime.core.model import GeneratedModel, channels_of, joint_units
+from runtime.core.model import TRANSMITTED, GeneratedModel, channels_of, joint_units
 from runtime.core.part import Part
 from runtime.core.residuals import unseen_by_blocks
 from runtime.core.result import Identification
@@ -54,6 +54,21 @@ from runtime.core.rows.prepared import Prepared
 from runtime.core.study import EstimateSettings
 from runtime.counts.encoder_advice import acceleration_error
 from runtime.physical.inertia import INERTIAL, PhysicalModel, physical_model
+
+EXPECTED_INTERVAL = (0.05, 0.95)
+"""Probabilities of the ends of that interval. Measured: benchmarks/truth.md."""
+RANGE_ROUNDING = 1e-13
+"""Eigenvalues of a scaled matrix that are rounding."""
+REFERENCE_RANGE = (0.2, 0.8)
+"""Amplitudes of the reference motion over half of the range of a joint. Measured: benchmarks/truth.md."""
+REFERENCE_SPEED = (0.1, 0.5)
+"""Speeds of the reference motion over the largest of a joint. Measured: benchmarks/truth.md."""
+REFERENCE_STATES = 400
+"""States of the reference motion."""
+STEPS_MOVE = (0.25, 2.0)
+"""What the steps of the encoders may do to predictions, over the share of the accelerations that they make: ends of the interval. Measured: benchmarks/truth_classes.py."""
+VALUES_KNOWN = 0.3
+"""Relative deviation to which the values of a robot file are taken as known, of a link by its mass and its inertia. Measured: benchmarks/truth.md."""
 
 Array = np.ndarray
 
@@ -141,8 +156,8 @@ def expected_error(
 ) -> Expected:
     """Compute the expected error of torques predicted for other motions, with its interval, %.
 
-    The error is nan if neither the robot file nor the records give a range, or if a loop cannot
-    close in the range.
+    The error is nan if neither the robot file nor the records give a range, if a loop cannot close
+    in the range, or if the records lack a signal of the model.
 
     Parameters
     ----------
@@ -160,11 +175,10 @@ def expected_error(
         Share of the accelerations that is an error of the encoder's steps.
     """
     states = reference_states(model, records)
-    if states is None or channels_of(model):
+    if states is None or not has_channels(model, records):
         return Expected(*3 * (float("nan"),))
     try:
-        q, qd, qdd = states
-        D, still = (np.asarray(model.regressor(q, qd, x)) for x in (qdd, np.zeros_like(qdd)))
+        D, still = regressors(model, states, records, fit)
     except ValueError:  # a loop that does not close
         return Expected(*3 * (float("nan"),))
     linear = linear_companion(settings)
@@ -194,8 +208,8 @@ def expected_error(
     spread = max(np.trace(M), 0.0)
     nu = max(np.trace(M) ** 2 / np.sum(M * M.T), 1.0)
     open_part = (spread + np.sum((A @ (X - near)) ** 2)) / size**2
-    times = np.array([1.0, *(chi2.ppf(p, nu) / nu for p in LIMIT.EXPECTED_INTERVAL)])
-    part = np.array([1.0, *LIMIT.STEPS_MOVE]) * inertial * steps / (1 + steps)
+    times = np.array([1.0, *(chi2.ppf(p, nu) / nu for p in EXPECTED_INTERVAL)])
+    part = np.array([1.0, *STEPS_MOVE]) * inertial * steps / (1 + steps)
     errors = 100 * np.sqrt(open_part * times + part**2)
     motions = (
         "motions over limits.q of the robot file at up to half of limits.qd"
@@ -204,6 +218,54 @@ def expected_error(
     )
     error, low, high = np.minimum(errors, LIMIT.LARGEST_EXPECTED).tolist()
     return Expected(error, low, high, motions)
+
+
+def has_channels(model: GeneratedModel, records: Sequence[Prepared]) -> bool:
+    """Whether every record has the channels of the model that the model does not compute."""
+    recorded = [c for c in channels_of(model) if not c.startswith(TRANSMITTED)]
+    return not recorded or bool(records and all({*recorded} <= {*r.channels} for r in records))
+
+
+def regressors(
+    model: GeneratedModel,
+    states: tuple[Array, Array, Array],
+    records: Sequence[Prepared],
+    fit: Estimate,
+) -> tuple[Array, Array]:
+    """Compute D and D_0, the regressors at the states with and without accelerations, (K, n, b).
+
+    A channel, such as a temperature, has random values of the records; a torque that a joint
+    transmits is that of the other parameters of `fit` at the states.
+    """
+    q, qd, qdd = states
+    rng, channels = np.random.default_rng(0), channels_of(model)
+    timed = {
+        c: rng.choice(np.concatenate([record.channels[c] for record in records]), len(q))
+        for c in channels
+        if not c.startswith(TRANSMITTED)
+    }
+    transmitted = {
+        c: model.JOINTS.index(int(c.removeprefix(TRANSMITTED)))
+        for c in channels
+        if c.startswith(TRANSMITTED)
+    }
+    laws = {name for c in transmitted for name in channels[c]}
+    X = np.array(
+        [
+            fit[name] if name in fit.names and name not in laws else 0.0
+            for name in model.BASE_PARAMETERS
+        ]
+    )
+
+    def at(qdd: Array) -> Array:
+        none = {c: np.zeros(len(q)) for c in transmitted}
+        D = np.asarray(model.regressor(q, qd, qdd, **timed, **none))  # type: ignore[arg-type]
+        if not transmitted:
+            return D
+        tau = {c: (D @ X)[:, j] for c, j in transmitted.items()}
+        return np.asarray(model.regressor(q, qd, qdd, **timed, **tau))  # type: ignore[arg-type]
+
+    return at(qdd), at(np.zeros_like(qdd))
 
 
 def with_values(physical: PhysicalModel, K: Array, R: Array, y: Array) -> tuple[Array, Array]:
@@ -221,11 +283,11 @@ def with_values(physical: PhysicalModel, K: Array, R: Array, y: Array) -> tuple[
     chosen = [name.startswith((*INERTIAL, "Ia")) for name in physical.standard]
     given = np.isfinite(deviation) & (deviation > 0) & chosen
     known, precision = np.where(given, known, 0.0), np.zeros(len(known))
-    precision[given] = (LIMIT.VALUES_KNOWN * deviation[given]) ** -2.0
+    precision[given] = (VALUES_KNOWN * deviation[given]) ** -2.0
     rows = R @ K
     A, g = rows.T @ rows + np.diag(precision), rows.T @ (y - rows @ known)
     d = np.sqrt(np.where(np.diag(A) > 0, np.diag(A), 1.0))
-    V = np.linalg.pinv(A / np.outer(d, d), rcond=LIMIT.RANGE_ROUNDING, hermitian=True)
+    V = np.linalg.pinv(A / np.outer(d, d), rcond=RANGE_ROUNDING, hermitian=True)
     V = V / np.outer(d, d)
     return known + V @ g, V
 
@@ -264,12 +326,12 @@ def reference_states(
             np.array([max(x[j], np.median(x[alike[j]])) for j in range(n)]) for x in (half, speed)
         )  # a joint that hardly moves: as its neighbours
         middle = (q.max(axis=0) + q.min(axis=0)) / 2
-        half, speed = half / LIMIT.REFERENCE_RANGE[1], speed / LIMIT.REFERENCE_SPEED[1]
+        half, speed = half / REFERENCE_RANGE[1], speed / REFERENCE_SPEED[1]
     else:
         span, speed = limits
         middle, half = span.mean(axis=1), np.ptp(span, axis=1) / 2
-    rng, shape = np.random.default_rng(0), (LIMIT.REFERENCE_STATES, n)
-    (least, most), (slow, fast) = LIMIT.REFERENCE_RANGE, LIMIT.REFERENCE_SPEED
+    rng, shape = np.random.default_rng(0), (REFERENCE_STATES, n)
+    (least, most), (slow, fast) = REFERENCE_RANGE, REFERENCE_SPEED
     a = half * rng.uniform(least, most, shape)
     w = np.minimum(speed * rng.uniform(slow, fast, shape) / np.where(a > 0, a, np.inf), 2 * np.pi)
     phase = rng.uniform(0, 2 * np.pi, shape)

@@ -15,7 +15,6 @@ from runtime.core.arrays import require_kind
 from runtime.core.cestac.result import Cestac
 from runtime.core.documents import json_text
 from runtime.core.errors import InputError
-from runtime.core.limits import LIMIT
 from runtime.core.model import joint_labels
 from runtime.core.part import Part
 from runtime.core.result import Identification
@@ -33,6 +32,9 @@ from runtime.reporting.parameters import parameters_csv
 from runtime.reporting.result_files import Results, write_all
 from runtime.study import Study, study_text
 from runtime.treatments import Ranking
+
+TABLE_LINES = 40
+"""Lines of parameters.tex that one page holds; more stand in two blocks, lines."""
 
 Files: TypeAlias = dict[str, str | bytes]
 
@@ -109,7 +111,7 @@ def identification_files(
         **page_files(page),
         "estimate.json": result.to_json(),
         "parameters.csv": parameters_csv(result),
-        "parameters.tex": fit.to_latex(blocks=1 if len(fit.names) <= LIMIT.TABLE_LINES else 2),
+        "parameters.tex": fit.to_latex(blocks=1 if len(fit.names) <= TABLE_LINES else 2),
         **array_files("estimate", estimate_arrays(result.estimate)),
         "study.yaml": study,
         "torques.png": plots.png(torques),

@@ -38,7 +38,6 @@ from runtime.core.errors import InputError
 from runtime.core.least_squares.block_covariance import block_covariance
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import percent
-from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel, elements_of, is_axis, joint_labels, require
 from runtime.core.part import BLACK, BLUE, GREY, LIGHT, ORANGE, Figure, Part
 from runtime.core.problem import Problem
@@ -50,6 +49,21 @@ from runtime.core.rows.regressor import in_time
 from runtime.core.signals.filters import decimated, require_motion
 from runtime.core.table import Table, number
 from runtime.physical.inertia import physical_model
+
+FRICTION_BINS = 40
+"""Bins of a friction curve."""
+INTERVAL = 1.96
+"""Half width of a 95 % interval in deviations, deviations."""
+LAW_GAIN = 0.01
+"""Share by which a law of more terms must lower the held-out error."""
+LAW_LEVEL = 0.01
+"""Level of the F-test of a law of more terms."""
+STRIBECK_FASTEST = 0.5
+"""Largest VS that is searched, of the largest speed."""
+STRIBECK_GRID = 16
+"""Values of VS that are tried first."""
+STRIBECK_SLOWEST = 0.005
+"""Smallest VS that is searched, of the largest speed."""
 
 Array = np.ndarray
 
@@ -416,7 +430,7 @@ def _predicting(laws: Sequence[FrictionLaw]) -> str:
     worth = [
         law
         for law in others
-        if law.p_value < LIMIT.LAW_LEVEL and law.held_out < (1 - LIMIT.LAW_GAIN) * first.held_out
+        if law.p_value < LAW_LEVEL and law.held_out < (1 - LAW_GAIN) * first.held_out
     ]
     return min(worth, key=lambda law: law.held_out, default=first).name
 
@@ -428,7 +442,7 @@ def _bins(terms: Terms) -> tuple[Array, Array, Array, Callable[[Array], Array]]:
     the 95 % intervals, and the function that averages any signal over the bins.
     """
     sides = [terms.v[terms.v < 0], terms.v[terms.v >= 0]]
-    shares = [max(round(LIMIT.FRICTION_BINS * len(side) / len(terms.v)), 1) for side in sides]
+    shares = [max(round(FRICTION_BINS * len(side) / len(terms.v)), 1) for side in sides]
     inner = [
         np.quantile(side, np.linspace(0, 1, k + 1))
         for side, k in zip(sides, shares, strict=True)
@@ -450,7 +464,7 @@ def _bins(terms: Terms) -> tuple[Array, Array, Array, Callable[[Array], Array]]:
     variance = (
         np.bincount(bin_of, weights=sums**2, minlength=len(count)) / np.maximum(count, 1) ** 2
     )
-    return mean_of(terms.v), mean[used], LIMIT.INTERVAL * np.sqrt(variance[used]), mean_of
+    return mean_of(terms.v), mean[used], INTERVAL * np.sqrt(variance[used]), mean_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -481,8 +495,7 @@ class Terms:
     def grid(self) -> tuple[Array, Array]:
         """Logarithms of trial Stribeck velocities, shape (k,), and the Stribeck terms, (k, N)."""
         x = np.log(
-            np.abs(self.v).max()
-            * np.geomspace(LIMIT.STRIBECK_SLOWEST, LIMIT.STRIBECK_FASTEST, LIMIT.STRIBECK_GRID)
+            np.abs(self.v).max() * np.geomspace(STRIBECK_SLOWEST, STRIBECK_FASTEST, STRIBECK_GRID)
         )
         return x, self.excess(np.exp(x))
 

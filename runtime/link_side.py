@@ -8,6 +8,7 @@ from typing import Any
 
 from runtime.core.model import elements_of
 from runtime.core.problem import Problem
+from runtime.core.record import Record
 from runtime.core.settings import require
 
 OF_DRIVES = ("inertia", "viscous", "coulomb")
@@ -17,12 +18,16 @@ OF_DRIVES = ("inertia", "viscous", "coulomb")
 def torques_of_links(problem: Problem) -> Problem:
     """Leave friction and inertia of drives out of the fit if torques are measured behind gears.
 
-    This is a step of the preparation of a problem. It acts only if estimate.columns is all.
+    This is a step of the preparation of a problem. It acts only if estimate.columns is all. Records
+    that do not tell their sides (`Origin.sides`) have those of the study.
     """
     settings: Any = problem.settings
-    if settings.estimate.columns != "all" or not _behind_gears(
-        [*settings.record, *settings.validate.record]
-    ):
+    stated = [
+        (", ".join(record.files) or "the study", record.sides)
+        for record in (*settings.record, *settings.validate.record)
+    ]
+    links = _behind_gears((*problem.records, *problem.unseen), stated)
+    if settings.estimate.columns != "all" or not links:
         return problem
     kinds = {name: element[0] for name, element in elements_of(problem.model).items()}
     columns = tuple(
@@ -32,12 +37,24 @@ def torques_of_links(problem: Problem) -> Problem:
     return problem.changed(settings=replace(settings, estimate=estimate))
 
 
-def _behind_gears(records: Sequence[Any]) -> bool:
-    """Whether the settings of the records say that torques are measured behind the gears.
+def _behind_gears(records: Sequence[Record], stated: Sequence[tuple[str, tuple[str, str]]]) -> bool:
+    """Whether the torques of the records are measured behind the gears.
 
     SettingsError if this is true for one record and false for another.
+
+    stated : files, and sides of positions and torques, by the settings of the study. They count if
+    a record does not tell its own, and wherever they say that torques are measured behind the
+    gears.
     """
-    sides = {record.sides[1] == "link" for record in records}
-    message = "link in one record and not in another; fit them in studies of their own"
-    require(len(sides) < 2, message, "record", 0, "torque_side")
-    return True in sides
+    told = [(record.file, record.origin.sides) for record in records]
+    silent = not told or any(own is None for _, own in told)
+    sides = {(name, own[1]) for name, own in told if own is not None}
+    sides |= {(name, tau) for name, (_, tau) in stated if silent or tau == "link"}
+    behind = sorted({name for name, tau in sides if tau == "link"})
+    others = sorted({name for name, tau in sides if tau != "link"})
+    message = (
+        f"torques are measured behind the gears (side: link) in {', '.join(behind)} and not in "
+        f"{', '.join(others)}; use records of one side, or fit them in studies of their own"
+    )
+    require(not (behind and others), message, "record")
+    return bool(behind)

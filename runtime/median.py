@@ -2,7 +2,7 @@
 
 A controller that reacts to each count of an encoder drives the motor in pulses. The mean of these
 pulses moves the robot, but a median removes them. Let d be the change of the torque tau of a joint
-by the median. With means over blocks of LIMIT.TORQUE_BLOCK,
+by the median. With means over blocks of TORQUE_BLOCK,
 
     d = a tau + b qd + c sign(qd) + rest       taken = ||d - rest|| / ||tau||
 
@@ -22,6 +22,13 @@ from runtime.core.rows.selection import excerpt
 from runtime.core.signals.filters import median_filtered
 from runtime.core.study import Study
 
+FEWEST_BLOCKS = 20
+"""Such means of a record from which it is asked."""
+MEDIAN_TAKES = 0.015
+"""Share of a torque in time with the motion from which no median is taken: loops 0.022 to 0.18, TX40 0.007, noise of 15 % 0.003. Measured: benchmarks/truth.md."""
+TORQUE_BLOCK = 0.1
+"""Length of the means that tell what a median takes from torques, s. Measured: benchmarks/truth.md."""
+
 Array = np.ndarray
 
 
@@ -34,10 +41,10 @@ def share_taken(tau: Array, q: Array, rate: float, window: int) -> Array:
     tau, q : torques and positions, shape (N, n).
     window : samples of the median.
     """
-    block = max(1, round(LIMIT.TORQUE_BLOCK * rate))
+    block = max(1, round(TORQUE_BLOCK * rate))
     count, n = len(tau) // block, tau.shape[1]
     share = np.zeros(n)
-    if window == 1 or count < LIMIT.FEWEST_BLOCKS:
+    if window == 1 or count < FEWEST_BLOCKS:
         return share
     off = median_filtered(tau, window) - tau
     off = np.where(np.abs(off) > LIMIT.SPIKE * np.sqrt(np.mean(off**2, axis=0)), 0.0, off)
@@ -67,7 +74,7 @@ def torque_median(problem: Problem) -> Problem:
         shares.append(
             share_taken(record.tau[samples], record.q[samples], record.rate, signals.median)
         )
-    if np.max(shares, initial=0.0) <= LIMIT.MEDIAN_TAKES:
+    if np.max(shares, initial=0.0) <= MEDIAN_TAKES:
         return problem.changed(settings=_with_window(problem, signals.median))
     worst = np.max(shares, axis=0)
     text = (

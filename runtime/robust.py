@@ -32,10 +32,18 @@ from runtime.core.least_squares.block_covariance import corrected_deviations
 from runtime.core.least_squares.linear import LinearOptions, labels_of
 from runtime.core.least_squares.method import Beginning, Fitted
 from runtime.core.least_squares.solution import solve
-from runtime.core.limits import LIMIT
 from runtime.core.rows.factor import Array, Factor, factor
 from runtime.core.rows.observation import Observation, split_rows
 from runtime.core.settings import Positive
+
+DOWN_WEIGHTED = 0.5
+"""Weight below which a row is reported as down-weighted."""
+IRLS_CONVERGED = 0.001
+"""Largest change of a parameter over its sigma at which the weights have converged, deviations."""
+NORMAL_MEDIAN = 0.6745
+"""Median of |z|, z standard normal."""
+SUSPECT_SHARE = 0.05
+"""Share of down-weighted rows of a joint above which the model is suspected."""
 
 TUNING = {"huber": 1.345, "tukey": 4.685}
 
@@ -116,7 +124,7 @@ def _iterated(start: Beginning, W: Array, X: Array, loss: str) -> Robust:
         change = float(np.max(np.abs(new - X) / np.linalg.norm(T, axis=1)))
         still = np.allclose(new, X, rtol=1e-12, atol=0)  # exact data, whose sigma is rounding
         X = new
-        if change < LIMIT.IRLS_CONVERGED or still:
+        if change < IRLS_CONVERGED or still:
             return Robust(X, u, w, S, T, done, True)
     return Robust(X, u, w, S, T, options.passes, False)
 
@@ -130,10 +138,7 @@ def _scales(observation: Observation, raw: Factor, e: Array) -> Array:
     """Compute a robust standard deviation of each joint's residuals from medians, shape (n,)."""
     by_joint = [e[observation.joint(j)] for j in range(observation.n)]
     S = np.array(
-        [
-            np.median(np.abs(x - np.median(x))) / LIMIT.NORMAL_MEDIAN if len(x) else 0.0
-            for x in by_joint
-        ]
+        [np.median(np.abs(x - np.median(x))) / NORMAL_MEDIAN if len(x) else 0.0 for x in by_joint]
     )
     return wls.floored(raw, S)
 
@@ -168,7 +173,7 @@ def _fit_of_last_pass(start: Beginning, W: Array, fit: Robust) -> Fitted:
     )
     corrected = corrected_deviations(blocks, bands, np.zeros(b), fit.T / bend)
     shares = {
-        label: float(np.mean(fit.w[observation.joint(j)] < LIMIT.DOWN_WEIGHTED))
+        label: float(np.mean(fit.w[observation.joint(j)] < DOWN_WEIGHTED))
         for j, label in enumerate(labels_of(start.model, observation.n))
         if observation.rows[j]
     }
@@ -185,14 +190,14 @@ def _fit_of_last_pass(start: Beginning, W: Array, fit: Robust) -> Fitted:
 def _note_of_shares(shares: Mapping[str, float]) -> str:
     """Write a note on the share of rows of each joint that have a small weight."""
     text = (
-        f"Share of rows with a weight below {LIMIT.DOWN_WEIGHTED:g}: "
+        f"Share of rows with a weight below {DOWN_WEIGHTED:g}: "
         + ", ".join(f"joint {joint} {100 * share:.1f} %" for joint, share in shares.items())
         + "."
     )
-    suspect = [joint for joint, share in shares.items() if share > LIMIT.SUSPECT_SHARE]
+    suspect = [joint for joint, share in shares.items() if share > SUSPECT_SHARE]
     if suspect:
         text += (
-            f" Above {100 * LIMIT.SUSPECT_SHARE:g} % (joint {', '.join(suspect)}) it is the model "
+            f" Above {100 * SUSPECT_SHARE:g} % (joint {', '.join(suspect)}) it is the model "
             "that does not fit, not a few outliers."
         )
     return text

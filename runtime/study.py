@@ -22,7 +22,6 @@ from pydantic import BeforeValidator, TypeAdapter
 from runtime.core import study as chapter
 from runtime.core.arrays import require_kind
 from runtime.core.errors import InputError
-from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel
 from runtime.core.record import Record
 from runtime.core.settings import NotNegative, PerJoint, Settings, structure, to_mapping
@@ -37,6 +36,9 @@ from runtime.reading.likely_columns import candidates, known_columns
 from runtime.reading.records import read_records
 from runtime.reading.settings import Records, RecordSettings, with_law
 from runtime.reading.units import speed
+
+RARE_WRAPS = 0.05
+"""Share of the steps between two samples that may be jumps of an angle by a full turn."""
 
 
 class Rows(chapter.Rows):
@@ -211,12 +213,14 @@ def read_record(
         Files that cannot be read or have other content, several records, or one record that
         `resample` splits.
     """
+    bare = False
     if isinstance(path, RecordSettings):
         settings: tuple[RecordSettings, ...] = (path,)
     else:
         require_kind(path, (str, Path), "path", "the name of a file, or RecordSettings")
         named = Path(folder) / path
         study, folder = study_of(named if named.exists() else path)
+        bare = is_measured(named)
         settings = study.record
         missing = missing or study.signals.admits_missing
     records = read_records(settings, model, folder=folder, missing=missing)
@@ -226,7 +230,8 @@ def read_record(
             f"the study has {len(records)} records (or pieces between gaps), but this function "
             f"returns only one; use read_records, which returns all: {names}"
         )
-    return records[0]
+    record = records[0]
+    return replace(record, origin=replace(record.origin, sides=None)) if bare else record
 
 
 def suggested(study: Study, model: GeneratedModel) -> tuple[Study, list[str]]:
@@ -281,7 +286,7 @@ def _starts_anew(settings: RecordSettings, model: GeneratedModel, missing: bool)
         for s in (settings, replace(settings, unwrap=True))
     )
     jumps = as_read.max(axis=0)
-    rare = (as_read > jumps / 2).mean(axis=0) < LIMIT.RARE_WRAPS
+    rare = (as_read > jumps / 2).mean(axis=0) < RARE_WRAPS
     return bool(np.any(rare & (jumps > 5 * unwrapped.max(axis=0))))
 
 

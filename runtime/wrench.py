@@ -61,6 +61,7 @@ def force_sensors(problem: Problem) -> Problem:
     Raises
     ------
     InputError
+        Torques in A or V beside a wrench in N and N m, since both share parameters.
         A module without the function base_wrench_regressor or without the frame of a sensor, a
         robot with loops and a sensor that is not below it, a record without one of the sensors, and
         a reader of encoder counts.
@@ -78,6 +79,15 @@ def force_sensors(problem: Problem) -> Problem:
                     f"{{wrench: {{{c.removeprefix(WRENCH)}: [...]}}}} in the study, with six columns",
                     file=record.file,
                 )
+    for record in records:
+        if record.origin.command:
+            raise InputError(
+                f"the joint torques are in {record.origin.command}, but the force sensor measures N "
+                "and N m, and both share parameters; give record.torque_constant (N*m/A or N*m/V) of "
+                "every joint in the study, or leave out the columns tau or the columns wrench of the "
+                "record",
+                file=record.file,
+            )
     settings = problem.settings
     if settings.signals.reader not in READ_SAMPLE_BY_SAMPLE:
         raise InputError(

@@ -35,7 +35,7 @@ from runtime.core.cestac.result import LevelResult
 from runtime.core.drives import Drives
 from runtime.core.errors import DataUnavailableError
 from runtime.core.study import CestacSettings
-from runtime.core.table import Table, number
+from runtime.core.table import Table, number, percentage
 from runtime.files import Files, identification_files, part_files
 from runtime.loop.reference import Reference, point_to_point
 from runtime.loop.settings import Points
@@ -353,8 +353,9 @@ def _fit_cells(fit: Estimate, name: str) -> tuple[str, str, str]:
     """
     if name not in fit.names:
         return "removed", "-", "-"
-    x, sigma = fit[name], fit.relative_sigma[fit.names.index(name)]
-    return number(x), f"{percent(x, TABLE_2[name]):+.1f}", number(sigma, ".2f")
+    x, k = fit[name], fit.names.index(name)
+    sigma = percentage(fit.relative_sigma[k], fit.relative_deviation[k])
+    return number(x), f"{percent(x, TABLE_2[name]):+.1f}", sigma
 
 
 def _table_2(demo: Demonstration) -> Section:

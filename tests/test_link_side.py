@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import planar_arm
 import pytest
 
 import runtime
@@ -79,6 +80,46 @@ def test_a_sensor_behind_the_gear_sees_no_drive(model):
 
 def test_sides_of_records_that_are_fitted_together_agree(model):
     one, other = study("link").record[0], study("joint").record[0]
-    with pytest.raises(SettingsError, match="in one record and not in another"):
+    with pytest.raises(SettingsError, match=r"side: link\) in .* and not in"):
         both = replace(study("link"), record=(one, other))
         runtime.identify(model, record(model, "link"), both, plausible=False)
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return planar_arm.arm()
+
+
+def test_a_record_keeps_its_side_without_its_study(arm, tmp_path):
+    """11 parameters before: the side was a setting of the study only."""
+    X = planar_arm.parameters(arm, link=True)
+    planar_arm.written(tmp_path / "link.csv", planar_arm.record(arm, 0, X))
+    path = tmp_path / "link.yaml"
+    path.write_text("symgen: 1\nrecord: {files: link.csv, side: link}\n")
+    run = runtime.read_record(path, arm)
+    assert run.origin.sides == ("link", "link")
+    for study in (None, runtime.load_study(path)):
+        found = runtime.identify(arm, run, study, plausible=False).estimate.names
+        assert len(found) == 6 and not [x for x in found if x.startswith(DRIVES)]
+
+
+def test_a_file_read_alone_has_the_side_of_the_study(arm, tmp_path):
+    X = planar_arm.parameters(arm, link=True)
+    file = planar_arm.written(tmp_path / "link.csv", planar_arm.record(arm, 0, X))
+    run = runtime.read_record(file, arm)
+    assert run.origin.sides is None
+    found = runtime.identify(arm, run, study("link"), plausible=False)
+    assert len(found.estimate.names) == 6
+
+
+def test_sensors_behind_the_gears_are_no_doubt(arm):
+    """ "Were the torques measured?" and the ratio of the inertia torques were doubts."""
+    run = planar_arm.record(arm, 0, planar_arm.parameters(arm, link=True))
+    settings = planar_arm.study(record={"files": "a.csv", "side": "link"})
+    result = runtime.identify(arm, run, settings, plausible=True)
+    assert result.checklist.state == "good", result.checklist.doubt
+    known = result.part("plausibility").robot_values
+    np.testing.assert_allclose(known.inertia, 1.0, atol=0.02)
+    plain = runtime.identify(arm, run, planar_arm.study(), plausible=True)
+    check = next(c for c in plain.checklist.checks if c.question == "Were the torques measured?")
+    assert check.state == "doubtful" and "record.torque_side: link" in check.remedy

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+import planar_arm
 import pytest
 from campaign import campaign, sampled
 
@@ -14,6 +15,7 @@ import runtime
 import symgen
 from oracles.applying import motion
 from oracles.pinocchio_model import PinocchioModel
+from runtime import compose
 from runtime.core.errors import InputError
 from runtime.study import study_from_mapping
 from runtime.wrench import WrenchModel
@@ -174,3 +176,29 @@ def test_what_is_missing_is_said() -> None:
     ):
         runtime.identify(model, elsewhere, STUDY)
     assert runtime.problem(model, bare, STUDY).model is model
+
+
+def test_amperes_beside_a_force_sensor_are_refused(tmp_path: Path) -> None:
+    """Both share parameters: ZZ1R was 1.53 kg m^2 for 0.718. A wrench alone has no torque unit."""
+    model = planar_arm.arm(options=OPTION)
+    run = planar_arm.record(model, 0)
+    names = [axis.lower() for axis in AXES]
+    wrench = np.random.default_rng(0).standard_normal((len(run.t), 6))
+    file = planar_arm.written(tmp_path / "run.csv", run, "," + ",".join(names), wrench)
+    columns = {"t": "t", "q": ["q1", "q2"], "tau": ["tau1", "tau2"], "wrench": {0: names}}
+    amperes = {"torque_constant": "none", "units": {"tau": "A"}}
+    study = planar_arm.study(record={"files": file, "columns": columns, **amperes})
+    records = compose.records_of(study.record, model, study)
+    with pytest.raises(InputError, match="joint torques are in A, but the force sensor measures N"):
+        runtime.identify(model, records, study)
+    study = planar_arm.study(record={"files": file, "columns": {**columns, "tau": []}, **amperes})
+    (alone,) = compose.records_of(study.record, model, study)
+    # tau1 and tau2 of the file are read by their names
+    assert alone.origin.command == "A"
+    np.savetxt(tmp_path / "wrench.csv", np.column_stack([run.t, run.q, wrench]), "%.12g", ",",
+               header=",".join(["t,q1,q2", *names]), comments="")  # fmt: skip
+    file = str(tmp_path / "wrench.csv")
+    study = planar_arm.study(record={"files": file, "columns": {**columns, "tau": []}, **amperes})
+    (alone,) = compose.records_of(study.record, model, study)
+    assert alone.origin.command == ""
+    assert runtime.estimate(model, alone, study).units["BFX0"] == "N"

@@ -15,11 +15,13 @@ from runtime.core.cestac.runs import Level
 from runtime.core.check import Answer, Check, Question, state_of
 from runtime.core.documents import Result, json_text
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.part import BLACK, BLUE, DOTTED, GREY, ORANGE, Figure, Part
 from runtime.core.result import Identification
-from runtime.core.table import Table
+from runtime.core.table import Table, percentage
 from runtime.counts.encoder_advice import visible_steps
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 
@@ -441,12 +443,18 @@ class Advice(Result, Part):
         )
         with np.errstate(divide="ignore", invalid="ignore"):
             added = 100 * self.torque_sigma / np.abs(self.reference.X)
+        own = self.reference.relative_deviation
         rows = []
         for i, name in enumerate(self.names):
             mark = "" if name in self.deciding else " *"
             steps = (f"{step[i]:.3g}" if np.isfinite(step[i]) else "-" for step in reached)
             rows.append(
-                (name + mark, f"{self.reference.relative_sigma[i]:.2f}", *steps, f"{added[i]:.3g}")
+                (
+                    name + mark,
+                    percentage(self.reference.relative_sigma[i], own[i]),
+                    *steps,
+                    percentage(added[i], own[i], ".3g"),
+                )
             )
         caption = (
             "All encoders alike, by parameter; * does not decide; last column: %sigma added "

@@ -53,7 +53,7 @@ from runtime.core.drives import Drives
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.method import linear_estimate, linear_system
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, is_axis, joint_labels, joint_units
 from runtime.core.problem import Problem
 from runtime.core.record import Record
@@ -62,6 +62,8 @@ from runtime.core.rows.observation import stack
 from runtime.core.rows.prepared import common_drives, stacked
 from runtime.core.settings import to_mapping
 from runtime.core.study import Study
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 Progress = Callable[[int, int], None]

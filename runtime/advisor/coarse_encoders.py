@@ -30,7 +30,7 @@ from runtime.core.cestac.perturbed import PreparedRecord, Task, prepared_record
 from runtime.core.cestac.rounding import Mode, counted, rounded, stream
 from runtime.core.drives import Drives, encoder_drives, encoder_root
 from runtime.core.least_squares.method import linear_system
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.missing import require_positions
 from runtime.core.problem import Problem
 from runtime.core.rows.observation import stack
@@ -41,6 +41,8 @@ from runtime.counts.own_encoder import own_encoder
 from runtime.counts.reader import counted as counted_states
 from runtime.counts.reader import encoder_position
 from runtime.counts.reading import Starts, read_counts
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 

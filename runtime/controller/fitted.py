@@ -12,12 +12,12 @@ X, kd of every joint and one delay are estimated together by least squares weigh
 standard deviations are those of blocks of time. If the drive cuts the torque, the law is not linear
 in kd: passes begin at several kd, a step that raises the misfit is halved, and the kd of smallest
 misfit is the result. If qd_ref does not move and the drive does not cut, V is the column of FV, and
-only the sum of kd and FV is determined.
+only the sum of kd and FV is determined: the sign of FV is then not judged.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,8 +27,8 @@ from runtime.controller.law import late, torque_law
 from runtime.core.documents import Result
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.method import linear_estimate
-from runtime.core.limits import LIMIT
-from runtime.core.model import GeneratedModel, joint_labels
+from runtime.core.limits import limits
+from runtime.core.model import GeneratedModel, elements_of, joint_labels, joint_units
 from runtime.core.part import Doubt
 from runtime.core.problem import Note, Problem
 from runtime.core.record import Record
@@ -37,6 +37,8 @@ from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared, stacked, with_torques
 from runtime.core.study import EstimateSettings
 from runtime.loop.settings import Law
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 
@@ -93,11 +95,59 @@ def law_of_controller(problem: Problem) -> Problem:
         tau = torque_of(record, np.nan_to_num(estimate.kd), estimate.delay, bound)
         return replace(record, tau=tau, channels=channels)
 
+    model: Any = problem.model
+    if sums := friction_and_gain(model, law, estimate):
+        model = UnsignedModel(model, sums)
     return problem.changed(
         Note(KIND, estimate.text, {KIND: estimate.summary()}, estimate),
+        model=model,
         records=tuple(map(with_torque, problem.records)),
         unseen=tuple(map(with_torque, problem.unseen)),
     )
+
+
+def friction_and_gain(model: GeneratedModel, law: Law, estimate: LawEstimate) -> tuple[str, ...]:
+    """Return the viscous friction that contains a gain kd, because both cannot be separated.
+
+    Such a parameter is the sum of friction and an unknown gain, so it may be negative.
+    """
+    pairs = zip(model.JOINTS, estimate.kd, strict=True)
+    joints = {j for j, kd in pairs if law.kd == "fit" and not np.isfinite(kd)}
+    return tuple(
+        name
+        for name, (kind, _, acts) in elements_of(model).items()
+        if kind == "viscous" and joints & {j for key in acts for j in np.atleast_1d(key).tolist()}
+    )
+
+
+class UnsignedModel:
+    """A model in which some parameters of elements may have either sign.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+    names : tuple of str
+        Parameters of the elements; their kind becomes `column`, which has no sign.
+    """
+
+    def __init__(self, model: GeneratedModel, names: tuple[str, ...]) -> None:
+        self._model, self._names = model, names
+        self.JOINT_UNITS, self.ELEMENTS = joint_units(model), self._unsigned(elements_of(model))
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__") or name == "_model":  # pickle asks before there is a model
+            raise AttributeError(name)
+        return getattr(self._model, name)
+
+    def elements(self, **constants: float) -> dict[str, Any]:
+        """Return the joint elements of the model, for other constants than those of the robot."""
+        return self._unsigned(elements_of(self._model, constants))
+
+    def _unsigned(self, elements: Mapping[str, Any]) -> dict[str, Any]:
+        return {
+            name: ("column", *element[1:]) if name in self._names else element
+            for name, element in elements.items()
+        }
 
 
 def doubt_of_gains(result: Identification) -> Doubt | None:

@@ -394,23 +394,38 @@ def signs(negative: Sequence[str]) -> Answer:
 def certain(fit: Estimate, bootstrap: Mapping[str, float]) -> Answer:
     """Check that the standard deviation of each parameter is small compared with its value.
 
-    The standard deviations do not assume independent residuals; eq. (10) is used only if no other
-    is known. bootstrap : as for `checklist_of`.
+    A parameter whose 95 % interval contains zero has no percentage: it is certain if its deviation
+    is small compared with the largest parameter of the same unit. The standard deviations do not
+    assume independent residuals; eq. (10) is used only if no other is known.
+
+    bootstrap : as for `checklist_of`.
     """
     deviations = np.fmax(fit.sigma_corrected, [bootstrap.get(name, np.nan) for name in fit.names])
+    sigma = np.where(np.isfinite(deviations), deviations, fit.sigma)
+    size, units = np.abs(fit.X), [fit.units.get(name, "") for name in fit.names]
+    zero = size <= 1.96 * sigma
+    largest = {unit: size[np.array(units) == unit].max() for unit in {*units}}
+    scale = np.where(zero, [largest[unit] for unit in units], size)
     with np.errstate(divide="ignore", invalid="ignore"):
-        percent = 100 * np.where(np.isfinite(deviations), deviations, fit.sigma) / np.abs(fit.X)
+        percent = np.where(sigma > 0, 100 * sigma / scale, 0.0)
     order = np.argsort(-percent)
-    above = [fit.names[i] for i in order if percent[i] > LIMIT.LARGE_DEVIATION]
-    text = (
-        f"Largest deviation {percent[order[0]]:.0f} % ({fit.names[order[0]]}), median "
-        f"{np.median(percent):.1f} %"
-    )
+    above = [i for i in order if percent[i] > LIMIT.LARGE_DEVIATION]
+    told, texts = [i for i in order if not zero[i]], []
+    if told:
+        texts = [
+            f"Largest deviation {percent[told[0]]:.0f} % ({fit.names[told[0]]}), median "
+            f"{np.median(percent[told]):.1f} %"
+        ]
+    if zero.any():
+        names = first_names([fit.names[i] for i in order if zero[i]])
+        texts.append(f"{'not' if told else 'Not'} told from zero: {names}")
+    text = "; ".join(texts)
     if not above:
         return Answer("good", text)
     # a physical set has all columns, held together by the conditions and the values of the file
     most = 2 * len(above) > len(fit.names) and "standard" not in fit.details
-    text += f"; above {LIMIT.LARGE_DEVIATION:g} %: {first_names(above)}"
+    if named := [fit.names[i] for i in above if not zero[i]]:
+        text += f"; above {LIMIT.LARGE_DEVIATION:g} %: {first_names(named)}"
     return Answer("no" if most else "doubtful", text)
 
 

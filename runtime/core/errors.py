@@ -77,6 +77,10 @@ class InputError(ValueError):
         super().__init__(printable(f"{place}: {self.message}" if place else self.message))
 
 
+class RecordWarning(UserWarning):
+    """Warning about a record that is read only in part: what was left out, and why."""
+
+
 class SettingsError(InputError):
     """Error: a setting that is unknown, of a wrong type or out of range.
 

@@ -22,7 +22,7 @@ from runtime.core.least_squares.method import linear_system
 from runtime.core.model import GeneratedModel
 from runtime.core.rows.observation import Observation
 from runtime.core.study import EssentialSettings, EstimateSettings
-from runtime.core.table import aligned
+from runtime.core.table import aligned, percentage
 
 THRESHOLDS = (1.02, 1.03, 1.04, 1.05, 1.06, 1.07, 1.08, 1.09, 1.10)
 """Thresholds whose counts are reported beside the one used."""
@@ -95,7 +95,7 @@ class Essential(Result):
                 (
                     name,
                     str(first - k - step.removed),
-                    f"{step.relative_sigma:.3f}",
+                    percentage(step.relative_sigma, step.relative_sigma, ".3f"),
                     f"{step.ratio:.5f}",
                 )
             )

@@ -1,21 +1,31 @@
-"""Limits and thresholds of all checks, in one table: runtime/core/limits.toml.
+"""Limits and thresholds of all checks: limits.toml in the folder of each feature.
 
 For each limit, the table gives the value, the unit, the meaning, and where it was measured.
 
+    LIMIT = limits(__package__)
     LIMIT.DECISIVE           the value
 """
 
 import tomllib
+from functools import cache
 from importlib.resources import files
 from types import SimpleNamespace
 from typing import Any
 
-ENTRIES: dict[str, dict[str, Any]] = {
-    name: limit
-    for module in tomllib.loads(
-        files("runtime.core").joinpath("limits.toml").read_text("utf-8")
-    ).values()
-    for name, limit in module.items()
-}
-LIMIT: Any = SimpleNamespace(**{name: limit["value"] for name, limit in ENTRIES.items()})
-"""Values of the limits, as attributes, for instance LIMIT.DECISIVE."""
+
+@cache
+def entries(package: str) -> dict[str, dict[str, Any]]:
+    """Read the limits in the folder of a package: value, unit, meaning and source of each."""
+    text = files(package).joinpath("limits.toml").read_text("utf-8")
+    return {name: limit for file in tomllib.loads(text).values() for name, limit in file.items()}
+
+
+@cache
+def limits(package: str) -> Any:
+    """Return the values of the limits of a feature, and of those of the core, as attributes."""
+    known = entries("runtime.core") | entries(package)
+    return SimpleNamespace(**{name: limit["value"] for name, limit in known.items()})
+
+
+LIMIT: Any = limits("runtime.core")
+"""Values of the limits of the core."""

@@ -30,24 +30,28 @@ UNTRUSTED = "is code that this installation has not generated and certified; pas
 def cache_folder(of: str) -> Path:
     """Return the path of one of the cache folders of symgen, for instance "modules" or "compiled".
 
-    The folder is in SYMGEN_CACHE, if set, or in the cache folder of the platform.
+    The folder is in SYMGEN_CACHE, if set, or in the cache folder of the platform. Symbolic links are
+    followed, so that the folder which is judged is the folder which is used. As the XDG
+    specification says, a relative XDG_CACHE_HOME is ignored.
     """
     if given := os.environ.get("SYMGEN_CACHE"):
-        return Path(given) / of
+        return (Path(given) / of).resolve()
     if sys.platform == "win32":
         base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
     elif sys.platform == "darwin":
         base = Path.home() / "Library" / "Caches"
     else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return base / "symgen" / of
+        base = Path(os.environ.get("XDG_CACHE_HOME", ""))
+        base = base if base.is_absolute() else Path.home() / ".cache"
+    return (base / "symgen" / of).resolve()
 
 
 def is_writable_by_others(folder: Path) -> bool:
     """Whether another user can change or replace the folder, so that its content is not safe."""
     if os.name != "posix":
         return False
-    for place in (folder, *folder.absolute().parents):
+    folder = folder.resolve()
+    for place in (folder, *folder.parents):
         if not place.exists():
             continue
         found = place.stat()

@@ -264,6 +264,18 @@ def require_no_channels(model: GeneratedModel, what: str) -> None:
         )
 
 
+def require_no_wrench(model: GeneratedModel, what: str) -> None:
+    """Raise InputError if the model has axes of force sensors, which no motor moves.
+
+    what : name of the caller, which plans motions of joints.
+    """
+    if any(is_axis(joint) for joint in model.JOINTS):
+        raise InputError(
+            f"{what} does not support force sensors; remove record.columns.wrench from the study, or "
+            "the channels wrench0 ... from the records"
+        )
+
+
 def joint_labels(model: GeneratedModel) -> tuple[str, ...]:
     """Return the labels of the joints in results: the number and perhaps the name, as in "2 elbow".
 

@@ -62,6 +62,10 @@ class Origin:
         Whether the record was simulated, not measured.
     by_law : bool
         Whether the torque was computed by the law of a controller.
+    sides : (str, str) or None
+        Sides of the gears at which the positions and the torques of the files were measured, each
+        "motor", "joint" or "link" (behind the gears); None: the record has no files, or no settings
+        were given for them.
     """
 
     files: Mapping[str, str] = field(default_factory=dict)
@@ -74,6 +78,7 @@ class Origin:
     whole: str = ""
     simulated: bool = False
     by_law: bool = False
+    sides: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True, eq=False, init=False)

@@ -97,6 +97,14 @@ def number(value: float, form: str = ".4g") -> str:
     return format(value, form) if isfinite(value) else "-"
 
 
+def percentage(percent: float, relative: float, form: str = ".2f") -> str:
+    """Write a number in % of the value of a parameter; "-" if its 95 % interval contains zero.
+
+    relative : standard deviation of the parameter, % of its value.
+    """
+    return number(percent, form) if 1.96 * relative < 100 else "-"
+
+
 def aligned(lines: Sequence[Sequence[str]]) -> str:
     """Write cells as aligned columns of text: the first column aligned left, the others right."""
     widths = [max(len(cell) for cell in column) for column in zip(*lines, strict=True)]

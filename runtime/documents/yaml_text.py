@@ -18,6 +18,11 @@ from runtime.core.limits import LIMIT
 if TYPE_CHECKING:
     from ruamel.yaml import Node
 
+YAML_LEVELS = 50
+"""Depth of a study file, levels."""
+YAML_VALUES = 20000
+"""Keys and values of a study file, and the ends of its lists: counted in about half a second, before anything is built, values."""
+
 Path = tuple[str | int, ...]
 
 NUMBER = re.compile(
@@ -100,8 +105,8 @@ def _require_plain(text: str, file: str) -> None:
             refused = "tags (!) are not supported; write a plain value"
         elif documents > 1:
             refused = "a second document starts here; expected one document per file"
-        elif depth > LIMIT.YAML_LEVELS + 2 or count > LIMIT.YAML_VALUES:
-            refused = f"nested deeper than {LIMIT.YAML_LEVELS} levels or more than {LIMIT.YAML_VALUES} keys and values; write fewer"
+        elif depth > YAML_LEVELS + 2 or count > YAML_VALUES:
+            refused = f"nested deeper than {YAML_LEVELS} levels or more than {YAML_VALUES} keys and values; write fewer"
         if refused:
             raise SettingsError(refused, file=file, line=event.start_mark.line + 1)
 

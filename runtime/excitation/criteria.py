@@ -27,17 +27,23 @@ from typing import Any
 import numpy as np
 
 from runtime.core.errors import InputError, SettingsError
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, base_columns, joint_labels, require
 from runtime.core.problem import Problem
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.predicted import Weights
+from runtime.core.signals.filters import lowpassed
 from runtime.excitation.settings import ExcitationSettings
 from runtime.loop.dry_friction import dry_friction
 from runtime.loop.trajectories import Motion
 
+LIMIT = limits(__package__)
+
 Array = np.ndarray
+
+QUANTITIES = {"q": "position", "qd": "velocity", "qdd": "acceleration"}
+UNITS = {"q": "rad or m", "qd": "rad/s or m/s", "qdd": "rad/s^2 or m/s^2"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,10 +115,11 @@ def limits_of(model: GeneratedModel, given: Mapping[str, Any]) -> MotionLimits:
     missing = [name for name in ("q", "qd", "qdd") if known.get(name) is None]
     if missing:
         raise SettingsError(
-            (
-                f"{model.NAME} has no limits of {', '.join(missing)}; give these limits here or in the "
-                "robot file"
-            ),
+            f"{model.NAME} has no {' or '.join(QUANTITIES[name] for name in missing)} limits"
+            f"{' (a URDF has none)' if missing == ['qdd'] else ''}: add "
+            f"`excitation: {{limits: {{{', '.join(f'{name}: [...]' for name in missing)}}}}}` to the "
+            f"study file of the record, a number per joint in "
+            f"{', '.join(UNITS[name] for name in missing)}, and run `symgen excite ROBOT study.yaml`",
             path=("limits",),
         )
     unknown = known.keys() - {"q", "qd", "qdd", "tau"}
@@ -219,8 +226,10 @@ def plan_rows(problem: Problem, motion: Motion, rate: float) -> Observation:
     record = Record(t=t, q=q, tau=np.zeros_like(q), rate=rate, name="planned motion")
     settings = problem.settings
     settings = replace(settings, rows=replace(settings.rows, window=(None, None)))
+    # planned positions are exact: a reader of encoder counts has nothing to read
+    reader = lowpassed if settings.signals.admits_missing else problem.reader
     return (
-        problem.changed(settings=settings, records=(record,), unseen=())
+        problem.changed(settings=settings, records=(record,), unseen=(), reader=reader)
         .prepared[0]
         .observation(problem.model)
     )

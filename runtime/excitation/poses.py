@@ -21,7 +21,7 @@ import numpy as np
 
 from runtime.core.documents import Result
 from runtime.core.errors import InputError
-from runtime.core.model import GeneratedModel, joint_labels
+from runtime.core.model import GeneratedModel, joint_labels, require_no_channels, require_no_wrench
 from runtime.core.problem import Problem
 from runtime.core.rows.prepared import stacked
 from runtime.core.rows.selection import per_joint
@@ -110,6 +110,8 @@ def static_poses(problem: Problem) -> StaticPoses:
         Too few poses, no parameter that acts at rest, no limits of q, or a record of a motion.
     """
     model, settings = problem.model, cast(Any, problem.settings).excitation or ExcitationSettings()
+    require_no_channels(model, "the search for poses")
+    require_no_wrench(model, "the search for poses")
     if problem.records and problem.settings.signals.reader != "static":
         raise InputError(
             "new poses can be added only to a record of poses at rest; set signals: {reader: static}"

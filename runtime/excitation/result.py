@@ -12,15 +12,17 @@ from typing import Any
 import numpy as np
 
 from runtime.core.documents import Result
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, joint_labels
 from runtime.core.rows.predicted import Weights
 from runtime.core.settings import to_mapping
-from runtime.core.table import Table
+from runtime.core.table import Table, percentage
 from runtime.excitation.criteria import MotionLimits, usage
 from runtime.excitation.settings import ExcitationSettings
 from runtime.loop.result import csv_text
 from runtime.loop.trajectories import Motion
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 
@@ -160,7 +162,7 @@ class Excitation(Result):
                 "motion of the record."
             )
         named = ", ".join(
-            f"{name} {self.relative_sigma[name]:.2g} % (record {before[name]:.2g} %)"
+            f"{name} {_percent(self.relative_sigma[name])} (record {_percent(before[name])})"
             for name in list(worse)[: LIMIT.SIGMAS_NAMED]
         )
         more = (
@@ -202,7 +204,6 @@ class Excitation(Result):
             if self.known.condition is None
             else f" (motion of the record: {self.known.condition:.1f})"
         )
-        worst = max(self.relative_sigma, key=self.relative_sigma.__getitem__)
         kept = (
             "all limits"
             if np.isfinite(self.limits.tau).all()
@@ -211,9 +212,19 @@ class Excitation(Result):
         return (
             f"A motion of {self.motion.duration:.1f} s within {kept} with weighted cond(W) "
             f"{self.condition:.1f}{of_record}; "
-            f"least certain is {worst} with a predicted %sigma of "
-            f"{self.relative_sigma[worst]:.2g}.{self.comparison}{self.torques}"
+            f"{self._least_certain}.{self.comparison}{self.torques}"
         )
+
+    @property
+    def _least_certain(self) -> str:
+        """Words on the parameter with the largest %sigma, of those that can be told from zero."""
+        told = {name: x for name, x in self.relative_sigma.items() if 1.96 * x < 100}
+        if not told:
+            return "the 95 % interval of every parameter contains zero"
+        worst = max(told, key=told.__getitem__)
+        more = len(self.relative_sigma) - len(told)
+        zero = f"; the 95 % intervals of {more} others contain zero" if more else ""
+        return f"least certain is {worst} with a predicted %sigma of {told[worst]:.2g}{zero}"
 
     def summary(self) -> dict[str, Any]:
         """Return all numbers of the result as JSON values, for the file excitation.json."""
@@ -250,7 +261,7 @@ class Excitation(Result):
         before = self.known.relative_sigma
         worst = sorted(self.relative_sigma.items(), key=lambda item: -item[1])[:most]
         rows = [
-            (name, f"{value:.3g}", *((f"{before[name]:.3g}",) if before else ()))
+            (name, *(percentage(x, x, ".3g") for x in (value, *([before[name]] if before else ()))))
             for name, value in worst
         ]
         note = (
@@ -294,3 +305,8 @@ class Excitation(Result):
                 ),
             ]
         )
+
+
+def _percent(relative: float) -> str:
+    """Write a %sigma for a sentence; words if the 95 % interval contains zero."""
+    return f"{relative:.2g} %" if 1.96 * relative < 100 else "not told from zero"

@@ -20,8 +20,8 @@ import numpy as np
 
 from runtime.core.errors import InputError
 from runtime.core.essential import essential_of
-from runtime.core.limits import LIMIT
-from runtime.core.model import GeneratedModel, require, require_no_channels
+from runtime.core.limits import limits
+from runtime.core.model import GeneratedModel, require, require_no_channels, require_no_wrench
 from runtime.core.problem import Problem, estimated, observe_rows
 from runtime.core.rows.predicted import Weights, kept_correlation
 from runtime.core.signals.filters import require_motion
@@ -33,6 +33,8 @@ from runtime.excitation.settings import ExcitationSettings
 from runtime.loop.control_law import parameters_of
 from runtime.loop.dry_friction import dry_friction
 from runtime.loop.trajectories import Motion, motion_from_mapping
+
+LIMIT = limits(__package__)
 
 
 def excite(
@@ -65,10 +67,12 @@ def excite(
     model = problem.model
     study: Any = problem.settings
     require_no_channels(model, "the search for a motion")
+    require_no_wrench(model, "the search for a motion")
     require_motion(study.signals, "the search for a motion (poses: excitation: {poses: N})")
     settings = study.excitation or ExcitationSettings()
+    limits = limits_of(model, settings.limits)
     known = _known_estimate(problem, settings)
-    limits, weights = limits_of(model, settings.limits), known.weights
+    weights = known.weights
     if settings.criterion == "record" and not known.relative_sigma:
         raise InputError(
             "criterion: record compares with the motion of a record, but no record is given; give "
@@ -159,11 +163,11 @@ def _known_estimate(problem: Problem, settings: ExcitationSettings) -> Known:
     model, records, study = problem.model, problem.records, problem.settings
     if not records:
         X = parameters_of(model)
-        return Known(
-            X,
-            "values of the robot file",
-            weights_of(model, settings, dict(zip(model.BASE_PARAMETERS, X, strict=True))),
-        )
+        values = dict(zip(model.BASE_PARAMETERS, X, strict=True))
+        fitted = study.estimate.columns
+        kept = model.BASE_PARAMETERS if fitted == "all" else fitted
+        weights = weights_of(model, settings, values, essential=kept)
+        return Known(X, "values of the robot file", weights)
     observation = observe_rows(problem)
     linear = replace(study.estimate, method="ols", weights="none", options={}, columns="all")
     fit = estimated(problem, observation, linear)

@@ -34,7 +34,8 @@ SAME_TORQUE = 1e-6  # of the rms of tau_m, between two passes
 def transmitted_torque(problem: Problem) -> Problem:
     """Add to the records the torque that each joint transmits, if columns of W depend on it.
 
-    A step of the identification. Without such laws the problem is returned unchanged.
+    A step of the identification. Without such laws, or without records, the problem is returned
+    unchanged.
 
     Raises
     ------
@@ -43,7 +44,7 @@ def transmitted_torque(problem: Problem) -> Problem:
     """
     model = problem.model
     read = {c: names for c, names in channels_of(model).items() if c.startswith(TRANSMITTED)}
-    if not read:
+    if not (read and problem.records):
         return problem
     parameters = ", ".join(sorted({name for names in read.values() for name in names}))
     weighted = problem.settings.estimate.weights != "none"

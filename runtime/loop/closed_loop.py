@@ -34,7 +34,7 @@ import numpy as np
 from scipy.ndimage import minimum_filter1d
 
 from runtime.core.errors import InputError, SettingsError
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, is_axis, joint_labels
 from runtime.core.problem import Problem
 from runtime.core.progress import at
@@ -53,6 +53,8 @@ from runtime.loop.settings import Controller
 
 if TYPE_CHECKING:
     from runtime.loop.simulation import Simulator  # CasADi
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 

@@ -20,9 +20,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.loading import is_writable_by_others
 from runtime.core.provenance import cpuinfo
+
+LIMIT = limits(__package__)
 
 LIBRARIES = ("-lm",)
 UNSAFE = (
@@ -84,6 +86,7 @@ def shared_object(
     key = hashlib.sha256(b"\0".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        folder = folder.resolve()
         if is_writable_by_others(folder):
             raise NotCompiledError(
                 f"anyone may write to the cache folder {folder}; choose another folder by the variable SYMGEN_CACHE"

@@ -23,13 +23,15 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.loading import cache_folder
 from runtime.core.model import GeneratedModel
 from runtime.loop.compile_cache import FallbackWarning, NotCompiledError, shared_object
 from runtime.loop.control_law import VECTORS
 from runtime.loop.dry_friction import DryFriction
 from runtime.loop.stick_slip import event_function, friction_function, kinetic, rest_function
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 MX = Any  # casadi.MX
@@ -319,7 +321,11 @@ def compiled(function: Any, cache: Path | None = None) -> Any:
         shared_object(
             Path(f"{function.name()}.c"), text, cache or cache_folder("compiled"), opened, FLAGS
         )
-    except (NotCompiledError, OSError) as e:
+    except (
+        NotCompiledError,
+        OSError,
+        RuntimeError,
+    ) as e:  # RuntimeError: no home folder, a circle of links
         warnings.warn(
             f"the simulation runs in the interpreter of CasADi, because it cannot run as compiled C: {e}",
             FallbackWarning,

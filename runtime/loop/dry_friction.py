@@ -11,8 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 

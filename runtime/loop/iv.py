@@ -31,12 +31,14 @@ from runtime.core.errors import InputError
 from runtime.core.least_squares.block_covariance import deletions
 from runtime.core.least_squares.method import Beginning, Fitted
 from runtime.core.least_squares.wls import common_scales, floored
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.rows.factor import Array
 from runtime.core.rows.observation import Observation, split_rows
 from runtime.loop.closed_loop import loop_of
 from runtime.loop.fixed_point import Step, iterate, outcome_of
 from runtime.loop.result import Simulation
+
+LIMIT = limits(__package__)
 
 
 def fit(start: Beginning) -> Fitted:

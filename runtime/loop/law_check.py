@@ -22,10 +22,12 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.record import Record
 from runtime.loop.reference import Reference
 from runtime.loop.settings import Controller
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 

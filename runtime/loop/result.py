@@ -9,10 +9,12 @@ import numpy as np
 
 from runtime.core.documents import Result
 from runtime.core.errors import InputError
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, joint_labels, joint_units
 from runtime.core.record import Origin, Record
 from runtime.core.table import Table
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 

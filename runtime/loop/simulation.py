@@ -23,7 +23,7 @@ import numpy as np
 from scipy.signal import butter, lfilter
 
 from runtime.core.errors import InputError, SettingsError
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, require, require_no_channels
 from runtime.core.record import Record
 from runtime.loop.control_law import (
@@ -38,6 +38,8 @@ from runtime.loop.dry_friction import DryFriction, dry_friction
 from runtime.loop.reference import Reference, reference_of
 from runtime.loop.result import Simulation, SimulationError
 from runtime.loop.settings import Controller
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 

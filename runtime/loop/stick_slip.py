@@ -20,9 +20,11 @@ from typing import Any
 
 import casadi as ca
 
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel
 from runtime.loop.dry_friction import DryFriction
+
+LIMIT = limits(__package__)
 
 SX = Any  # casadi.SX
 

@@ -29,8 +29,10 @@ import numpy as np
 from pydantic import Field
 
 from runtime.core.errors import InputError, SettingsError
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.settings import Positive, Settings, Whole, require, structure, to_mapping
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 States = tuple[Any, Any, Any]  # q, qd, qdd

@@ -22,7 +22,9 @@ import numpy as np
 
 from runtime.core.cestac.runs import Runs
 from runtime.core.errors import InputError
-from runtime.core.limits import LIMIT
+
+ARCHIVE_PERIOD = 30.0
+"""Time after which the runs of a study are written again, s."""
 
 FILE = "runs.npz"
 UNFINISHED = ".unfinished"
@@ -34,7 +36,7 @@ class Checkpoint:
     The file is written every `every` seconds and by `flush`.
     """
 
-    def __init__(self, folder: str | Path, *, every: float = LIMIT.ARCHIVE_PERIOD) -> None:
+    def __init__(self, folder: str | Path, *, every: float = ARCHIVE_PERIOD) -> None:
         self.file = Path(folder) / FILE
         self.every = every
         self.written = 0  # runs on disk

@@ -36,7 +36,7 @@ from runtime.core.drives import Drives
 from runtime.core.errors import InputError
 from runtime.core.least_squares.block_covariance import gram_root, scatter
 from runtime.core.least_squares.linear import LinearOptions, assemble, ordinary
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, joint_labels
 from runtime.core.rows.factor import triangularise
 from runtime.core.rows.observation import Observation, split_rows, stack
@@ -46,6 +46,8 @@ from runtime.core.table import Table, number
 from runtime.payload.load import load_columns
 from runtime.payload.settings import PayloadSettings
 from runtime.physical.inertia import physical_model
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 

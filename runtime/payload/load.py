@@ -32,13 +32,15 @@ from runtime.core.documents import Result
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.method import linear_estimate
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, elements_of, require
 from runtime.core.rows.observation import Observation, stack
 from runtime.core.study import EstimateSettings
 from runtime.core.table import Table, number
 from runtime.payload.settings import PayloadSettings
 from runtime.physical.inertia import INERTIAL, PhysicalModel, physical_model, pseudo_inertia
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 
@@ -165,6 +167,11 @@ def payload(
         Y = rows.Y - mounted * (rows.W @ load.torque)
         return replace(rows, W=np.asfortranarray(np.hstack([rows.W, of_load])), Y=Y, names=names)
 
+    method = method or EstimateSettings()
+    if method.columns != "all":
+        left_out = {*model.BASE_PARAMETERS} - {*method.columns}
+        used = tuple(name for name in names if name.removesuffix(LOAD) not in left_out)
+        method = replace(method, columns=used)
     both = stack([extended(stack(without), 0.0), extended(stack(loaded), 1.0)])
     fit = linear_estimate(both, method, model=model, provenance=provenance)
     units = {**fit.units, **{f"{family}{LOAD}": _unit(family) for family in load.unknown}}

@@ -14,7 +14,13 @@ import numpy as np
 from runtime.core.documents import Result
 from runtime.core.errors import SettingsError
 from runtime.core.least_squares.method import linear_companion
-from runtime.core.model import GeneratedModel, require_no_channels
+from runtime.core.model import (
+    GeneratedModel,
+    base_columns,
+    elements_of,
+    joint_torque_units,
+    require_no_channels,
+)
 from runtime.core.part import Part
 from runtime.core.problem import Problem
 from runtime.core.record import Record
@@ -99,7 +105,7 @@ def payload_study(problem: Problem, loaded: Sequence[Record]) -> PayloadStudy:
     Raises
     ------
     SettingsError
-        No record with the load, or columns left out.
+        No record with the load, inertial columns left out, or torques in A or V without gains.
     """
     study: Any = problem.settings
     model, settings = problem.model, study.payload
@@ -109,10 +115,19 @@ def payload_study(problem: Problem, loaded: Sequence[Record]) -> PayloadStudy:
             path=("payload", "record"),
         )
     method = linear_companion(study.estimate)
-    if method.columns != "all":
+    columns = base_columns(model, method.columns, (), "estimate", "columns")
+    if lacking := [x for x in model.BASE_PARAMETERS if x not in {*columns, *elements_of(model)}]:
         raise SettingsError(
-            "a load needs all base parameters; remove estimate.columns",
+            f"a load needs all inertial base parameters, but {', '.join(lacking)} are left out; "
+            "remove estimate.columns",
             path=("estimate", "columns"),
+        )
+    command = next((unit for unit in joint_torque_units(model) if unit[0] != "N"), "")
+    if command and not settings.gains:
+        raise SettingsError(
+            f"a load in kg needs torques in N m, but the torques are in {command}; set "
+            "record.torque_constant, or payload.gains: true with a weighed mass",
+            path=("payload",),
         )
     require_no_channels(model, "the study of a load")
     require_motion(study.signals, "a load")

@@ -12,26 +12,30 @@ different chi of one X give the same torques.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import islice
 
 import numpy as np
 from scipy.stats import chi2
 
 from runtime.core.errors import InputError, SettingsError
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.settings import Positive, Real, Settings, Text
-from runtime.physical.inertia import INERTIAL, PhysicalModel
+from runtime.physical.inertia import INERTIAL, Condition, PhysicalModel
 from runtime.physical.semidefinite import (
     Distance,
     LinearBounds,
     Optimum,
     Prior,
+    Space,
     closest,
     everything,
     margin,
     solutions,
 )
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 Bounds = tuple[Real | None, Real | None]
@@ -152,15 +156,24 @@ def feasibility(
         raise InputError(
             unsolved(first.status, rows, lambda other: margin(physical.conditions, other, space))
         )
-    blocking, conditions, released = [], list(physical.conditions), first
-    while released.solved and released.margin < -LIMIT.MARGIN_ROUNDING and conditions:
-        worst = max(released.duals, key=lambda name: released.duals[name])
-        blocking.append((worst, released.margin))
+    blocking = tuple(islice(blocked(physical.conditions, rows, space, first), None if blame else 1))
+    return Feasibility(first.margin, not blocking, blocking, first.chi, not blocking)
+
+
+def blocked(
+    conditions: Sequence[Condition], rows: LinearBounds, space: Space, first: Optimum
+) -> Iterator[tuple[str, float]]:
+    """Yield the conditions that no chi in a space fulfils, each with the margin t* before it.
+
+    Each is the condition with the largest multiplier, which is then released. first : the optimum
+    of `margin` with all conditions.
+    """
+    conditions, optimum = list(conditions), first
+    while optimum.solved and optimum.margin < -LIMIT.MARGIN_ROUNDING and conditions:
+        worst = max(optimum.duals, key=lambda name: optimum.duals[name])
+        yield worst, optimum.margin
         conditions = [c for c in conditions if c.name != worst]
-        if not blame:
-            break
-        released = margin(conditions, rows, space)
-    return Feasibility(first.margin, not blocking, tuple(blocking), first.chi, not blocking)
+        optimum = margin(conditions, rows, space)
 
 
 def within_noise(
@@ -185,8 +198,8 @@ def within_noise(
         everything(units(physical)),
         least=LIMIT.MARGIN_ROUNDING,
     )
-    blocked = dict(judged.blocking)
-    freedom = sum(c.B.shape[1] for c in physical.conditions if c.name in blocked)
+    broken = dict(judged.blocking)
+    freedom = sum(c.B.shape[1] for c in physical.conditions if c.name in broken)
     far = float(np.sum((R @ nearest.chi - z) ** 2)) if nearest.solved else np.inf
     if far > chi2.ppf(LIMIT.NOISE_LEVEL, freedom):
         return judged
@@ -205,10 +218,25 @@ def nearest_standard(
     start : a chi that fulfils the conditions of a physical robot; the result if the solver finds
     nothing better.
     """
-    scale, unit = scales(physical), units(physical)
-    space, rows = solutions(physical.rows(names), X, unit), limit_rows(physical, limits)
+    scale, rows = scales(physical), limit_rows(physical, limits)
+    space = solutions(physical.rows(names), X, units(physical))
     chi0 = np.array([physical.values.get(name, 0.0) for name in physical.standard])
-    reach = np.abs(space.basis).max(axis=1, initial=0.0) / unit
+    criterion = np.diag(1 / scale), chi0 / scale
+    return nearest_in(space, physical, rows, start, criterion)
+
+
+def nearest_in(
+    space: Space,
+    physical: PhysicalModel,
+    rows: LinearBounds,
+    start: Array,
+    criterion: tuple[Array, Array],
+) -> Array:
+    """Find the physical standard parameters chi in a space and within rows, with least ||R chi - z||.
+
+    criterion : R, shape (m, p), and z, shape (m,). start : as in `nearest_standard`.
+    """
+    reach = np.abs(space.basis).max(axis=1, initial=0.0) / units(physical)
     open_ = tuple(
         c for c in physical.conditions if reach[list(c.numbers)].max() > LIMIT.MARGIN_ROUNDING
     )
@@ -224,7 +252,7 @@ def nearest_standard(
             LIMIT.LEAST_EIGENVALUE,
         )
     )
-    nearest = closest(np.diag(1 / scale), chi0 / scale, open_, rows, space, least=least)
+    nearest = closest(*criterion, open_, rows, space, least=least)
     kept = nearest.solved and all(c.smallest(nearest.chi) >= 0 for c in open_)
     return nearest.chi if kept else start
 

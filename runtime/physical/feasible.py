@@ -49,7 +49,7 @@ import numpy as np
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.least_squares.linear import System, assemble, percent
 from runtime.core.least_squares.method import Beginning, Fitted
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel
 from runtime.core.progress import at
 from runtime.core.rows.factor import Array, Factor, factor, triangularise
@@ -68,6 +68,8 @@ from runtime.physical.feasibility import (
 )
 from runtime.physical.inertia import PhysicalModel, physical_model, reach_of
 from runtime.physical.semidefinite import Distance, LinearBounds, Optimum, closest, everything
+
+LIMIT = limits(__package__)
 
 WEIGHTS = 10.0 ** np.arange(0.0, -9.5, -0.5)
 DECADES = WEIGHTS[::2]  # of the search for the weight of smallest held-out error
@@ -364,8 +366,8 @@ def by_reach(
     for a fit without solution, for instance if no robot is within the bounds.
     """
     found: list[Array | None] = []
-    for limits in (unbounded, bounded):
-        options = replace(limits, prior="none", weight="auto")  # a weight is of a prior
+    for asked in (unbounded, bounded):
+        options = replace(asked, prior="none", weight="auto")  # a weight is of a prior
         try:
             found.append(solve_feasible(rows, physical, options, 0.0))
         except InputError:

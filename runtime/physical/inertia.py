@@ -29,8 +29,10 @@ from typing import Any, cast
 import numpy as np
 
 from runtime.core.errors import InputError, ModelError
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import SIGNED, GeneratedModel, elements_of, is_form, joint_units, require
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 

@@ -30,8 +30,10 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import null_space
 
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.physical.inertia import Condition
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 Distance = Literal["none", "euclidean"]

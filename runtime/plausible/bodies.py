@@ -31,9 +31,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg.lapack import dposv
 
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.physical.inertia import Condition, PhysicalModel
 from runtime.physical.semidefinite import Quadratic
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from runtime.core.errors import InputError
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, joint_labels, joint_units
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
@@ -26,6 +26,8 @@ from runtime.plausible.delay import Delay, delay_of
 from runtime.plausible.known import KnownValues, known_values
 from runtime.plausible.samples import Filtered, Samples, excerpts, samples_of
 from runtime.plausible.trials import Baseline, baseline_of, regressor
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 
@@ -174,7 +176,8 @@ class Case:
         The side of the torques is "law" if the control law of a controller computed them.
         """
         settings: Any = self.study
-        q, tau = settings.record[0].sides if settings.record else ("joint", "joint")
+        stated = settings.record[0].sides if settings.record else ("joint", "joint")
+        q, tau = self.records[0].origin.sides or stated
         return q, "law" if any(record.origin.by_law for record in self.records) else tau
 
     @cached_property
@@ -245,7 +248,9 @@ class Case:
         if self.unfit:
             return None
         baseline = self.baseline or self._baseline(values=True)
-        return known_values(baseline) if baseline and baseline.bodies.near_values else None
+        if not baseline.bodies.near_values:
+            return None
+        return known_values(baseline, rotors=self.sides[1] != "link")
 
     @cached_property
     def noise_floor(self) -> float:

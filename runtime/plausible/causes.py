@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import (
     GeneratedModel,
     drives_of,
@@ -32,6 +32,8 @@ from runtime.core.model import (
     joint_units,
 )
 from runtime.plausible.samples import Samples
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 Item = Mapping[str, Any]

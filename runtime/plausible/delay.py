@@ -22,7 +22,7 @@ from scipy.interpolate import CubicSpline, PPoly
 
 from runtime.core.documents import Result
 from runtime.core.errors import InputError
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, is_axis, joint_labels
 from runtime.core.problem import Problem
 from runtime.core.rows.regressor import in_time
@@ -30,6 +30,8 @@ from runtime.core.signals.filters import require_motion
 from runtime.core.table import Table, number
 from runtime.plausible.bodies import Grams, solve_scaled
 from runtime.plausible.samples import Filtered, filtered, usable
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 

@@ -3,7 +3,9 @@
     Y_j = a_j (gravity torque by the values)_j + b_j (the rest of their torque)_j + friction and
     offset,
 
-by least squares for each joint: a_j = b_j = 1 if values, gear and sign are right. A part is left
+by least squares for each joint: a_j = b_j = 1 if values, gear and sign are right. Viscous
+and dry friction are fitted whether the robot file has them or not, unless sensors behind the gears
+measure the torques. A part is left
 out if it is small or cannot be separated.
 
 A second question: are the measured torques really torques? Motor currents change in time as the
@@ -26,7 +28,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from runtime.core.documents import Result
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, elements_of, is_axis, joint_labels
 from runtime.core.part import Doubt
 from runtime.core.result import Identification
@@ -36,6 +38,8 @@ from runtime.physical.inertia import INERTIAL
 
 if TYPE_CHECKING:
     from runtime.plausible.trials import Baseline
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 
@@ -131,10 +135,13 @@ class KnownValues(Result):
         return tuple(texts)
 
 
-def known_values(baseline: Baseline) -> KnownValues | None:
+def known_values(baseline: Baseline, *, rotors: bool = True) -> KnownValues | None:
     """Compare torques computed from the inertial values of the robot file with measured torques.
 
     None if the file does not give all ten values of any link.
+
+    rotors : whether the measured torques include friction and rotors of the drives; false for
+        sensors behind the gears.
     """
     physical, s = baseline.physical, baseline.samples
     given = [all(f"{family}{j}" in physical.values for family in INERTIAL) for j in physical.links]
@@ -146,7 +153,7 @@ def known_values(baseline: Baseline) -> KnownValues | None:
     chi = np.zeros(len(physical.standard))
     chi[inertial] = [physical.values[physical.standard[k]] for k in inertial]
     for k, name in enumerate(physical.standard):
-        if name.startswith("Ia"):
+        if rotors and name.startswith("Ia"):
             chi[k] = physical.values.get(name) or baseline.given.X[k]  # a URDF has no place for it
     X = physical.K @ chi
     at_rest = np.zeros_like(s.q)
@@ -166,6 +173,9 @@ def known_values(baseline: Baseline) -> KnownValues | None:
         if len(y) < 20:
             continue
         friction = columns[rows][:, j, beside]
+        if rotors:
+            v = s.qd[rows, j]
+            friction = np.column_stack([friction, v, np.sign(v)])
         parts = np.column_stack([gravity[rows, j], (whole - gravity)[rows, j]])
         left = parts - friction @ np.linalg.lstsq(friction, parts, rcond=None)[0]
         rest = y - friction @ np.linalg.lstsq(friction, y, rcond=None)[0]

@@ -22,7 +22,7 @@ import numpy as np
 from runtime.core.check import Answer, Question, State, first_names
 from runtime.core.errors import InputError
 from runtime.core.least_squares.method import LINEAR
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.problem import Problem, estimate_of
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.predicted import Weights, kept_correlation
@@ -32,6 +32,8 @@ from runtime.core.signals.velocities import agreement
 from runtime.core.study import EstimateSettings, Signals, Study
 from runtime.plausible.case import Case
 from runtime.plausible.samples import Samples, samples_of
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 

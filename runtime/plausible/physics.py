@@ -11,11 +11,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from runtime.core.check import Answer, Question, State
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import elements_of, joint_torque_units
 from runtime.plausible.case import Case
 from runtime.plausible.delay import Delay
 from runtime.plausible.trials import Trial, reach
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 
@@ -75,21 +77,25 @@ def measured(case: Case) -> Answer | None:
     """Check that the torques were measured, not computed: measured torques show friction and noise.
 
     Friction is measured as a share of the torque of a joint, noise by fifth differences of the
-    samples. None if the law of a controller gives the torques, or if nothing is fitted.
+    samples. Sensors behind the gears measure noise only. None if the law of a controller gives the torques, or if nothing is fitted.
     """
     if case.alone is None or any(record.origin.by_law for record in case.records):
         return None
+    behind = case.sides[1] == "link"
     elements = elements_of(case.model)
     kinds = [elements.get(name, ("",))[0] for name in case.model.BASE_PARAMETERS]
     chosen = np.isin(kinds, ("viscous", "coulomb"))
     friction = np.linalg.norm(case.D[:, :, chosen] @ case.alone.free.X[chosen], axis=0)
     share = float((friction / np.linalg.norm(case.samples.tau, axis=0)).max())
-    if chosen.any() and share < LIMIT.LEAST_FRICTION:
+    if chosen.any() and share < LIMIT.LEAST_FRICTION and not behind:
         return Answer(
             "doubtful",
             f"No joint shows friction (at most {100 * share:.1f} % of its torque), as if a "
             "controller or a simulation computed the torques, or sensors measured them "
             "behind the gears",
+            "log torques or currents as they were measured: torques that a controller computes "
+            "from its model describe that model, not the robot; torques of sensors behind the "
+            "gears need record.torque_side: link",
         )
     fifth = [np.quantile(np.abs(np.diff(one.tau, 5, axis=0)), 0.8, axis=0) for one in case.records]
     size = [np.sqrt((one.tau**2).mean(axis=0)).clip(1e-300) for one in case.records]
@@ -100,6 +106,10 @@ def measured(case: Case) -> Answer | None:
             f"The torques have almost no noise ({noise:.0e} of their size), as if a controller, a "
             "simulation or a filter computed them",
         )
+    if behind:
+        return Answer("good", "Sensors behind the gears measure no friction of the drives")
+    if not chosen.any():
+        return Answer("good", "The robot file has no friction, so noise alone is judged")
     return Answer("good", f"Friction is up to {100 * share:.0f} % of the torque of a joint")
 
 

@@ -29,6 +29,7 @@ from runtime.core.table import Table
 from runtime.counts.reader import unwrapped
 from runtime.plausible.case import Case
 from runtime.plausible.delay import Delay
+from runtime.plausible.friction import friction
 from runtime.plausible.jumps import cut_torques, jumps
 from runtime.plausible.known import KnownValues
 from runtime.plausible.motion import motion_excites, recorded_speeds, rest
@@ -70,6 +71,7 @@ CHECKS: tuple[Callable[[Case], Check | None], ...] = (
     motion_excites,
     not_asked,
     cut_torques,
+    friction,
     physics,
     measured,
     size,
@@ -228,6 +230,9 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
         if (broken := answers[check]) is not None and broken.state == "no":
             checks.append(Check(question, "open", f"Not checked: {text}"))
             return Plausibility(tuple(checks))
+    if (lacking := answers[friction]) is not None and lacking.state in WORST[:2]:
+        checks.append(Check(question, "open", "Not checked: the robot file lacks friction"))
+        return Plausibility(tuple(checks), robot_values=case.robot_values)
     trials: list[Trial] = []
     if variants is not None or worst_of(checks) is not None:
         at("what would explain the record better")

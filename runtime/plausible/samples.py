@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from runtime.core.errors import InputError
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.record import Record
 from runtime.core.rows.prepared import Prepared
 from runtime.core.rows.selection import window_of
@@ -25,6 +25,8 @@ from runtime.core.signals.filters import (
     median_filtered,
 )
 from runtime.core.study import Lowpass, Study
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 

@@ -28,7 +28,7 @@ import numpy as np
 from scipy.linalg import qr
 from scipy.optimize import minimize_scalar
 
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, drives_of
 from runtime.physical.inertia import INERTIAL, PhysicalModel, frame_origins, physical_model
 from runtime.plausible.bodies import (
@@ -51,6 +51,8 @@ from runtime.plausible.causes import (
     unmodelled_torques,
 )
 from runtime.plausible.samples import Samples, moving
+
+LIMIT = limits(__package__)
 
 Array = np.ndarray
 Change = Callable[[float], Cause]

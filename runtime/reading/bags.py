@@ -19,6 +19,7 @@ Time is the stamp of the header, or the time of the log if every stamp is zero.
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,10 +27,11 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.errors import InputError
+from runtime.core.errors import InputError, RecordWarning, printable
 from runtime.core.limits import LIMIT
 from runtime.documents.files import require_file
 from runtime.reading.files import sha256, sha256_of
+from runtime.reading.publishers import Sent, counted_senders, of_one_publisher
 from runtime.reading.table import Array, Options, Table, damage_named
 
 MESSAGE = "sensor_msgs/msg/JointState"
@@ -60,6 +62,8 @@ class JointState:
         Names of the joints.
     position, velocity, effort : ndarray
         One value per joint (rad or m, rad/s or m/s, N m or N), or none.
+    sender : str
+        What the bag says of the publisher.
     """
 
     number: int
@@ -68,6 +72,14 @@ class JointState:
     position: Array
     velocity: Array
     effort: Array
+    sender: str = ""
+
+    def value(self, joint: str, quantity: str) -> float:
+        """Return one value of a joint, nan if the message does not have exactly one."""
+        values = getattr(self, quantity)
+        if self.joints.count(joint) != 1 or len(values) != len(self.joints):
+            return np.nan
+        return float(values[self.joints.index(joint)])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -84,7 +96,16 @@ class JointTable(Table):
         """
         joints = {name.rpartition(".")[0] for name in names} - {""}
         some = [message for message in self.messages if joints.intersection(message.joints)]
+        skipped = len(self.messages) - len(some or self.messages)
+        notes = [
+            f"{skipped} of {len(self.messages)} messages on {self.topic} have none of these joints and are skipped"
+        ] * bool(skipped)
         messages = some or list(self.messages)
+        kept, note = of_one_publisher(self._sent(messages, names))
+        if note:
+            warnings.warn(f"{self.file}: {note}", RecordWarning, stacklevel=2)
+            notes.append(note)
+        messages = [message for message, keep in zip(messages, kept, strict=True) if keep]
         columns: dict[str, Array] = {}
         for name in names:
             joint, _, quantity = name.rpartition(".")
@@ -95,17 +116,29 @@ class JointTable(Table):
             elif joint and quantity in QUANTITIES:
                 values = [self._value(message, joint, quantity) for message in messages]
                 columns[name] = np.array(values)
-        skipped = len(self.messages) - len(messages)
-        note = f"{skipped} of {len(self.messages)} messages on {self.topic} have none of these joints and are skipped"
         return Table(
             file=self.file,
             columns={**dict.fromkeys(self.columns, np.empty(0)), **columns},
             row=lambda i: self._row(messages[i]),
             joints=self.joints,
             topic=self.topic,
-            note=note if skipped else "",
+            note=". ".join(notes),
             what=self.what,
             digest=self.digest,
+        )
+
+    def _sent(self, messages: Sequence[JointState], names: Sequence[str]) -> Sent:
+        """Return what the messages tell of their publishers, with the columns `names`."""
+        pairs = [name.rpartition(".")[::2] for name in dict.fromkeys(names)]
+        asked = [(joint, word) for joint, word in pairs if joint and word in QUANTITIES]
+        values = [message.value(*pair) for message in messages for pair in asked]
+        return Sent(
+            self.topic,
+            self.file,
+            tuple(message.sender for message in messages),
+            np.array([message.stamp for message in messages], dtype=np.int64),
+            np.array(values).reshape(len(messages), len(asked)),
+            np.array([word == "effort" for _, word in asked], dtype=bool),
         )
 
     def _row(self, message: JointState) -> str:
@@ -283,11 +316,27 @@ def _messages(reader: Any, topic: str, decode: Any) -> list[JointState]:
     connections = [c for c in reader.connections if c.topic == topic]
     states = []
     logs = []
-    for number, (_, logged, raw) in enumerate(reader.messages(connections=connections), start=1):
+    counters = []
+    for number, (c, logged, raw) in enumerate(reader.messages(connections=connections), start=1):
         m = decode(raw, MESSAGE)
         stamp = int(m.header.stamp.sec) * NANOSECONDS + int(m.header.stamp.nanosec)
-        states.append(JointState(number, stamp, tuple(m.name), m.position, m.velocity, m.effort))
+        sender = _sender(c, str(m.header.frame_id), several=len(connections) > 1)
+        values = (m.position, m.velocity, m.effort)
+        states.append(JointState(number, stamp, tuple(m.name), *values, sender))
         logs.append(int(logged))
+        counters.append(int(getattr(m.header, "seq", 0)))
+    if len({state.sender for state in states}) == 1:
+        senders = counted_senders(counters)
+        states = [replace(x, sender=name) for x, name in zip(states, senders, strict=True)]
     if any(state.stamp for state in states):
         return states
     return [replace(state, stamp=log) for state, log in zip(states, logs, strict=True)]
+
+
+def _sender(connection: Any, frame: str, *, several: bool) -> str:
+    """Write what a bag says of the publisher of a message: its node or channel, and its frame_id."""
+    node = getattr(connection.ext, "callerid", None)
+    if not node and several:
+        node = f"channel {connection.id}"
+    words = [str(node)] * bool(node) + [f"frame_id {frame}"] * bool(frame)
+    return printable(" ".join(words)[:80].replace("\n", " "))

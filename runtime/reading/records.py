@@ -95,6 +95,7 @@ def _pieces(
     side = conversion(settings, drives, first, last, n)
     samples = _joint_side(settings, columns, signals, side, missing)
     table = signals["q"].table
+    command = side.command if "tau" in signals else ""
     notes = [signal.table.note for signal in signals.values() if signal.table.note]
     del signals, tables, first, last, other
     law = None
@@ -108,11 +109,12 @@ def _pieces(
         jitter=settings.jitter,
         drives=side.drives,
         torque_constant=side.constant,
-        command=side.command,
+        command=command,
         joints=() if model is None else joint_labels(model),
         whole="" if len(stretches) == 1 else label.name,
         simulated=settings.simulated,
         by_law=settings.by_law,
+        sides=settings.sides,
     )
     keys = [key for key in samples if key != "t"]
     pieces = len(stretches)

@@ -14,12 +14,14 @@ from typing import Any, cast
 import numpy as np
 
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.limits import LIMIT
 from runtime.core.markup import element, formula, symbol, unit
 from runtime.core.model import GeneratedModel
 from runtime.core.result import Identification
 from runtime.core.table import Table, csv_text, interval, number
 from runtime.reporting.page import Matrix, Section
+
+CORRELATIONS_SHOWN = 14
+"""Names of a shaded table; the strongest correlations first."""
 
 FILE_NOTE = (
     "Robot file: its values through the same formulas; the difference to it is left out where that "
@@ -187,7 +189,7 @@ def correlation_matrix(fit: Estimate) -> Matrix | None:
     deviation = np.sqrt(np.diag(fit.covariance))
     if len(fit.names) < 2 or not np.all(deviation > 0):
         return None
-    correlation, most = fit.covariance / np.outer(deviation, deviation), LIMIT.CORRELATIONS_SHOWN
+    correlation, most = fit.covariance / np.outer(deviation, deviation), CORRELATIONS_SHOWN
     strongest = np.abs(correlation - np.diag(np.diag(correlation))).max(axis=1)
     shown = np.sort(np.argsort(-strongest, kind="stable")[:most])
     caption = "Correlation of the estimates of the parameters that are used" + (

@@ -8,7 +8,7 @@ from dataclasses import replace
 from runtime.core.part import Part
 from runtime.core.result import Identification
 from runtime.core.signals.decimation import CUTOFF
-from runtime.core.table import Table, number
+from runtime.core.table import Table, number, percentage
 from runtime.core.validation import JointComparison
 from runtime.reporting import figures as plots
 from runtime.reporting.page import Section
@@ -198,7 +198,7 @@ def trail_section(result: Identification) -> Section:
         [
             step.name if step.removed else f"{step.name} (kept)",
             str(first - k - step.removed),
-            percent_sigma(step.relative_sigma),
+            percentage(step.relative_sigma, step.relative_sigma, ".2g"),
             number(step.ratio, ".4f"),
         ]
         for k, step in enumerate(essential.trail)
@@ -215,11 +215,6 @@ def trail_section(result: Identification) -> Section:
     )
     tables = [Table("Trail", header, rows), *trust.tables()[3:]]
     return Section("Essential parameters", text, tables=tables)
-
-
-def percent_sigma(percent: float) -> str:
-    """Write a relative standard deviation, %; "" if the 95 % interval contains zero."""
-    return f"{percent:.2g}" if 1.96 * percent < 100 else ""
 
 
 def probability(p: float) -> str:

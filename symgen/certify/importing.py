@@ -36,35 +36,36 @@ CERTIFICATE = re.compile(
 def cache_folder() -> Path:
     """Return the cache folder in which emitted modules are stored.
 
-    It is SYMGEN_CACHE/modules, or else a folder in the cache folder of the platform.
+    It is SYMGEN_CACHE/modules, or else a folder in the cache folder of the platform. Symbolic links
+    are followed, so that the folder which is judged is the folder which is used. As the XDG
+    specification says, a relative XDG_CACHE_HOME is ignored.
     """
     if given := os.environ.get("SYMGEN_CACHE"):
-        return Path(given) / "modules"
+        return (Path(given) / "modules").resolve()
     if sys.platform == "win32":
-        return (
-            Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-            / "symgen"
-            / "modules"
-        )
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "symgen" / "modules"
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "symgen" / "modules"
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME", ""))
+        base = base if base.is_absolute() else Path.home() / ".cache"
+    return (base / "symgen" / "modules").resolve()
 
 
 def cached_path(file: str, text: str) -> Path | None:
     """Return the path of the cached source file whose text, without its certificate, equals `text`.
 
-    Return None if there is no such file.
+    Return None if there is no such file, or if its whole text is not marked as certified.
     """
-    path = entry(text)
+    folder = entry(text)
+    if folder is None:
+        return None
     try:
-        return (
-            path / file
-            if path and without_certificate((path / file).read_text("utf-8")) == text
-            else None
-        )
+        whole = (folder / file).read_bytes().decode("utf-8")
     except (OSError, UnicodeError):
         return None
+    right = is_certified(whole) and without_certificate(whole) == text
+    return folder / file if right else None
 
 
 def stored_path(file: str, text: str) -> Path:
@@ -133,7 +134,8 @@ def is_writable_by_others(folder: Path) -> bool:
     """
     if os.name != "posix":
         return False
-    for place in (folder, *folder.absolute().parents):
+    folder = folder.resolve()
+    for place in (folder, *folder.parents):
         if not place.exists():
             continue
         found = place.stat()
@@ -158,7 +160,7 @@ def entry(text: str) -> Path | None:
     raised instead if SYMGEN_CACHE names such a folder.
     """
     try:
-        folder = cache_folder().absolute()
+        folder = cache_folder()
         shared = is_writable_by_others(folder)
     except (OSError, RuntimeError):
         return None

@@ -136,20 +136,21 @@ def emitted(
 def report_differences(output: Path, modules: dict[str, str]) -> None:
     """Print the differences between the existing modules and those that would be written.
 
-    Certificates are not compared. Exit code 1 if a module differs or is missing.
+    The lines of the certificates are compared as well, because a file may be imported or compiled
+    with any text in them. Only the ends of lines may be those of Windows. Exit code 1 if a module
+    differs or is missing.
     """
-    from symgen.certify.importing import without_certificate
-
     stale = []
     for path, text in ((output / name, text) for name, text in modules.items()):
-        present = path.read_text(encoding="utf-8") if path.is_file() else None
-        if present is not None and without_certificate(present) == without_certificate(text):
+        present = path.read_bytes().replace(b"\r\n", b"\n") if path.is_file() else None
+        if present == text.encode("utf-8"):
             continue
         stale.append(path)
         if present is None:
             typer.echo(f"{path} is missing")
         else:
-            now, then = present.splitlines(True), text.splitlines(True)
+            now = present.decode("utf-8", "backslashreplace").splitlines(True)
+            then = text.splitlines(True)
             lines = difflib.unified_diff(now, then, f"{path} (found)", f"{path} (current)", n=1)
             typer.echo("".join(list(lines)[:200]))
     if stale:

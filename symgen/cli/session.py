@@ -54,7 +54,7 @@ def reported_errors() -> Iterator[None]:
 
     single_thread()
     try:
-        with _noted_angles():
+        with _noted_warnings():
             yield
     except BrokenPipeError as e:  # the reader has enough, as `head` has: the end is quiet
         nowhere = os.open(os.devnull, os.O_WRONLY)
@@ -70,24 +70,27 @@ def reported_errors() -> Iterator[None]:
 
 
 @contextmanager
-def _noted_angles() -> Iterator[None]:
+def _noted_warnings() -> Iterator[None]:
     import warnings
 
+    from runtime.core.errors import RecordWarning
     from symgen.description.angles import RobotFileWarning
 
+    noted = (RobotFileWarning, RecordWarning)
     with warnings.catch_warnings():
         show = warnings.showwarning
         told: set[str] = set()  # a verb may regroup its robot twice
 
         def note(message: Warning | str, category: type[Warning], *place: Any) -> None:
-            if not issubclass(category, RobotFileWarning):
+            if not issubclass(category, noted):
                 show(message, category, *place)
             elif str(message) not in told:
                 told.add(str(message))
                 typer.echo(f"note: {message}", err=True)
 
         warnings.showwarning = note  # type: ignore[assignment]
-        warnings.simplefilter("always", RobotFileWarning)
+        for kind in noted:
+            warnings.simplefilter("always", kind)
         yield
 
 

@@ -36,7 +36,9 @@ TARGETS = {
         "{}.py", "CasADi", 'in CasADi {}.casadi("inverse_dynamics") is a casadi.Function of columns'
     ),
     "c": Target("{}.c", "C", iterates=True),
-    "h": Target("{}.h", "C", "{}.h declares what {}.c has; --target c writes both", iterates=True),
+    "h": Target(
+        "{}.h", "C", "{0}.h declares what {0}.c has; --target c writes both", iterates=True
+    ),
     "xp": Target(
         "{}.py",
         "arrays of any package",

@@ -61,7 +61,9 @@ def negative(x: Tree) -> Tree:
     """Negate x without changing the order of its factors."""
     if x.is_Number:
         return -x
-    return x.args[1] if is_negative(x) else sympy.Mul(MINUS, x, evaluate=False)
+    if is_negative(x):
+        return x.args[1] if len(x.args) == 2 else sympy.Mul(*x.args[1:], evaluate=False)
+    return sympy.Mul(MINUS, x, evaluate=False)
 
 
 def is_negative(x: Tree) -> bool:

@@ -188,7 +188,10 @@ class Presentation(MathMLPresentationPrinter):  # type: ignore[misc]
     def term(self, x: Tree, *, first: bool = True) -> Any:
         """Print a term of a sum with its sign; the first term has no plus sign."""
         minus = is_negative(x)
-        inside = self._print(negative(x) if minus else x)
+        rest = negative(x) if minus else x
+        inside = self._print(rest)
+        if minus and (rest.is_Add or is_negative(rest)):
+            inside = self.row(self._l_paren(), inside, self._r_paren())
         if first and not minus:
             return inside
         form = "prefix" if first else "infix"

@@ -129,12 +129,15 @@ class Writing:
 
     @property
     def placeless(self) -> dict[str, float]:
-        """New values, by name, of changed parameters that the file format cannot store."""
+        """New values, by name, of parameters that the file format cannot store.
+
+        They are the motor inertias, also those of zero, and the other parameters that changed.
+        """
         return {
             name: float(self.nearest.u[k])
             for name, k in self.nearest.elements.items()
             if (name not in self.own or not self.text.attribute(*self.own[name]))
-            and not same(self.nearest.u[k], self.nearest.u0[k])
+            and (name.startswith("Ia") or not same(self.nearest.u[k], self.nearest.u0[k]))
         }
 
     def require_read_back(self, again: RobotText) -> None:

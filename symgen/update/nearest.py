@@ -13,15 +13,17 @@ elements:
     MS = M c,    J = I + M (c'c 1 - c c')
 
 K chi(u) = X is linearised and solved repeatedly until it holds. If the resulting numbers are no
-physical robot, the optimisation of `runtime.physical.feasibility` gives chi, with the values of the
-file as prior. A number on which no base parameter depends does not change. A mass does not change
-if base parameters depend on it only through its first moment and its tensor.
+physical robot, a semidefinite program finds chi: K chi = X and the conditions are linear in chi,
+and the distance in u is linearised repeatedly. Both ways have the same order of preference: a motor
+inertia gets what the torques cannot separate from it, whether the format has a place for it or not.
+A number on which no base parameter depends does not change. A mass does not change if base
+parameters depend on it only through its first moment and its tensor. Such a number or mass changes
+only if no physical robot is possible otherwise.
 
 A body may be several links, held together by fixed joints: the record determines only their sum.
-First, only the link on the moving joint changes; the other links change with it only if no physical
-link is possible otherwise. A motor inertia gets what the torques cannot separate from it, whether
-the format has a place for it or not. Other elements that the file does not have change only if the
-links cannot give the same torques.
+First, only the link on the moving joint changes, or, if it has no mass, the next link; the other
+links change with it only if no physical link is possible otherwise. Other elements that the file
+does not have change only if the links cannot give the same torques.
 """
 
 from __future__ import annotations
@@ -31,21 +33,34 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from runtime.core.limits import LIMIT
-from runtime.physical.feasibility import feasibility, nearest_standard, scales
+from runtime.core.limits import limits
+from runtime.physical.feasibility import (
+    blocked,
+    feasibility,
+    limit_rows,
+    nearest_in,
+    scales,
+    units,
+)
 from runtime.physical.inertia import INERTIAL, PhysicalModel
+from runtime.physical.semidefinite import LinearBounds, Space, margin, solutions, within
 from symgen.description.tree import Array
 from symgen.errors import DescriptionError
 from symgen.update.places import FileLink
 
+LIMIT = limits("runtime.physical")
+
 NONE = "no physical robot with the links of this file has the estimated parameters"
 MISSED = 1e-9  # of the size of a base parameter: more is not reached
 STEPS, SETTLED = 30, 1e-15  # of Newton, and what they change at last
+LINEARISED, STILL = 10, 1e-4  # of the distance: how often, and the sizes that it changes at last
 FAR = 1e6  # sizes that a number may move
 ROTORS = 1e6  # size of a motor inertia beside that of the file
 NEAR = 1e-6  # of the size of a number: nearer to the file is rounding
 BARRIER = 2 * LIMIT.LEAST_EIGENVALUE  # what the program keeps an element from zero
 STRANGE = 2.0  # mass over that of the file
+NO_MASS = 1e-15  # kg; a link with no more has no mass, as in MuJoCo
+SMALL = 0.1, 0.1  # kg, m: mass and extent of a small body
 TINY = 1e-15  # SI; an eigenvalue so little below zero is rounding
 
 
@@ -166,7 +181,7 @@ def nearest(
     physical : PhysicalModel
         Model of the robot, with one link for each body.
     links : sequence of FileLink
-        Links of the file. The first link of a body is the one that changes first.
+        Links of the file. The first link with mass of a body is the one that changes first.
     values : mapping, SI
         Values of the elements on the joints, by name.
     names : sequence of str
@@ -227,11 +242,12 @@ def _of_file(
     """Collect the unknowns of `nearest` from the file, sorted by the attempt that may change them.
 
     Return the unknowns, the index of each element, and for each attempt how many numbers may
-    change. The first attempt has the first link of each body, and the elements. The second adds
-    elements that the file does not have and that other parameters can replace; the third adds the
-    other links.
+    change. The first attempt has the first link with mass of each body, and the elements. The
+    second adds elements that the file does not have and that other parameters can replace; the
+    third adds the other links.
     """
-    leading = {link.j: link for link in reversed(links)}
+    massless_last = sorted(links, key=lambda link: link.ten[-1] <= NO_MASS)
+    leading = {link.j: link for link in reversed(massless_last)}
     led = [leading[j] for j in physical.links if j in leading]
     others = [link for link in links if link is not leading[link.j]]
     inertial = {f"{family}{j}" for j in physical.links for family in INERTIAL}
@@ -283,11 +299,15 @@ def _of_file(
 def _sizes_of(x: Array) -> Array:
     """Estimate typical sizes of mass, centre of mass and inertia tensor of a link, shape (10,).
 
-    The sizes of centre and tensor follow from the extent of the link.
+    The sizes of centre and tensor follow from the extent of the link. A link without mass has no
+    extent; its sizes are those of a small body.
     """
     M, moments = x[0], float(np.abs(x[[4, 7, 9]]).sum()) / 2
-    extent = np.sqrt(x[1:4] @ x[1:4] + moments / M) if M > 0 else 1.0
-    return np.array([M, *[max(extent, 1e-3)] * 3, *[max(moments, 1e-3 * M * extent**2)] * 6])
+    if M <= NO_MASS:
+        mass, extent = SMALL
+        return np.array([mass, *[extent] * 3, *[max(moments, mass * extent**2)] * 6])
+    extent = max(np.sqrt(x[1:4] @ x[1:4] + moments / M), 1e-3)
+    return np.array([M, *[extent] * 3, *[max(moments, 1e-3 * M * extent**2)] * 6])
 
 
 def _spare(physical: PhysicalModel, own: Sequence[str], absent: Sequence[str]) -> list[str]:
@@ -329,7 +349,7 @@ def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple
         answer = feasibility(part.physical, names, rest)
         if not answer.feasible:
             return None, answer.text
-        u = _hold(part, nearest_standard(part.physical, names, rest, answer.chi))
+        u = _physical(part, K, rest, part.u0 if u is None else u, answer.chi)
     near = NEAR * part.size
     alone = [c.numbers[0] for c in part.physical.conditions if len(c.numbers) == 1]
     near[alone] += BARRIER
@@ -369,16 +389,105 @@ def _solve(part: Numbers, K: Array, rest: Array, start: Array, free: Array) -> A
     return u if np.all(missed <= NEAR * sizes) else None
 
 
-def _hold(part: Numbers, chi: Array) -> Array:
-    """Convert standard parameters to link and joint values; values without effect do not change.
+def _physical(part: Numbers, K: Array, rest: Array, u: Array, start: Array) -> Array:
+    """Find the link and joint values of the physical robot nearest to the file.
 
-    A value has no effect if no base parameter depends on it. If the unchanged values violate a
-    condition of a physical robot, the values in this condition are those of chi.
+    This is the optimisation of `_solve`, with every condition of a physical robot. K chi = rest and
+    the conditions are linear in the standard parameters chi, and hold exactly. The distance from
+    the file is linearised repeatedly, first at u:
+
+        u(chi) = u + T^-1 (chi - chi(u)),    T = d chi / d u
+
+    The motor inertias, which move with the greatest ease, are at last those nearest to the file
+    that the links leave.
+
+    u : values of `_solve`, or of the file. start : standard parameters of a physical robot with
+    K chi = rest.
     """
+    held, start = _held(part, K, rest, u, start)
+    rows, S = limit_rows(part.physical, None), part.size * part.ease
+    rotors = part.ease > 1
+    distance, best = np.inf, u
+    for _ in range(LINEARISED):
+        W, w = _linear(part, u)
+        space = _holding(part, K, rest, u, held)
+        criterion = W / part.ease[:, None], w / part.ease
+        chi = nearest_in(space, part.physical, rows, start, criterion)
+        before, u = u, _numbers(part, chi)
+        if (far := float(np.linalg.norm((u - part.u0) / S))) < distance:
+            distance, best = far, u
+        if np.all(np.abs(u - before)[~rotors] <= STILL * part.size[~rotors]):
+            best = u
+            break
+    best = _hold(part, best)
+    other = _solve(part, K, rest, np.where(rotors, part.u0, best), rotors)
+    return best if other is None or _violated(part, other) else other
+
+
+def _held(part: Numbers, K: Array, rest: Array, u: Array, start: Array) -> tuple[Array, Array]:
+    """Find the numbers that a physical robot can keep as in the file, of those `_solve` keeps.
+
+    These are the masses that nothing tells, and numbers without effect. If no physical robot keeps
+    them all, the first of these sets that leaves one is given up, each of the links in the way:
+    masses; numbers without effect; both. At last all numbers of all links are given up.
+
+    Returns the numbers that stay, bool, shape (p,), and the standard parameters of such a robot.
+    """
+    conditions, rows = part.physical.conditions, limit_rows(part.physical, None)
+    silent = ~part.seen(u) & ~part.masses
+    kept = part.masses | silent
+    space = _holding(part, K, rest, u, kept)
+    first = margin(conditions, rows, space)
+    names = {name for name, _ in blocked(conditions, rows, space, first)}
+    in_way = np.zeros(len(u), dtype=bool)
+    for c in conditions:
+        in_way[list(c.numbers)] |= c.name in names
+    for given_up in (~kept, part.masses & in_way, silent & in_way, in_way):
+        held = kept & ~given_up
+        found = margin(conditions, rows, _holding(part, K, rest, u, held))
+        if found.solved and found.margin >= -LIMIT.MARGIN_ROUNDING:
+            return held, found.chi
+    return np.zeros(len(u), dtype=bool), start
+
+
+def _holding(part: Numbers, K: Array, rest: Array, u: Array, held: Array) -> Space:
+    """Return all chi with K chi = rest in which the numbers `held` are those of the file.
+
+    Centres and tensors, which are no linear functions of chi, are linearised at u.
+    """
+    W, w = (x[held] for x in _linear(part, u))
+    names = tuple(map(str, np.flatnonzero(held)))
+    space = solutions(K, rest, units(part.physical))
+    return within(space, LinearBounds(names, W, w, w))[0]
+
+
+def _linear(part: Numbers, u: Array) -> tuple[Array, Array]:
+    """Linearise the deviation from the file at u: (u(chi) - u0) / size = W chi - w.
+
+    A link without mass has no centre; it is linearised at a mass of typical size.
+    """
+    point = u.copy()
+    for _, at in part.links:
+        point[at[0]] = u[at[0]] if u[at[0]] > NEAR * part.size[at[0]] else part.size[at[0]]
+    W = np.linalg.inv(part.slope(point) * part.size)
+    return W, W @ part.chi(point) - (point - part.u0) / part.size
+
+
+def _numbers(part: Numbers, chi: Array) -> Array:
+    """Convert standard parameters to link and joint values."""
     u = chi.copy()
     for link, at in part.links:
         u[at] = link.place.numbers(chi[at])
-    held = np.where(part.seen(u), u, part.u0)
+    return u
+
+
+def _hold(part: Numbers, u: Array) -> Array:
+    """Set link and joint values without effect to those of the file.
+
+    A value has no effect if no base parameter depends on it. If the values of the file violate a
+    condition of a physical robot, the values in this condition stay.
+    """
+    u, held = u.copy(), np.where(part.seen(u), u, part.u0)
     for c in part.physical.conditions:
         at = list(c.numbers)
         u[at] = held[at] if c.smallest(part.chi(held)) >= 0 else u[at]

@@ -16,7 +16,7 @@ own.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 from pathlib import Path
 from typing import Any
@@ -120,7 +120,8 @@ class LinkPlace:
     axes : ndarray, shape (3, 3)
         Orientation of the axes of the tensor in the link, as in the file or as compiled by MuJoCo.
     stated : ndarray, shape (10,), or None
-        NUMBERS as a URDF states them; None for an MJCF, whose numbers are compiled.
+        NUMBERS as a URDF states them; None for an MJCF, whose numbers are compiled, unless the link
+        has no mass: its ten parameters do not contain its centre.
     """
 
     attributes: Attributes
@@ -255,10 +256,14 @@ class Places:
             )
         place = self.tree.places.get(name, np.eye(4))  # a URDF has one frame for link and body
         axes = place[:3, :3].T @ inertial.pose[:3, :3]
-        tensor = inertial.I[np.triu_indices(3)]
-        stated = np.array([inertial.M, *inertial.pose[:3, 3], *tensor])
-        of_file = stated if self.attributes is URDF else None
-        return LinkPlace(self.attributes, link, e, X @ place, axes, of_file)
+        compiled = LinkPlace(self.attributes, link, e, X @ place, axes, None)
+        if self.attributes is MJCF and inertial.M > 0:
+            return compiled
+        centre = np.linalg.solve(place, inertial.pose[:, 3])[:3]
+        own = self.attributes is URDF or compiled.principal
+        I = inertial.I if own else axes @ inertial.I @ axes.T
+        stated = np.array([inertial.M, *centre, *I[np.triu_indices(3)]])
+        return replace(compiled, stated=stated)
 
     def attribute(self, family: str, joint: Joint) -> str | None:
         """Return the name of the XML attribute for a parameter of a joint, such as damping.

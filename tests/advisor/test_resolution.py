@@ -18,7 +18,7 @@ from runtime.advisor.sign_errors import kernels, switch_with_error
 from runtime.compose import advise, observe
 from runtime.core.drives import encoder_drives
 from runtime.core.errors import InputError, ModelError, SettingsError
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.model import BoundModel, load_model
 from runtime.core.record import Record
 from runtime.core.rows.prepared import decimated_torque
@@ -32,6 +32,8 @@ from runtime.reporting.sections import part_section
 from runtime.study import study_from_mapping
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files
+
+LIMIT = limits("runtime.advisor")
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 TX40_COLUMNS = (

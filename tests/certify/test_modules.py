@@ -21,6 +21,7 @@ from typer.testing import CliRunner
 import symgen
 from oracles.random_robots import random_robot
 from runtime import load_model
+from runtime.core import loading
 from symgen.certify import importing, requests
 from symgen.certify.importing import without_certificate
 from symgen.certify.modules import certified_files, certify, require_valid
@@ -318,6 +319,61 @@ def test_a_cache_that_others_may_write_to_is_refused(cache, place, mode) -> None
         return
     with pytest.raises(SymgenError, match=r"SYMGEN_CACHE: other users can write to .*chmod 700"):
         symgen.model("planar_2r")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permission bits")
+@pytest.mark.parametrize("way", ["link", "link to a part", ".."])
+def test_a_cache_is_judged_where_it_is(way, tmp_path, monkeypatch) -> None:
+    """Another could replace the folder at the end of a link, or that which `..` leads to."""
+    shared, own = tmp_path / "shared", tmp_path / "own"
+    (shared / "part").mkdir(parents=True)
+    own.mkdir()
+    shared.chmod(0o777)
+    (own / "link").symlink_to(shared / "part")
+    given = {
+        "link": own / "link",
+        "link to a part": own / "link" / "cache",
+        "..": own / "link" / "..",
+    }
+    monkeypatch.setenv("SYMGEN_CACHE", str(given[way]))
+    with pytest.raises(SymgenError, match="SYMGEN_CACHE: other users can write to"):
+        symgen.model("planar_2r")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permission bits")
+def test_a_link_from_a_shared_folder_is_followed(tmp_path, monkeypatch) -> None:
+    """The folder itself is used, by its own path."""
+    (tmp_path / "shared").mkdir()
+    (tmp_path / "shared" / "link").symlink_to(tmp_path / "cache")
+    (tmp_path / "shared").chmod(0o777)
+    monkeypatch.setenv("SYMGEN_CACHE", str(tmp_path / "shared" / "link"))
+    assert Path(symgen.model("planar_2r").__file__).is_relative_to(tmp_path / "cache")
+
+
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="no XDG folders")
+@pytest.mark.parametrize(
+    "folder", [importing.cache_folder, lambda: loading.cache_folder("modules")]
+)
+def test_a_relative_xdg_cache_home_is_ignored(folder, tmp_path, monkeypatch) -> None:
+    monkeypatch.delenv("SYMGEN_CACHE", raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    for given in ("", ".", "cache", "../cache"):
+        monkeypatch.setenv("XDG_CACHE_HOME", given)
+        assert folder() == tmp_path / ".cache" / "symgen" / "modules"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
+    assert folder() == tmp_path / "xdg" / "symgen" / "modules"
+
+
+def test_foreign_text_in_the_certificate_of_an_entry_is_not_run(cache, tmp_path) -> None:
+    path, mark = Path(symgen.model("planar_2r").__file__), tmp_path / "mark"
+    text = path.read_bytes()
+    foreign = (
+        f"# Certificate by symgen coding: raw_unicode_escape \\u000aopen({str(mark)!r},'w')#\n"
+    )
+    foreign += f"# {importing.END}{64 * '0'}\n{without_certificate(text.decode())}"
+    path.write_text(foreign, encoding="utf-8")
+    assert symgen.model("planar_2r").NAME == "planar_2r"
+    assert path.read_bytes() == text and not mark.exists()
 
 
 def test_two_processes_at_once_and_others_that_load_the_file(cache) -> None:

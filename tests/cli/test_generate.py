@@ -1,8 +1,10 @@
 """`symgen generate`: modules are current, deterministic, and written whole or not at all."""
 
 import os
+import re
 import subprocess
 import sys
+from itertools import combinations
 from pathlib import Path
 
 import pytest
@@ -14,6 +16,7 @@ from symgen.certify.importing import without_certificate
 from symgen.cli.generate import emitted
 from symgen.cli.main import app
 from symgen.description import packaged_robots, skeleton
+from symgen.emit.targets import TARGETS
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 
@@ -88,6 +91,22 @@ def test_no_folder_of_this_machine_in_emitted_files(tmp_path, file):
         )
 
 
+@pytest.mark.parametrize(
+    "targets",
+    [(name,) for name in TARGETS] + [*combinations(TARGETS, 2)],
+    ids=",".join,
+)
+def test_each_target_alone_and_each_pair(targets, tmp_path):
+    result = run("emps", "--target", ",".join(targets), "-o", tmp_path)
+    assert result.exit_code == 0, result.output
+    kinds = {*targets, *["h"] * ("c" in targets)}
+    files = {TARGETS[name].file.replace("{}", "emps") for name in kinds}
+    assert {path.name for path in tmp_path.iterdir()} == files
+    said = result.stderr.splitlines()
+    assert len(said) == sum(bool(TARGETS[name].use) for name in targets)
+    assert all("emps" in line and "{" not in line for line in said)
+
+
 def test_default_folder_is_generated(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert run("emps").exit_code == 0
@@ -105,6 +124,48 @@ def test_check_shows_what_changed_and_writes_nothing(tmp_path):
     assert "-NAME = 'old'" in result.stdout and "+NAME = 'emps'" in result.stdout
     assert "not current" in result.stderr and "planar_2r.py" in result.stderr
     assert (tmp_path / "emps.py").read_bytes() == before and len(list(tmp_path.iterdir())) == 1
+
+
+END = "sha256 of all but these lines: " + 64 * "0"
+FOREIGN = {
+    "coding cookie": lambda text: (
+        "# Certificate by symgen 0.4.0 coding: raw_unicode_escape \\u000aprint('foreign')\\u000a#\n"
+        f"# {END}\n{without_certificate(text)}"
+    ),
+    "comment that closes": lambda text: (
+        f"/* Certificate by symgen 0.4.0 */ int foreign = 1;\n/* {END}\n{without_certificate(text)}"
+    ),
+    "word in a certificate": lambda text: text.replace("0.4.0: formulas", "0.4.0: foreign", 1),
+    "one more line": lambda text: text.replace("sha256 of all", "foreign\nsha256 of all", 1),
+    "another digest": lambda text: re.sub(r"(these lines: )\w{64}", rf"\g<1>{64 * '0'}", text),
+    "no certificate": without_certificate,
+    "carriage return": lambda text: text.replace("formulas exact", "\rformulas exact", 1),
+    "byte order mark": lambda text: "\ufeff" + text,
+    "no UTF-8": lambda text: text.replace("formulas exact", "formulas \udcff exact", 1),
+}
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+@pytest.mark.parametrize("target", ["numpy", "c"])
+@some(8)
+def test_foreign_text_in_a_certificate_is_not_current(target, name, tmp_path):
+    """A coding cookie and a comment that closes make code of a comment."""
+    path = tmp_path / TARGETS[target].file.format("emps")
+    assert run("emps", "--target", target, "-o", tmp_path).exit_code == 0
+    text = path.read_bytes().decode("utf-8")
+    foreign = FOREIGN[name](text)
+    assert foreign != text
+    path.write_bytes(foreign.encode("utf-8", "surrogateescape"))
+    result = run("emps", "--target", target, "--check", "-o", tmp_path)
+    assert result.exit_code == 1, result.output
+    assert f"not current: {path};" in result.stderr
+
+
+def test_ends_of_lines_of_windows_are_current(tmp_path):
+    assert run("emps", "-o", tmp_path).exit_code == 0
+    path = tmp_path / "emps.py"
+    path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
+    assert run("emps", "--check", "-o", tmp_path).exit_code == 0
 
 
 def test_one_bad_robot_and_nothing_is_written(tmp_path):

@@ -56,6 +56,17 @@ def test_a_cache_that_anyone_may_write_to_proves_nothing(generated):
         load_model("planar_2r", folder=generated)
 
 
+def test_a_cache_behind_a_link_is_judged_where_it_is(generated):
+    shared = generated / "shared"
+    shared.mkdir()
+    (generated / "cache").rename(shared / "cache")
+    (generated / "cache").symlink_to(shared / "cache")
+    assert load_model("planar_2r", folder=generated).NAME == "planar_2r"
+    shared.chmod(0o777)
+    with pytest.raises(ModelError, match="pass trust=True"):
+        load_model("planar_2r", folder=generated)
+
+
 def test_a_module_of_python_needs_no_file():
     module = symgen.model("planar_2r")
     assert load_model(module) is module

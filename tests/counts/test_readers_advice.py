@@ -12,11 +12,13 @@ from runtime.advisor.advice import crossing
 from runtime.advisor.coarse_encoders import PHASES, CoarseEncoders, mean_change
 from runtime.advisor.readers import curves
 from runtime.compose import advise, cestac, problem
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.signals.filters import filtered_states
 from runtime.core.study import CestacSettings
 from runtime.reporting.sections import part_section
 from runtime.study import Rows, Study
+
+LIMIT = limits("runtime.advisor")
 
 NAMES = ("ZZ1R", "ZZ2", "FV1")
 STUDY = Study(

@@ -16,7 +16,7 @@ import runtime
 import symgen
 from oracles.random_robots import random_parameters, random_robot
 from runtime.compose import estimate_of
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.core.rows.prepared import Prepared
 from runtime.core.signals.filters import lowpassed
 from runtime.physical.inertia import physical_model
@@ -27,6 +27,8 @@ from runtime.plausible.samples import Samples, excerpts, samples_of
 from runtime.reading.records import read_records
 from runtime.study import Rows, Study, study_from_mapping
 from symgen.description.yaml import parse_robot
+
+LIMIT = limits("runtime.plausible")
 
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
 

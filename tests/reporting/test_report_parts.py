@@ -19,6 +19,7 @@ from runtime.core.markup import split, symbol, unit
 from runtime.core.model import load_model
 from runtime.core.part import Part
 from runtime.core.study import Decimate, Signals
+from runtime.core.table import percentage
 from runtime.core.validation import JointComparison
 from runtime.expected import Expected, expected_off
 from runtime.physical.consistency import Consistency
@@ -32,7 +33,6 @@ from runtime.reporting.parameters import (
 from runtime.reporting.sections import (
     decimation_cutoff,
     other_torques_section,
-    percent_sigma,
     probability,
     torque_section,
 )
@@ -337,7 +337,8 @@ def test_no_difference_to_a_value_within_the_interval(given, difference):
 
 
 def test_small_and_large_statistics_keep_few_digits():
-    assert [percent_sigma(x) for x in (0.456, 23.45, 51.0, 1.3e12)] == ["0.46", "23", "51", ""]
+    percents = [percentage(x, x, ".2g") for x in (0.456, 23.45, 51.0, 1.3e12)]
+    assert percents == ["0.46", "23", "51", "-"]
     assert [probability(p) for p in (0.92, 0.0049, 4.5e-176, 0.0)] == [
         "0.92", "0.0049", "< 0.0001", "< 0.0001",
     ]  # fmt: skip

@@ -26,9 +26,10 @@ def joint_states(stamps, joints, q, tau, qd=None):
     return [(int(s), tuple(joints), *x) for s, *x in zip(stamps, q, qd, tau, strict=True)]
 
 
-def write_bag(kind, path, topics, *, logged=None):
+def write_bag(kind, path, topics, *, logged=None, frames=None, nodes=None, counts=None):
     """A bag of the kind at `path`, without its ending; topics : messages by topic. Returns its
-    path. logged : ns by message, default the stamps.
+    path. By message: logged, ns, default the stamps; frames, its frame_id; and in ROS 1 nodes, the
+    publisher, and counts, its counter seq.
     """
     if kind.startswith("ros1"):
         path = path.with_suffix(".bag")
@@ -36,7 +37,7 @@ def write_bag(kind, path, topics, *, logged=None):
         writer = rosbag1.Writer(path)
         if " " in kind:
             writer.set_compression(rosbag1.Writer.CompressionFormat[kind.split()[1].upper()])
-        encode, header = store.serialize_ros1, {"seq": 0}
+        encode, header = store.serialize_ros1, ("seq",)
     else:
         store = get_typestore(Stores.ROS2_HUMBLE)
         plugin = StoragePlugin.MCAP if "mcap" in kind else StoragePlugin.SQLITE3
@@ -44,23 +45,36 @@ def write_bag(kind, path, topics, *, logged=None):
         mode = kind.split()[1].upper() if " " in kind and "bare" not in kind else ""
         if mode:
             writer.set_compression(CompressionMode[mode], CompressionFormat.ZSTD)
-        encode, header = store.serialize_cdr, {}
+        encode, header = store.serialize_cdr, ()
     Header, Time, State = (
         store.types[name]
         for name in ("std_msgs/msg/Header", "builtin_interfaces/msg/Time", MESSAGE)
     )
     with writer:
         for topic, messages in topics.items():
-            connection = writer.add_connection(topic, MESSAGE, typestore=store)
+            named = [
+                {} if node is None else {"callerid": node}
+                for node in dict.fromkeys(nodes or [None])
+            ]
+            connections = [
+                writer.add_connection(topic, MESSAGE, typestore=store, **n) for n in named
+            ]
+            of = dict(zip(dict.fromkeys(nodes or [None]), connections, strict=True))
             for i, (stamp, joints, *values) in enumerate(messages):
                 time = Time(sec=int(stamp) // 10**9, nanosec=int(stamp) % 10**9)
                 state = State(
-                    Header(stamp=time, frame_id="", **header),
+                    Header(
+                        stamp=time,
+                        frame_id=frames[i] if frames else "",
+                        **dict.fromkeys(header, counts[i] if counts else 0),
+                    ),
                     list(joints),
                     *(np.array(x, dtype=float) for x in values),
                 )
                 writer.write(
-                    connection, int(stamp) if logged is None else logged[i], encode(state, MESSAGE)
+                    of[nodes[i] if nodes else None],
+                    int(stamp) if logged is None else logged[i],
+                    encode(state, MESSAGE),
                 )
     if kind.startswith("bare"):
         return next(path.glob("*.mcap" if "mcap" in kind else "*.db3"))

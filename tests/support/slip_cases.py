@@ -22,13 +22,15 @@ import symgen
 from runtime.compose import problem
 from runtime.core.drives import Drives
 from runtime.core.errors import InputError
-from runtime.core.limits import LIMIT
+from runtime.core.limits import limits
 from runtime.plausible.causes import unchanged_study
 from runtime.plausible.samples import samples_of
 from runtime.plausible.trials import Baseline, baseline_of, regressor
 from runtime.study import study_from_mapping
 from symgen.description.yaml import parse_robot
 from symgen.errors import SymgenError
+
+LIMIT = limits("runtime.plausible")
 
 Array = np.ndarray
 Plain = dict[str, Any]

@@ -68,6 +68,9 @@ def test_they_give_way_where_no_physical_link_is_left(tmp_path) -> None:
     applied = symgen.apply(exact(model, light), path)
     (note,) = (x for x in applied.notes() if "no physical link was left otherwise" in x)
     assert "link 'b': " in note
+    changed = [c for c in applied.changes if c.told_by == "file"]
+    assert changed and all(np.isnan(c.sigma) for c in changed)
+    assert not {f"{c.place}: {c.number}" for c in changed} & {*applied.undetermined}
     placed = dict(load_robot(applied.write(tmp_path / "new.urdf")).values)
     assert model.base_parameters(placed | dict(applied.placeless)) == pytest.approx(
         np.asarray(model.base_parameters(light)), rel=1e-9, abs=1e-12

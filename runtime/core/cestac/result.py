@@ -56,7 +56,7 @@ from runtime.core.part import (
 )
 from runtime.core.rows.observation import Observation
 from runtime.core.study import CestacSettings
-from runtime.core.table import Table, csv_text, notebook, number
+from runtime.core.table import Table, csv_text, notebook, number, percentage
 
 Array = np.ndarray
 
@@ -300,14 +300,17 @@ class Cestac(Result, Part):
     def error_table(self) -> Table:
         """Return the table of errors %e, eq. (21), and %sigma, eq. (20), at every rounding step.
 
-        It has one line per parameter; `*` marks parameters that do not decide the verdict.
+        It has one line per parameter; `*` marks parameters that do not decide the verdict, "-"
+        parameters whose 95 % interval contains zero.
         """
+        reference = self.reference
+        own = reference.relative_deviation
         rows = [
             (
                 name if name in self.deciding else f"{name} *",
-                number(self.reference.relative_sigma[i], ".2f"),
+                percentage(reference.relative_sigma[i], own[i]),
                 *(
-                    f"{number(r.e[i], '.2f')} ({number(r.relative_sigma[i], '.2f')})"
+                    f"{percentage(r.e[i], own[i])} ({percentage(r.relative_sigma[i], own[i])})"
                     for r in self.levels
                 ),
             )

@@ -22,7 +22,7 @@ from typing import Any, Literal
 import numpy as np
 
 from runtime.core.documents import InfIfNull, Matrix, NanIfNull, Vector, Whole, from_text, json_text
-from runtime.core.table import Table, notebook, number, parameter_table
+from runtime.core.table import Table, notebook, number, parameter_table, percentage
 
 SCHEMA = "symgen-estimate/1"
 """Kind and version of the JSON layout; `symgen schema --of estimate` prints its JSON Schema."""
@@ -174,6 +174,15 @@ class Estimate:
             return np.asarray(100 * self.sigma / np.abs(self.X))
 
     @property
+    def relative_deviation(self) -> Vector:
+        """The larger of the stated and the corrected standard deviation, % of |X|; inf if X is zero.
+
+        The 95 % interval of a parameter contains zero if 1.96 times this number is 100 or more.
+        """
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            return np.asarray(100 * np.fmax(self.sigma, self.sigma_corrected) / np.abs(self.X))
+
+    @property
     def rows(self) -> Whole:
         """Number of rows r of W."""
         return sum(fit.rows for fit in self.per_joint)
@@ -228,7 +237,7 @@ class Estimate:
                 name,
                 f"{self.X[i]:.6g}",
                 number(self.sigma[i], ".3g"),
-                number(self.relative_sigma[i], ".3f"),
+                percentage(self.relative_sigma[i], self.relative_deviation[i], ".3f"),
                 number(self.sigma_corrected[i], ".3g"),
                 self.units.get(name, ""),
             )
@@ -277,6 +286,5 @@ class Estimate:
         """
         shown = self.names if names is None else tuple(names)
         place = [self.names.index(name) for name in shown]
-        return parameter_table(
-            shown, self.X[place], self.relative_sigma[place], self.units, blocks=blocks
-        )
+        percent = np.where(1.96 * self.relative_deviation < 100, self.relative_sigma, np.nan)
+        return parameter_table(shown, self.X[place], percent[place], self.units, blocks=blocks)
