@@ -152,6 +152,7 @@ def settings(step: float | None = None) -> Study:
     """Those of the measured record, read by the low-pass, or as counts of that step."""
     signals = {
         "median": 5,
+        "torque_median": 5,
         "lowpass": {"cutoff": 50},
         **({} if step is None else {"reader": "counts", "step": step}),
     }

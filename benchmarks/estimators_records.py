@@ -132,7 +132,7 @@ EMPS_METHODS: tuple[tuple[str, int, EstimateSettings], ...] = (
 def tx40_rows(low_speed: float, around: float) -> tuple[GeneratedModel, Study, Observation]:
     """Rows of the TX40 record in the loop that is assumed, without the median filter."""
     model, mapping = load_model("tx40", folder=GENERATED, trust=True), dict(dataset_study("tx40"))
-    mapping["signals"] = {**mapping["signals"], "median": 1}
+    mapping["signals"] = {**mapping["signals"], "median": 1, "torque_median": 1}
     mapping["rows"] = {**mapping["rows"], "low_speed": low_speed}
     mapping["controller"] = {"law": LAW, "rate": 5000, "torque": {"saturation": None}}
     study = study_from_mapping(mapping)

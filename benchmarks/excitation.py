@@ -113,7 +113,7 @@ def confirm(model: object, study: object, motion: object, s: np.ndarray, records
     asked = replace(
         study,
         rows=replace(study.rows, window=(None, None)),
-        signals=replace(study.signals, median=1),
+        signals=replace(study.signals, median=1, torque_median=1),
         estimate=replace(study.estimate, method="wls"),
     )
     _, *states = motion.sampled(RATE)

@@ -60,7 +60,10 @@ def study_of(files: list[str]) -> Study:
     given = study_from_mapping(dataset_study("tx40"))
     records = tuple(replace(record, files=tuple(files), dataset=None) for record in given.record)
     signals = Signals(
-        median=5, lowpass=Lowpass(cutoff=CUTOFF, on=("q",)), decimate=Decimate(factor=FACTOR)
+        median=5,
+        torque_median=5,
+        lowpass=Lowpass(cutoff=CUTOFF, on=("q",)),
+        decimate=Decimate(factor=FACTOR),
     )
     return replace(given, record=records, signals=signals, rows=Rows(window=(0.0, END), trim=0))
 

@@ -19,7 +19,7 @@ import sys
 import time
 
 from symgen.description import Robot, load_robot, parse_robot
-from symgen.description.at_values import at_values
+from symgen.description.values import at_values
 from symgen.emit.generate import generate_module
 
 ROBOTS = ("tx40", "panda", "haptic", "sr400", "four_bar", "five_bar")

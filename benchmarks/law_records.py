@@ -1,10 +1,8 @@
-"""Records without torques and joints with two encoders: tables of law_records.md; `calf`:
-armature of the calves.
+"""Records without torques: tables of law_records.md; `calf`: armature of the calves.
 
-    SYMGEN_DATA=... python benchmarks/law_records.py [go2] [kr300] [calf]
+    SYMGEN_DATA=... python benchmarks/law_records.py [go2] [calf]
 
-Go2: runs 0 to 7 under one PD law; torque of the law, weights by joint. KR300: records A and B, motor
-encoders and those behind the gears of axes 1 to 3.
+Go2: runs 0 to 7 under one PD law; torque of the law, weights by joint.
 """
 
 from __future__ import annotations
@@ -12,7 +10,6 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -21,11 +18,8 @@ import numpy as np
 import symgen
 from runtime.compose import estimate_of, problem
 from runtime.core.model import GeneratedModel
-from runtime.core.record import Record
 from runtime.core.rows.observation import Observation, stack
-from runtime.core.rows.prepared import stacked
 from runtime.core.study import EstimateSettings
-from runtime.elastic import elasticity
 from runtime.reading.records import read_records
 from runtime.study import Study, study_from_mapping
 
@@ -64,7 +58,12 @@ def go2_study(
         {
             "record": {"files": files[0], "also": files[1:], "columns": columns, "rate": 200},
             "controller": {"law": law, "torque": {"saturation": None}},
-            "signals": {"median": median, "lowpass": {"cutoff": cutoff}, "velocity": velocity},
+            "signals": {
+                "median": median,
+                "torque_median": median,
+                "lowpass": {"cutoff": cutoff},
+                "velocity": velocity,
+            },
         }
     )
 
@@ -144,7 +143,7 @@ def go2() -> None:
         print(problem(model, records, study).noted("law").text, "\n")
     print("Error on each run, %, of a fit of the other seven\n")
     cases: list[tuple[str, Study]] = [
-        ("defaults (median 5, cut-off auto)", go2_study(cutoff="auto", median=5)),
+        ("median 5, cut-off auto", go2_study(cutoff="auto", median=5)),
         (
             "the same, differences of q alone",
             go2_study(cutoff="auto", median=5, velocity="differences"),
@@ -174,49 +173,14 @@ def calf() -> None:
     for title, study in (
         ("median off, low-pass 10 Hz", go2_study()),
         ("the same, torques 10 ms later", go2_study(delay=0.01)),
-        ("defaults: median 5, cut-off auto", go2_study(cutoff="auto", median=5)),
+        ("median 5, cut-off auto", go2_study(cutoff="auto", median=5)),
     ):
         values = spread(model, observed(model, study), [f"Ia{j}" for j in CALVES])
         rows.append((title, *(f"{m:.4f}, {s:.4f} ({d:.4f})" for _, m, s, d in values)))
     table(("treatment", "FL, `Ia3`", "FR, `Ia6`", "RL, `Ia9`", "RR, `Ia12`"), rows)
 
 
-def kr300() -> None:
-    import kr300 as source
-
-    print("Stiffness of axes 1 to 3, 1e6 N m/rad, +- 95 %\n")
-    rows = []
-    for load, rotors in ((source.LOAD, "known"), (None, "fitted")):
-        with TemporaryDirectory() as folder:
-            path = Path(folder) / "kr300.yaml"
-            path.write_text(source.robot_text(load))
-            model = symgen.model(path)
-        for names in ("A", "B", "AB"):
-            records = []
-            for name in names:
-                study = study_from_mapping(source.study(name))
-                columns = replace(study.record[0].columns, q_link=("rec.act_pos_se_deg",))
-                given = replace(study.record[0], columns=columns)
-                record: Record = read_records((given,), model)[0]
-                records.append(record)
-            whole = problem(model, records, study)
-            fit = estimate_of(stacked(model, whole.prepared), EstimateSettings(), model=model)
-            gears = elasticity(whole, fit.names, fit.X)
-            assert gears is not None
-            each = [
-                f"{K / 1e6:.2f} +- {1.96 * s / 1e6:.2f}" if np.isfinite(K) else "not told"
-                for K, s in zip(gears.K, gears.sigma_K, strict=True)
-            ]
-            lags = ", ".join(f"{1e3 * lag:.2f}" for lag in gears.lag)
-            rows.append((" and ".join(names), rotors, *each, lags))
-    rows.append(("authors", "", "4.58", "7.52", "4.10", ""))
-    table(
-        ("records", "rotor inertia", "axis 1", "axis 2", "axis 3", "lag of the encoder behind, ms"),
-        rows,
-    )
-
-
 if __name__ == "__main__":
-    asked = sys.argv[1:] or ["go2", "kr300"]
+    asked = sys.argv[1:] or ["go2"]
     for name in asked:
-        {"go2": go2, "kr300": kr300, "calf": calf}[name]()
+        {"go2": go2, "calf": calf}[name]()

@@ -52,7 +52,6 @@ from runtime.core.study import EstimateSettings
 from runtime.counts.encoder_advice import EncoderSteps
 from runtime.counts.own_encoder import own_encoder
 from runtime.counts.reader import counted
-from runtime.elastic import elastic_gears
 from runtime.expected import ExpectedError
 from runtime.laws.scalars import fitted_scalars, scalars_of_laws
 from runtime.laws.transmitted import transmitted_torque
@@ -62,7 +61,7 @@ from runtime.loop.cestac import loop_of
 from runtime.loop.closed_loop import observed_loop
 from runtime.loop.fixed_point import FixedPointOptions
 from runtime.loop.simulated_motion import beside_record
-from runtime.median import torque_median
+from runtime.median import pulses_in_torques
 from runtime.payload.study import LOADED, load_of_study, payload_study
 from runtime.physical import feasible
 from runtime.physical.consistency import as_fitted, consistency
@@ -92,7 +91,7 @@ STEPS: list[Step] = [
     commands_for_torques,
     force_sensors,
     torques_of_links,
-    torque_median,
+    pulses_in_torques,
     recorded_speeds,
     automatic_cutoff,
     poses_at_rest,
@@ -150,7 +149,6 @@ EXTRAS: list[Extra] = [
     ),
     scalars_of_laws,
     load_of_study,
-    elastic_gears,
     EncoderSteps,
     agreement,
     ExpectedError,

@@ -1,4 +1,4 @@
-"""Decide whether a running median suits the torques of a record (`signals.torque_median: auto`).
+"""Tell whether the running median of the torques (`signals.torque_median`) removes motion.
 
 A controller that reacts to each count of an encoder drives the motor in pulses. The mean of these
 pulses moves the robot, but a median removes them. Let d be the change of the torque tau of a joint
@@ -12,20 +12,17 @@ benchmarks/truth.md.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from runtime.core.limits import LIMIT
 from runtime.core.problem import SIGNALS, Note, Problem
 from runtime.core.rows.selection import excerpt
 from runtime.core.signals.filters import median_filtered
-from runtime.core.study import Study
 
 FEWEST_BLOCKS = 20
 """Such means of a record from which it is asked."""
 MEDIAN_TAKES = 0.015
-"""Share of a torque in time with the motion from which no median is taken: loops 0.022 to 0.18, TX40 0.007, noise of 15 % 0.003. Measured: benchmarks/truth.md."""
+"""Share of a torque in time with the motion from which it is told: loops 0.022 to 0.18, TX40 0.007, noise of 15 % 0.003. Measured: benchmarks/truth.md."""
 TORQUE_BLOCK = 0.1
 """Length of the means that tell what a median takes from torques, s. Measured: benchmarks/truth.md."""
 
@@ -60,32 +57,25 @@ def share_taken(tau: Array, q: Array, rate: float, window: int) -> Array:
     return share
 
 
-def torque_median(problem: Problem) -> Problem:
-    """Switch the running median of the torques off if it removes torque that follows the motion.
+def pulses_in_torques(problem: Problem) -> Problem:
+    """Note if the running median of the torques removes torque that follows the motion.
 
-    This is a step of the preparation of a problem. It acts only if signals.torque_median is auto.
+    This is a step of the preparation of a problem; it changes no setting.
     """
-    signals = problem.settings.signals
-    if signals.torque_median != "auto":
+    window = problem.settings.signals.torque_median
+    if window == 1:
         return problem
     shares = []
     for record in problem.records:
         samples = excerpt(record, problem.settings.rows)
-        shares.append(
-            share_taken(record.tau[samples], record.q[samples], record.rate, signals.median)
-        )
+        shares.append(share_taken(record.tau[samples], record.q[samples], record.rate, window))
     if np.max(shares, initial=0.0) <= MEDIAN_TAKES:
-        return problem.changed(settings=_with_window(problem, signals.median))
+        return problem
     worst = np.max(shares, axis=0)
     text = (
-        "No median filter of the torques (torque_median: auto): this filter would remove "
+        f"The median filter of the torques (signals.torque_median: {window}) removes "
         f"{100 * worst.max():.2g} % of the torque of joint {1 + worst.argmax()} together with "
-        "the motion, as if a controller answers every count of its encoder."
+        "the motion, as if a controller answers every count of its encoder; "
+        "set torque_median: 1."
     )
-    return problem.changed(Note(SIGNALS, text), settings=_with_window(problem, 1))
-
-
-def _with_window(problem: Problem, window: int) -> Study:
-    """Return the study settings with a running median of `window` samples for the torques."""
-    settings = problem.settings
-    return replace(settings, signals=replace(settings.signals, torque_median=window))
+    return problem.changed(Note(SIGNALS, text))

@@ -114,7 +114,7 @@ def _record(record: Record, channels: Sequence[str]) -> Record:
     """Add six fixed joints per force sensor to a record; their torques are the measured wrench."""
     rest = np.zeros((len(record), 6 * len(channels)))
     others = {
-        c: np.hstack([x, rest * (np.nan if c == "q_link" else 0)]) if c in JOINT_CHANNELS else x
+        c: np.hstack([x, rest]) if c in JOINT_CHANNELS else x
         for c, x in record.channels.items()
         if c not in channels
     }

@@ -47,11 +47,11 @@ FAULTS = (
     # derive
     Fault("symgen/derive/newton_euler.py", "off(1, 2, DV[0][1] - wd[2])", "off(1, 2, DV[0][1] + wd[2])", "sign in U = skew(wd) + skew(w)**2", EMITTED),
     Fault("symgen/derive/newton_euler.py", "a[1] - qd2 * w[0]", "a[1] + qd2 * w[0]", "sign of the Coriolis term of a prismatic joint", EMITTED),
-    Fault("symgen/derive/model.py", "-e for k, e in enumerate(d.robot.gravity)", "e for k, e in enumerate(d.robot.gravity)", "gravity turned", EMITTED),
+    Fault("symgen/derive/models.py", "-e for k, e in enumerate(d.robot.gravity)", "e for k, e in enumerate(d.robot.gravity)", "gravity turned", EMITTED),
     Fault("symgen/derive/newton_euler.py", "dot((YY, XX - ZZ, XZ, XY, -YZ)", "dot((YY, ZZ - XX, XZ, XY, -YZ)", "sign in w x (J w)", EMITTED),
     Fault("symgen/derive/newton_euler.py", "cross(geometry.P[j], fi)", "cross(fi, geometry.P[j])", "lever of the force on the link before, turned", EMITTED),
     Fault("symgen/derive/geometry.py", "self.turn[f.ant][1] + offset", "self.turn[f.ant][1]", "constant of an angle sum of parallel axes lost", EMITTED),
-    Fault("symgen/derive/elements.py", 'return speed if law == Expression.symbol("qd") else direction', 'return direction if law == Expression.symbol("qd") else speed', "one-sided Coulomb and viscous friction exchanged", EMITTED),
+    Fault("symgen/derive/regressor.py", 'return speed if law == Expression.symbol("qd") else direction', 'return direction if law == Expression.symbol("qd") else speed', "one-sided Coulomb and viscous friction exchanged", EMITTED),
     # regroup
     Fault("symgen/regroup/rules.py", '{("XX", 0): -ONE}', '{("XX", 0): ONE}', "YY goes into XX with the wrong sign", REGROUPED),
     Fault("symgen/regroup/rules.py", "- p[k] * u[m] -", "+ p[k] * u[m] -", "sign in the parallel axis rule", REGROUPED),
@@ -71,7 +71,7 @@ FAULTS = (
     Fault("runtime/core/signals/filters.py", "np.minimum(np.maximum(a, b), shifted[-1])", "np.minimum(np.minimum(a, b), shifted[-1])", "the running median is the smaller of two", SIGNALS),
     Fault("runtime/core/rows/selection.py", "np.abs(qd[instants].T) >= slow", "np.abs(qd[instants]).max(axis=1) >= slow", "low speed judged by the fastest joint", ("core/test_observation.py",)),
     Fault("runtime/core/rows/selection.py", 'np.searchsorted(t, t1, side="right"', 'np.searchsorted(t, t1, side="left"', "the last sample of a window is lost", ("core/test_observation.py",)),
-    Fault("runtime/core/rows/prepared.py", "median_filtered(tau, selection.signals.window_of_torques)", "tau", "torques without their median filter", ("core/test_observation.py", "core/test_cestac.py")),
+    Fault("runtime/core/rows/prepared.py", "median_filtered(tau, selection.signals.torque_median)", "tau", "torques without their median filter", ("core/test_observation.py", "core/test_cestac.py")),
     Fault("runtime/core/rows/factor.py", "R=joint.R * w)", "R=joint.R * w**2)", "weights of the joints squared", ESTIMATES),
     Fault("runtime/core/rows/observation.py", "start = sum(self.rows[:j])", "start = sum(self.rows[: j + 1]) - self.rows[0]", "rows of a joint looked for at another place", ("core/test_observation.py", *ESTIMATES)),
     # model: units and drives

@@ -5,6 +5,7 @@ are, and a rich motion is left alone.
 from dataclasses import replace
 
 import numpy as np
+import planar_arm
 import pytest
 
 import runtime
@@ -58,6 +59,25 @@ def test_range_not_known_and_not_determined(arm):
     assert np.isnan(expected_error(bare, result.observation, result.study.estimate, fit, ()).error)
     lost = replace(result, estimate=replace(result.estimate, status="rank-deficient"))
     assert lost.expected_error == 999
+
+
+def test_a_law_of_the_transmitted_torque_has_an_expected_error():
+    """It was not known, so that single values (MY1, MY2, which are zero) counted in the verdict."""
+    text = planar_arm.text_of(
+        planar_arm.FRICTION + "\n  FL: {kind: load_dependent, along: all}",
+        planar_arm.FRICTION_VALUES + ", FL1: 0.12, FL2: 0.12",
+    )
+    model = planar_arm.arm(text)
+    t, q, qd, qdd = planar_arm.motion(0)
+    X = planar_arm.parameters(model)
+    rest = np.where([name.startswith("FL") for name in model.BASE_PARAMETERS], 0.0, X)
+    none = dict.fromkeys(("tau_model1", "tau_model2"), np.zeros(len(t)))
+    load = dict(zip(none, (model.regressor(q, qd, qdd, **none) @ rest).T, strict=True))
+    tau = model.regressor(q, qd, qdd, **load) @ X
+    tau = tau + 0.03 * np.random.default_rng(1).standard_normal(tau.shape)
+    result = runtime.identify(model, runtime.Record(t, q, tau), planar_arm.study())
+    assert result.estimate["FL1"] == pytest.approx(0.12, abs=0.01)
+    assert result.expected_error < 2 and result.checklist.state == "good"
 
 
 def test_values_hold_what_the_record_leaves_open(arm):

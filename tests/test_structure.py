@@ -90,7 +90,7 @@ ONLY_IN = {  # library: files and folders that may import it
     "ruamel": ("symgen/description/", "symgen/cli/", "runtime/documents/yaml_text.py"),
     "sympy": ("symgen/symbols/",),
     "casadi": (
-        "symgen/derive/lagrange.py",
+        "symgen/certify/lagrange.py",
         "runtime/loop/",
         "runtime/excitation/optimiser.py",
         "generated/",

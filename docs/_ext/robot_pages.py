@@ -14,8 +14,7 @@ import symgen
 from symgen.derive.loops import close
 from symgen.description import packaged_robots
 from symgen.description.robot import FIXED, PRISMATIC
-from symgen.pages.figure import figure
-from symgen.pages.page import robot_page
+from symgen.pages.page import figure, robot_page
 from symgen.regroup.regrouping import Regrouping
 
 WIDTH, HEIGHT, MARGIN = 300, 220, 22

@@ -111,11 +111,12 @@ def friction_and_gain(model: GeneratedModel, law: Law, estimate: LawEstimate) ->
 
     Such a parameter is the sum of friction and an unknown gain, so it may be negative.
     """
+    elements: Mapping[str, Any] = getattr(model, "ELEMENTS", {})
     pairs = zip(model.JOINTS, estimate.kd, strict=True)
     joints = {j for j, kd in pairs if law.kd == "fit" and not np.isfinite(kd)}
     return tuple(
         name
-        for name, (kind, _, acts) in elements_of(model).items()
+        for name, (kind, _, acts) in elements.items()
         if kind == "viscous" and joints & {j for key in acts for j in np.atleast_1d(key).tolist()}
     )
 

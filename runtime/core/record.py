@@ -25,7 +25,7 @@ Array = np.ndarray
 
 WRENCH = "wrench"
 """Beginning of the channels that are wrenches, before the number of the frame."""
-JOINT_CHANNELS = ("q_r", "qd", "qd_ref", "q_link", "tau_ff")
+JOINT_CHANNELS = ("q_r", "qd", "qd_ref", "tau_ff")
 """Channels with one column per joint."""
 
 UNNAMED = "record"
@@ -113,9 +113,8 @@ class Record:
         Files, clock and drives by which the record was read.
     **named : array_like or None, shape (N, n)
         Channels of the joints: q_r, reference positions of the controller, rad or m; tau_ff,
-        feed-forward torques that it added, N m or N; qd and qd_ref, velocities and their reference;
-        q_link, positions behind the gears, nan on joints without an encoder there. None: not
-        recorded.
+        feed-forward torques that it added, N m or N; qd and qd_ref, velocities and their reference.
+        None: not recorded.
 
     Raises
     ------
@@ -290,8 +289,7 @@ def _channel(label: str, x: ArrayLike, shape: tuple[int, ...], file: str) -> Arr
             f"{label} has shape {array.shape}, but q has shape {shape}; expected {expected}",
             file=file,
         )
-    held = array[:, ~np.isnan(array).all(axis=0)] if label == "q_link" else array
-    require_finite(held, [f"{label}{k + 1}" for k in range(held.shape[1])], file)
+    require_finite(array, [f"{label}{k + 1}" for k in range(array.shape[1])], file)
     array.setflags(write=False)
     return array
 

@@ -107,6 +107,8 @@ WENT: Mapping[str, str] = {
     "estimate.method: cloe": "output error of the closed loop was removed; use didim, which uses the same records of the same loop",
     "record.ratio": RATIO,
     "record.gear_ratio": RATIO,
+    "record.columns.q_link": "the stiffness of gears with two encoders is no longer estimated; remove this key",
+    "signals.torque_median: auto": "the automatic median of torques was removed; write a window such as 5, or remove this key: torques then have no median",
     "signals.lines": "lines of uneven encoders are no longer estimated; remove this key: bounds are widened by the deviation of the lines",
     "estimate.options.prior: pullback": "the distance pullback was removed; use euclidean or none",
     "stream": "this setting was removed, every record is read whole; remove the key, and cut a record that is too large for the memory into shorter records",

@@ -108,8 +108,7 @@ class Signals(Settings):
     Attributes
     ----------
     median : int
-        Window of the median filter on positions and torques, odd number of samples; 1 switches it
-        off.
+        Window of the median filter on positions, odd number of samples; 1 switches it off.
     lowpass : Lowpass or None
         Low-pass filter; null switches it off.
     ends : str
@@ -129,9 +128,9 @@ class Signals(Settings):
         Use of recorded velocities (record.columns.qd), for reader lowpass: the frequency from which
         they replace differences of q. auto: the frequency at which both have the same noise; they
         are not used if they disagree with the positions. differences: they are not used.
-    torque_median : int or str
-        Window of the median filter on torques; auto: as on positions, but no filter if it would
-        remove torque that belongs to the motion, as from a controller that answers every count
+    torque_median : int
+        Window of the median filter on torques, odd number of samples; 1 switches it off. A median
+        removes the pulses of a controller that answers every count of its encoder
         (`runtime.median`).
     options : mapping
         Options of the reader.
@@ -145,7 +144,7 @@ class Signals(Settings):
     step: PerJoint[Positive] | None = None
     side: Literal["joint", "motor"] = "joint"
     velocity: Literal["auto", "differences"] | PerJoint[Positive] = "auto"
-    torque_median: OddWindow | Literal["auto"] = "auto"
+    torque_median: OddWindow = 1
     options: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -162,11 +161,6 @@ class Signals(Settings):
             single = {"median": 1, "torque_median": 1, "lowpass": None, "decimate": None}
             for key, value in single.items():
                 object.__setattr__(self, key, value)
-
-    @property
-    def window_of_torques(self) -> int:
-        """Window of the torque median filter, in samples; for "auto", the window of positions."""
-        return self.median if isinstance(self.torque_median, str) else self.torque_median
 
     @property
     def admits_missing(self) -> bool:

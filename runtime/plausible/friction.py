@@ -37,8 +37,10 @@ def friction(case: Case) -> Answer | None:
     None if every joint has friction, if nothing is fitted, or if sensors behind the gears measure
     the torques, as these have no friction of the drives.
     """
+    if case.alone is None or case.sides[1] == "link":
+        return None
     lacking = ~with_friction(case)
-    if case.alone is None or case.sides[1] == "link" or not lacking.any():
+    if not lacking.any():
         return None
     s = case.samples
     constant, moving = np.ones_like(s.qd), (s.qd, np.sign(s.qd))

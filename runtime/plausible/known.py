@@ -5,8 +5,7 @@
 
 by least squares for each joint: a_j = b_j = 1 if values, gear and sign are right. Viscous
 and dry friction are fitted whether the robot file has them or not, unless sensors behind the gears
-measure the torques. A part is left
-out if it is small or cannot be separated.
+measure the torques. A part is left out if it is small or cannot be separated.
 
 A second question: are the measured torques really torques? Motor currents change in time as the
 computed torques do, but have another size.

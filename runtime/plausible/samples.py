@@ -160,7 +160,7 @@ class Filtered:
 
     def torque(self, tau: Array) -> Array:
         """Filter torques, shape (N, n), by a median filter and the low-pass of the positions."""
-        smooth = median_filtered(tau, self.study.signals.window_of_torques)
+        smooth = median_filtered(tau, self.study.signals.torque_median)
         return lowpass_filtered(smooth, self.record.rate, self.low)
 
 

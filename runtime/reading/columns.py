@@ -209,16 +209,13 @@ class Conversion:
 
     def position(self, q: Array) -> Array:
         """Convert positions q of the file, shape (N, n), to joint positions, rad or m."""
-        return self._at_joints(self.continued(q * self.positions))
+        q = q * self.positions
+        if self.turns is not None:  # without jumps of a full turn
+            q = np.where(self.turns, np.unwrap(q, axis=0), q)
+        return self._at_joints(q)
 
     def _at_joints(self, q: Array) -> Array:
         return q if self.of_positions is None else self.of_positions.joint_position(q)
-
-    def continued(self, q: Array) -> Array:
-        """Remove jumps of a full turn from measured angles q, rad, shape (N, n)."""
-        if self.turns is None:
-            return q
-        return np.asarray(np.where(self.turns, np.unwrap(q, axis=0), q))
 
     @property
     def follows(self) -> Array | None:

@@ -62,6 +62,7 @@ TX40 = Dataset(
         },
         "signals": {
             "median": 5,
+            "torque_median": 5,
             "lowpass": {"cutoff": 50, "order": 4, "on": ["q", "qd"]},
             "decimate": {"factor": "auto", "phase": "first"},
         },

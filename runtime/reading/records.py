@@ -165,7 +165,6 @@ def _signals(
         "q_r": (first, columns.q_ref),
         "qd": (first, columns.qd),
         "qd_ref": (first, columns.qd_ref),
-        "q_link": (first, _columns_of_joints(columns.q_link)),
         "tau": (last, _columns_of_joints(columns.tau)),
         "tau_ff": (last, columns.tau_ff),
         "tau_known": (other, _columns_of_joints(columns.tau_known)),
@@ -193,22 +192,18 @@ def _require_shapes(
     rows, width = signals.get("tau", signals["q"]).values.shape
     width += columns.tau.count(NONE) if "tau" in signals else 0
     require_alike(columns, first, last, (N, n), (rows, width))
-    absent = {
-        "q_link": columns.q_link.count(NONE),
-        "tau_known": columns.tau_known.count(NONE),
-    }
     for key, title in (
         ("q_r", "reference positions"),
         ("qd", "velocities"),
         ("qd_ref", "reference velocities"),
-        ("q_link", "positions behind the gears"),
         ("tau_ff", "feed-forward torques"),
         ("tau_known", "known torques"),
     ):
         if key not in signals:
             continue
         signal = signals[key]
-        width = signal.values.shape[1] + absent.get(key, 0)
+        width = signal.values.shape[1]
+        width += columns.tau_known.count(NONE) if key == "tau_known" else 0
         if width != n:
             raise InputError(
                 f"found {width} {title} ({', '.join(signal.names)}); expected {n}, one per joint",
@@ -248,17 +243,14 @@ def _joint_side(
         elif key in ("qd", "qd_ref"):
             values = side.velocity(values)
         elif key == "tau":
-            values = side.torque(_spread(values, columns.tau, 0.0))
+            values = side.torque(_spread(values, columns.tau))
         elif key == "tau_ff":
             values = side.torque(values)
         elif key == "tau_known":
-            values = _spread(values, columns.tau_known, 0.0)
-        elif key == "q_link":
-            values = side.continued(_spread(values, columns.q_link, np.nan) * side.positions)
+            values = _spread(values, columns.tau_known)
         elif key not in columns.channels:
             values = values * settings.scale.wrench
-        held = values[:, ~np.isnan(values[0])] if key == "q_link" else values
-        signal.finite(held, largest=LIMIT.LARGEST_NUMBER)
+        signal.finite(values, largest=LIMIT.LARGEST_NUMBER)
         samples[key] = values
     return samples
 
@@ -268,12 +260,12 @@ def _columns_of_joints(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in names if name != NONE)
 
 
-def _spread(values: Array, names: Sequence[str], absent: float) -> Array:
-    """Insert columns of the value `absent` for joints without a column; return shape (N, n)."""
+def _spread(values: Array, names: Sequence[str]) -> Array:
+    """Insert columns of zeros for joints without a column; return shape (N, n)."""
     present = [name != NONE for name in names]
     if all(present):
         return values
-    spread = np.full((len(values), len(names)), absent)
+    spread = np.zeros((len(values), len(names)))
     spread[:, present] = values
     return spread
 

@@ -59,7 +59,7 @@ TorqueUnit = Annotated[Text, _known(torque_unit)]
 Factor = Annotated[PerJoint[Real] | Text, Field(union_mode="left_to_right")]
 
 
-QUANTITIES = ("t", "q", "tau", "q_r", "qd", "qd_ref", "q_link", "tau_ff", "tau_known", "law_v")
+QUANTITIES = ("t", "q", "tau", "q_r", "qd", "qd_ref", "tau_ff", "tau_known", "law_v")
 BY_NAME = ("names",)  # columns found by the names of the joints
 
 
@@ -88,9 +88,6 @@ class Columns(Settings):
         per s. They replace differences of q in the rows where they are more accurate.
     qd_ref : tuple of str
         Reference velocities, in the same file, units as qd; for the law of a controller.
-    q_link : tuple of str
-        Positions by encoders behind the gears, in the same file, joint side, unit of q; 0 in place
-        of a name: none on this joint.
     tau_ff : tuple of str
         Feed-forward torques that the controller added, in the file of the torques; unit and side
         are those of tau. For methods that simulate the controller, and for the torque of a law.
@@ -114,7 +111,6 @@ class Columns(Settings):
     qr: Names = ()
     qd: Names = ()
     qd_ref: Names = ()
-    q_link: Names = ()
     tau_ff: Names = ()
     tau_known: Names = ()
     channels: Mapping[Text, Text] = field(default_factory=dict)

@@ -16,11 +16,11 @@ are not random: a false identity between numbers is a fixed nonzero number, whic
 prime factors divide.
 
 General loops: the same identities are checked at random points of the closed mechanism
-(`regroup.closed_draw`), with the values of lengths that are numbers in the robot file. The rank is
+(`regroup.states`), with the values of lengths that are numbers in the robot file. The rank is
 checked at random lengths.
 
 Numeric, in floating point at the lengths of the robot file: the standard regressor W is that of a
-dynamics by energies (`derive.lagrange`), which shares no code with the recursions. W has the rank
+dynamics by energies (`certify.lagrange`), which shares no code with the recursions. W has the rank
 of the base parameters (by SVD), and W chi = W_base X for random chi and the X that the formulas
 give.
 """
@@ -38,22 +38,20 @@ import numpy as np
 
 from symgen.certify.texts import TOLERANCE, TextCheck
 from symgen.certify.witness import base_values, is_assumed
-from symgen.derive.angles import roots_of, rows_of, units_of
 from symgen.derive.closure import parts
+from symgen.derive.constants import kept_angle, numbered, roots_of, rows_of, units_of
 from symgen.derive.doubts import nearly_round
 from symgen.derive.exact import Array, Draw, primes_for
 from symgen.derive.loops import close
-from symgen.derive.numbers import kept_angle, numbered
-from symgen.description.at_values import WITHIN
 from symgen.description.expression import Call, Expression, Number, quarter_turns
 from symgen.description.robot import REVOLUTE, Frame, Robot
-from symgen.regroup.closed_draw import closed_draw
+from symgen.description.values import WITHIN
 from symgen.regroup.finite_field import rref
 from symgen.regroup.regrouping import EXACT, Regrouping
-from symgen.regroup.residues import sample, states_for
+from symgen.regroup.states import closed_draw, sample, states_for
 
 if TYPE_CHECKING:
-    from symgen.derive.lagrange import Sample
+    from symgen.certify.lagrange import Sample
 
 Sampler = Callable[[Draw, tuple[str, ...]], Array]
 LOST = 1e12  # sums of numbers as large keep less than three decimals of numbers of size 1
@@ -474,7 +472,7 @@ def _false_in_floats(regrouping: Regrouping, W: Array, base: list[int]) -> list[
 @lru_cache(maxsize=4)
 def independent(robot: Robot) -> Sample:
     """Compute the regressor of `robot` from its energies, at random states; cache the result."""
-    from symgen.derive.lagrange import (
+    from symgen.certify.lagrange import (
         in_one_mode,
         sampled,
     )  # CasADi, loaded late

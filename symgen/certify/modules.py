@@ -11,8 +11,8 @@ from symgen.certify.importing import cached_path, stored_path
 from symgen.certify.texts import text_check, with_certificate
 from symgen.certify.witness import Witness, ungrouped
 from symgen.derive.doubts import nearly_round
-from symgen.description.at_values import WITHIN
 from symgen.description.robot import Robot
+from symgen.description.values import WITHIN
 from symgen.emit.generate import generate_files
 from symgen.emit.targets import TARGETS
 from symgen.errors import CertificateError

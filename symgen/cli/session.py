@@ -206,7 +206,7 @@ def described_robot(source: str, at_values: bool = False, exact: bool = False) -
     """
     from symgen.derive.doubts import doubts
     from symgen.description import load_robot
-    from symgen.description.at_values import at_values as with_values
+    from symgen.description.values import at_values as with_values
 
     robot = load_robot(source, exact=exact)
     for sentence in doubts(robot):

@@ -16,13 +16,10 @@ from functools import lru_cache
 
 import numpy as np
 
+from symgen.derive.algebra import GraphAlgebra, Matrix, Scalar, Vector, dot
 from symgen.derive.closure import Closure, open_tree
-from symgen.derive.floats import Floats, states_of
-from symgen.derive.frames import frame_poses
-from symgen.derive.geometry import Geometry
-from symgen.derive.graph import interpret
-from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.derive.scalar import Matrix, Scalar, Vector, dot
+from symgen.derive.geometry import Geometry, frame_poses
+from symgen.derive.graph import Floats, interpret, states_of
 from symgen.description.expression import ZERO, Expression
 from symgen.description.parts import row_of
 from symgen.description.robot import Loop, Robot

@@ -20,9 +20,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import lcm, prod
 
+from symgen.derive.algebra import GraphAlgebra, Scalar
 from symgen.derive.graph import ActiveRow, Turn
-from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.derive.scalar import Scalar
 from symgen.description.expression import ONE, ZERO, Expression
 from symgen.description.robot import REVOLUTE, Robot
 from symgen.errors import DescriptionError
@@ -123,6 +122,15 @@ class Closure:
             for u in self.tied:
                 total[i] = total[i] + algebra.rate(u, i) * total[u]
         return {i: total[i] for i in self.robot.joints}
+
+    def project_twice(
+        self, algebra: GraphAlgebra, A: Mapping[tuple[int, int], Scalar]
+    ) -> dict[tuple[int, int], Scalar]:
+        """Return G' A G of the actuated joints from the matrix A of all moving joints; G = dq/dq_a."""
+        joints, moving = self.robot.joints, self.robot.moving
+        AG = {j: self.project(algebra, {k: A[j, k] for k in moving}) for j in moving}
+        columns = {k: self.project(algebra, {j: AG[j][k] for j in moving}) for k in joints}
+        return {(i, k): columns[k][i] for k in joints for i in joints}
 
 
 def parts(robot: Robot) -> int:

@@ -17,17 +17,14 @@ from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import NamedTuple
 
+from symgen.derive.algebra import GraphAlgebra, Matrix, Scalar, Vector
 from symgen.derive.closure import Closure
 from symgen.derive.composite import CompositeLinks
-from symgen.derive.elements import element_column
-from symgen.derive.frames import frame_poses
-from symgen.derive.geometry import Geometry
-from symgen.derive.graph_algebra import GraphAlgebra
+from symgen.derive.constants import numbered
+from symgen.derive.geometry import Geometry, frame_poses
 from symgen.derive.loops import close
 from symgen.derive.newton_euler import Motion, joint_torques
-from symgen.derive.numbers import numbered
-from symgen.derive.regressor import columns, element_names
-from symgen.derive.scalar import Matrix, Scalar, Vector
+from symgen.derive.regressor import columns, element_column, element_names
 from symgen.description.robot import Robot
 
 ABSORBED = ("YY", "MZ", "M")
@@ -113,21 +110,9 @@ def derived(robot: Robot, closing: Callable[[Robot], Closure]) -> Derivation:
     last = [name for name in robot.parameters if name.rstrip("0123456789") in ABSORBED]
     D = columns(motion, [*(name for name in robot.parameters if name not in last), *last])
     poses = frame_poses(geometry)
-    inertia = projected_twice(closure, algebra, CompositeLinks(geometry, chi).matrix())
+    inertia = closure.project_twice(algebra, CompositeLinks(geometry, chi).matrix())
     algebra.graph.seal()
     joints = {i: actuated.get(i, 0) for i in robot.joints}
     return Derivation(
         robot, closing(robot), algebra, geometry, motion, chi, joints, inertia, D, poses
     )
-
-
-def projected_twice(
-    closure: Closure, algebra: GraphAlgebra, A: Mapping[tuple[int, int], Scalar]
-) -> dict[tuple[int, int], Scalar]:
-    """Return G' A G of the actuated joints from the matrix A of all moving joints; G = dq/dq_a."""
-    robot = closure.robot
-    AG = {j: closure.project(algebra, {k: A[j, k] for k in robot.moving}) for j in robot.moving}
-    columns = {
-        k: closure.project(algebra, {j: AG[j][k] for j in robot.moving}) for k in robot.joints
-    }
-    return {(i, k): columns[k][i] for k in robot.joints for i in robot.joints}

@@ -34,23 +34,12 @@ from collections.abc import Mapping
 from copy import copy
 from fractions import Fraction
 
+from symgen.derive.algebra import E3, ZERO3, Scalar, Vector, array, cross, dot
 from symgen.derive.derivation import Derivation
-from symgen.derive.elements import law_value
-from symgen.derive.frames import Frames
+from symgen.derive.geometry import Frames
 from symgen.derive.graph import Symbol
 from symgen.derive.newton_euler import LinkMotion, Motion
-from symgen.derive.regressor import columns, element_names, inertial_names, unit_wrench
-from symgen.derive.scalar import (
-    E3,
-    ZERO3,
-    Scalar,
-    Vector,
-    array,
-    cross,
-    dot,
-    linear,
-    turned,
-)
+from symgen.derive.regressor import Law, columns, element_names, inertial_names, unit_wrench
 from symgen.description.expression import Expression
 from symgen.description.robot import INERTIAL, PRISMATIC, Element, parameter
 
@@ -109,9 +98,9 @@ def potential_energy(d: Derivation) -> Scalar:
         if e.kind == "stiffness":
             total = total + d.chi[name] * (half * _square(d, e, j, positions))
         elif e.kind == "offset":
-            total = total + d.chi[name] * linear(d.algebra, e.along[j], positions)
+            total = total + d.chi[name] * d.algebra.linear(e.along[j], positions)
         elif e.energy is not None:
-            total = total + d.chi[name] * law_value(d.motion, e, j, e.potential(j))
+            total = total + d.chi[name] * Law(d.motion, e, j).of(e.potential(j))
     return total
 
 
@@ -122,9 +111,9 @@ def _square(d: Derivation, e: Element, j: int, x: Mapping[int, Scalar]) -> Scala
     x are the joint velocities (inertia) or the joint positions (spring).
     """
     if j in e.along:
-        s = linear(d.algebra, e.along[j], x)
+        s = d.algebra.linear(e.along[j], x)
         return s * s
-    return linear(d.algebra, e.form[j], {(i, m): x[i] * x[m] for i, m in e.form[j]})
+    return d.algebra.linear(e.form[j], {(i, m): x[i] * x[m] for i, m in e.form[j]})
 
 
 class AtRates(Motion):
@@ -162,14 +151,14 @@ class AtRates(Motion):
             self.algebra.section(f"Link {j}, {of}")
             m = self.geometry.carrier[j].m
             axis_rate = array((w[1], -w[0], 0))  # w x e3
-            n = turned(self.algebra, self.geometry.carrier[j].turn, every)
+            n = self.algebra.turned(self.geometry.carrier[j].turn, every)
             z[j] = self.vector("Z", self.geometry.from_carrier(j, z[m]) + E3 * n, j)
             zd[j] = self.vector("ZP", self.geometry.from_carrier(j, zd[m]) + axis_rate * n, j)
             a = self.geometry.rotation[j].down(
                 self.link[f.ant].a + self.link[f.ant].U @ self.geometry.P[j]
             )
             if f.sigma == PRISMATIC:
-                n = linear(self.algebra, self.geometry.closure.row[j], every)
+                n = self.algebra.linear(self.geometry.closure.row[j], every)
                 a = a + axis_rate * n + cross(z[j], E3 * motion.qd(j))
             self.link[j] = _link(z[j], zd[j], w, self.vector("VP", a, j), half)
 

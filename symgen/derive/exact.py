@@ -5,7 +5,7 @@ The class `Draw` is a domain of graph nodes. p < 2**31, so products fit in int64
 the unit circle. These points form a group of order p + 1. p is chosen so that this order is a
 multiple of 2D, with D the common denominator of the robot's fractions of pi. Then pi/3 or pi/4 are
 exact roots of unity of F_p, not approximations. Every other fixed angle is a sum of multiples of
-unit angles, which are random points (`derive.angles`).
+unit angles, which are random points (`derive.constants`).
 
 Square roots of small primes are computed from the same root of unity, so that sqrt(3)/2 is
 cos(pi/6) and never -cos(pi/6). For an odd prime l, by Gauss, with the Legendre symbol (k/l)
@@ -42,19 +42,18 @@ from math import lcm
 
 import numpy as np
 
-from symgen.derive.angles import (
+from symgen.derive.algebra import GraphAlgebra, Scalar
+from symgen.derive.closure import parts
+from symgen.derive.constants import (
     LARGEST_RADICAND,
     PI,
     Unit,
     Variable,
+    numbered,
     radicands,
     units_of,
 )
-from symgen.derive.closure import parts
 from symgen.derive.graph import INV, POS, SIGN, SIN, SQRT, Angle, Node, Symbol, Velocity, interpret
-from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.derive.numbers import numbered
-from symgen.derive.scalar import Scalar
 from symgen.description.expression import Call, Expression, Number, quarter_turns
 from symgen.description.robot import Robot
 from symgen.errors import SymgenError

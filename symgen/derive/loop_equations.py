@@ -18,12 +18,11 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
+from symgen.derive.algebra import Scalar, dot
 from symgen.derive.assembly import Array, differences, loop_ends, newton, residuals
 from symgen.derive.closure import Closure
 from symgen.derive.derivation import Derivation, derive
-from symgen.derive.floats import Floats, states_of
-from symgen.derive.graph import Symbol, interpret, rates
-from symgen.derive.scalar import Scalar, dot
+from symgen.derive.graph import Floats, Symbol, interpret, rates, states_of
 from symgen.description.robot import REVOLUTE, Robot
 
 IN_METRES = 0.01  # m: mechanisms in which no length is above are closed to 1e-16 m

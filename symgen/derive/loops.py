@@ -19,6 +19,7 @@ from itertools import product
 
 import numpy as np
 
+from symgen.derive.algebra import GraphAlgebra
 from symgen.derive.assembly import (
     STEPS,
     TOLERANCE,
@@ -31,11 +32,8 @@ from symgen.derive.assembly import (
 )
 from symgen.derive.closure import Closure, Relation, open_tree
 from symgen.derive.exact import Draw
-from symgen.derive.floats import Floats, states_of
-from symgen.derive.frames import frame_poses
-from symgen.derive.geometry import Geometry
-from symgen.derive.graph import interpret
-from symgen.derive.graph_algebra import GraphAlgebra
+from symgen.derive.geometry import Geometry, frame_poses
+from symgen.derive.graph import Floats, interpret, states_of
 from symgen.description.expression import ONE, PI, ZERO, Expression, quarter_turns
 from symgen.description.robot import PRISMATIC, REVOLUTE, Loop, Robot
 from symgen.errors import DescriptionError
@@ -169,7 +167,7 @@ def _angle_sum(
 
     In a planar loop all hinges have parallel axes, in equal or opposite directions, with or without
     prismatic joints between them. The axes are compared in two configurations of the open tree;
-    `regroup.closed_draw` proves the sum over F_p.
+    `regroup.states` proves the sum over F_p.
     """
     robot = assembly.robot
     if robot.frame(loop.cut).sigma != REVOLUTE:

@@ -20,20 +20,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
+from symgen.derive.algebra import ZERO3, Matrix, Scalar, Vector, array, cross, dot, is_zero
 from symgen.derive.geometry import Geometry
-from symgen.derive.scalar import (
-    ZERO3,
-    Matrix,
-    Scalar,
-    Vector,
-    array,
-    cross,
-    dot,
-    is_zero,
-    linear,
-    named_vector,
-    turned,
-)
 from symgen.description.expression import Expression
 from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, REVOLUTE, parameter
 
@@ -110,23 +98,23 @@ class Motion:
 
     def qd(self, j: int) -> Scalar:
         """Return the velocity of any moving joint j."""
-        return linear(self.algebra, self.geometry.closure.row[j], self._qd)
+        return self.algebra.linear(self.geometry.closure.row[j], self._qd)
 
     def qdd(self, j: int) -> Scalar:
         """Return the acceleration of any moving joint j."""
-        return linear(self.algebra, self.geometry.closure.row[j], self._qdd)
+        return self.algebra.linear(self.geometry.closure.row[j], self._qdd)
 
     def vector(self, family: str, value: Iterable[Scalar], *indices: int) -> Vector:
         """Name the components of a vector, such as W12 (component 1, link 2); return the vector."""
-        return named_vector(self.algebra, family, value, *indices, *self.tag)
+        return self.algebra.vector(family, value, *indices, *self.tag)
 
     def _link(self, j: int) -> LinkMotion:
         f, geometry = self.robot.frame(j), self.geometry
         self.algebra.section(f"Link {j}")
         carrier = geometry.carrier[j]
         inner, i = self.link[carrier.m], self.link[f.ant]
-        rate = turned(self.algebra, carrier.turn, self._qd)
-        acceleration = turned(self.algebra, carrier.turn, self._qdd)
+        rate = self.algebra.turned(carrier.turn, self._qd)
+        acceleration = self.algebra.turned(carrier.turn, self._qdd)
         slides = (self.qd(j), self.qdd(j)) if f.sigma == PRISMATIC else (0, 0)
         if (
             inner is REST

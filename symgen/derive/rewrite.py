@@ -19,6 +19,7 @@ from functools import lru_cache
 from itertools import product
 from typing import Any
 
+from symgen.derive.algebra import GraphAlgebra
 from symgen.derive.exact import Draw, Fp
 from symgen.derive.graph import (
     ADD,
@@ -33,7 +34,6 @@ from symgen.derive.graph import (
     reachable,
     value_of,
 )
-from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.names import families_of
 from symgen.description.expression import FUNCTIONS, Expression
 from symgen.description.robot import Robot
@@ -160,7 +160,8 @@ class Rewrite:
                     if isinstance(value := given[j], Expression):
                         offset = offset + value * n
                 turn = tuple((j, n) for j, n in turn if given[j] is None)
-                return self.algebra.cos_sin(turn, offset)[node.op == SIN]
+                image: Scalar | int = self.algebra.cos_sin(turn, offset)[node.op == SIN]
+                return image
             case "pos" if x[0] == 0:
                 return 0
             case op if op in FUNCTIONS and x[0] == 0:

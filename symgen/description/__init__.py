@@ -4,11 +4,9 @@ from symgen.description.angles import AngleWarning
 from symgen.description.expression import Expression
 from symgen.description.files import load_robot, packaged_robots, read_robot
 from symgen.description.grammar import parse
-from symgen.description.new import skeleton
 from symgen.description.par import read_par
 from symgen.description.robot import Drives, Element, Frame, Loop, Robot
-from symgen.description.schema import json_schema
-from symgen.description.yaml import parse_robot, write_yaml
+from symgen.description.robot_file import json_schema, parse_robot, skeleton, write_yaml
 
 __all__ = [
     "AngleWarning",

@@ -11,10 +11,9 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
-from symgen.description.element import Element, check_channels, check_law
+from symgen.description.element import KINDS, OWN_LAWS, Element, check_channels, check_law
 from symgen.description.expression import ONE, PI, Call, Expression
 from symgen.description.fields import Path, Problem, dotted
-from symgen.description.kinds import KINDS, OWN_LAWS
 from symgen.description.naming import check_names
 from symgen.description.parts import (
     ANGLES,

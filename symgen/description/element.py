@@ -5,26 +5,28 @@ For each key j, an element has one standard parameter c, named family + key (for
     along {j: G}:  s = G q,  Gamma += G' c law(s, sd, sdd)
     form  {j: B}:  Gamma += c B qdd | c B qd | c B q
 
-The law of each kind is an expression in KINDS, in which q, qd, qdd mean s, sd, sdd. A column is an
-element with a law of the user, in s, sd, q1, qd1 ... of any joints, constants and scalars. This law
-is a torque, or an energy U with Gamma += c dU/dq. A form is possible only for the laws qdd, qd and
-q. If `when` is given, a viscous or coulomb element acts only in motion along s in this direction.
-In a law, channel.NAME is the constant NAME as a function of time, and tau_model is the torque that
-the rest of the model transmits at the joint.
+The law of each kind is an expression in KINDS, in which q, qd, qdd mean s, sd, sdd. A new kind is
+one entry in KINDS (docs/contributing.md). A column is an element with a law of the user, in s, sd,
+q1, qd1 ... of any joints, constants and scalars. This law is a torque, or an energy U with
+Gamma += c dU/dq. A form is possible only for the laws qdd, qd and q. If `when` is given, a viscous
+or coulomb element acts only in motion along s in this direction. In a law, channel.NAME is the
+constant NAME as a function of time, and tau_model is the torque that the rest of the model
+transmits at the joint.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping
 from functools import partial
 from itertools import product
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from symgen.description.expression import ONE, ZERO, Expression
+from symgen.description.expression import ONE, ZERO, Atom, Call, Expression, Number
 from symgen.description.fields import (
     CONFIG,
     UNWRITTEN,
@@ -36,7 +38,6 @@ from symgen.description.fields import (
     Written,
 )
 from symgen.description.grammar import LAWS, parse
-from symgen.description.kinds import CHANNEL, KINDS, OWN_LAWS, STATE, TRANSMITTED, USUAL_KINDS
 from symgen.description.parts import (
     DIRECTIONS,
     GEOMETRY,
@@ -48,6 +49,99 @@ from symgen.description.parts import (
     rows,
 )
 from symgen.errors import DescriptionError, ExpressionError
+
+JOINT_FAMILIES = ("Ia", "FV", "FS", "OFFSET")  # after the inertial ones of eq. (4), link by link
+
+
+class Kind(NamedTuple):
+    """One kind of element on the joints, such as viscous friction: law, units and allowed options.
+
+    Attributes
+    ----------
+    law : str
+        Torque along the coordinate s for the parameter value 1; q, qd, qdd mean s, sd, sdd.
+    units : tuple of str
+        Units of the parameter for a revolute and for a prismatic joint.
+    meaning : str
+        Name of the kind in words.
+    dissipative : bool
+        Whether the parameter cannot be negative, because the element takes power from the motion.
+    form, when : bool
+        Whether an element of this kind may have `form` and `when`.
+    fit : mapping
+        Default scalars of the law, as a file gives them. A file may give other values.
+    """
+
+    law: str
+    units: tuple[str, str]
+    meaning: str
+    dissipative: bool = False
+    form: bool = False
+    when: bool = False
+    fit: Mapping[str, Any] = {}
+
+    @property
+    def torque(self) -> Expression:
+        return parse(self.law, None, LAWS)
+
+
+SLOW = {"vs": {"bounds": [0.002, 5], "start": 0.1}}  # rad/s or m/s
+KINDS = {
+    "inertia": Kind("qdd", ("kg*m**2", "kg"), "inertia of the actuator", form=True),
+    "viscous": Kind(
+        "qd", ("N*m*s/rad", "N*s/m"), "viscous friction", dissipative=True, form=True, when=True
+    ),
+    "coulomb": Kind("sign(qd)", ("N*m", "N"), "Coulomb friction", dissipative=True, when=True),
+    "offset": Kind("1", ("N*m", "N"), "constant torque or force"),
+    "stiffness": Kind("q", ("N*m/rad", "N/m"), "stiffness", form=True),
+    "cubic": Kind("qd**3", ("N*m*s**3/rad**3", "N*s**3/m**3"), "cubic friction", dissipative=True),
+    "stribeck": Kind(
+        "sign(qd)*exp(-(abs(qd)/vs)**delta)",
+        ("N*m", "N"),
+        "friction of slow motion beyond Coulomb's",
+        fit={**SLOW, "delta": 2},
+    ),
+    "tanh": Kind(
+        "tanh(qd/vs)", ("N*m", "N"), "smooth Coulomb friction", dissipative=True, fit=SLOW
+    ),
+    "sigmoid": Kind(
+        "1/(1 + exp(-(qd + vo)/vs)) - 1/(1 + exp(-vo/vs))",
+        ("N*m", "N"),
+        "Coulomb friction as a sigmoid of the velocity",
+        dissipative=True,
+        fit={**SLOW, "vo": 0},
+    ),
+    "load_dependent": Kind(
+        "abs(tau_model)*sign(qd)",
+        ("1", "1"),
+        "Coulomb friction per transmitted torque",
+        dissipative=True,
+    ),
+    "cogging": Kind(
+        "sin(order*q + phase)", ("N*m", "N"), "cogging of the motor", fit={"order": 1, "phase": 0}
+    ),
+    "column": Kind("0", ("", ""), "column of the robot file"),
+    "dissipative": Kind("0", ("", ""), "friction of the robot file", dissipative=True),
+}
+OWN_LAWS = ("column", "dissipative")  # kinds whose law the file gives
+STATE = re.compile(r"(q|qd|qdd)([1-9][0-9]*)?\Z")
+"""Names of a law: of s and its rates, and of those of a joint."""
+CHANNEL = "channel."
+"""Before the name of a function of time in a law: a constant whose value the record gives."""
+TRANSMITTED = "tau_model"
+"""In a law, the torque that the rest of the model transmits at its joint: channel.tau_model3."""
+USUAL_KINDS = dict(zip((*JOINT_FAMILIES, "K"), KINDS, strict=False))
+
+
+def varies(a: Atom) -> bool:
+    """Whether a symbol or function call in a torque law depends on the joint state or on time.
+
+    A function other than cos, sin and 1/x counts as varying, even if its operand is constant.
+    """
+    if isinstance(a, Call):
+        exact = a.function in ("cos", "sin", "inv")
+        return not exact or any(varies(b) for e in a.operands for b in e.atoms)
+    return not isinstance(a, Number) and (a.startswith(CHANNEL) or bool(STATE.match(a)))
 
 
 @dataclass(frozen=True, config=CONFIG)

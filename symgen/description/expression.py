@@ -74,7 +74,7 @@ class Call:
 class Number:
     """A positive rational number that is printed as in the robot file: 0.4318**2, not 0.18645124.
 
-    See `derive.numbers`.
+    See `derive.constants`.
     """
 
     value: Fraction

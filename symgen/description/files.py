@@ -13,7 +13,7 @@ from pathlib import Path
 from symgen.description.fields import located
 from symgen.description.par import read_par
 from symgen.description.robot import Robot
-from symgen.description.yaml import parse_robot, write_yaml
+from symgen.description.robot_file import parse_robot, write_yaml
 from symgen.errors import DescriptionError
 
 TREES = (".urdf", ".xml", ".mjcf")  # suffixes of the formats of links and joints by name
@@ -185,7 +185,7 @@ def write_robot(
     if suffix not in WRITTEN:
         raise DescriptionError(f"{file}: expected a file name that ends in {', '.join(WRITTEN)}")
     if suffix == ".urdf":
-        from symgen.description.urdf_write import write_urdf  # numpy, which robot files do without
+        from symgen.description.urdf import write_urdf  # numpy, which robot files do without
 
         return write_urdf(robot)
     return write_yaml(robot, comments=comments), ()

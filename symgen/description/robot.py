@@ -31,7 +31,7 @@ from pydantic.dataclasses import dataclass
 
 from symgen.description.checks import check_robot
 from symgen.description.distal import khalil_frames
-from symgen.description.element import Element
+from symgen.description.element import JOINT_FAMILIES, KINDS, TRANSMITTED, USUAL_KINDS, Element
 from symgen.description.expression import ONE, Expression
 from symgen.description.fields import (
     CONFIG,
@@ -46,7 +46,6 @@ from symgen.description.fields import (
     Whole,
     Written,
 )
-from symgen.description.kinds import JOINT_FAMILIES, KINDS, TRANSMITTED, USUAL_KINDS
 from symgen.description.parts import (
     DIRECTIONS,
     FIXED,

@@ -53,11 +53,11 @@ from symgen.description.tree import (
     FREE_TYPE,
     WHOLE_TREE,
     Array,
-    Inertial,
     Joint,
     Tree,
     TreePart,
     part_of,
+    ten_of,
     transform,
 )
 from symgen.description.urdf import parse_urdf
@@ -552,27 +552,3 @@ def _standard(table: Table, body: Body) -> Array:
     """Compute XX XY XZ YY YZ ZZ MX MY MZ M of a body in its frame, shape (10,)."""
     links = [(table.tree.links[name], X) for name, X in body.links.items()]
     return sum((ten_of(own, X) for own, X in links if own is not None), start=np.zeros(10))
-
-
-def inertial_of(ten: Sequence[float] | Array) -> Inertial:
-    """Convert XX XY XZ YY YZ ZZ MX MY MZ M to mass, centre of mass, and tensor about this centre.
-
-    The tensor has the axes of the frame in which the ten parameters are given.
-    """
-    *J, mx, my, mz, M = (float(x) for x in ten)
-    c, I, pose = np.array([mx, my, mz]) / M if M else np.zeros(3), np.zeros((3, 3)), np.eye(4)
-    I[np.triu_indices(3)] = J
-    I = I + I.T - np.diag(np.diag(I)) - M * (c @ c * np.eye(3) - np.outer(c, c))
-    pose[:3, 3] = c
-    return Inertial(M, pose, I)
-
-
-def ten_of(inertial: Inertial, X: Array) -> Array:
-    """Convert mass, centre of mass and inertia tensor to XX XY .. ZZ MX MY MZ M, shape (10,).
-
-    The result is given in the frame of the body, in which the link has the pose X, shape (4, 4).
-    """
-    own = X @ inertial.pose
-    R, c, M = own[:3, :3], own[:3, 3], inertial.M
-    J = R @ inertial.I @ R.T + M * (c @ c * np.eye(3) - np.outer(c, c))
-    return np.array([*J[np.triu_indices(3)], *(M * c), M])

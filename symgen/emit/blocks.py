@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from symgen.derive.graph import SYM, Node, Scalar
-from symgen.derive.model import Entry
+from symgen.derive.models import Entry
 from symgen.description.naming import Namespace
 from symgen.emit.printers import Language, Section, Text, under_titles
 from symgen.emit.spec import STATES, Function, ModuleSpec

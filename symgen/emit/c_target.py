@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 from symgen.derive.graph import CONST, COS, SIN, SYM, Node, Scalar, reachable
 from symgen.derive.loop_equations import loop_system
-from symgen.derive.model import Entry, Place
+from symgen.derive.models import Entry, Place
 from symgen.description.expression import FUNCTIONS, Expression
 from symgen.description.naming import Namespace
 from symgen.description.robot import FIXED, PRISMATIC

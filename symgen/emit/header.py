@@ -13,7 +13,7 @@ from typing import Any
 from symgen.derive.closure import Closure
 from symgen.derive.names import FAMILIES, families_of
 from symgen.derive.regressor import element_names, unit
-from symgen.description.kinds import TRANSMITTED
+from symgen.description.element import TRANSMITTED
 from symgen.description.robot import FIXED, KINDS, Element, Robot
 from symgen.emit.printers import Text
 from symgen.emit.render import WIDTH

@@ -20,18 +20,7 @@ from operator import itemgetter
 from string import ascii_lowercase
 from typing import NamedTuple
 
-from symgen.derive.graph import (
-    ADD,
-    CONST,
-    COS,
-    INV,
-    MUL,
-    SIN,
-    SYM,
-    Node,
-    Scalar,
-    reachable,
-)
+from symgen.derive.graph import ADD, CONST, COS, INV, MUL, SIN, SYM, Node, Scalar, reachable
 from symgen.description.expression import FUNCTIONS, Expression, decimal
 from symgen.description.naming import Namespace
 

@@ -15,8 +15,7 @@ from typing import Any
 
 from symgen.derive.closure import Closure
 from symgen.derive.loop_equations import loop_system
-from symgen.derive.model import Model
-from symgen.derive.models import EMITTED, ON_REQUEST
+from symgen.derive.models import EMITTED, ON_REQUEST, Model
 from symgen.derive.regressor import acting, element_names
 from symgen.description.expression import ZERO, Expression
 from symgen.description.robot import FIXED, PRISMATIC, Robot

@@ -14,8 +14,7 @@ from functools import cached_property, lru_cache
 from symgen.derive.derivation import Derivation, derive, derived
 from symgen.derive.graph import ADD, COS, MUL, SIN, Node, Scalar, reachable
 from symgen.derive.loops import close
-from symgen.derive.model import Entry, Model, Place, Request, Values, labels, rewriting
-from symgen.derive.models import MODELS
+from symgen.derive.models import MODELS, Entry, Model, Place, Request, Values, labels, rewriting
 from symgen.derive.regressor import element_names, inertial_names
 from symgen.derive.rewrite import Rewrite
 from symgen.description.naming import Namespace

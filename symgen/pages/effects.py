@@ -15,11 +15,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from symgen.derive.algebra import Scalar, dot
 from symgen.derive.derivation import derive
 from symgen.derive.energies import origin_velocities
 from symgen.derive.graph import Scalar as Node
 from symgen.derive.regressor import element_names, inertial_names, unit
-from symgen.derive.scalar import Scalar, dot
 from symgen.description.robot import KINDS, Robot
 from symgen.emit.spec import ModuleSpec
 

@@ -1,6 +1,7 @@
 """Write the page of a robot as one HTML file that any browser can open.
 
 One script and one style sheet are inside; the page requests nothing from other files or servers.
+The script computes the geometry of the drawing itself, from the data of `figure`.
 
 Names, titles and expressions are escaped by the template or by `symbols.printers`; numbers for the
 script are JSON in which <, > and & are written as escapes. The content security policy allows only
@@ -15,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from hashlib import sha256
 from importlib.resources import files
-from math import prod
+from math import pi, prod
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
@@ -25,11 +26,11 @@ from symgen.derive.closure import Closure
 from symgen.derive.loops import close
 from symgen.derive.regressor import unit
 from symgen.description.expression import ONE, Expression
-from symgen.description.robot import Element, Robot
+from symgen.description.parts import GEOMETRY
+from symgen.description.robot import PRISMATIC, Element, Robot
 from symgen.emit.header import informative_columns
 from symgen.emit.spec import ModuleSpec, module_spec
 from symgen.pages.effects import Effect, effects
-from symgen.pages.figure import figure, passive_text
 from symgen.regroup.reasons import Absorption, absorptions
 from symgen.regroup.regrouping import Regrouping
 from symgen.symbols import expressions
@@ -260,3 +261,67 @@ def _template() -> Template:
         lstrip_blocks=True,
     )
     return environment.get_template("robot.html.jinja")
+
+
+def figure(robot: Robot, closure: Closure) -> dict[str, Any]:
+    """Collect the data of the robot drawing as plain values for JSON, in SI units and rad.
+
+    `theta` and `r` are without the joint position. `follows` gives each passive joint as
+    q_j = offset + sum_i of_i q_i.
+    """
+    follows = {
+        j: {
+            "of": {i: g.value(robot.constants) for i, g in closure.row[j].items()},
+            "offset": closure.offset[j].value(robot.constants),
+        }
+        for j in robot.passive
+        if j not in closure.tied
+    }
+    frames = [
+        {"j": f.j, "ant": f.ant, "sigma": f.sigma}
+        | {name: e.value(robot.constants) for name, e in zip(GEOMETRY, f.at_zero, strict=True)}
+        for f in robot.frames
+    ]
+    return {
+        "frames": frames,
+        "gravity": [e.value(robot.constants) for e in robot.gravity],
+        "joints": joint_ranges(
+            robot, closure, sum(abs(f[name]) for f in frames for name in ("b", "d", "r"))
+        ),
+        "follows": follows,
+        "tied": {j: closure.start[j] for j in closure.tied},
+        "loops": [{"cut": loop.cut, "twin": loop.twin} for loop in robot.loops],
+    }
+
+
+def joint_ranges(robot: Robot, closure: Closure, size: float) -> list[dict[str, Any]]:
+    """Choose the range and the initial position of the slider of every actuated joint.
+
+    The range is that of the joint limits. Without limits it is half a turn to either side, or half
+    of `size`, the size of the robot, for a prismatic joint. The start is 0 if 0 is in the range.
+    """
+    ranges = []
+    for row, j in enumerate(robot.joints):
+        slides = robot.frame(j).sigma == PRISMATIC
+        half = (size / 2 or 0.5) if slides else pi
+        low, high = robot.limits["q"][row] if "q" in robot.limits else (-half, half)  # type: ignore[misc]
+        start = closure.start[j] if closure.tied else 0.0 if low <= 0 <= high else (low + high) / 2
+        ranges.append(
+            {
+                "j": j,
+                "slides": slides,
+                "low": min(low, start),
+                "high": max(high, start),
+                "start": start,
+            }
+        )
+    return ranges
+
+
+def passive_text(robot: Robot, closure: Closure) -> dict[int, str]:
+    """Describe how each passive joint position is found: declared, or from the kinematic loop."""
+    words = {True: "declared", False: "found from the loop"}
+    return {
+        j: "solved from the loop" if j in closure.tied else words[j in robot.constraints]
+        for j in robot.passive
+    }

@@ -15,14 +15,13 @@ import numpy as np
 
 from symgen.derive.derivation import derive
 from symgen.derive.exact import Array
-from symgen.derive.floats import Floats, states_of
-from symgen.derive.graph import Symbol, interpret
+from symgen.derive.graph import Floats, Symbol, interpret, states_of
 from symgen.derive.loop_equations import LoopSystem, loop_system
 from symgen.derive.loops import close
 from symgen.description.expression import Expression
 from symgen.description.robot import PRISMATIC, Robot
 from symgen.errors import DescriptionError, SymgenError
-from symgen.regroup.residues import states_for
+from symgen.regroup.states import states_for
 
 # singular values of unit columns: those below are rounding where a gap says so, at most here
 LARGEST_ROUNDING, SMALLEST = 1e-9, 1e-14

@@ -19,26 +19,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symgen.derive.elements import is_opaque
+from symgen.derive.constants import numbered
 from symgen.derive.exact import Draw
 from symgen.derive.loops import close
-from symgen.derive.numbers import numbered
-from symgen.derive.regressor import element_names, inertial_names
+from symgen.derive.regressor import element_names, inertial_names, is_opaque
 from symgen.description.angles import InertiaWarning
-from symgen.description.expression import (
-    ONE,
-    ZERO,
-    Expression,
-    simplified,
-    with_known_cosines,
-)
-from symgen.description.kinds import OWN_LAWS
+from symgen.description.element import OWN_LAWS
+from symgen.description.expression import ONE, ZERO, Expression, simplified, with_known_cosines
 from symgen.description.robot import INERTIAL, PRISMATIC, Robot, parameter
 from symgen.regroup.finite_field import rref
 from symgen.regroup.floats import float_relations, numeric_coefficients
-from symgen.regroup.residues import draw_states, sample, states_for
 from symgen.regroup.rules import Combination, Step, Transfer
 from symgen.regroup.solve import coefficients
+from symgen.regroup.states import draw_states, sample, states_for
 from symgen.time_limit import limited
 
 Signed = tuple[bool, str]  # whether a term is added, and the term

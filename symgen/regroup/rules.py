@@ -17,8 +17,8 @@ that reaches the base has no effect.
 
 from __future__ import annotations
 
+from symgen.derive.algebra import IDENTITY, Vector, array
 from symgen.derive.geometry import Rotation, axis_rotation, displacement
-from symgen.derive.scalar import IDENTITY, Vector, array
 from symgen.description.expression import ONE, ZERO, Expression, call
 from symgen.description.robot import FIXED, PRISMATIC, REVOLUTE, Frame, Robot, parameter
 

@@ -25,13 +25,20 @@ from math import comb, isqrt
 
 import numpy as np
 
-from symgen.derive.angles import PI, Variable, fixed_angles, roots_of, units_of
+from symgen.derive.constants import (
+    PI,
+    Variable,
+    fixed_angles,
+    numbered,
+    numbers_of,
+    roots_of,
+    units_of,
+)
 from symgen.derive.exact import Array, Draw, primes_for
-from symgen.derive.numbers import numbered, numbers_of
 from symgen.description.expression import Call, Expression, Number
 from symgen.description.robot import Robot
 from symgen.regroup.finite_field import rref, small_rational, solve_each
-from symgen.regroup.residues import draw_states, sample, states_for
+from symgen.regroup.states import draw_states, sample, states_for
 from symgen.time_limit import require_time
 
 MAX_UNKNOWNS = 500

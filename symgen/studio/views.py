@@ -30,7 +30,7 @@ from symgen.derive.loops import close
 from symgen.description import AngleWarning
 from symgen.description.files import write_robot
 from symgen.errors import SymgenError
-from symgen.pages.figure import figure
+from symgen.pages.page import figure
 from symgen.studio.table import cells_of, degrees
 
 FIRST_ROWS = 5  # first ones that are shown

@@ -14,19 +14,18 @@ from functools import cached_property, partial
 from math import isfinite
 from typing import Any
 
+from symgen.derive.algebra import GraphAlgebra, Scalar
 from symgen.derive.closure import Closure, open_tree
 from symgen.derive.derivation import Derivation, derive, derived
 from symgen.derive.graph import Symbol
-from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.loops import close
-from symgen.derive.model import Request
+from symgen.derive.models import Request
 from symgen.derive.names import Names
 from symgen.derive.rewrite import Input
-from symgen.derive.scalar import Scalar, linear
-from symgen.description.at_values import at_values, exact, substituted
 from symgen.description.expression import ONE, Expression
 from symgen.description.grammar import parse
 from symgen.description.robot import Robot
+from symgen.description.values import at_values, exact, substituted
 from symgen.errors import SymgenError
 from symgen.regroup.regrouping import Formula, Regrouping, regroup
 from symgen.symbols.expressions import in_decimals
@@ -112,7 +111,7 @@ class Source:
         """
         row, tied = self.relations.row[u], self.relations.tied
         steps = {k: algebra.rate(k, i) if k in tied else int(k == i) for k in row}
-        return linear(algebra, row, steps)
+        return algebra.linear(row, steps)
 
 
 def source_of(

@@ -23,9 +23,9 @@ import sympy
 from sympy.polys.orderings import lex
 from sympy.polys.rings import PolyRing
 
+from symgen.derive.algebra import GraphAlgebra
+from symgen.derive.constants import numbered, numbers_of
 from symgen.derive.graph import Angle, Node, Scalar, reachable
-from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.derive.numbers import numbered, numbers_of
 from symgen.description.expression import FUNCTIONS, PI, Expression, call
 from symgen.errors import SymgenError
 from symgen.symbols import expressions

@@ -13,11 +13,10 @@ from functools import cached_property
 from itertools import product
 from typing import Any
 
-from symgen.derive.frames import Frames
+from symgen.derive.algebra import GraphAlgebra
+from symgen.derive.geometry import Frames
 from symgen.derive.graph import SYM, Angle, Domain, Scalar, Symbol, interpret
-from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.derive.model import TWIST, Model, Place, Request, labels, rewriting
-from symgen.derive.models import MODELS
+from symgen.derive.models import MODELS, TWIST, Model, Place, Request, labels, rewriting
 from symgen.description.expression import Expression
 from symgen.description.grammar import parse
 from symgen.description.naming import Namespace

@@ -27,16 +27,18 @@ from symgen.description.fields import located
 from symgen.description.files import TREES
 from symgen.description.mjcf import DEEPEST, ORIENTATION
 from symgen.description.robot import FIXED, Robot
-from symgen.description.tree import FIXED_TYPE, Array, Inertial, Joint, Tree, TreePart, part_of
-from symgen.description.tree_robot import (
-    JOINT_TERMS,
-    Table,
+from symgen.description.tree import (
+    FIXED_TYPE,
+    Array,
+    Inertial,
+    Joint,
+    Tree,
+    TreePart,
     inertial_of,
-    parse_tree,
-    placed,
-    robot_of_tree,
+    part_of,
     ten_of,
 )
+from symgen.description.tree_robot import JOINT_TERMS, Table, parse_tree, placed, robot_of_tree
 from symgen.description.xml_text import XmlElement, read_elements
 from symgen.errors import DescriptionError
 from symgen.update.xml_edits import XmlEdits, numbers, same

@@ -12,8 +12,9 @@ from campaign import campaign, sampled, some
 
 from oracles.random_robots import describe_mix, random_robot
 from oracles.same_draw import same_draw
+from symgen.certify import lagrange
 from symgen.certify.certificate import certify_formulas, numeric_rank
-from symgen.derive import lagrange, newton_euler
+from symgen.derive import newton_euler
 from symgen.derive.derivation import derive
 from symgen.description import Robot, load_robot, packaged_robots
 from symgen.description.expression import Expression

@@ -16,8 +16,8 @@ from symgen.certify.certificate import certify_formulas
 from symgen.certify.modules import certify
 from symgen.derive.doubts import doubts
 from symgen.description import load_robot, parse_robot
-from symgen.description.at_values import at_values
 from symgen.description.expression import PI
+from symgen.description.values import at_values
 from symgen.regroup.regrouping import regroup
 
 G = sympy.Rational(981, 100)

@@ -24,11 +24,11 @@ from runtime import load_model
 from runtime.core import loading
 from symgen.certify import importing, requests
 from symgen.certify.importing import without_certificate
+from symgen.certify.lagrange import Lagrange
 from symgen.certify.modules import certified_files, certify, require_valid
 from symgen.certify.requests import model
 from symgen.certify.texts import DERIVATIVES, TextCheck
 from symgen.cli.main import app
-from symgen.derive.lagrange import Lagrange
 from symgen.derive.loops import close
 from symgen.description import load_robot, packaged_robots
 from symgen.description.angles import AngleWarning

@@ -20,7 +20,7 @@ from runtime.core.record import Record
 from runtime.reading.records import read_records
 from runtime.study import Study, study_from_mapping
 from runtime.wrench import WrenchModel
-from symgen.description.yaml import parse_robot
+from symgen.description.robot_file import parse_robot
 
 ARM = """
 symgen: 1
@@ -49,7 +49,7 @@ RATE = 200.0  # Hz
 SECONDS = 8.0
 STEP = 1e-3  # rad, of the encoders of counts
 CESTAC = {"delta": [2e-3], "runs": 2}
-SIGNALS = {"median": 1, "torque_median": 1, "lowpass": {"cutoff": 20}}
+SIGNALS = {"median": 1, "lowpass": {"cutoff": 20}}
 LAW = {"kp": 200.0, "kd": 8.0}
 
 
@@ -251,7 +251,7 @@ def torque_median(folder: Path) -> Case:
         pulses[::5] = 5.0
         return replace(record, tau=record.tau * (0.7 + 0.3 * pulses[:, None]))
 
-    signals = {"median": 5, "torque_median": "auto"}
+    signals = {"median": 5, "torque_median": 5}
     return Case(model, *pair(model, pulsed), study(signals=signals))
 
 

@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 import planar_2r_model as planar
+import planar_arm
 import pytest
 from campaign import campaign
 from planar_data import TRUE, motion
@@ -209,6 +210,30 @@ def test_kd_beside_a_reference_at_rest_is_told(tmp_path):
     np.testing.assert_allclose(viscous, GAIN + TRUE[[3, 8]], rtol=0.02)
 
 
+def test_the_sign_of_a_sum_of_kd_and_friction_is_not_judged(tmp_path):
+    """The reference is 1.1 qd: the torque lacks 0.8 qd of kd = 8, and "FV1, FV2 below zero" was
+    said: "a sign of the joint is wrong".
+    """
+    model = planar_arm.arm()
+    t, q, qd, qdd = planar_arm.motion(0)
+    tau = model.inverse_dynamics(q, qd, qdd, planar_arm.parameters(model))
+    followed = q + (tau + 8.0 * qd - 8.0 * 1.1 * qd) / 200.0
+    np.savez(tmp_path / "law.npz", t=t, q=q, v=qd, r=followed, rd=1.1 * qd)
+    columns = {"t": "t", "q": "q", "qd": "v", "q_ref": "r", "qd_ref": "rd"}
+    study = planar_arm.study(
+        record={"files": str(tmp_path / "law.npz"), "columns": columns},
+        controller={"law": {"kp": 200.0, "kd": "fit"}},
+    )
+    runs = read_records(study.record, model)
+    result = identify(model, runs, study, plausible=True, physical=True)
+    np.testing.assert_allclose(
+        [result.estimate["FV1"], result.estimate["FV2"]], [-0.3, -0.5], atol=0.01
+    )
+    assert result.negative == () and result.checklist.state == "good", result.checklist.doubt
+    elements = result.model.ELEMENTS
+    assert elements["FV1"][0] == "column" and elements["FS1"][0] == "coulomb"
+
+
 @pytest.mark.parametrize("moving", [True, False])
 def test_the_saturation_is_in_force_where_kd_is_found(tmp_path, moving):
     """Drives that cut a tenth of the samples: the torque of the record stays within the limit, kd is
@@ -223,7 +248,7 @@ def test_the_saturation_is_in_force_where_kd_is_found(tmp_path, moving):
             tmp_path,
             log,
             controller={"law": {"kp": KP.tolist(), "kd": kd}, "torque": {"saturation": list(cut)}},
-            signals={"median": 1, "torque_median": 1, "lowpass": {"cutoff": 40}},
+            signals={"median": 1, "lowpass": {"cutoff": 40}},
         )
         result = identified(study)
         errors[str(kd)] = result.estimate.relative_error

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from problems import resolved
+from problems import problem_of, resolved
 
 import runtime
 import symgen
 from runtime.core.signals.cutoff import cutoff
 from runtime.core.signals.filters import median_filtered
 from runtime.core.study import Signals
-from runtime.median import share_taken
+from runtime.median import pulses_in_torques, share_taken
 from runtime.study import Study
 
 RATE = 1000.0
@@ -95,7 +95,7 @@ def pulses(q: np.ndarray, step: float, size: float) -> np.ndarray:
     return -size * np.apply_along_axis(lambda x: np.convolve(x, shape)[: len(x)], 0, steps)
 
 
-def test_a_median_of_torques_is_none_where_a_controller_answers_every_count():
+def test_pulses_of_a_controller_that_a_median_of_torques_removes_are_told():
     q = motion()
     rng, smooth = np.random.default_rng(3), 10 * q + np.sign(np.gradient(q, axis=0))
     torque = smooth + 0.1 * rng.standard_normal(q.shape)
@@ -111,12 +111,13 @@ def test_a_median_of_torques_is_none_where_a_controller_answers_every_count():
     whole = [np.linalg.norm(x, axis=0) for x in blocks]
     assert share[1] == pytest.approx((whole[0] / whole[1])[1], rel=0.1)
     record = runtime.Record(T, np.round(q / 0.1) * 0.1, driven)
-    study, why = resolved(Study(), [record])
-    assert study.signals.window_of_torques == 1 and study.signals.median == 5
-    assert "No median filter of the torques" in why
-    assert resolved(Study(), [runtime.Record(T, q, torque)])[0].signals.window_of_torques == 5
-    asked = Study(signals=Signals(torque_median=3))
-    assert resolved(asked, [record])[0].signals.window_of_torques == 3
+    for window, told in ((1, False), (5, True)):
+        study = Study(signals=Signals(torque_median=window))
+        problem = pulses_in_torques(problem_of(study, [record]))
+        said = " ".join(note.text for note in problem.notes)
+        assert problem.settings == study and ("% of the torque of joint 2" in said) == told
+    plain = problem_of(Study(signals=Signals(torque_median=5)), [runtime.Record(T, q, torque)])
+    assert not pulses_in_torques(plain).notes
 
 
 def bench(vs, step, speed, rate=500.0):

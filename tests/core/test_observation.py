@@ -88,7 +88,7 @@ def test_a_spike_of_a_torque_is_no_measurement(record):
     spiked = Record(T, record.q, tau, rate=RATE)
     difference = [
         np.abs(observe(planar, spiked, s).Y - observe(planar, record, s).Y).max()
-        for s in (study(signals={"median": 3}), study())
+        for s in (study(signals={"torque_median": 3}), study())
     ]
     assert difference[0] < 1e-2 * np.abs(record.tau).max() and difference[1] > 10
 

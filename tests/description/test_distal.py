@@ -8,8 +8,8 @@ import pytest
 import symgen
 from oracles.pinocchio_model import PinocchioModel
 from oracles.random_robots import random_parameters
+from symgen.certify.lagrange import Lagrange
 from symgen.derive.doubts import doubts
-from symgen.derive.lagrange import Lagrange
 from symgen.description import parse_robot, write_yaml
 from symgen.errors import DescriptionError
 

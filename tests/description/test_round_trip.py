@@ -13,7 +13,7 @@ from symgen.description import load_robot, packaged_robots, parse_robot
 from symgen.description.element import Element
 from symgen.description.parts import Drives, Frame, Loop
 from symgen.description.robot import Robot
-from symgen.description.yaml import write_yaml
+from symgen.description.robot_file import write_yaml
 
 READ_FROM_OTHERS = (
     "angles",
@@ -96,7 +96,7 @@ def test_packaged_robots_are_written(name: str) -> None:
 
 def test_limits_as_numbers_are_to_either_side() -> None:
     """A robot made in Python: its limits in the module, the page, the URDF and the file."""
-    from symgen.description.urdf_write import write_urdf
+    from symgen.description.urdf import write_urdf
     from symgen.pages.page import robot_page
 
     robot = replace(load_robot("planar_2r"), limits={"q": (1.5, (-0.5, 2)), "qd": (3.0, 3.0)})

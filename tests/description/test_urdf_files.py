@@ -13,7 +13,7 @@ from oracles.urdf_robots import panda, ur5
 from symgen.description import Robot, load_robot, parse
 from symgen.description.tree import TreePart
 from symgen.description.tree_robot import read_tree
-from symgen.description.urdf_write import write_urdf
+from symgen.description.urdf import write_urdf
 from symgen.description.xml_text import MAX_BYTES
 from symgen.errors import DescriptionError
 

@@ -9,8 +9,7 @@ from oracles.random_parallelograms import random_parallelogram
 from oracles.random_robots import random_robot
 from symgen.derive.derivation import derive
 from symgen.derive.energies import AtRates
-from symgen.derive.model import Request, rewriting
-from symgen.derive.models import MODELS
+from symgen.derive.models import MODELS, Request, rewriting
 from symgen.derive.newton_euler import joint_torques
 from symgen.description import Robot, load_robot, packaged_robots
 

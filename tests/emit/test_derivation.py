@@ -24,7 +24,7 @@ from symgen.emit.generate import generate_files
 from symgen.emit.spec import function, module_spec, spec_of
 from symgen.pages.page import robot_page
 from symgen.regroup.regrouping import _regrouped, regroup
-from symgen.regroup.residues import _acting
+from symgen.regroup.states import _acting
 
 TARGETS = ("numpy", "casadi", "xp", "c")
 

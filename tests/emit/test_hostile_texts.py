@@ -25,7 +25,7 @@ from typer.testing import CliRunner
 from symgen.cli.main import app
 from symgen.description import load_robot, parse_robot, read_par, write_yaml
 from symgen.description.tree_robot import read_tree
-from symgen.description.urdf_write import write_urdf
+from symgen.description.urdf import write_urdf
 from symgen.emit.generate import generate_files
 from symgen.errors import SymgenError
 from symgen.pages.page import robot_page

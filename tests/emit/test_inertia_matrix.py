@@ -10,12 +10,11 @@ import symgen
 from oracles.random_loops import KINDS, random_loop
 from oracles.random_parallelograms import random_parallelogram
 from oracles.random_robots import random_robot
+from symgen.certify.lagrange import in_one_mode
+from symgen.certify.lagrange import sampled as lagrange_sample
 from symgen.derive.assembly import inertia_of
 from symgen.derive.derivation import derive
-from symgen.derive.lagrange import in_one_mode
-from symgen.derive.lagrange import sampled as lagrange_sample
-from symgen.derive.model import Request, rewriting
-from symgen.derive.models import MODELS
+from symgen.derive.models import MODELS, Request, rewriting
 from symgen.description import Robot, load_robot, packaged_robots
 
 

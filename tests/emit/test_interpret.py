@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 import sympy
 
+from symgen.certify.lagrange import Lagrange
 from symgen.derive.derivation import derive
-from symgen.derive.floats import Floats, states_of
-from symgen.derive.graph import POS, Symbol, interpret, rates
-from symgen.derive.lagrange import Lagrange
+from symgen.derive.graph import POS, Floats, Symbol, interpret, rates, states_of
 from symgen.description import load_robot
 from symgen.description.expression import FUNCTIONS
 from symgen.symbols.sympy_objects import Objects

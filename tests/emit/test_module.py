@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from campaign import some
 
-from symgen.derive.lagrange import Lagrange
+from symgen.certify.lagrange import Lagrange
 from symgen.description import Robot, load_robot, parse_robot
 from symgen.emit.generate import generate_module
 from symgen.errors import DescriptionError

@@ -57,7 +57,7 @@ def par_files() -> tuple[bytes, ...]:
 @cache
 def urdf_files() -> tuple[bytes, ...]:
     from symgen.description import load_robot
-    from symgen.description.urdf_write import write_urdf
+    from symgen.description.urdf import write_urdf
 
     loaded = [load_robot(name) for name in ("planar_2r", "scara", "stanford", "rx90")]
     return tuple(

@@ -1,7 +1,7 @@
 """Dynamics of mechanisms with loops by Lagrange multipliers: an independent oracle.
 
 The open tree moves in all its joints q; phi(q) = 0 says that every twin coincides with its cut
-frame and that every declared relation holds. With the energies of the tree (symgen.derive.lagrange)
+frame and that every declared relation holds. With the energies of the tree (symgen.certify.lagrange)
 and Jc = dphi/dq, S the columns of the actuated joints,
 
     S tau + Jc' lambda = Gamma_tree(q, qd, qdd) ,     Jc qd = 0 ,     Jc qdd + Jcdot qd = 0 .
@@ -19,7 +19,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from symgen.derive.lagrange import Lagrange
+from symgen.certify.lagrange import Lagrange
 from symgen.description.expression import Expression
 from symgen.description.robot import PRISMATIC, REVOLUTE, Robot
 

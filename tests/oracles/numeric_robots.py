@@ -15,10 +15,10 @@ import numpy as np
 
 from oracles.random_parallelograms import random_parallelogram
 from oracles.random_robots import random_robot
-from symgen.description.at_values import at_values
 from symgen.description.expression import ONE, ZERO, Expression
 from symgen.description.grammar import parse
 from symgen.description.robot import PRISMATIC, REVOLUTE, Element, Frame, Robot
+from symgen.description.values import at_values
 
 Generator = np.random.Generator
 ROOTS = ("sqrt(3)/2", "sqrt(2)/2", "sqrt(5)/4", "sqrt(3)", "sqrt(0.02)", "sqrt(7)/9")

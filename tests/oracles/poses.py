@@ -7,8 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from symgen.derive.derivation import derive
-from symgen.derive.floats import Floats, states_of
-from symgen.derive.graph import interpret
+from symgen.derive.graph import Floats, interpret, states_of
 from symgen.description.robot import Robot
 
 

@@ -6,11 +6,11 @@ from __future__ import annotations
 
 from symgen.certify.certificate import Sampler
 from symgen.derive.exact import Array, Draw
-from symgen.regroup.residues import sample
+from symgen.regroup.states import sample
 
 
 def same_draw() -> Sampler:
-    """`symgen.regroup.residues.sample` that gives the columns of its first draw for a prime ever
+    """`symgen.regroup.states.sample` that gives the columns of its first draw for a prime ever
     after: sampling is most of the work.
     """
     drawn: dict[int, Array] = {}

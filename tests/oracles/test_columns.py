@@ -14,12 +14,11 @@ from campaign import sampled
 import symgen
 from oracles.random_robots import random_robot
 from symgen.certify.modules import certified_files
-from symgen.description.element import LawScalar
+from symgen.description.element import KINDS, LawScalar
 from symgen.description.expression import ONE
 from symgen.description.grammar import LAWS, parse
-from symgen.description.kinds import KINDS
 from symgen.description.robot import Element, Robot
-from symgen.description.yaml import parse_robot, write_yaml
+from symgen.description.robot_file import parse_robot, write_yaml
 from symgen.errors import DescriptionError
 from symgen.regroup.regrouping import EXACT, regroup
 

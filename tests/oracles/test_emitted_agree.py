@@ -18,7 +18,7 @@ from campaign import sampled, some
 
 from oracles.pinocchio_model import PinocchioModel
 from oracles.random_robots import random_parameters, random_robot, random_state
-from symgen.derive.lagrange import Lagrange
+from symgen.certify.lagrange import Lagrange
 from symgen.description import load_robot, packaged_robots
 from symgen.description.robot import Robot
 from symgen.emit.generate import generate_module

@@ -22,7 +22,7 @@ from oracles.multipliers import Multipliers
 from oracles.random_parallelograms import SEEDS, random_parallelogram
 from oracles.random_robots import random_parameters
 from symgen.certify.certificate import certify_formulas
-from symgen.derive.lagrange import Lagrange
+from symgen.certify.lagrange import Lagrange
 from symgen.derive.loops import close as close_loops
 from symgen.description import load_robot
 from symgen.description.expression import Expression

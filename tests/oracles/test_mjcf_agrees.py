@@ -10,7 +10,7 @@ import pytest
 
 from oracles.mjcf_robots import ARM, GRIPPER, NAMED, random_tree
 from oracles.poses import poses_in_floats
-from symgen.derive.lagrange import Lagrange
+from symgen.certify.lagrange import Lagrange
 from symgen.description import Robot
 from symgen.description.robot import PRISMATIC
 from symgen.description.tree_robot import read_tree

@@ -13,7 +13,7 @@ from oracles.named_robots import four_bar, planar_2r, six_r
 from oracles.pinocchio_model import PinocchioModel
 from oracles.random_robots import describe_mix, random_parameters, random_robot, random_state
 from oracles.test_emitted_agree import PACKAGED
-from symgen.derive.lagrange import Lagrange, sampled
+from symgen.certify.lagrange import Lagrange, sampled
 from symgen.description.robot import Robot
 from symgen.errors import DescriptionError
 

@@ -15,8 +15,7 @@ from oracles.urdf_table import FOUND, difference, snapped_text
 from symgen.certify.modules import certify
 from symgen.description.angles import SNAPPED
 from symgen.description.tree_robot import read_tree
-from symgen.description.urdf import parse_urdf
-from symgen.description.urdf_write import write_urdf
+from symgen.description.urdf import parse_urdf, write_urdf
 from symgen.errors import DescriptionError
 from symgen.regroup.regrouping import regroup
 

@@ -17,8 +17,8 @@ from oracles.random_robots import random_parameters
 from oracles.test_loops_agree import whole
 from oracles.test_random_loops import SEEDS, module_of, torques_agree
 from symgen.certify.certificate import certify_formulas
+from symgen.certify.lagrange import sampled as sampled_states
 from symgen.certify.modules import certify
-from symgen.derive.lagrange import sampled as sampled_states
 from symgen.derive.loops import close
 from symgen.description import parse_robot
 from symgen.description.expression import Expression

@@ -11,11 +11,11 @@ import pytest
 
 from oracles.poses import poses_in_floats
 from oracles.urdf_robots import NAMED, random_tree
-from symgen.derive.lagrange import Lagrange
+from symgen.certify.lagrange import Lagrange
 from symgen.description import Robot
 from symgen.description.robot import FIXED, PRISMATIC
 from symgen.description.tree_robot import read_tree
-from symgen.description.urdf_write import write_urdf
+from symgen.description.urdf import write_urdf
 from symgen.emit.generate import generate_module
 
 TOLERANCE = 1e-10  # of the largest torque of the sample

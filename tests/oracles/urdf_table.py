@@ -17,8 +17,7 @@ import numpy as np
 from oracles.test_urdf_agrees import Pinocchio, legend
 from symgen.certify.modules import certify
 from symgen.derive.derivation import derive
-from symgen.derive.floats import Floats, states_of
-from symgen.derive.graph import Symbol, interpret
+from symgen.derive.graph import Floats, Symbol, interpret, states_of
 from symgen.description import Robot
 from symgen.description.angles import SNAP
 from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, parameter

@@ -17,10 +17,9 @@ from oracles.numeric_robots import describe_numbers, numeric_robot
 from symgen import Robot, SymgenError, load_robot, parse_robot, regrouping
 from symgen.certify.certificate import Certificate, certify_formulas
 from symgen.certify.modules import certified_files, certify
-from symgen.derive.angles import units_of
-from symgen.derive.numbers import keep_rationals
-from symgen.description.at_values import at_values, exact
+from symgen.derive.constants import keep_rationals, units_of
 from symgen.description.expression import Expression, Number, call
+from symgen.description.values import at_values, exact
 from symgen.regroup.regrouping import EXACT, BaseParameter, Regrouping
 
 HEAD = "symgen: 1\nname: x\ngravity: {gravity}\nconstants: {{{constants}}}\nframes:\n"

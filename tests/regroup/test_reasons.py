@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import symgen
-from symgen.derive.lagrange import in_one_mode, sampled
+from symgen.certify.lagrange import in_one_mode, sampled
 from symgen.description.grammar import parse
 
 

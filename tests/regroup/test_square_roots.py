@@ -15,9 +15,9 @@ from campaign import some
 
 from runtime import load_model
 from symgen import Robot, generate_module, parse_robot, regrouping
+from symgen.certify.lagrange import sampled
 from symgen.certify.modules import certified_files, certify
 from symgen.derive.exact import Draw, Fp
-from symgen.derive.lagrange import sampled
 from symgen.description.expression import Expression, call
 from symgen.errors import CertificateError
 

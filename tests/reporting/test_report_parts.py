@@ -13,7 +13,7 @@ import pytest
 
 from runtime.advisor.advice import answer
 from runtime.core.check import Check, state_of
-from runtime.core.checklist import checklist_of, lost_joints, separate
+from runtime.core.checklist import certain, checklist_of, lost_joints, separate
 from runtime.core.least_squares.estimate import Estimate, JointFit
 from runtime.core.markup import split, symbol, unit
 from runtime.core.model import load_model
@@ -205,6 +205,24 @@ def test_verdict_is_the_worst_answer(estimate, unseen, state, question):
     assert set(checklist.summary()) == {
         "state", "answer", "grade", "use", "doubt", "next", "checks",
     }  # fmt: skip
+
+
+@pytest.mark.parametrize(("X", "sigma", "state", "finding"), [
+    ((1.0, 1e-9), (0.01, 0.01), "good", "Largest deviation 1 % (A1), median 1.0 %; not told from zero: B1"),
+    ((1.0, 0.2), (0.01, 0.4), "doubtful", "Largest deviation 1 % (A1), median 1.0 %; not told from zero: B1"),
+    ((1.0, 0.8), (0.01, 0.4), "doubtful", "Largest deviation 50 % (B1), median 25.5 %; above 30 %: B1"),
+    ((0.1, 0.2), (0.3, 0.4), "no", "Not told from zero: B1, A1"),
+    ((0.0, 1.0), (0.0, 0.01), "good", "Largest deviation 1 % (B1), median 1.0 %; not told from zero: A1"),
+])  # fmt: skip
+def test_a_value_within_its_interval_of_zero_has_no_percentage(X, sigma, state, finding):
+    """439 % (MY2), 2975630 % (MY1) were said of parameters that are zero."""
+    estimate = fit(X, np.array(sigma) / 2)  # corrected: sigma
+    answer = certain(estimate, {})
+    assert (answer.state, answer.finding) == (state, finding)
+    percents = [row[3] for row in estimate.tables()[0].rows]
+    told = np.abs(X) > 1.96 * np.array(sigma)
+    assert [percent != "-" for percent in percents] == told.tolist()
+    assert estimate.to_latex().count("--") == 2 - told.sum()
 
 
 def test_single_values_are_remarks_where_the_expected_error_is_known():

@@ -9,15 +9,19 @@ from runtime.core.automatic import automatic_cutoff
 from runtime.core.problem import prepared
 from runtime.core.record import Origin, Record
 from runtime.loop.closed_loop import closed_loop
-from runtime.median import torque_median
 from runtime.speeds import recorded_speeds
+
+
+def problem_of(study, records):
+    """The problem of a study and records without a robot, without any step."""
+    model = SimpleNamespace(JOINTS=range(records[0].n), NAME="none", DRIVES=None)
+    return state_problem(model, records, study)
 
 
 def resolved(study, records):
     """The settings after the automatic ones have their numbers, and what the steps say."""
-    model = SimpleNamespace(JOINTS=range(records[0].n), NAME="none", DRIVES=None)
-    steps = (torque_median, recorded_speeds, automatic_cutoff)
-    problem = prepared(state_problem(model, records, study), steps)
+    steps = (recorded_speeds, automatic_cutoff)
+    problem = prepared(problem_of(study, records), steps)
     return problem.settings, " ".join(note.text for note in problem.notes)
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import itertools
 import math
 
-from symgen.derive.graph_algebra import GraphAlgebra
+from symgen.derive.algebra import GraphAlgebra
 from symgen.description import load_robot
 from symgen.description.expression import ZERO
 

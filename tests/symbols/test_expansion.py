@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import symgen
-from symgen.derive.graph_algebra import GraphAlgebra
+from symgen.derive.algebra import GraphAlgebra
 from symgen.description.expression import PI, ZERO, Expression
 from symgen.symbols.expansion import Expansion, TooManyTermsError
 

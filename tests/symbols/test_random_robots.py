@@ -10,7 +10,7 @@ from campaign import sampled
 
 from oracles.exact_zero import valued
 from oracles.random_robots import random_robot
-from symgen.derive.lagrange import Lagrange
+from symgen.certify.lagrange import Lagrange
 from symgen.symbols.symbolic import symbolic
 
 N, LARGEST = 3, 400  # states; terms of a closed form that is compared

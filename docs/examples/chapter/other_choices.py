@@ -84,7 +84,7 @@ def treatments(model: Any, study: Study, record: Record) -> dict[str, tuple[Stud
         f"rows below {SLOW:.0%} of top speed left out": (without(SLOW), record),
         f"rows below {3 * SLOW:.0%} of top speed left out": (without(3 * SLOW), record),
         "whole record, rest included": (whole, record),
-        "no median filter": (changed(study, "signals", median=1), record),
+        "no median filter": (changed(study, "signals", median=1, torque_median=1), record),
         f"{FASTER:g} Hz": (faster(study), record),
         "rows weighted by joint": (changed(study, "estimate", method="wls"), record),
         "torque 2 ms later": (study, delayed),

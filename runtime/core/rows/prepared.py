@@ -142,7 +142,7 @@ def decimated_torque(tau: Array, selection: Selection) -> Array:
 
     Median, window, decimation; rows are not yet selected.
     """
-    tau = median_filtered(tau, selection.signals.window_of_torques)
+    tau = median_filtered(tau, selection.signals.torque_median)
     windowed = np.ascontiguousarray(tau[selection.samples].T)
     return windowed if selection.plan is None else decimate(windowed, selection.plan)
 

@@ -47,8 +47,8 @@ import numpy as np
 
 from symgen.derive.assembly import inertia_of, newton
 from symgen.derive.loops import close
+from symgen.description.element import CHANNEL
 from symgen.description.expression import FUNCTIONS, Expression
-from symgen.description.kinds import CHANNEL
 from symgen.description.robot import INERTIAL, PRISMATIC, REVOLUTE, Element, Frame, Robot, parameter
 from symgen.errors import DescriptionError
 

@@ -1,13 +1,21 @@
-"""Constants, joint variables, cosines, sines and velocity signs of a robot as graph nodes.
+"""Scalars, vectors and matrices of a robot's formulas, as nodes of its expression graph.
 
 Inputs of the graph are q1, QP1, QDP1 ... and the constants of the robot file under their names.
 Numbers that formulas keep as written are inputs too, so that one graph serves all numbers. Each
 node contains the description that exact arithmetic needs (see `graph.Node`).
+
+A scalar is a node of the graph with a sign, a constant expression, or any other object with + - *
+and unary minus. The Python integers 0, 1 and -1 cost nothing: a sum with 0 or a product with 0, 1
+or -1 is simplified at once and makes no node of the graph.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from fractions import Fraction
+from typing import Any, TypeVar
+
+import numpy as np
 
 from symgen.derive.graph import (
     COS,
@@ -19,7 +27,6 @@ from symgen.derive.graph import (
     ActiveRow,
     Angle,
     Graph,
-    Scalar,
     Symbol,
     Turn,
     Velocity,
@@ -27,6 +34,47 @@ from symgen.derive.graph import (
 from symgen.derive.names import Names
 from symgen.description.expression import Expression, Number, call, quarter_turns
 from symgen.description.robot import Robot
+
+K = TypeVar("K")
+Scalar = Any
+Vector = np.ndarray  # of three scalars
+Matrix = np.ndarray  # of three rows
+
+
+def array(entries: Any) -> Vector:
+    """Return a vector of scalars, or a matrix from its rows; + - * and @ act on the scalars.
+
+    It cannot be changed in place, because several links may share it.
+    """
+    made = np.array(entries, dtype=object)
+    made.flags.writeable = False
+    return made
+
+
+ZERO3, E3 = array((0, 0, 0)), array((0, 0, 1))
+IDENTITY = array(((1, 0, 0), (0, 1, 0), (0, 0, 1)))
+
+
+def is_zero(v: Iterable[Scalar]) -> bool:
+    """Whether every component of v is the Python integer 0, so that v vanishes identically."""
+    return all(x == 0 for x in v)
+
+
+def dot(u: Iterable[Scalar], v: Iterable[Scalar]) -> Scalar:
+    total: Scalar = 0
+    for a, b in zip(u, v, strict=True):
+        total = total + a * b
+    return total
+
+
+def cross(u: Vector, v: Vector) -> Vector:
+    return array(
+        (
+            u[1] * v[2] - u[2] * v[1],
+            u[2] * v[0] - u[0] * v[2],
+            u[0] * v[1] - u[1] * v[0],
+        )
+    )
 
 
 class GraphAlgebra:
@@ -59,17 +107,14 @@ class GraphAlgebra:
         """Start a section of the formulas: nodes made from now on are under the heading `title`."""
         self.sections.append((len(self.graph.nodes), title))
 
-    def constant(self, e: Expression) -> Scalar | int:
+    def constant(self, e: Expression) -> Scalar:
         """Return the node of a constant expression, such as a length or cosine of a fixed angle."""
-        value: Scalar | int = e.evaluate(
-            self._constant, self._call, self.graph.number, self._number
-        )
-        return value
+        return e.evaluate(self._constant, self._call, self.graph.number, self._number)
 
     def _constant(self, name: str) -> Scalar:
         return self.graph.symbol(Symbol("pi" if name == "pi" else "constant", name), fixed=True)
 
-    def _number(self, number: Number) -> Scalar | int:
+    def _number(self, number: Number) -> Scalar:
         if not self.written:
             return self.graph.number(number.value)
         return self.graph.symbol(Symbol("number", str(number.value)), fixed=True)
@@ -78,7 +123,7 @@ class GraphAlgebra:
         """Return the node of a standard or base parameter."""
         return self.graph.symbol(Symbol("parameter", name), fixed=True)
 
-    def gravity(self, axis: int) -> Scalar | int:
+    def gravity(self, axis: int) -> Scalar:
         """Return the node of one component of the negative gravity vector in frame 0, m/s**2, or
         the number 0.
         """
@@ -92,14 +137,14 @@ class GraphAlgebra:
         of = call("sqrt", argument) if function == SQRT else Angle((), argument)
         return self.graph.call(function, x, of=of)
 
-    def cos_sin(self, turn: Turn, offset: Expression) -> tuple[Scalar | int, Scalar | int]:
+    def cos_sin(self, turn: Turn, offset: Expression) -> tuple[Scalar, Scalar]:
         """Return cosine and sine of sum_j n_j q_j + offset, for the pairs (j, n_j) of `turn`."""
         if not turn:
             return self.constant(call("cos", offset)), self.constant(call("sin", offset))
         quarters, rest = quarter_turns(offset)
         backward = turn[0][1] < 0
         about = -Angle(turn, rest) if backward else Angle(turn, rest)
-        angle: Scalar | int = 0
+        angle: Scalar = 0
         for j, n in about.turn:
             term = self.q(j)
             angle = angle + (term if n == 1 else -term if n == -1 else term * self.graph.lift(n))
@@ -168,10 +213,24 @@ class GraphAlgebra:
         """Return a node that applies a function, such as exp or pow, to scalars."""
         return self.graph.call(op, *map(self.graph.lift, operands))
 
-    def name(self, value: Scalar | int, name: str) -> Scalar | int:
+    def name(self, value: Scalar, name: str) -> Scalar:
         """Give a name, such as W12, to the node of a value, and return the value."""
         return self.graph.name(value, name)
 
-    def hint(self, value: Scalar | int, name: str) -> Scalar | int:
+    def hint(self, value: Scalar, name: str) -> Scalar:
         """Suggest a name for a value, used if it is needed more than once, and return the value."""
         return self.graph.hint(value, name)
+
+    def vector(self, family: str, value: Iterable[Scalar], *indices: int) -> Vector:
+        """Name the components of a vector, such as W12 (component 1, link 2); return the vector."""
+        named = self.named
+        return array([self.name(x, named(family, k, *indices)) for k, x in enumerate(value, 1)])
+
+    def linear(self, row: Mapping[K, Expression], x: Mapping[K, Scalar]) -> Scalar:
+        """Return sum_i row_i x_i, with constant expressions row_i and scalars x_i."""
+        return dot([self.constant(g) for g in row.values()], [x[i] for i in row])
+
+    def turned(self, turn: Turn, x: Mapping[int, Scalar]) -> Scalar:
+        """Return sum_j n_j x_j for the pairs (j, n_j) of `turn`; a joint j missing in x counts as 0."""
+        row = {j: Expression.number(n) for j, n in turn}
+        return self.linear(row, {j: x.get(j, 0) for j in row})
