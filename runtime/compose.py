@@ -30,8 +30,8 @@ from runtime.core.errors import InputError, SettingsError
 from runtime.core.essential import Essential, essential_of
 from runtime.core.identify import Extra, OnRequest
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.least_squares.linear import ordinary
-from runtime.core.least_squares.method import LINEAR, Method, linear_companion
+from runtime.core.least_squares.linear import LinearOptions, ordinary
+from runtime.core.least_squares.method import Method
 from runtime.core.least_squares.wls import by_weights, weighted
 from runtime.core.model import GeneratedModel, require_emitted
 from runtime.core.problem import (
@@ -105,16 +105,27 @@ READERS: dict[str, SignalReader] = {
     "static": SignalReader(at_rest),
 }
 METHODS: dict[str, Method] = {
-    **LINEAR,
+    # ordinary least squares
+    "ols": Method(LinearOptions, ordinary, weights=("none",)),
+    # least squares weighted by joint
+    "wls": Method(LinearOptions, weighted),
     # robust least squares, Huber or Tukey
     "irls": Method(irls.IrlsOptions, weighted, irls.fit, weights=("none",)),
     # instrumental variables of the simulated closed loop
     "iv": Method(
-        FixedPointOptions, ordinary, partial(beside_record, iv.fit), observe=observed_loop
+        FixedPointOptions,
+        ordinary,
+        partial(beside_record, iv.fit),
+        observe=observed_loop,
+        rounding=iv.ROUNDING,
     ),
     # torques on the regressor of the simulated motion
     "didim": Method(
-        FixedPointOptions, ordinary, partial(beside_record, didim.fit), observe=observed_loop
+        FixedPointOptions,
+        ordinary,
+        partial(beside_record, didim.fit),
+        observe=observed_loop,
+        rounding=didim.ROUNDING,
     ),
     # least squares among physical robots
     "feasible": Method(
@@ -123,6 +134,7 @@ METHODS: dict[str, Method] = {
         feasible.fit,
         brief={"explain": False},
         any_rank=True,
+        physical=True,
     ),
 }
 
@@ -360,11 +372,9 @@ def essential(
     the same weights.
     """
     whole = problem(model, records, study, simulator=simulator)
-    settings = whole.settings
     return essential_of(
-        observe_rows(whole),
-        settings.essential,
-        linear_companion(settings.estimate),
+        whole.linear_system(observe_rows(whole)),
+        whole.settings.essential,
         model=whole.model,
         provenance=whole.provenance,
     )

@@ -30,6 +30,7 @@ from typing import Any, cast
 import numpy as np
 
 from runtime.core.errors import InputError
+from runtime.core.least_squares.method import linear_method
 from runtime.core.model import BoundModel, GeneratedModel, channels_of, elements_of, joint_units
 from runtime.core.problem import Problem
 from runtime.core.record import JOINT_CHANNELS, WRENCH, Record
@@ -98,8 +99,9 @@ def force_sensors(problem: Problem) -> Problem:
     slow = per_joint(settings.rows.low_speed, n, "rows.low_speed") if torques else [UNMEASURED] * n
     low_speed = (*map(float, slow), *[0.0] * 6 * len(channels))
     settings = replace(settings, rows=replace(settings.rows, low_speed=low_speed))
-    if settings.estimate.method == "ols":  # N and N m in one sum
-        weighted = replace(settings.estimate, method="wls", weights="joint")
+    if problem.method.linear and not problem.method.weighs:  # N and N m in one sum
+        method = linear_method("joint", problem.methods)
+        weighted = replace(settings.estimate, method=method, weights="joint")
         settings = replace(settings, estimate=weighted)
     frames = [int(c.removeprefix(WRENCH)) for c in channels]
     return problem.changed(

@@ -326,7 +326,7 @@ class CoarseEncoders:
             )
             for (states, mask), record in zip(parts, self.task.records, strict=True)
         ]
-        return linear_system(stack(rows), self.task.estimate).solve().X
+        return linear_system(stack(rows), self.task.estimate, self.task.methods).solve().X
 
 
 def mean_change(ratios: Array) -> Array:

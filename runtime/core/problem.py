@@ -18,10 +18,10 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from runtime.core.arrays import require_kind
-from runtime.core.errors import InputError, SettingsError
+from runtime.core.errors import InputError
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.least_squares.linear import assemble
-from runtime.core.least_squares.method import Beginning, Method
+from runtime.core.least_squares.linear import System, assemble
+from runtime.core.least_squares.method import Beginning, Method, Methods, linear_system, method_of
 from runtime.core.model import GeneratedModel, drives_of, require_emitted
 from runtime.core.provenance import origin
 from runtime.core.record import Record
@@ -85,7 +85,7 @@ class Problem:
     unseen: tuple[Record, ...]
     settings: Study
     reader: Reader
-    methods: Mapping[str, Method]
+    methods: Methods
     notes: tuple[Note, ...] = ()
 
     def __post_init__(self) -> None:
@@ -123,6 +123,17 @@ class Problem:
     def method(self) -> Method:
         """Method of estimation that settings.estimate names."""
         return self.methods[self.settings.estimate.method]
+
+    def linear_system(self, rows: Observation, **changes: Any) -> System:
+        """Weigh the rows Y = W X + rho for linear least squares with the weights of the settings.
+
+        It is the system of the method, or of its companion if the method is not linear. changes :
+        other values of settings.estimate, such as columns.
+        """
+        settings = self.settings.estimate
+        return linear_system(
+            rows, replace(settings, **changes) if changes else settings, self.methods
+        )
 
     def noted(self, kind: str) -> Note | None:
         """Return the first message (note) on the subject `kind`; None if there is no message."""
@@ -214,7 +225,7 @@ def estimated(
 def estimate_of(
     observation: Observation,
     settings: EstimateSettings,
-    methods: Mapping[str, Method],
+    methods: Methods,
     *,
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
@@ -254,17 +265,7 @@ def estimate_of(
     )
 
 
-def method_of(settings: EstimateSettings, methods: Mapping[str, Method]) -> Method:
-    """Return the method of estimation that `settings` names; SettingsError if it is unknown."""
-    if settings.method not in methods:
-        raise SettingsError(
-            f"unknown method {settings.method!r}; expected {' or '.join(methods)}",
-            path=("estimate", "method"),
-        )
-    return methods[settings.method]
-
-
-def point_estimate(settings: EstimateSettings, methods: Mapping[str, Method]) -> EstimateSettings:
+def point_estimate(settings: EstimateSettings, methods: Methods) -> EstimateSettings:
     """Return settings for a faster fit that gives X only, without explanations for the user.
 
     Methods that have no such options use the settings unchanged.

@@ -188,6 +188,9 @@ class Rows(Settings):
     low_speed: PerJoint[NotNegative] = 0.0
 
 
+Weights = Literal["none", "joint", "iterated", "covariance"]
+
+
 class EstimateSettings(Settings):
     """Method of estimation, weights of the rows, and columns of W that are fitted.
 
@@ -204,7 +207,7 @@ class EstimateSettings(Settings):
     """
 
     method: Text = "ols"
-    weights: Literal["none", "joint", "iterated", "covariance"] = "none"
+    weights: Weights = "none"
     columns: Literal["all"] | Many[Text] = "all"
     options: Mapping[str, Any] = field(default_factory=dict)
 

@@ -142,20 +142,13 @@ class Loop:
     @property
     def notes(self) -> tuple[str, ...]:
         """Remarks for the user of a study, such as an assumption on the reference motion."""
-        method = self.study.estimate.method
         notes = [self.closed.assumption] if self.closed.assumption else []
         if self.study.cestac.place == "loop":
             notes.append(
                 "The encoder rounds inside the simulated loop, whose parameters are the values of the robot file; every run is a record of its own, compared with the mean of as many records of the same seeds whose encoder is that of the study."
             )
-        elif method == "didim":
-            notes.append(
-                "didim uses only the first recorded position, so rounding the record says nothing about an encoder in the loop, whose steps the controller answers; place: loop studies that."
-            )
-        elif method == "iv":
-            notes.append(
-                "The instruments of iv do not depend on the rounding of recorded positions; place: loop studies an encoder in the loop."
-            )
+        elif rounding := self.problem.method.rounding:
+            notes.append(rounding.format(method=self.study.estimate.method))
         return tuple(notes)
 
     def measured(self) -> Observation:

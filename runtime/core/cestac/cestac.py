@@ -42,12 +42,12 @@ from runtime.core.cestac.perturbed import (
     prepared_record,
     study_columns,
 )
-from runtime.core.cestac.result import Cestac, level_result, names_judged
+from runtime.core.cestac.result import LEAST_SQUARES, Cestac, level_result, names_judged
 from runtime.core.cestac.runs import Level, Run, Runs
 from runtime.core.cestac.sources import Checkpoint, EncoderOf, LoopOf
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.least_squares.method import LINEAR, linear_system
+from runtime.core.least_squares.method import method_of
 from runtime.core.limits import LIMIT
 from runtime.core.problem import Problem, estimate_of, point_estimate
 from runtime.core.provenance import processor
@@ -173,12 +173,13 @@ def cestac(
     )
     by_level = [runs.where(runs.level == k) for k in range(len(task.levels))]
     levels = list(zip(task.levels, by_level, strict=True))
+    linear = method_of(task.estimate, task.methods).linear
     if settings.place == "loop":
         (_, exact), *levels = levels
-        X = np.nanmean(exact.X, axis=0)
-        reference = replace(
-            reference, X=X, residual_norm=float(np.linalg.norm(measured.Y - measured.W @ X))
-        )
+        reference = replace(reference, X=np.nanmean(exact.X, axis=0))
+    if settings.place == "loop" or not linear:  # their residuals are not those of `measured`
+        norm = float(np.linalg.norm(measured.Y - measured.W @ reference.X))
+        reference = replace(reference, residual_norm=norm)
     return Cestac(
         names=task.names,
         reference=reference,
@@ -189,6 +190,7 @@ def cestac(
             *(() if loop is None else loop.notes),
             *(record.note for record in task.records if record.note),
         ),
+        estimator=LEAST_SQUARES if linear else reference.method.upper(),
     )
 
 
@@ -361,8 +363,9 @@ def one_run(columns: Columns, task: Task, key: tuple[int, int]) -> Run:
 
 def _estimated(task: Task, observation: Observation) -> Array:
     """Estimate X, shape (b,), from the system of one run; nan if the method finds no estimate."""
-    if task.estimate.method in LINEAR:
-        return linear_system(observation, task.estimate).solve().X
+    method = method_of(task.estimate, task.methods)
+    if method.linear:
+        return method.system(observation, task.estimate).solve().X
     try:
         settings = point_estimate(task.estimate, task.methods)
         estimate = estimate_of(observation, settings, task.methods, model=task.model)

@@ -24,7 +24,7 @@ from runtime.core.cestac.sources import EncoderOf, Loop, RecordEncoder
 from runtime.core.drives import Drives
 from runtime.core.errors import InputError
 from runtime.core.essential import essential_of
-from runtime.core.least_squares.method import Method, linear_companion
+from runtime.core.least_squares.method import Method
 from runtime.core.missing import COUNTS, Missing, require_positions
 from runtime.core.model import GeneratedModel, base_columns
 from runtime.core.problem import Problem
@@ -218,8 +218,7 @@ def study_columns(
         return named
     if columns is None:
         rows = _measured(problem, records) if loop is None else loop.measured()
-        linear = linear_companion(settings.estimate)
-        columns = essential_of(rows, settings.essential, linear).names
+        columns = essential_of(problem.linear_system(rows), settings.essential).names
     return (*named, *(name for name in columns if name not in named))
 
 
