@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from runtime.core.documents import Result
+from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, joint_labels
 from runtime.core.part import Part
 from runtime.core.problem import Problem
@@ -117,7 +118,7 @@ def elastic_gears(result: Identification) -> Elasticity | None:
     None if there is no such gear, if the records are poses at rest, or if not all parameters are
     determined.
     """
-    if not result.determined or result.study.signals.reader == "static":
+    if not result.determined or result.problem.reader.at_rest:
         return None
     return elasticity(result.problem, result.estimate.names, result.estimate.X)
 
