@@ -125,9 +125,10 @@ class ExpectedError(Part):
         result = self.result
         if not result.usable:
             return Expected(*3 * (float("nan"),))
-        by_lowpass = [r for r in result.prepared if r.study.signals.reader == "lowpass"]
         steps = [
-            acceleration_error(r.record, r.states, r.study.signals, r.drives) for r in by_lowpass
+            acceleration_error(r.record, r.states, r.study.signals, r.drives)
+            for r in result.prepared
+            if r.reader.filters_positions
         ]
         system = result.problem.linear_system(result.observation)
         if system.settings.weights == "none":

@@ -45,10 +45,6 @@ PROBED_STATES = 64  # random ones that tell columns apart
 LEFT_OF_COLUMN = 1e-8  # of the norm of a column: less is left of it beside those before
 
 
-READ_SAMPLE_BY_SAMPLE = ("lowpass", "static")
-"""Readers that take positions as they are, so that a joint at rest is one."""
-
-
 def force_sensors(problem: Problem) -> Problem:
     """Add six fixed joints per force sensor to model and records; their torques are the wrench.
 
@@ -90,7 +86,7 @@ def force_sensors(problem: Problem) -> Problem:
                 file=record.file,
             )
     settings = problem.settings
-    if settings.signals.reader not in READ_SAMPLE_BY_SAMPLE:
+    if not problem.reader.linear:
         raise InputError(
             f"signals.reader: {settings.signals.reader} does not support force sensors; write signals: {{reader: lowpass}} in the study, or remove record.columns.wrench"
         )

@@ -18,7 +18,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from runtime.core.arrays import require_kind
-from runtime.core.errors import InputError
+from runtime.core.errors import InputError, SettingsError
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import System, assemble
 from runtime.core.least_squares.method import Beginning, Method, Methods, linear_system, method_of
@@ -27,7 +27,7 @@ from runtime.core.provenance import origin
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared, stacked
-from runtime.core.signals.filters import Reader
+from runtime.core.signals.reader import Reader
 from runtime.core.study import EstimateSettings, Study
 
 RECORD_EXPECTED = (
@@ -138,6 +138,18 @@ class Problem:
     def noted(self, kind: str) -> Note | None:
         """Return the first message (note) on the subject `kind`; None if there is no message."""
         return next((note for note in self.notes if note.kind == kind), None)
+
+    def require_motion(self, who: str) -> None:
+        """Raise SettingsError if the records are poses at rest, for an analysis of a motion.
+
+        who : name of the analysis in the message.
+        """
+        if self.reader.at_rest:
+            raise SettingsError(
+                f"reader: {self.settings.signals.reader} is for poses at rest, but {who} needs "
+                "records of a motion; set another reader",
+                path=("signals", "reader"),
+            )
 
     @property
     def provenance(self) -> dict[str, Any]:

@@ -26,7 +26,6 @@ from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, require, require_no_channels, require_no_wrench
 from runtime.core.problem import Problem, observe_rows
 from runtime.core.rows.predicted import Weights, kept_correlation
-from runtime.core.signals.filters import require_motion
 from runtime.core.study import Study
 from runtime.excitation.criteria import criterion_of, excesses, limits_of, plan_rows, weights_of
 from runtime.excitation.optimiser import Search, improve, one_start
@@ -70,7 +69,7 @@ def excite(
     study: Any = problem.settings
     require_no_channels(model, "the search for a motion")
     require_no_wrench(model, "the search for a motion")
-    require_motion(study.signals, "the search for a motion (poses: excitation: {poses: N})")
+    problem.require_motion("the search for a motion (poses: excitation: {poses: N})")
     settings = study.excitation or ExcitationSettings()
     limits = limits_of(model, settings.limits)
     known = _known_estimate(problem, settings)

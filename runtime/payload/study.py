@@ -26,7 +26,6 @@ from runtime.core.record import Record
 from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared
-from runtime.core.signals.filters import require_motion
 from runtime.core.table import Table, in_lines, with_intervals
 from runtime.payload.gains import DriveGains, drive_gains, scaled
 from runtime.payload.load import Payload, payload
@@ -129,7 +128,7 @@ def payload_study(problem: Problem, loaded: Sequence[Record]) -> PayloadStudy:
             path=("payload",),
         )
     require_no_channels(model, "the study of a load")
-    require_motion(study.signals, "a load")
+    problem.require_motion("a load")
     full = [problem.reading(record) for record in loaded]
     gains = None
     if settings.gains:

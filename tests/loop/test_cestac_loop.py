@@ -165,12 +165,12 @@ def test_what_cannot_be_asked(arm, study, record):  # noqa: F811
 
 @pytest.mark.parametrize("name", ["iv", pytest.param("didim", marks=campaign)])
 def test_a_simulating_method_under_another_name_is_the_method(
-    arm,
+    arm,  # noqa: F811
     study,
     record,
     simulator,
     monkeypatch,
-    name,  # noqa: F811
+    name,
 ):
     monkeypatch.setitem(METHODS, "twinned", METHODS[name])
     expected, found = (

@@ -35,7 +35,6 @@ from typing import Any
 import numpy as np
 
 from runtime.core.cestac.perturbed import (
-    PreparedRecord,
     Task,
     measured_rows,
     perturbed,
@@ -51,6 +50,7 @@ from runtime.core.least_squares.method import method_of
 from runtime.core.limits import LIMIT
 from runtime.core.problem import Problem, estimate_of, point_estimate
 from runtime.core.provenance import processor
+from runtime.core.record import Record
 from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import common_drives
@@ -123,10 +123,17 @@ def cestac(
             ),
             path=("cestac", "side"),
         )
-    if study.signals.reader == "counts" and settings.delta and settings.rounding != "phase":
+    name = study.signals.reader
+    if settings.delta and not problem.reader.reads_rounded:
+        raise SettingsError(
+            f"steps, but signals.reader: {name} does not say how it reads rounded positions; set "
+            "another reader, or delta: []",
+            path=("cestac", "delta"),
+        )
+    if problem.reader.encoder is not None and settings.delta and settings.rounding != "phase":
         raise SettingsError(
             (
-                f"rounding: {settings.rounding} does not work with signals.reader: counts, because "
+                f"rounding: {settings.rounding} does not work with signals.reader: {name}, because "
                 "it rounds each sample independently and so destroys the changes of the encoder "
                 "count; set rounding: phase"
             ),
@@ -139,7 +146,10 @@ def cestac(
         study = replace(study, estimate=loop.estimate)
     rounded = () if settings.place == "loop" else as_measured
     task = Task(
-        records=tuple(prepared_record(own, study, own_encoder, drives) for own in rounded),
+        records=tuple(
+            prepared_record(own, study, own_encoder, drives, exact=bool(settings.delta))
+            for own in rounded
+        ),
         model=model,
         names=study_columns(problem, as_measured, columns, loop),
         estimate=replace(study.estimate, columns="all"),
@@ -275,13 +285,13 @@ def _all_runs(
     return Runs.joined(parts, b)
 
 
-def _measured(record: PreparedRecord) -> Iterator[memoryview]:
+def _measured(record: Record) -> Iterator[memoryview]:
     """Yield the bytes of the positions, torques and missing-sample flags of a record, for a hash.
 
     A hash of these bytes identifies the record.
     """
     missing = () if record.missing is None else (np.packbits(record.missing.samples),)
-    return (np.ascontiguousarray(x).data for x in (record.q, record.tau, *missing))
+    return (np.ascontiguousarray(x).data for x in (record.q, record.torque, *missing))
 
 
 def _identity(
@@ -307,7 +317,9 @@ def _identity(
         ],
         "robot": provenance.get("robot"),
         "robot_sha256": provenance.get("robot_sha256"),
-        "records": [sha256(b"".join(map(bytes, _measured(r)))).hexdigest() for r in task.records],
+        "records": [
+            sha256(b"".join(map(bytes, _measured(r.record)))).hexdigest() for r in task.records
+        ],
         "versions": provenance["versions"],
     }
 
