@@ -14,15 +14,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from runtime import robust as irls
 from runtime.advisor.advice import NoAdvice
-from runtime.agreement import agreement
-from runtime.commands import commands_for_torques
-from runtime.controller.fitted import doubt_of_gains, law_of_controller
 from runtime.core import identify as identification
 from runtime.core.arrays import kind_of, require_kind
 from runtime.core.automatic import automatic_cutoff
@@ -32,8 +27,8 @@ from runtime.core.identify import Extra, OnRequest
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import LinearOptions, ordinary
 from runtime.core.least_squares.method import Method
-from runtime.core.least_squares.wls import by_weights, weighted
-from runtime.core.model import GeneratedModel, require_emitted
+from runtime.core.least_squares.wls import weighted
+from runtime.core.model import GeneratedModel, channels_of, require_emitted
 from runtime.core.problem import (
     RECORD_EXPECTED,
     Note,
@@ -44,28 +39,17 @@ from runtime.core.problem import (
     prepared,
 )
 from runtime.core.problem import estimate_of as estimate_by
-from runtime.core.record import Record
+from runtime.core.record import WRENCH, Record
 from runtime.core.rows.observation import Observation
 from runtime.core.settings_errors import gone
 from runtime.core.signals.reader import LOWPASS, Reader
 from runtime.core.study import EstimateSettings, Signals
 from runtime.counts.encoder_advice import EncoderSteps
-from runtime.counts.own_encoder import own_encoder
-from runtime.counts.reader import COUNTS
 from runtime.expected import ExpectedError
-from runtime.laws.scalars import fitted_scalars, scalars_of_laws
-from runtime.laws.transmitted import transmitted_torque
+from runtime.late import Late, Listed, PartWhen, When
 from runtime.link_side import torques_of_links
-from runtime.loop import didim, iv
-from runtime.loop.cestac import loop_of
-from runtime.loop.closed_loop import observed_loop
-from runtime.loop.fixed_point import FixedPointOptions
-from runtime.loop.simulated_motion import beside_record
 from runtime.median import pulses_in_torques
-from runtime.payload.study import LOADED, load_of_study, payload_study
-from runtime.physical import feasible
-from runtime.physical.consistency import as_fitted, consistency
-from runtime.plausible.known import torque_unit
+from runtime.payload.settings import LOADED
 from runtime.reading.formats import is_measured
 from runtime.reading.records import read_records
 from runtime.reading.settings import RecordSettings
@@ -73,7 +57,6 @@ from runtime.rest import STATIC, poses_at_rest
 from runtime.speeds import recorded_speeds
 from runtime.study import Study, study_of, study_schema
 from runtime.threads import alone_each, single_threaded
-from runtime.wrench import force_sensors
 
 if TYPE_CHECKING:
     from runtime.advisor.advice import Advice
@@ -89,90 +72,82 @@ if TYPE_CHECKING:
     from runtime.treatments import Ranking
 
 STEPS: list[Step] = [
-    commands_for_torques,
-    force_sensors,
+    When(
+        Late("runtime.commands:commands_for_torques"),
+        lambda p: any(r.origin.command for r in (*p.records, *p.unseen)),
+    ),
+    When(
+        Late("runtime.wrench:force_sensors"),
+        lambda p: any(c.startswith(WRENCH) for r in (*p.records, *p.unseen) for c in r.channels),
+    ),
     torques_of_links,
     pulses_in_torques,
     recorded_speeds,
     automatic_cutoff,
     poses_at_rest,
-    transmitted_torque,
-    fitted_scalars,
-    law_of_controller,
+    When(Late("runtime.laws.transmitted:transmitted_torque"), lambda p: bool(channels_of(p.model))),
+    When(Late("runtime.laws.scalars:fitted_scalars"), lambda p: hasattr(p.model, "FIT")),
+    When(
+        Late("runtime.controller.fitted:law_of_controller"),
+        lambda p: any("law_v" in r.channels for r in p.records),
+    ),
 ]
-READERS: dict[str, Reader] = {"lowpass": LOWPASS, "counts": COUNTS, "static": STATIC}
-METHODS: dict[str, Method] = {
-    # ordinary least squares
-    "ols": Method(LinearOptions, ordinary, weights=("none",)),
-    # least squares weighted by joint
-    "wls": Method(LinearOptions, weighted),
-    # robust least squares, Huber or Tukey
-    "irls": Method(irls.IrlsOptions, weighted, irls.fit, weights=("none",)),
-    # instrumental variables of the simulated closed loop
-    "iv": Method(
-        FixedPointOptions,
-        ordinary,
-        partial(beside_record, iv.fit),
-        observe=observed_loop,
-        rounding=iv.ROUNDING,
-    ),
-    # torques on the regressor of the simulated motion
-    "didim": Method(
-        FixedPointOptions,
-        ordinary,
-        partial(beside_record, didim.fit),
-        observe=observed_loop,
-        rounding=didim.ROUNDING,
-    ),
-    # least squares among physical robots
-    "feasible": Method(
-        feasible.FeasibleOptions,
-        by_weights,
-        feasible.fit,
-        brief={"explain": False},
-        any_rank=True,
-        physical=True,
-    ),
-}
-
-
-def later(module: str, name: str) -> Callable[..., Any]:
-    """Return a function that calls `name` of `module`, which is imported only at the first call.
-
-    So an analysis on request does not slow down other calls.
-    """
-
-    def called(*given: Any, **options: Any) -> Any:
-        return getattr(import_module(module), name)(*given, **options)
-
-    return called
-
-
+READERS: Listed[Reader] = Listed(
+    {"lowpass": LOWPASS, "counts": "runtime.counts.reader:COUNTS", "static": STATIC}
+)
+METHODS: Listed[Method] = Listed(
+    {
+        # ordinary least squares
+        "ols": Method(LinearOptions, ordinary, weights=("none",)),
+        # least squares weighted by joint
+        "wls": Method(LinearOptions, weighted),
+        # least squares among physical robots
+        "feasible": "runtime.physical.feasible:METHOD",
+        # robust least squares, Huber or Tukey
+        "irls": "runtime.robust:METHOD",
+        # instrumental variables of the simulated closed loop
+        "iv": "runtime.loop.iv:METHOD",
+        # torques on the regressor of the simulated motion
+        "didim": "runtime.loop.didim:METHOD",
+    }
+)
 EXTRAS: list[Extra] = [
-    torque_unit,
-    doubt_of_gains,
+    PartWhen(Late("runtime.plausible.known:torque_unit"), lambda r: bool(r.model.VALUES)),
+    PartWhen(
+        Late("runtime.controller.fitted:doubt_of_gains"),
+        lambda r: any("law_v" in record.channels for record in r.records),
+    ),
     OnRequest(
         "plausible",
         "plausibility of the record",
-        later("runtime.plausible.plausibility", "plausibility_of"),
+        Late("runtime.plausible.plausibility:plausibility_of"),
     ),
-    scalars_of_laws,
-    load_of_study,
+    PartWhen(Late("runtime.laws.scalars:scalars_of_laws"), lambda r: bool(r.problem.notes)),
+    PartWhen(
+        Late("runtime.payload.study:load_of_study"),
+        lambda r: getattr(r.study, "payload", None) is not None,
+    ),
     EncoderSteps,
-    agreement,
-    ExpectedError,
-    OnRequest("friction", "friction", later("runtime.friction", "friction")),
-    OnRequest("physical", "physical consistency", consistency, as_fitted),
-    OnRequest(
-        "advice", "resolution advice", later("runtime.advisor.advisor", "advice_of"), NoAdvice
+    PartWhen(
+        Late("runtime.agreement:agreement"),
+        lambda r: len(r.records) + len(r.problem.unseen) > 1,
     ),
+    ExpectedError,
+    OnRequest("friction", "friction", Late("runtime.friction:friction")),
+    OnRequest(
+        "physical",
+        "physical consistency",
+        Late("runtime.physical.consistency:consistency"),
+        Late("runtime.physical.consistency:as_fitted"),
+    ),
+    OnRequest("advice", "resolution advice", Late("runtime.advisor.advisor:advice_of"), NoAdvice),
     OnRequest(
         "resolution",
         "resolution study",
         partial(
-            later("runtime.core.cestac.cestac", "resolution"),
-            own_encoder=own_encoder,
-            loop_of=loop_of,
+            Late("runtime.core.cestac.cestac:resolution"),
+            own_encoder=Late("runtime.counts.own_encoder:own_encoder"),
+            loop_of=Late("runtime.loop.cestac:loop_of"),
         ),
     ),
 ]
@@ -238,7 +213,7 @@ def state_problem(
     study = complete_study(require_study(study))
     methods: Mapping[str, Method] = METHODS
     if simulator is not None:
-        observe = partial(observed_loop, simulator=simulator)
+        observe = partial(Late("runtime.loop.closed_loop:observed_loop"), simulator=simulator)
         methods = {
             name: method if method.observe is None else replace(method, observe=observe)
             for name, method in METHODS.items()
@@ -563,7 +538,7 @@ def compare(
     problems = {name: prepared(_candidate(model, one), STEPS) for name, one in candidates.items()}
     of_the_best = []
     if variants is not None:
-        plausible = later("runtime.plausible.plausibility", "plausibility_of")
+        plausible = Late("runtime.plausible.plausibility:plausibility_of")
         of_the_best.append(partial(plausible, variants=variants))
     return comparing.compare(problems, extras({}), of_the_best)
 
@@ -588,8 +563,8 @@ def cestac(
 
     return resolution.cestac(
         problem(model, records, study, simulator=simulator),
-        own_encoder=own_encoder,
-        loop_of=partial(loop_of, simulator=simulator),
+        own_encoder=Late("runtime.counts.own_encoder:own_encoder"),
+        loop_of=partial(Late("runtime.loop.cestac:loop_of"), simulator=simulator),
         map=alone_each(map),
         **options,
     )
@@ -647,9 +622,11 @@ def payload(
 
     loaded : records with the load; default: the records of study.payload.record.
     """
+    from runtime.payload import study as loads
+
     whole = _with_loaded(model, records, study, (), loaded, None)
     note = whole.noted(LOADED)
-    return payload_study(whole, () if note is None else note.result)
+    return loads.payload_study(whole, () if note is None else note.result)
 
 
 @single_threaded

@@ -29,6 +29,7 @@ from runtime.core.rows.prepared import Prepared
 from runtime.core.table import Table, in_lines, with_intervals
 from runtime.payload.gains import DriveGains, drive_gains, scaled
 from runtime.payload.load import Payload, payload
+from runtime.payload.settings import LOADED
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,10 +76,6 @@ class PayloadStudy(Result, Part, keys="payload drive_gains:gains"):
             known = [x for j, x in zip(gains.joints, values, strict=True) if j not in gains.refused]
             lines += ["Torque constants, SI, +- 95 %", *in_lines(known), gains.text]
         return "\n".join(lines)
-
-
-LOADED = "loaded"
-"""Kind of the note that holds the records with the load, prepared."""
 
 
 def load_of_study(result: Identification) -> PayloadStudy | None:
