@@ -11,6 +11,8 @@ cut        the largest or the smallest torque is repeated in many samples, and a
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -21,6 +23,7 @@ from runtime.core.errors import instant
 from runtime.core.limits import limits
 from runtime.core.missing import held_samples
 from runtime.core.model import drives_of, joint_torque_units
+from runtime.core.record import Record
 from runtime.core.signals.filters import median_filtered
 from runtime.plausible.bodies import least_squares
 from runtime.plausible.case import Case
@@ -31,6 +34,137 @@ LIMIT = limits(__package__)
 Array = np.ndarray
 
 
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Positions of one record from sample to sample.
+
+    Attributes
+    ----------
+    record : Record
+    q : ndarray, shape (N, n), rad or m
+        Positions after the median filter of the study.
+    high : ndarray of bool, shape (N - 1, n)
+        Steps between two samples that are jumps.
+    sharp : ndarray of bool, shape (N - 2, n)
+        Changes from one step to the next that no robot makes.
+    window : int
+        Samples of the median filter.
+    """
+
+    record: Record
+    q: Array
+    high: Array
+    sharp: Array
+    window: int
+
+    @cached_property
+    def steps(self) -> Array:
+        """Size of each step between two samples, shape (N - 1, n)."""
+        return np.abs(np.diff(self.q, axis=0))
+
+    def jumps(self) -> tuple[Array, Array]:
+        """First and last step of each jump of any joint."""
+        return _runs(np.asarray(self.high.any(axis=1)), self.window)
+
+
+def course_of(case: Case, record: Record) -> Course:
+    """Find the jumps and the sharp changes of the positions of a record."""
+    window, limits = case.study.signals.median, case.limits("qd")
+    fastest = np.array([LIMIT.LARGEST_SPEED[unit][1] for unit in case.units])
+    fastest = fastest if limits is None else 4 * limits
+    good, none = np.array([LIMIT.LARGEST_ACCELERATION[unit] for unit in case.units]).T
+    q = median_filtered(record.q, window)
+    steps = np.diff(q, axis=0)
+    apart = np.abs(steps - median_filter(steps, (2 * LIMIT.JUMP_STEPS + 1, 1)))
+    least = np.minimum(fastest / record.rate, none / record.rate**2)
+    high = apart > np.maximum(LIMIT.JUMP * _usual(apart), least)
+    changes = np.abs(np.diff(q, 2, axis=0))
+    sharp = changes > np.maximum(LIMIT.JUMP * _usual(changes), good / record.rate**2)
+    return Course(record, q, high, sharp, window)
+
+
+def same_positions(case: Case, course: Course) -> Answer | None:
+    """Tell two joints that move and have the same positions in the file."""
+    drives = drives_of(case.model) if case.sides[0] == "motor" else None
+    q = course.record.q
+    files = np.diff(q if drives is None else drives.motor_position(q), axis=0)
+    for two in combinations(np.flatnonzero(course.steps.any(axis=0)), 2):
+        if np.ptp(files[:, two], axis=1).max() <= 1e-9 * np.abs(files[:, two]).max():
+            return Answer(
+                "no",
+                f"Positions of joints {' and '.join(case.labels[j] for j in two)} are the same",
+                "one column is used for both joints: check record.columns.q",
+            )
+    return None
+
+
+def held_packets(case: Case, course: Course) -> Answer | None:
+    """Tell samples that a controller held, if every jump is near such samples."""
+    held = held_samples(course.record.q)
+    near = LIMIT.JUMP_STEPS + course.window
+    runs = zip(*course.jumps(), strict=True) if course.high.any() else ()
+    if not held.any() or not all(held[max(a - near, 0) : b + near].any() for a, b in runs):
+        return None
+    packets = int(np.count_nonzero(np.diff(held, prepend=False) & held))
+    return Answer(
+        "good" if held.mean() < LIMIT.HELD_SHARE else "doubtful",
+        f"The controller held the positions at {packets} instants ({int(held.sum())} of "
+        f"{len(held)} samples), then jumped to the new positions",
+        "log without lost packets, or leave these times out (rows.window); signals: "
+        "{reader: counts} treats these samples as missing",
+    )
+
+
+def frozen_encoder(case: Case, course: Course) -> Answer | None:
+    """Tell a joint that moves and whose position suddenly stays at one value."""
+    pairs = zip(course.steps.T, course.sharp.T, strict=True)
+    frozen = np.array([_frozen(steps, sharp) for steps, sharp in pairs])
+    if not frozen.any():
+        return None
+    k = int(np.flatnonzero(frozen.any(axis=0))[0])
+    return Answer(
+        "no",
+        f"Joint {case.joints(np.asarray(frozen.any(axis=1)))} moves, but its position suddenly "
+        f"stays at one value at {instant(course.record.t[k])} s",
+        "an encoder froze: leave this time out (rows.window), or repair the record",
+    )
+
+
+def jumping_joints(case: Case, course: Course) -> Answer | None:
+    """Tell the joints of the first jump, its size, and its probable cause."""
+    if not course.high.any():
+        return None
+    first, _ = course.jumps()
+    k = int(first[0])
+    jumping = course.high[k]
+    sizes = zip(course.steps[k], case.units, jumping, strict=True)
+    by = ", ".join(f"{size:.3g} {unit}" for size, unit, own in sizes if own)
+    one = np.count_nonzero(jumping) == 1
+    who = f"{'Joint' if one else 'Joints'} {case.joints(jumping)} {'jumps' if one else 'jump'}"
+    text = f"{who} by {by} at {instant(course.record.t[k])} s"
+    if more := len(first) - 1:
+        text += f", and at {more} more {'instant' if more == 1 else 'instants'}"
+    if _wrap(course):
+        remedy = (
+            "the position starts anew: for an angle at a full turn set record: "
+            "{unwrap: true}, for a counter set signals: {reader: counts}"
+        )
+    elif not one or len(case.units) == 1:
+        remedy = (
+            "samples are missing there, or two records are joined: give each its own file "
+            "(record.also), or cut (rows.window)"
+        )
+    else:
+        remedy = (
+            "an encoder failed, froze or was reset: leave this time out (rows.window), or "
+            "repair the record"
+        )
+    return Answer("no", text, remedy)
+
+
+FINDINGS = (same_positions, held_packets, frozen_encoder, jumping_joints)
+
+
 @Question(
     "Are the positions those of a motion?",
     f"steps between samples that differ by less than {LIMIT.JUMP:g} times the usual change, or by "
@@ -38,79 +172,11 @@ Array = np.ndarray
 )
 def jumps(case: Case) -> Answer:
     """Check whether a joint position jumps, freezes, or is the same as that of another joint."""
-    median, units, limits = case.study.signals.median, case.units, case.limits("qd")
-    fastest = np.array([LIMIT.LARGEST_SPEED[unit][1] for unit in units])
-    fastest = fastest if limits is None else 4 * limits
-    good, none = np.array([LIMIT.LARGEST_ACCELERATION[unit] for unit in units]).T
     for record in case.records:
-        q = median_filtered(record.q, median)
-        steps = np.abs(np.diff(q, axis=0))
-        drives = drives_of(case.model) if case.sides[0] == "motor" else None
-        files = np.diff(record.q if drives is None else drives.motor_position(record.q), axis=0)
-        for two in combinations(np.flatnonzero(steps.any(axis=0)), 2):
-            if np.ptp(files[:, two], axis=1).max() <= 1e-9 * np.abs(files[:, two]).max():
-                return Answer(
-                    "no",
-                    f"Positions of joints {' and '.join(case.labels[j] for j in two)} are the same",
-                    "one column is used for both joints: check record.columns.q",
-                )
-        usual = _usual(steps)
-        around = median_filter(np.diff(q, axis=0), (2 * LIMIT.JUMP_STEPS + 1, 1))
-        apart = np.abs(np.diff(q, axis=0) - around)
-        least = np.minimum(fastest / record.rate, none / record.rate**2)
-        high = apart > np.maximum(LIMIT.JUMP * _usual(apart), least)
-        changes = np.abs(np.diff(q, 2, axis=0))
-        sharp = changes > np.maximum(LIMIT.JUMP * _usual(changes), good / record.rate**2)
-        held = held_samples(record.q)
-        near = LIMIT.JUMP_STEPS + median
-        runs = zip(*_runs(high.any(axis=1), median), strict=True) if high.any() else ()
-        if held.any() and all(held[max(a - near, 0) : b + near].any() for a, b in runs):
-            packets = int(np.count_nonzero(np.diff(held, prepend=False) & held))
-            return Answer(
-                "good" if held.mean() < LIMIT.HELD_SHARE else "doubtful",
-                f"The controller held the positions at {packets} instants ({int(held.sum())} of "
-                f"{len(held)} samples), then jumped to the new positions",
-                "log without lost packets, or leave these times out (rows.window); signals: "
-                "{reader: counts} treats these samples as missing",
-            )
-        frozen = np.array([_frozen(x, own) for x, own in zip(steps.T, sharp.T, strict=True)])
-        if frozen.any():
-            still = np.asarray(frozen.any(axis=1))
-            k = int(np.flatnonzero(frozen.any(axis=0))[0])
-            return Answer(
-                "no",
-                f"Joint {case.joints(still)} moves, but its position suddenly stays at one value "
-                f"at {instant(record.t[k])} s",
-                "an encoder froze: leave this time out (rows.window), or repair the record",
-            )
-        if not high.any():
-            continue
-        first, _ = _runs(high.any(axis=1), median)
-        k = int(first[0])
-        joints = np.flatnonzero(high[k])
-        by = ", ".join(f"{steps[k, j]:.3g} {units[j]}" for j in joints)
-        who = f"Joints {case.joints(high[k])} jump"
-        if len(joints) == 1:
-            who = f"Joint {case.joints(high[k])} jumps"
-        text = f"{who} by {by} at {instant(record.t[k])} s"
-        if more := len(first) - 1:
-            text += f", and at {more} more {'instant' if more == 1 else 'instants'}"
-        if _wrap(q, high, usual, median):
-            remedy = (
-                "the position starts anew: for an angle at a full turn set record: "
-                "{unwrap: true}, for a counter set signals: {reader: counts}"
-            )
-        elif len(joints) > 1 or len(units) == 1:
-            remedy = (
-                "samples are missing there, or two records are joined: give each its own file "
-                "(record.also), or cut (rows.window)"
-            )
-        else:
-            remedy = (
-                "an encoder failed, froze or was reset: leave this time out (rows.window), or "
-                "repair the record"
-            )
-        return Answer("no", text, remedy)
+        course = course_of(case, record)
+        for finding in FINDINGS:
+            if (answer := finding(case, course)) is not None:
+                return answer
     return Answer("good", "No joint jumps between two samples")
 
 
@@ -138,25 +204,25 @@ def _frozen(steps: Array, sharp: Array) -> Array:
     return held
 
 
-def _runs(high: Array, median: int) -> tuple[Array, Array]:
+def _runs(high: Array, window: int) -> tuple[Array, Array]:
     """Find the start and the end of each jump: its first and its last step between samples.
 
     Resampling may spread a jump over several steps.
     """
     instants = np.flatnonzero(high)
-    apart = np.diff(instants) > max(median, LIMIT.JUMP_STEPS)
+    apart = np.diff(instants) > max(window, LIMIT.JUMP_STEPS)
     return instants[np.append(True, apart)], instants[np.append(apart, True)]
 
 
-def _wrap(q: Array, high: Array, usual: Array, median: int) -> bool:
+def _wrap(course: Course) -> bool:
     """Whether all jumps of each joint have one size, as if its angle or counter wraps around.
 
     A joint that jumps must do so more than once.
     """
     around, again = LIMIT.JUMP_STEPS, []
-    for own, jump, step in zip(q.T, high.T, usual, strict=True):
+    for own, jump, step in zip(course.q.T, course.high.T, _usual(course.steps), strict=True):
         if jump.any():
-            first, last = _runs(jump, median)
+            first, last = _runs(jump, course.window)
             before = own[np.maximum(first - around, 0)]
             sizes = np.abs(own[np.minimum(last + around, len(own) - 1)] - before)
             again.append(len(sizes) > 1 and np.ptp(sizes) <= 2 * LIMIT.JUMP * step)
