@@ -56,7 +56,7 @@ from runtime.elastic import elastic_gears
 from runtime.expected import ExpectedError
 from runtime.laws.scalars import fitted_scalars, scalars_of_laws
 from runtime.laws.transmitted import transmitted_torque
-from runtime.link_side import torques_of_links
+from runtime.link_side import stated_sides, torques_of_links
 from runtime.loop import didim, iv
 from runtime.loop.cestac import loop_of
 from runtime.loop.closed_loop import observed_loop
@@ -90,6 +90,7 @@ if TYPE_CHECKING:
     from runtime.treatments import Ranking
 
 STEPS: list[Step] = [
+    stated_sides,
     commands_for_torques,
     force_sensors,
     torques_of_links,

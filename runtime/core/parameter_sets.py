@@ -61,14 +61,18 @@ def physical_asked(errors: Mapping[Any, float], first: bool) -> bool:
     return bool(errors) and not stands
 
 
-def physical_possible(settings: EstimateSettings, fit: Estimate) -> bool:
+def physical_possible(problem: Problem, fit: Estimate) -> bool:
     """Whether a second fit, of physically consistent parameters, is possible after this fit.
 
-    `fit` has all parameters. This needs all columns, a fit with status ok, and weights other than
-    "covariance".
+    It needs a fit with status ok that has every inertial base parameter (friction and other
+    elements may be left out), and weights other than "covariance".
     """
-    whole = settings.columns == "all" and fit.status == "ok"
-    return whole and settings.weights != "covariance"
+    estimate, names = problem.settings.estimate, problem.model.BASE_PARAMETERS
+    if estimate.columns != "all":
+        elements = getattr(problem.model, "ELEMENTS", {})
+        names = tuple(name for name in names if name not in elements)
+    whole = {*names} <= {*fit.names} and fit.status == "ok"
+    return whole and estimate.weights != "covariance"
 
 
 def physical_set(problem: Problem, observation: Observation) -> tuple[Estimate, EstimateSettings]:
@@ -81,7 +85,7 @@ def physical_set(problem: Problem, observation: Observation) -> tuple[Estimate, 
     settings = problem.settings.estimate
     options = {"linear": settings.options} if settings.options else {}
     own = EstimateSettings(
-        "feasible", "none" if settings.method == "ols" else "joint", "all", options
+        "feasible", "none" if settings.method == "ols" else "joint", settings.columns, options
     )
     fit = estimated(problem, observation, own)
     decided = fit.details["options"]
@@ -236,7 +240,7 @@ def validated(
     validation, missing = predict(fits.settings, fits.sets or {"all": fits.estimate})
     errors = validation[-1].errors() if validation else {}
     linear = method in LINEAR
-    possible = linear and physical_possible(study.estimate, fits.estimate)
+    possible = linear and physical_possible(problem, fits.estimate)
     if possible and physical_asked(errors, study.essential.first):
         try:
             fit, settings = physical_set(problem, observation)

@@ -222,7 +222,7 @@ class Identification:
         linear = self.study.estimate.method in LINEAR
         if self.model_columns != "essential" or "feasible" in self.sets or not linear:
             return self.sets
-        if not physical_possible(self.study.estimate, self.estimate):
+        if not physical_possible(self.problem, self.estimate):
             return self.sets
         try:
             fit, _ = physical_set(self.problem, self.observation)
