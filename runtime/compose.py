@@ -47,7 +47,7 @@ from runtime.core.study import EstimateSettings, Signals
 from runtime.counts.encoder_advice import EncoderSteps
 from runtime.expected import ExpectedError
 from runtime.late import Late, Listed, PartWhen, When
-from runtime.link_side import torques_of_links
+from runtime.link_side import stated_sides, torques_of_links
 from runtime.median import pulses_in_torques
 from runtime.payload.settings import LOADED
 from runtime.reading.formats import is_measured
@@ -72,6 +72,7 @@ if TYPE_CHECKING:
     from runtime.treatments import Ranking
 
 STEPS: list[Step] = [
+    stated_sides,
     When(
         Late("runtime.commands:commands_for_torques"),
         lambda p: any(r.origin.command for r in (*p.records, *p.unseen)),

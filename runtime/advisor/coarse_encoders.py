@@ -98,14 +98,16 @@ class CoarseEncoders:
     ) -> None:
         model, study = problem.model, problem.settings
         signals = study.signals
-        if reader != signals.reader:
+        own_reader = problem.reader
+        if (own_reader.encoder is not None) != (reader == "counts"):
+            own_reader = STATES[reader]
             signals = replace(signals, reader=reader, step=None, side="joint")
         settings = replace(study.cestac, rounding=law, delta=(), place="record")
         study = replace(study, signals=signals, cestac=settings)
         side = encoder_drives(settings.side, drives, "cestac")
         self.reader, self.root, self.parts = reader, encoder_root(side, len(model.JOINTS)), []
         into = np.linalg.inv(self.root).T
-        readings = problem.changed(settings=study, reader=STATES[reader]).prepared
+        readings = problem.changed(settings=study, reader=own_reader).prepared
         for own in readings:
             require_positions(own.record.missing, "advice on encoders", own.record.file)
             part = prepared_record(own, study, own_encoder, drives)
@@ -125,7 +127,7 @@ class CoarseEncoders:
             settings,
             (),
             drives,
-            STATES[reader],
+            own_reader,
             problem.methods,
         )
         self.columns = self.task.columns

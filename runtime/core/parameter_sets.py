@@ -208,11 +208,14 @@ def physical_asked(errors: Mapping[Any, float], first: bool) -> bool:
 def physical_method(problem: Problem, fit: Estimate) -> str | None:
     """Return the name of the method that fits the physical set after the fit of all parameters.
 
-    None if that is not possible: it needs such a method, a linear method of the study, all columns,
-    a fit with status ok, and weights other than "covariance".
+    None if that is not possible: it needs such a method, a linear method of the study, a fit with
+    status ok that has every inertial base parameter (friction and other elements may be left out),
+    and weights other than "covariance".
     """
-    settings = problem.settings.estimate
-    whole = settings.columns == "all" and fit.status == "ok" and settings.weights != "covariance"
+    settings, needed = problem.settings.estimate, {*problem.model.BASE_PARAMETERS}
+    if settings.columns != "all":
+        needed -= {*getattr(problem.model, "ELEMENTS", {})}
+    whole = needed <= {*fit.names} and fit.status == "ok" and settings.weights != "covariance"
     if not (problem.method.linear and whole):
         return None
     return next((name for name, method in problem.methods.items() if method.physical), None)
@@ -232,7 +235,7 @@ def with_physical(problem: Problem, observation: Observation, sets: Sets) -> tup
     settings = problem.settings.estimate
     options = {"linear": settings.options} if settings.options else {}
     weights: Weights = "joint" if problem.method.weighs else "none"
-    own = EstimateSettings(name, weights, "all", options)
+    own = EstimateSettings(name, weights, settings.columns, options)
     try:
         fit = estimated(problem, observation, own)
     except InputError as e:
