@@ -27,9 +27,9 @@ from estimators import AROUND, AWAY, METHODS, STEPS, UNIT, bench, determined
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from runtime.core.settings import to_mapping
-from runtime.core.table import aligned
 from runtime.documents.yaml_text import yaml_text
+from runtime.ground.settings import to_mapping
+from runtime.ground.table import aligned
 
 Array = np.ndarray
 RECORDED = ("ols", "iv", "didim")  # also with recorded positions alone rounded

@@ -42,9 +42,9 @@ from runtime.core.rows.prepared import decimated_torque, observation_of
 from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import certain_rows, select_rows
 from runtime.core.signals.filters import filtered_states
-from runtime.core.table import aligned
 from runtime.counts.lattice import lattice
 from runtime.counts.reading import read_counts
+from runtime.ground.table import aligned
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.study import Study, study_from_mapping

@@ -36,8 +36,8 @@ from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
 from runtime.core.signals.filters import lowpass_filtered
 from runtime.core.study import EstimateSettings, Lowpass
-from runtime.core.table import aligned
 from runtime.counts.reading import read_counts
+from runtime.ground.table import aligned
 from runtime.loop.closed_loop import ClosedLoop
 from runtime.study import Study
 

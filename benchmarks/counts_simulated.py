@@ -53,8 +53,8 @@ from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import certain_rows, select_rows
 from runtime.core.rows.switches import switches
 from runtime.core.signals.filters import States, filtered_states
-from runtime.core.table import aligned
 from runtime.counts.reading import read_counts
+from runtime.ground.table import aligned
 from runtime.loop.reference import Reference, reference_of
 from runtime.loop.simulation import Simulator
 from runtime.study import Study, study_from_mapping

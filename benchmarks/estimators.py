@@ -41,7 +41,7 @@ from runtime.core.least_squares.estimate import Estimate
 from runtime.core.model import GeneratedModel
 from runtime.core.record import Record
 from runtime.core.study import EstimateSettings
-from runtime.core.table import aligned
+from runtime.ground.table import aligned
 from runtime.loop.closed_loop import ClosedLoop
 from runtime.loop.control_law import parameters_of
 from runtime.loop.reference import Reference, reference_of

@@ -28,11 +28,11 @@ from simulation import LAW
 
 from runtime import load_model
 from runtime.compose import estimate_of
-from runtime.core.errors import InputError
 from runtime.core.model import GeneratedModel
 from runtime.core.rows.observation import Observation
 from runtime.core.study import EstimateSettings
-from runtime.core.table import aligned
+from runtime.ground.errors import InputError
+from runtime.ground.table import aligned
 from runtime.loop.reference import Reference
 from runtime.loop.simulation import Simulator
 from runtime.reading.datasets import dataset_study, fetch

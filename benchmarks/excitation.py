@@ -28,10 +28,10 @@ from simulation import LAW
 from runtime import load_model
 from runtime.compose import estimate_of, excite, observe
 from runtime.core.rows.predicted import kept_correlation
-from runtime.core.settings import structure
 from runtime.core.signals.filters import decimated, decimation_factor
 from runtime.excitation.criteria import excesses, plan_rows, weights_of
 from runtime.excitation.settings import ExcitationSettings
+from runtime.ground.settings import structure
 from runtime.loop.control_law import parameters_of
 from runtime.loop.reference import Reference
 from runtime.loop.settings import Controller

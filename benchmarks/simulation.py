@@ -27,7 +27,7 @@ import numpy as np
 from rounds import interleave, processor, ratio
 
 from runtime import load_model
-from runtime.core.settings import structure
+from runtime.ground.settings import structure
 from runtime.loop.compile_cache import FallbackWarning, compiler
 from runtime.loop.control_law import parameters_of
 from runtime.loop.reference import reference_of

@@ -38,7 +38,6 @@ if TYPE_CHECKING:
         static_poses,
     )
     from runtime.core.cestac.result import Cestac
-    from runtime.core.errors import InputError
     from runtime.core.least_squares.estimate import Estimate
     from runtime.core.model import load_model
     from runtime.core.problem import Problem
@@ -46,6 +45,7 @@ if TYPE_CHECKING:
     from runtime.core.result import Identification
     from runtime.core.rows.observation import Observation
     from runtime.files import report
+    from runtime.ground.errors import InputError
     from runtime.reading.resampling import resample
     from runtime.study import Study, load_study
 
@@ -97,7 +97,7 @@ _MODULES = {
         "static_poses",
     ),
     "runtime.core.problem": ("Problem",),
-    "runtime.core.errors": ("InputError",),
+    "runtime.ground.errors": ("InputError",),
     "runtime.core.least_squares.estimate": ("Estimate",),
     "runtime.core.result": ("Identification",),
     "runtime.core.model": ("load_model",),

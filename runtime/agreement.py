@@ -23,20 +23,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from runtime.core.check import Answer, Check, Question
-from runtime.core.documents import Result
-from runtime.core.errors import InputError
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import System, assemble
 from runtime.core.least_squares.wls import weighted_system
-from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel
-from runtime.core.part import Part
 from runtime.core.provenance import record_names
 from runtime.core.residuals import unseen_by_blocks
 from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
-from runtime.core.table import Table
+from runtime.ground.check import Answer, Check, Question
+from runtime.ground.documents import Result
+from runtime.ground.errors import InputError
+from runtime.ground.limits import LIMIT
+from runtime.ground.part import Part
+from runtime.ground.table import Table
 
 DIFFERS = 3.0
 """Distance of a parameter of one record from that of the others, from which it differs, deviations. Measured: benchmarks/truth.md."""

@@ -10,10 +10,10 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from runtime.core.errors import InputError
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.model import GeneratedModel, joint_units
 from runtime.core.problem import Problem
+from runtime.ground.errors import InputError
 
 INERTIAS = {"kg*m**2": "*s**2/rad", "kg*m": "*s**2/m", "kg": "*s**2/m"}
 """Units of inertias, as the rest behind the unit of the torque."""

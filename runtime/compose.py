@@ -19,9 +19,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from runtime.advisor.advice import NoAdvice
 from runtime.core import identify as identification
-from runtime.core.arrays import kind_of, require_kind
 from runtime.core.automatic import automatic_cutoff
-from runtime.core.errors import InputError, SettingsError
 from runtime.core.essential import Essential, essential_of
 from runtime.core.identify import Extra, OnRequest
 from runtime.core.least_squares.estimate import Estimate
@@ -41,11 +39,13 @@ from runtime.core.problem import (
 from runtime.core.problem import estimate_of as estimate_by
 from runtime.core.record import WRENCH, Record
 from runtime.core.rows.observation import Observation
-from runtime.core.settings_errors import gone
 from runtime.core.signals.reader import LOWPASS, Reader
 from runtime.core.study import EstimateSettings, Signals
 from runtime.counts.encoder_advice import EncoderSteps
 from runtime.expected import ExpectedError
+from runtime.ground.arrays import kind_of, require_kind
+from runtime.ground.errors import InputError, SettingsError
+from runtime.ground.settings_errors import gone
 from runtime.late import Late, Listed, PartWhen, When
 from runtime.link_side import stated_sides, torques_of_links
 from runtime.median import pulses_in_torques

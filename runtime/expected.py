@@ -40,17 +40,17 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import chi2
 
-from runtime.core.check import Answer, Check, Question
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import System, assemble
 from runtime.core.least_squares.wls import weighted_system
-from runtime.core.limits import LIMIT
 from runtime.core.model import TRANSMITTED, GeneratedModel, channels_of, joint_units
-from runtime.core.part import Part
 from runtime.core.residuals import unseen_by_blocks
 from runtime.core.result import Identification
 from runtime.core.rows.prepared import Prepared
 from runtime.counts.encoder_advice import acceleration_error
+from runtime.ground.check import Answer, Check, Question
+from runtime.ground.limits import LIMIT
+from runtime.ground.part import Part
 from runtime.physical.inertia import INERTIAL, PhysicalModel, physical_model
 
 EXPECTED_INTERVAL = (0.05, 0.95)

@@ -11,16 +11,16 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from runtime.advisor.advice import Advice
-from runtime.core.arrays import require_kind
 from runtime.core.cestac.result import Cestac
-from runtime.core.documents import json_text
-from runtime.core.errors import InputError
 from runtime.core.model import joint_labels
-from runtime.core.part import Part
 from runtime.core.result import Identification
 from runtime.documents.yaml_text import yaml_text
 from runtime.excitation.poses import StaticPoses
 from runtime.excitation.result import Excitation
+from runtime.ground.arrays import require_kind
+from runtime.ground.documents import json_text
+from runtime.ground.errors import InputError
+from runtime.ground.part import Part
 from runtime.loop.result import Simulation, csv_text
 from runtime.reading.settings import RecordSettings
 from runtime.reporting import figures as plots

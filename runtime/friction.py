@@ -34,12 +34,10 @@ from typing import Any, cast
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from runtime.core.errors import InputError
 from runtime.core.least_squares.block_covariance import block_covariance
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import percent
 from runtime.core.model import GeneratedModel, elements_of, is_axis, joint_labels, require
-from runtime.core.part import BLACK, BLUE, GREY, LIGHT, ORANGE, Figure, Part
 from runtime.core.problem import Problem
 from runtime.core.residuals import correlation_time, p_value, residual_correlation
 from runtime.core.result import Identification
@@ -47,7 +45,9 @@ from runtime.core.rows.observation import split_rows
 from runtime.core.rows.prepared import Prepared
 from runtime.core.rows.regressor import in_time
 from runtime.core.signals.filters import decimated
-from runtime.core.table import Table, number
+from runtime.ground.errors import InputError
+from runtime.ground.part import BLACK, BLUE, GREY, LIGHT, ORANGE, Figure, Part
+from runtime.ground.table import Table, number
 from runtime.physical.inertia import physical_model
 
 FRICTION_BINS = 40

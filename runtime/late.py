@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, TypeVar, cast
 
-from runtime.core.part import Part
 from runtime.core.problem import Problem, Step
 from runtime.core.result import Identification
+from runtime.ground.part import Part
 
 T = TypeVar("T")
 

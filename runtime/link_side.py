@@ -9,7 +9,7 @@ from typing import Any
 from runtime.core.model import elements_of
 from runtime.core.problem import Problem
 from runtime.core.record import Record
-from runtime.core.settings import require
+from runtime.ground.settings import require
 
 OF_DRIVES = ("inertia", "viscous", "coulomb")
 """Kinds of elements in which sensors behind the gears have no part."""

@@ -14,10 +14,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from runtime.core.limits import LIMIT
 from runtime.core.problem import SIGNALS, Note, Problem
 from runtime.core.rows.selection import excerpt
 from runtime.core.signals.filters import median_filtered
+from runtime.ground.limits import LIMIT
 
 FEWEST_BLOCKS = 20
 """Such means of a record from which it is asked."""

@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from runtime.core.errors import InputError
 from runtime.core.missing import COUNTS, require_positions
 from runtime.core.problem import Note, Problem
 from runtime.core.record import Record
@@ -17,6 +16,7 @@ from runtime.core.rows.prepared import stacked
 from runtime.core.signals.filters import States
 from runtime.core.signals.reader import Reader
 from runtime.core.study import Signals
+from runtime.ground.errors import InputError
 
 ROUNDING = 1e-9  # of the largest entry of W: a column below it is zero
 TEXT = "others (inertias, friction) are left out. Dry friction holds a joint with a torque of unknown sign: approach every pose from both sides and record the mean, or both as poses."

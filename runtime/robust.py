@@ -34,7 +34,7 @@ from runtime.core.least_squares.method import Beginning, Fitted, Method
 from runtime.core.least_squares.solution import solve
 from runtime.core.rows.factor import Array, Factor, factor
 from runtime.core.rows.observation import Observation, split_rows
-from runtime.core.settings import Positive
+from runtime.ground.settings import Positive
 
 DOWN_WEIGHTED = 0.5
 """Weight below which a row is reported as down-weighted."""

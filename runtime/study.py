@@ -20,13 +20,13 @@ import numpy as np
 from pydantic import BeforeValidator, TypeAdapter
 
 from runtime.core import study as chapter
-from runtime.core.arrays import require_kind
-from runtime.core.errors import InputError
 from runtime.core.model import GeneratedModel
-from runtime.core.settings import NotNegative, PerJoint, Settings, structure, to_mapping
 from runtime.documents.files import settings_from_text, text_of
 from runtime.documents.yaml_text import yaml_text
 from runtime.excitation.settings import ExcitationSettings
+from runtime.ground.arrays import require_kind
+from runtime.ground.errors import InputError
+from runtime.ground.settings import NotNegative, PerJoint, Settings, structure, to_mapping
 from runtime.loop.settings import Controller
 from runtime.payload import settings as load
 from runtime.reading.datasets import DATASETS, dataset_study

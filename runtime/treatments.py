@@ -25,16 +25,16 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.errors import InputError
 from runtime.core.identify import Extra, identify, with_parts
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.parameter_sets import ORDER, SetName, best_set
 from runtime.core.problem import Problem, estimated
-from runtime.core.progress import at
 from runtime.core.record import Record
 from runtime.core.result import Identification
 from runtime.core.rows.prepared import stacked
-from runtime.core.table import Table
+from runtime.ground.errors import InputError
+from runtime.ground.progress import at
+from runtime.ground.table import Table
 
 
 @dataclass(frozen=True, eq=False)

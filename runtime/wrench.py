@@ -29,12 +29,12 @@ from typing import Any, cast
 
 import numpy as np
 
-from runtime.core.errors import InputError
 from runtime.core.least_squares.method import linear_method
 from runtime.core.model import BoundModel, GeneratedModel, channels_of, elements_of, joint_units
 from runtime.core.problem import Problem
 from runtime.core.record import JOINT_CHANNELS, WRENCH, Record
 from runtime.core.rows.selection import UNMEASURED, per_joint
+from runtime.ground.errors import InputError
 from runtime.physical.inertia import INERTIAL, physical_model
 
 Array = np.ndarray

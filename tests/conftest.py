@@ -20,8 +20,8 @@ import pytest
 from campaign import campaign
 from hypothesis import settings
 
-from runtime.core.errors import DataUnavailableError
 from runtime.core.loading import KEY, cache_folder
+from runtime.ground.errors import DataUnavailableError
 from runtime.reading.datasets import DATASETS, fetch, locate
 
 # Expressions and syntax trees stay alive by the hundred thousand: looking at them again and again

@@ -10,7 +10,7 @@ import pytest
 
 import runtime
 import symgen
-from runtime.core.errors import SettingsError
+from runtime.ground.errors import SettingsError
 from runtime.study import study_from_mapping
 
 DRIVES = ("Ia", "FV", "FS")

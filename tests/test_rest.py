@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 import runtime
 import symgen
 from oracles.pinocchio_model import PinocchioModel
-from runtime.core.errors import InputError, SettingsError
+from runtime.ground.errors import InputError, SettingsError
 from runtime.study import study_from_mapping
 from symgen.cli.main import app
 from symgen.description import load_robot

@@ -12,10 +12,10 @@ from planar_data import OLS, TRUE, observation
 from scipy.optimize import least_squares
 
 from runtime.compose import estimate_of, observe
-from runtime.core.errors import SettingsError
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.model import load_model
 from runtime.core.study import EstimateSettings
+from runtime.ground.errors import SettingsError
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.robust import slope, weight

@@ -16,7 +16,7 @@ import symgen
 from oracles.applying import motion
 from oracles.pinocchio_model import PinocchioModel
 from runtime import compose
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 from runtime.study import study_from_mapping
 from runtime.wrench import WrenchModel
 

@@ -27,7 +27,7 @@ import numpy as np  # noqa: E402
 from feasible import feasible  # noqa: E402
 from records import CASES, CUTOFFS, ROBOTS, ROOT, SLOW, Case, Piece, slips, treated  # noqa: E402
 
-from runtime.core.errors import InputError  # noqa: E402
+from runtime.ground.errors import InputError  # noqa: E402
 
 HERE = Path(__file__).resolve().parent
 MARK = "<!-- tables -->"

@@ -16,7 +16,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 import docstrings
 from typer.main import get_command
 
-from runtime.core.settings import to_mapping
+from runtime.ground.settings import to_mapping
 from runtime.study import Study
 from symgen.cli.main import VERBS, app
 from symgen.description import load_robot, packaged_robots

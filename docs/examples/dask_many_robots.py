@@ -8,7 +8,7 @@ from distributed import Client, LocalCluster
 
 import runtime
 import symgen
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 
 
 def identified(file: Path) -> str:

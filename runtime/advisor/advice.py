@@ -12,14 +12,14 @@ from scipy.special import stdtrit
 
 from runtime.core.cestac.result import deciding_names
 from runtime.core.cestac.runs import Level
-from runtime.core.check import Answer, Check, Question, state_of
-from runtime.core.documents import Result, json_text
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.limits import limits
-from runtime.core.part import BLACK, BLUE, DOTTED, GREY, ORANGE, Figure, Part
 from runtime.core.result import Identification
-from runtime.core.table import Table, percentage
 from runtime.counts.encoder_advice import visible_steps
+from runtime.ground.check import Answer, Check, Question, state_of
+from runtime.ground.documents import Result, json_text
+from runtime.ground.limits import limits
+from runtime.ground.part import BLACK, BLUE, DOTTED, GREY, ORANGE, Figure, Part
+from runtime.ground.table import Table, percentage
 
 LIMIT = limits(__package__)
 

@@ -50,17 +50,17 @@ from runtime.core.cestac.perturbed import study_columns
 from runtime.core.cestac.result import deciding_names, names_judged
 from runtime.core.cestac.rounding import VARIANCE, Mode
 from runtime.core.drives import Drives
-from runtime.core.errors import InputError, SettingsError
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, is_axis, joint_labels, joint_units
 from runtime.core.problem import Problem, estimated
 from runtime.core.record import Record
 from runtime.core.result import Identification
 from runtime.core.rows.observation import stack
 from runtime.core.rows.prepared import common_drives, stacked
-from runtime.core.settings import to_mapping
 from runtime.core.study import Study
+from runtime.ground.errors import InputError, SettingsError
+from runtime.ground.limits import limits
+from runtime.ground.settings import to_mapping
 
 LIMIT = limits(__package__)
 

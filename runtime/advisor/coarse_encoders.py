@@ -30,7 +30,6 @@ from runtime.core.cestac.perturbed import PreparedRecord, Task, prepared_record
 from runtime.core.cestac.rounding import Mode, counted, rounded, stream
 from runtime.core.drives import Drives, encoder_drives, encoder_root
 from runtime.core.least_squares.method import linear_system
-from runtime.core.limits import limits
 from runtime.core.missing import require_positions
 from runtime.core.problem import Problem
 from runtime.core.rows.observation import stack
@@ -41,6 +40,7 @@ from runtime.core.signals.reader import LOWPASS, Reader
 from runtime.counts.own_encoder import own_encoder
 from runtime.counts.reader import COUNTS, encoder_position
 from runtime.counts.reading import Starts, read_counts
+from runtime.ground.limits import limits
 
 LIMIT = limits(__package__)
 

@@ -35,11 +35,11 @@ from runtime.core.rows.prepared import Prepared
 from runtime.core.rows.regressor import in_time
 from runtime.core.rows.selection import Selection
 from runtime.core.rows.switches import Switch, switches
-from runtime.core.settings import to_mapping
 from runtime.core.signals.filters import States
 from runtime.core.signals.noise_gain import Bandwidth, bandwidth
 from runtime.core.signals.reader import LOWPASS
 from runtime.core.study import Study
+from runtime.ground.settings import to_mapping
 
 Array = np.ndarray
 

@@ -28,7 +28,7 @@ from runtime.advisor.advice import (
 from runtime.advisor.coarse_encoders import CoarseEncoders, ReaderName, mean_change
 from runtime.core.cestac.result import deciding_names
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.limits import limits
+from runtime.ground.limits import limits
 
 LIMIT = limits(__package__)
 

@@ -24,18 +24,18 @@ from typing import Any
 import numpy as np
 
 from runtime.controller.law import late, torque_law
-from runtime.core.documents import Result
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import assemble
 from runtime.core.least_squares.wls import weighted_system
-from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, elements_of, joint_labels, joint_units
-from runtime.core.part import Doubt
 from runtime.core.problem import Note, Problem
 from runtime.core.record import Record
 from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared, stacked, with_torques
+from runtime.ground.documents import Result
+from runtime.ground.limits import limits
+from runtime.ground.part import Doubt
 from runtime.loop.settings import Law
 
 LIMIT = limits(__package__)

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.errors import SettingsError
+from runtime.ground.errors import SettingsError
 from runtime.loop.settings import Controller
 
 Array = np.ndarray

@@ -1,7 +1,7 @@
 """The verdict on an identification: can its parameter values be used?
 
 The verdict consists of questions, each with its answer, its limit and a remedy; the worst answer
-decides. The limits are in runtime/core/limits.toml: they are conventions of practice, not theorems.
+decides. The limits are in runtime/ground/limits.toml: they are conventions of practice, not theorems.
 Errors are relative, in %: 100 ||Y - W X|| / ||Y||. Standard deviations are the larger of the
 corrected one and the one of the block bootstrap (`runtime.core.uncertainty`); eq. (10) alone is
 used only if both are unknown.
@@ -15,7 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.check import (
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.model import SIGNED, GeneratedModel, is_form
+from runtime.ground.check import (
     WORST,
     Answer,
     Check,
@@ -25,12 +27,10 @@ from runtime.core.check import (
     state_of,
     worst_of,
 )
-from runtime.core.documents import Result
-from runtime.core.least_squares.estimate import Estimate
-from runtime.core.limits import LIMIT
-from runtime.core.model import SIGNED, GeneratedModel, is_form
-from runtime.core.part import About, Part
-from runtime.core.table import Table, notebook
+from runtime.ground.documents import Result
+from runtime.ground.limits import LIMIT
+from runtime.ground.part import About, Part
+from runtime.ground.table import Table, notebook
 
 ANSWERS = {"good": "Yes", "doubtful": "With care", "no": "No"}
 

@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from runtime.core.errors import InputError, SettingsError
+from runtime.ground.errors import InputError, SettingsError
 
 Array = np.ndarray
 Coupling = Literal["both", "position", "torque", "none"]

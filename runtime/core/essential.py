@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.documents import Result
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import System, assemble, standard_deviations
 from runtime.core.model import GeneratedModel
 from runtime.core.study import EssentialSettings
-from runtime.core.table import aligned, percentage
+from runtime.ground.documents import Result
+from runtime.ground.table import aligned, percentage
 
 THRESHOLDS = (1.02, 1.03, 1.04, 1.05, 1.06, 1.07, 1.08, 1.09, 1.10)
 """Thresholds whose counts are reported beside the one used."""

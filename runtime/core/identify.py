@@ -11,14 +11,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
-from runtime.core.errors import InputError, SettingsError
 from runtime.core.parameter_sets import fit_problem, validated
-from runtime.core.part import Part
 from runtime.core.problem import SIGNALS, Problem, observe_rows, observed_unseen
 from runtime.core.provenance import record_names
 from runtime.core.result import Identification
 from runtime.core.uncertainty import uncertainty
 from runtime.core.validation import direct_comparison, weak_directions
+from runtime.ground.errors import InputError, SettingsError
+from runtime.ground.part import Part
 
 Extra: TypeAlias = Callable[[Identification], Part | None]
 """A function that makes a Part of an identification, or None if it has nothing to say."""

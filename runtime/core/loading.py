@@ -21,7 +21,7 @@ from importlib.machinery import ModuleSpec
 from pathlib import Path
 from types import ModuleType
 
-from runtime.core.errors import ModelError
+from runtime.ground.errors import ModelError
 
 KEY = 32  # digits of the SHA-256 that name a text in the cache
 UNTRUSTED = "is code that this installation has not generated and certified; pass trust=True (--trust) if you trust the author of this file, or generate the model here with `symgen generate`"

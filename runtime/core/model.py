@@ -19,10 +19,10 @@ from typing import Any, Protocol, cast
 
 import numpy as np
 
-from runtime.core.arrays import kind_of, require_kind
 from runtime.core.drives import Drives
-from runtime.core.errors import InputError, ModelError, SettingsError
 from runtime.core.loading import module_of, run
+from runtime.ground.arrays import kind_of, require_kind
+from runtime.ground.errors import InputError, ModelError, SettingsError
 
 Array = np.ndarray
 

@@ -30,16 +30,16 @@ from typing import Any, Literal
 
 import numpy as np
 
-from runtime.core.documents import NanIfNull, Vector, Whole
-from runtime.core.errors import InputError, instant
 from runtime.core.essential import Essential, essential_of
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.limits import LIMIT
 from runtime.core.problem import Problem, estimated
-from runtime.core.progress import at
 from runtime.core.rows.observation import Observation, halves
 from runtime.core.study import EstimateSettings, Weights
 from runtime.core.validation import CrossValidation, cross_validation, split_validation
+from runtime.ground.documents import NanIfNull, Vector, Whole
+from runtime.ground.errors import InputError, instant
+from runtime.ground.limits import LIMIT
+from runtime.ground.progress import at
 
 SetName = Literal["essential", "feasible", "all"]
 ORDER: tuple[SetName, ...] = ("essential", "feasible", "all")

@@ -17,8 +17,6 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from runtime.core.arrays import require_kind
-from runtime.core.errors import InputError, SettingsError
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import System, assemble
 from runtime.core.least_squares.method import Beginning, Method, Methods, linear_system, method_of
@@ -29,6 +27,8 @@ from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared, stacked
 from runtime.core.signals.reader import Reader
 from runtime.core.study import EstimateSettings, Study
+from runtime.ground.arrays import require_kind
+from runtime.ground.errors import InputError, SettingsError
 
 RECORD_EXPECTED = (
     "a Record, or a list of them: runtime.Record(t, q, tau), runtime.read_record(file)"

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from runtime.core.arrays import real, real_number, require_kind
-from runtime.core.clock import JITTER, Stamps, rate_of, sample
 from runtime.core.drives import Drives
-from runtime.core.errors import InputError
-from runtime.core.limits import LIMIT
 from runtime.core.missing import COUNTS, Missing, bridged
+from runtime.ground.arrays import real, real_number, require_kind
+from runtime.ground.clock import JITTER, Stamps, rate_of, sample
+from runtime.ground.errors import InputError
+from runtime.ground.limits import LIMIT
 
 Array = np.ndarray
 

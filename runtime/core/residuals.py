@@ -26,9 +26,9 @@ from scipy.special import chdtrc
 from scipy.stats import f as fisher
 
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.limits import LIMIT
 from runtime.core.rows.observation import Observation
 from runtime.core.validation import JointComparison, direct_comparison
+from runtime.ground.limits import LIMIT
 
 Array = np.ndarray
 

@@ -11,13 +11,10 @@ from typing import Any, Literal
 import numpy as np
 
 from runtime.core.checklist import Checklist, checklist_of, lost_joints, negative_elements
-from runtime.core.documents import json_text
 from runtime.core.essential import Essential
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel, joint_labels, joint_torque_units
 from runtime.core.parameter_sets import SetDocument, SetName, Sets, ranking_text, written_sets
-from runtime.core.part import Part, printed
 from runtime.core.problem import SIGNALS, Problem
 from runtime.core.provenance import record_names
 from runtime.core.record import UNNAMED, Record
@@ -25,7 +22,6 @@ from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared
 from runtime.core.rows.selection import unused_joints
 from runtime.core.study import Study
-from runtime.core.table import Table, in_lines, notebook, number, with_intervals
 from runtime.core.uncertainty import Uncertainty
 from runtime.core.validation import (
     CrossValidation,
@@ -34,6 +30,10 @@ from runtime.core.validation import (
     WeakDirections,
     record_errors,
 )
+from runtime.ground.documents import json_text
+from runtime.ground.limits import LIMIT
+from runtime.ground.part import Part, printed
+from runtime.ground.table import Table, in_lines, notebook, number, with_intervals
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
-from runtime.core.settings import (
+from runtime.ground.settings import (
     MOST,
     Count,
     Flag,

@@ -25,15 +25,15 @@ from typing import Any
 import numpy as np
 from scipy.special import fdtrc
 
-from runtime.core.documents import Result
 from runtime.core.essential import Essential
 from runtime.core.least_squares.block_covariance import gram_solution, scatter
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import System
-from runtime.core.limits import LIMIT
 from runtime.core.residuals import Whiteness, effective_share, whiteness
-from runtime.core.table import Table
 from runtime.core.validation import JointComparison
+from runtime.ground.documents import Result
+from runtime.ground.limits import LIMIT
+from runtime.ground.table import Table
 
 Array = np.ndarray
 

@@ -19,16 +19,16 @@ from typing import Any
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from runtime.core.documents import Result
-from runtime.core.errors import InputError, instant
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import System, percent
 from runtime.core.least_squares.solution import unit_columns
-from runtime.core.limits import LIMIT
 from runtime.core.problem import Problem, estimated, point_estimate
 from runtime.core.rows.observation import Observation, Window
 from runtime.core.study import EstimateSettings
-from runtime.core.table import Table, number
+from runtime.ground.documents import Result
+from runtime.ground.errors import InputError, instant
+from runtime.ground.limits import LIMIT
+from runtime.ground.table import Table, number
 
 Array = np.ndarray
 

@@ -12,8 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from runtime.core.drives import Drives, encoder_root
-from runtime.core.errors import InputError, SettingsError
-from runtime.core.part import Part
 from runtime.core.record import Record
 from runtime.core.result import Identification
 from runtime.core.signals.filters import States
@@ -21,6 +19,8 @@ from runtime.core.signals.noise_gain import bandwidth
 from runtime.core.study import Signals
 from runtime.counts.lattice import Lattice, lattice
 from runtime.counts.reader import encoder_position
+from runtime.ground.errors import InputError, SettingsError
+from runtime.ground.part import Part
 
 Array = np.ndarray
 

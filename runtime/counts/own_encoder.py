@@ -23,12 +23,12 @@ from typing import Any
 import numpy as np
 
 from runtime.core.drives import Drives
-from runtime.core.errors import InputError, SettingsError
-from runtime.core.limits import LIMIT
 from runtime.core.record import Record
 from runtime.core.study import Study
 from runtime.counts.lattice import smallest_step
 from runtime.counts.reading import Reading, read_counts
+from runtime.ground.errors import InputError, SettingsError
+from runtime.ground.limits import LIMIT
 
 Array = np.ndarray
 

@@ -22,7 +22,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from runtime.core.errors import InputError
 from runtime.counts.boxes import (
     CLEAR,
     CLOCK_ERRORS,
@@ -34,6 +33,7 @@ from runtime.counts.boxes import (
     of_most_evidence,
 )
 from runtime.counts.spline import Basis, Factor, next_density
+from runtime.ground.errors import InputError
 
 Array = np.ndarray
 

@@ -18,13 +18,13 @@ from pydantic_core import core_schema
 from runtime.core.cestac.result import SCHEMA as CESTAC
 from runtime.core.cestac.result import LevelResult, Verdict
 from runtime.core.cestac.runs import Run
-from runtime.core.documents import Vector, Whole, from_text
-from runtime.core.errors import InputError
 from runtime.core.least_squares.estimate import SCHEMA as ESTIMATE
 from runtime.core.least_squares.estimate import Estimate, JointFit
 from runtime.core.parameter_sets import SetDocument, SetName, whole_set
 from runtime.core.validation import RecordError, WeakDirections
 from runtime.documents.files import result_text
+from runtime.ground.documents import Vector, Whole, from_text
+from runtime.ground.errors import InputError
 
 
 @dataclass(frozen=True, eq=False)

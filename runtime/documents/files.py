@@ -8,10 +8,10 @@ from pathlib import Path
 from stat import S_ISDIR, S_ISREG
 from typing import TypeVar
 
-from runtime.core.errors import InputError, SettingsError
-from runtime.core.limits import LIMIT
-from runtime.core.settings import structure
 from runtime.documents.yaml_text import yaml_values
+from runtime.ground.errors import InputError, SettingsError
+from runtime.ground.limits import LIMIT
+from runtime.ground.settings import structure
 
 T = TypeVar("T")
 

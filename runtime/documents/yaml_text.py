@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from io import StringIO
 from typing import TYPE_CHECKING, Any
 
-from runtime.core.errors import InputError, SettingsError, first_line
-from runtime.core.limits import LIMIT
+from runtime.ground.errors import InputError, SettingsError, first_line
+from runtime.ground.limits import LIMIT
 
 if TYPE_CHECKING:
     from ruamel.yaml import Node

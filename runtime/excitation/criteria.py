@@ -26,14 +26,14 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.errors import InputError, SettingsError
-from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, base_columns, joint_labels, require
 from runtime.core.problem import Problem
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.predicted import Weights
 from runtime.excitation.settings import ExcitationSettings
+from runtime.ground.errors import InputError, SettingsError
+from runtime.ground.limits import limits
 from runtime.loop.dry_friction import dry_friction
 from runtime.loop.trajectories import Motion
 

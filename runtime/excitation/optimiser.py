@@ -20,13 +20,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from runtime.core.errors import InputError
-from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel
 from runtime.core.rows.predicted import Weights
 from runtime.excitation.criteria import MotionLimits
 from runtime.excitation.result import Start
 from runtime.excitation.settings import ExcitationSettings
+from runtime.ground.errors import InputError
+from runtime.ground.limits import limits
 from runtime.loop.trajectories import Fourier, Motion, Part
 
 LIMIT = limits(__package__)

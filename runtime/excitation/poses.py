@@ -19,15 +19,15 @@ from typing import Any, cast
 
 import numpy as np
 
-from runtime.core.documents import Result
-from runtime.core.errors import InputError
 from runtime.core.model import GeneratedModel, joint_labels, require_no_channels, require_no_wrench
 from runtime.core.problem import Problem
 from runtime.core.rows.prepared import stacked
 from runtime.core.rows.selection import per_joint
-from runtime.core.table import Table
 from runtime.excitation.criteria import limits_of
 from runtime.excitation.settings import ExcitationSettings
+from runtime.ground.documents import Result
+from runtime.ground.errors import InputError
+from runtime.ground.table import Table
 
 Array = np.ndarray
 CANDIDATES = 600  # random poses that are looked at

@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.documents import Result
-from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, joint_labels
 from runtime.core.rows.predicted import Weights
-from runtime.core.settings import to_mapping
-from runtime.core.table import Table, percentage
 from runtime.excitation.criteria import MotionLimits, usage
 from runtime.excitation.settings import ExcitationSettings
+from runtime.ground.documents import Result
+from runtime.ground.limits import limits
+from runtime.ground.settings import to_mapping
+from runtime.ground.table import Table, percentage
 from runtime.loop.result import csv_text
 from runtime.loop.trajectories import Motion
 

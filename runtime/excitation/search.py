@@ -18,11 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.errors import InputError
 from runtime.core.essential import essential_of
 from runtime.core.least_squares.linear import assemble
 from runtime.core.least_squares.wls import weighted_system
-from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, require, require_no_channels, require_no_wrench
 from runtime.core.problem import Problem, observe_rows
 from runtime.core.rows.predicted import Weights, kept_correlation
@@ -31,6 +29,8 @@ from runtime.excitation.criteria import criterion_of, excesses, limits_of, plan_
 from runtime.excitation.optimiser import Search, improve, one_start
 from runtime.excitation.result import Excitation, Known, Start
 from runtime.excitation.settings import ExcitationSettings
+from runtime.ground.errors import InputError
+from runtime.ground.limits import limits
 from runtime.loop.control_law import parameters_of
 from runtime.loop.dry_friction import dry_friction
 from runtime.loop.trajectories import Motion, motion_from_mapping

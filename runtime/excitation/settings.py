@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from runtime.core.settings import Many, Positive, Real, Seed, Settings, Text, Whole, require
+from runtime.ground.settings import Many, Positive, Real, Seed, Settings, Text, Whole, require
 from runtime.loop.trajectories import AnyFamily, Fourier, PointToPoint
 
 MOST_INSTANTS = {"grid": 2e4, "rate": 2e7}

@@ -14,18 +14,18 @@ from typing import Any, cast
 
 import numpy as np
 
-from runtime.core.errors import InputError
 from runtime.core.least_squares.block_covariance import block_covariance
 from runtime.core.least_squares.linear import percent
 from runtime.core.model import BoundModel, GeneratedModel
-from runtime.core.part import Part
 from runtime.core.problem import Note, Problem
-from runtime.core.progress import at
 from runtime.core.residuals import correlation_time, p_value, residual_correlation
 from runtime.core.result import Identification
 from runtime.core.rows.observation import split_rows
 from runtime.core.rows.prepared import Prepared
-from runtime.core.table import Table, number
+from runtime.ground.errors import InputError
+from runtime.ground.part import Part
+from runtime.ground.progress import at
+from runtime.ground.table import Table, number
 from runtime.laws.projection import LawProblem, Projection, basis
 from runtime.laws.transmitted import transmitted_torque
 

@@ -17,12 +17,12 @@ from typing import Any, cast
 
 import numpy as np
 
-from runtime.core.errors import InputError
-from runtime.core.limits import LIMIT
 from runtime.core.model import TRANSMITTED, GeneratedModel, channels_of
 from runtime.core.problem import Note, Problem
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared
+from runtime.ground.errors import InputError
+from runtime.ground.limits import LIMIT
 
 Array = np.ndarray
 

@@ -32,13 +32,13 @@ import numpy as np
 
 from runtime.core.cestac.rounding import stream
 from runtime.core.cestac.runs import Level
-from runtime.core.errors import SettingsError
 from runtime.core.model import GeneratedModel
 from runtime.core.problem import Problem
 from runtime.core.rows.observation import LoopRows, Observation
 from runtime.core.rows.prepared import Prepared
-from runtime.core.settings import to_mapping
 from runtime.core.study import EstimateSettings
+from runtime.ground.errors import SettingsError
+from runtime.ground.settings import to_mapping
 from runtime.loop.closed_loop import ClosedLoop, closed_loop
 from runtime.loop.control_law import parameters_of
 from runtime.loop.reference import Reference, reference_of

@@ -33,19 +33,19 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from scipy.ndimage import minimum_filter1d
 
-from runtime.core.errors import InputError, SettingsError
-from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, is_axis, joint_labels
 from runtime.core.problem import Problem
-from runtime.core.progress import at
 from runtime.core.record import Record
 from runtime.core.rows.observation import LoopRows, Observation, stack
 from runtime.core.rows.prepared import Prepared, observation_of, stacked
 from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import Selection, certain_rows, select_rows
-from runtime.core.settings import NotNegative, Settings, structure
 from runtime.core.signals.filters import States, decimated
 from runtime.counts.reading import REACH
+from runtime.ground.errors import InputError, SettingsError
+from runtime.ground.limits import limits
+from runtime.ground.progress import at
+from runtime.ground.settings import NotNegative, Settings, structure
 from runtime.loop.law_check import LawFit, law_fits, law_text
 from runtime.loop.reference import Reference, of_record, reference_of, require_rate
 from runtime.loop.result import Simulation

@@ -20,9 +20,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from runtime.core.limits import limits
 from runtime.core.loading import is_writable_by_others
 from runtime.core.provenance import cpuinfo
+from runtime.ground.limits import limits
 
 LIMIT = limits(__package__)
 

@@ -21,9 +21,9 @@ import numpy as np
 from scipy.signal import cont2discrete
 
 from runtime.core.drives import Drives
-from runtime.core.errors import InputError, SettingsError
 from runtime.core.model import GeneratedModel, drives_of
-from runtime.core.settings import PerJoint
+from runtime.ground.errors import InputError, SettingsError
+from runtime.ground.settings import PerJoint
 from runtime.loop.settings import Controller
 
 Array = np.ndarray

@@ -23,9 +23,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from runtime.core.limits import limits
 from runtime.core.loading import cache_folder
 from runtime.core.model import GeneratedModel
+from runtime.ground.limits import limits
 from runtime.loop.compile_cache import FallbackWarning, NotCompiledError, shared_object
 from runtime.loop.control_law import VECTORS
 from runtime.loop.dry_friction import DryFriction

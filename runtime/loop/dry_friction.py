@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel
+from runtime.ground.limits import limits
 
 LIMIT = limits(__package__)
 

@@ -20,13 +20,13 @@ from typing import Any, Literal
 
 import numpy as np
 
-from runtime.core.errors import InputError, SettingsError
 from runtime.core.least_squares.estimate import Status
 from runtime.core.least_squares.method import Beginning
-from runtime.core.limits import limits
 from runtime.core.model import joint_labels
-from runtime.core.progress import at
-from runtime.core.settings import Count, Positive, Real
+from runtime.ground.errors import InputError, SettingsError
+from runtime.ground.limits import limits
+from runtime.ground.progress import at
+from runtime.ground.settings import Count, Positive, Real
 from runtime.loop.closed_loop import ClosedLoop, LoopOptions
 from runtime.loop.control_law import parameters_of
 from runtime.loop.result import Simulation

@@ -28,14 +28,14 @@ import numpy as np
 from scipy.linalg import LinAlgError
 from scipy.stats import chi2
 
-from runtime.core.errors import InputError
 from runtime.core.least_squares.block_covariance import deletions
 from runtime.core.least_squares.linear import ordinary
 from runtime.core.least_squares.method import Beginning, Fitted, Method
 from runtime.core.least_squares.wls import common_scales, floored
-from runtime.core.limits import limits
 from runtime.core.rows.factor import Array
 from runtime.core.rows.observation import Observation, split_rows
+from runtime.ground.errors import InputError
+from runtime.ground.limits import limits
 from runtime.loop.closed_loop import loop_of, observed_loop
 from runtime.loop.fixed_point import FixedPointOptions, Step, iterate, outcome_of
 from runtime.loop.result import Simulation

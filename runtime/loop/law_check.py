@@ -22,8 +22,8 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.limits import limits
 from runtime.core.record import Record
+from runtime.ground.limits import limits
 from runtime.loop.reference import Reference
 from runtime.loop.settings import Controller
 

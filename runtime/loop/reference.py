@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from runtime.core.errors import InputError, SettingsError
-from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, joint_labels
 from runtime.core.record import Record
 from runtime.core.signals.filters import derivative
+from runtime.ground.errors import InputError, SettingsError
+from runtime.ground.limits import limits
 from runtime.loop.settings import Controller, Points
 from runtime.loop.trajectories import motion_from_mapping, ramp
 from runtime.reading.formats import read_table

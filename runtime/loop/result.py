@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.documents import Result
-from runtime.core.errors import InputError
-from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, joint_labels, joint_units
 from runtime.core.record import Origin, Record
-from runtime.core.table import Table
+from runtime.ground.documents import Result
+from runtime.ground.errors import InputError
+from runtime.ground.limits import limits
+from runtime.ground.table import Table
 
 LIMIT = limits(__package__)
 

@@ -18,8 +18,8 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, Field
 
-from runtime.core.errors import SettingsError
-from runtime.core.settings import (
+from runtime.ground.errors import SettingsError
+from runtime.ground.settings import (
     Count,
     Many,
     NotNegative,

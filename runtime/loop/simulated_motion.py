@@ -18,13 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.errors import InputError
 from runtime.core.least_squares.estimate import Status
 from runtime.core.least_squares.linear import percent
 from runtime.core.least_squares.method import Beginning, Fitted
-from runtime.core.limits import limits
 from runtime.core.model import joint_labels
 from runtime.core.rows.observation import Observation
+from runtime.ground.errors import InputError
+from runtime.ground.limits import limits
 from runtime.loop.closed_loop import ClosedLoop, loop_of
 from runtime.loop.law_check import law_text
 

@@ -22,10 +22,10 @@ import casadi as ca
 import numpy as np
 from scipy.signal import butter, lfilter
 
-from runtime.core.errors import InputError, SettingsError
-from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, require, require_no_channels
 from runtime.core.record import Record
+from runtime.ground.errors import InputError, SettingsError
+from runtime.ground.limits import limits
 from runtime.loop.control_law import (
     ControlLaw,
     continuous_pole,

@@ -20,8 +20,8 @@ from typing import Any
 
 import casadi as ca
 
-from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel
+from runtime.ground.limits import limits
 from runtime.loop.dry_friction import DryFriction
 
 LIMIT = limits(__package__)

@@ -28,9 +28,9 @@ from typing import Annotated, Any, Literal, cast
 import numpy as np
 from pydantic import Field
 
-from runtime.core.errors import InputError, SettingsError
-from runtime.core.limits import limits
-from runtime.core.settings import Positive, Settings, Whole, require, structure, to_mapping
+from runtime.ground.errors import InputError, SettingsError
+from runtime.ground.limits import limits
+from runtime.ground.settings import Positive, Settings, Whole, require, structure, to_mapping
 
 LIMIT = limits(__package__)
 

@@ -21,7 +21,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from runtime.core.cestac.runs import Runs
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 
 ARCHIVE_PERIOD = 30.0
 """Time after which the runs of a study are written again, s."""

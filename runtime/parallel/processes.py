@@ -22,7 +22,7 @@ from functools import lru_cache, partial
 from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 
 Map = Callable[..., Iterator[Any]]
 

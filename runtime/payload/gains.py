@@ -31,18 +31,18 @@ import numpy as np
 from scipy.linalg import qr
 from scipy.optimize import nnls
 
-from runtime.core.documents import Result
 from runtime.core.drives import Drives
-from runtime.core.errors import InputError
 from runtime.core.least_squares.block_covariance import gram_root, scatter
 from runtime.core.least_squares.linear import LinearOptions, assemble, ordinary
-from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, joint_labels
 from runtime.core.rows.factor import triangularise
 from runtime.core.rows.observation import Observation, split_rows, stack
 from runtime.core.rows.prepared import Prepared, decimated_torque
 from runtime.core.study import EstimateSettings
-from runtime.core.table import Table, number
+from runtime.ground.documents import Result
+from runtime.ground.errors import InputError
+from runtime.ground.limits import limits
+from runtime.ground.table import Table, number
 from runtime.payload.load import load_columns
 from runtime.payload.settings import PayloadSettings
 from runtime.physical.inertia import physical_model

@@ -28,15 +28,15 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
-from runtime.core.documents import Result
-from runtime.core.errors import InputError, SettingsError
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import System, assemble
 from runtime.core.least_squares.wls import weighted_system
-from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, elements_of, require
 from runtime.core.rows.observation import Observation, stack
-from runtime.core.table import Table, number
+from runtime.ground.documents import Result
+from runtime.ground.errors import InputError, SettingsError
+from runtime.ground.limits import limits
+from runtime.ground.table import Table, number
 from runtime.payload.settings import PayloadSettings
 from runtime.physical.inertia import INERTIAL, PhysicalModel, physical_model, pseudo_inertia
 

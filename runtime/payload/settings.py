@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import field
 
-from runtime.core.settings import Flag, Real, Settings, Text, Whole, require
+from runtime.ground.settings import Flag, Real, Settings, Text, Whole, require
 
 LOAD = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 """Standard parameters of a load."""

@@ -11,8 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.documents import Result
-from runtime.core.errors import SettingsError
 from runtime.core.model import (
     GeneratedModel,
     base_columns,
@@ -20,13 +18,15 @@ from runtime.core.model import (
     joint_torque_units,
     require_no_channels,
 )
-from runtime.core.part import Part
 from runtime.core.problem import Problem
 from runtime.core.record import Record
 from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared
-from runtime.core.table import Table, in_lines, with_intervals
+from runtime.ground.documents import Result
+from runtime.ground.errors import SettingsError
+from runtime.ground.part import Part
+from runtime.ground.table import Table, in_lines, with_intervals
 from runtime.payload.gains import DriveGains, drive_gains, scaled
 from runtime.payload.load import Payload, payload
 from runtime.payload.settings import LOADED

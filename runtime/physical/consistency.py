@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.check import Answer, Check, Question
-from runtime.core.errors import InputError
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.part import Part
 from runtime.core.result import Identification
-from runtime.core.table import Table, csv_text, number
+from runtime.ground.check import Answer, Check, Question
+from runtime.ground.errors import InputError
+from runtime.ground.part import Part
+from runtime.ground.table import Table, csv_text, number
 from runtime.physical.feasibility import Feasibility, feasibility, within_noise
 from runtime.physical.inertia import physical_model
 

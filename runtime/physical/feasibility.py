@@ -19,9 +19,9 @@ from itertools import islice
 import numpy as np
 from scipy.stats import chi2
 
-from runtime.core.errors import InputError, SettingsError
-from runtime.core.limits import limits
-from runtime.core.settings import Positive, Real, Settings, Text
+from runtime.ground.errors import InputError, SettingsError
+from runtime.ground.limits import limits
+from runtime.ground.settings import Positive, Real, Settings, Text
 from runtime.physical.inertia import INERTIAL, Condition, PhysicalModel
 from runtime.physical.semidefinite import (
     Distance,

@@ -46,16 +46,16 @@ from typing import Any, Literal
 
 import numpy as np
 
-from runtime.core.errors import InputError, SettingsError
 from runtime.core.least_squares.linear import System, assemble, percent
 from runtime.core.least_squares.method import Beginning, Fitted, Method
 from runtime.core.least_squares.wls import by_weights
-from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel
-from runtime.core.progress import at
 from runtime.core.rows.factor import Array, Factor, factor, triangularise
 from runtime.core.rows.observation import Observation
-from runtime.core.settings import Flag, NotNegative, Positive, require
+from runtime.ground.errors import InputError, SettingsError
+from runtime.ground.limits import limits
+from runtime.ground.progress import at
+from runtime.ground.settings import Flag, NotNegative, Positive, require
 from runtime.physical.feasibility import (
     Feasibility,
     RobotLimits,

@@ -28,9 +28,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from runtime.core.errors import InputError, ModelError
-from runtime.core.limits import limits
 from runtime.core.model import SIGNED, GeneratedModel, elements_of, is_form, joint_units, require
+from runtime.ground.errors import InputError, ModelError
+from runtime.ground.limits import limits
 
 LIMIT = limits(__package__)
 

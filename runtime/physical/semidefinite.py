@@ -30,7 +30,7 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import null_space
 
-from runtime.core.limits import limits
+from runtime.ground.limits import limits
 from runtime.physical.inertia import Condition
 
 LIMIT = limits(__package__)

@@ -31,7 +31,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg.lapack import dposv
 
-from runtime.core.limits import limits
+from runtime.ground.limits import limits
 from runtime.physical.inertia import Condition, PhysicalModel
 from runtime.physical.semidefinite import Quadratic
 

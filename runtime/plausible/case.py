@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.errors import InputError
-from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, joint_labels, joint_units
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared, stacked
 from runtime.core.signals.cutoff import noise_share
 from runtime.core.study import Study
+from runtime.ground.errors import InputError
+from runtime.ground.limits import limits
 from runtime.physical.inertia import PhysicalModel, physical_model
 from runtime.plausible.bodies import Grams
 from runtime.plausible.delay import Delay, delay_of

@@ -23,7 +23,6 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.limits import limits
 from runtime.core.model import (
     GeneratedModel,
     drives_of,
@@ -31,6 +30,7 @@ from runtime.core.model import (
     joint_torque_units,
     joint_units,
 )
+from runtime.ground.limits import limits
 from runtime.plausible.samples import Samples
 
 LIMIT = limits(__package__)

@@ -20,13 +20,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline, PPoly
 
-from runtime.core.documents import Result
-from runtime.core.errors import InputError
-from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, is_axis, joint_labels
 from runtime.core.problem import Problem
 from runtime.core.rows.regressor import in_time
-from runtime.core.table import Table, number
+from runtime.ground.documents import Result
+from runtime.ground.errors import InputError
+from runtime.ground.limits import limits
+from runtime.ground.table import Table, number
 from runtime.plausible.bodies import Grams, solve_scaled
 from runtime.plausible.samples import Filtered, filtered, usable
 

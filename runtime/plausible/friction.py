@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from runtime.core.check import Answer, Question, State
-from runtime.core.limits import limits
 from runtime.core.model import elements_of
+from runtime.ground.check import Answer, Question, State
+from runtime.ground.limits import limits
 from runtime.plausible.case import Case
 
 LIMIT = limits(__package__)

@@ -18,13 +18,13 @@ from itertools import combinations
 import numpy as np
 from scipy.ndimage import median_filter
 
-from runtime.core.check import Answer, Question
-from runtime.core.errors import instant
-from runtime.core.limits import limits
 from runtime.core.missing import held_samples
 from runtime.core.model import drives_of, joint_torque_units
 from runtime.core.record import Record
 from runtime.core.signals.filters import median_filtered
+from runtime.ground.check import Answer, Question
+from runtime.ground.errors import instant
+from runtime.ground.limits import limits
 from runtime.plausible.bodies import least_squares
 from runtime.plausible.case import Case
 from runtime.plausible.samples import moving as in_motion

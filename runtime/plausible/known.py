@@ -26,13 +26,13 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from runtime.core.documents import Result
-from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, elements_of, is_axis, joint_labels
-from runtime.core.part import Doubt
 from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
-from runtime.core.table import Table, number
+from runtime.ground.documents import Result
+from runtime.ground.limits import limits
+from runtime.ground.part import Doubt
+from runtime.ground.table import Table, number
 from runtime.physical.inertia import INERTIAL
 
 if TYPE_CHECKING:

@@ -19,17 +19,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from runtime.core.check import Answer, Question, State, first_names
-from runtime.core.errors import InputError
 from runtime.core.least_squares.linear import percent
 from runtime.core.least_squares.wls import weighted_system
-from runtime.core.limits import limits
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.predicted import Weights, kept_correlation
 from runtime.core.rows.prepared import stacked
 from runtime.core.rows.selection import per_joint
 from runtime.core.signals.velocities import agreement
 from runtime.core.study import Signals, Study
+from runtime.ground.check import Answer, Question, State, first_names
+from runtime.ground.errors import InputError
+from runtime.ground.limits import limits
 from runtime.plausible.case import Case
 from runtime.plausible.samples import Samples
 

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from runtime.core.check import Answer, Question, State
-from runtime.core.limits import limits
 from runtime.core.model import elements_of, joint_torque_units
+from runtime.ground.check import Answer, Question, State
+from runtime.ground.limits import limits
 from runtime.plausible.case import Case
 from runtime.plausible.delay import Delay
 from runtime.plausible.trials import Trial, reach

@@ -16,15 +16,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from runtime.core.check import WORST, Check, worst_of
-from runtime.core.documents import Result
-from runtime.core.errors import InputError
 from runtime.core.model import GeneratedModel, is_axis, require_no_channels
-from runtime.core.part import Part
 from runtime.core.problem import Problem
-from runtime.core.progress import at
 from runtime.core.result import Identification
-from runtime.core.table import Table
+from runtime.ground.check import WORST, Check, worst_of
+from runtime.ground.documents import Result
+from runtime.ground.errors import InputError
+from runtime.ground.part import Part
+from runtime.ground.progress import at
+from runtime.ground.table import Table
 from runtime.plausible.case import Case
 from runtime.plausible.delay import Delay
 from runtime.plausible.friction import friction

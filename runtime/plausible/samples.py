@@ -12,8 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from runtime.core.errors import InputError
-from runtime.core.limits import limits
 from runtime.core.record import Record
 from runtime.core.rows.prepared import Prepared
 from runtime.core.rows.selection import window_of
@@ -24,6 +22,8 @@ from runtime.core.signals.filters import (
     median_filtered,
 )
 from runtime.core.study import Lowpass, Study
+from runtime.ground.errors import InputError
+from runtime.ground.limits import limits
 
 LIMIT = limits(__package__)
 

@@ -11,10 +11,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from runtime.core.check import Answer, Question, State
-from runtime.core.limits import limits
 from runtime.core.model import joint_torque_units
 from runtime.core.record import Record
+from runtime.ground.check import Answer, Question, State
+from runtime.ground.limits import limits
 from runtime.physical.inertia import INERTIAL, PhysicalModel, frame_origins
 from runtime.plausible.case import Case
 from runtime.plausible.causes import changed_unit

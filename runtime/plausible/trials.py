@@ -28,8 +28,8 @@ import numpy as np
 from scipy.linalg import qr
 from scipy.optimize import minimize_scalar
 
-from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, drives_of
+from runtime.ground.limits import limits
 from runtime.physical.inertia import INERTIAL, PhysicalModel, frame_origins, physical_model
 from runtime.plausible.bodies import (
     Bodies,

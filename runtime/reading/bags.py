@@ -27,9 +27,9 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.errors import InputError, RecordWarning, printable
-from runtime.core.limits import LIMIT
 from runtime.documents.files import require_file
+from runtime.ground.errors import InputError, RecordWarning, printable
+from runtime.ground.limits import LIMIT
 from runtime.reading.files import sha256, sha256_of
 from runtime.reading.publishers import Sent, counted_senders, of_one_publisher
 from runtime.reading.table import Array, Options, Table, damage_named

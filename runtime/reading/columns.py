@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from runtime.core.drives import Drives
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 from runtime.reading.likely_columns import likely_columns
 from runtime.reading.settings import BY_NAME, NONE, Columns, RecordSettings
 from runtime.reading.table import Array, Table

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from runtime.core.errors import DataUnavailableError, InputError
+from runtime.ground.errors import DataUnavailableError, InputError
 from runtime.reading.files import is_file, sha256_of
 
 TIMEOUT = 10.0  # s, for a connection and between two packets

@@ -11,8 +11,8 @@ from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO, cast
 
-from runtime.core.errors import InputError
 from runtime.documents.files import require_file
+from runtime.ground.errors import InputError
 
 WHOLE = 2**31  # bytes of a file that is read into memory as it is
 ALWAYS = 2**28  # bytes, 256 MiB: what any file may unpack to

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 from runtime.reading.bags import digest_of, read_bag
 from runtime.reading.files import sha256_of
 from runtime.reading.mat import read_mat

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 from runtime.reading.units import position_unit, time_unit, torque_unit
 
 WORDS = {  # the first words of a quantity are taken before the others; parts of long words count

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 from runtime.reading.files import opened, unpacked
 from runtime.reading.table import Options, Table, damage_named, is_numeric
 

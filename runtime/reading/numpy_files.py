@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 from runtime.reading.files import require_size, unpacked
 from runtime.reading.table import WIDEST, Array, Options, Table, damage_named, is_numeric
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 from runtime.reading.files import require_size, unpacked
 from runtime.reading.table import Options, Table, damage_named
 

@@ -21,7 +21,7 @@ from itertools import combinations
 
 import numpy as np
 
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 
 Array = np.ndarray
 

@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 
 from runtime.controller.law import torque_law
-from runtime.core.clock import Stamps, rate_of, time_stamps
-from runtime.core.errors import InputError, ModelError
-from runtime.core.limits import LIMIT
 from runtime.core.missing import COUNTS, Missing, bridged
 from runtime.core.model import GeneratedModel, drives_of, joint_labels
 from runtime.core.record import JOINT_CHANNELS, Origin, Record, require_finite
+from runtime.ground.clock import Stamps, rate_of, time_stamps
+from runtime.ground.errors import InputError, ModelError
+from runtime.ground.limits import LIMIT
 from runtime.reading.columns import Conversion, column_names, conversion, require_alike
 from runtime.reading.datasets import fetch
 from runtime.reading.formats import endings, read_table

@@ -25,11 +25,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from runtime.core.arrays import real
-from runtime.core.clock import GAP, TimeStamps, remedy_text, time_stamps
-from runtime.core.errors import InputError
-from runtime.core.limits import LIMIT
-from runtime.core.settings import structure
+from runtime.ground.arrays import real
+from runtime.ground.clock import GAP, TimeStamps, remedy_text, time_stamps
+from runtime.ground.errors import InputError
+from runtime.ground.limits import LIMIT
+from runtime.ground.settings import structure
 from runtime.reading.settings import Resample
 
 Array = np.ndarray

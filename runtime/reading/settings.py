@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from runtime.core.record import WRENCH
-from runtime.core.settings import (
+from runtime.ground.settings import (
     Flag,
     Many,
     NotNegative,

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from runtime.core.clock import sample
-from runtime.core.errors import InputError, first_line
+from runtime.ground.clock import sample
+from runtime.ground.errors import InputError, first_line
 
 Array = np.ndarray
 

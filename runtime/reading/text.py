@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 from runtime.reading.files import opened
 from runtime.reading.table import WIDEST, Array, Options, Table
 

@@ -18,7 +18,7 @@ from functools import cache
 from math import pi
 from typing import Any
 
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 
 Unit = tuple[str, float]  # kind and factor to the SI unit of its kind
 

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 import scipy.io
 
-from runtime.core.documents import json_text
-from runtime.core.errors import encodable
 from runtime.core.least_squares.estimate import Estimate
+from runtime.ground.documents import json_text
+from runtime.ground.errors import encodable
 
 Array = np.ndarray
 

@@ -18,10 +18,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from runtime.core.part import BLACK, BLUE, DOTTED, GREY, ORANGE, SKY
-from runtime.core.part import Figure as PartFigure
 from runtime.core.residuals import Whiteness
 from runtime.core.validation import JointComparison
+from runtime.ground.part import BLACK, BLUE, DOTTED, GREY, ORANGE, SKY
+from runtime.ground.part import Figure as PartFigure
 from runtime.reporting.page import Image
 from runtime.reporting.series import Series, series
 

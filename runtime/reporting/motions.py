@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from runtime.core.limits import LIMIT
 from runtime.core.model import joint_labels
-from runtime.core.part import BLUE, DOTTED, GREY, ORANGE
+from runtime.ground.limits import LIMIT
+from runtime.ground.part import BLUE, DOTTED, GREY, ORANGE
 from runtime.reporting.figures import draw_figure, legend_above, panels
 from runtime.reporting.page import Page, Section
 from runtime.reporting.series import extremes

@@ -22,8 +22,8 @@ from typing import Any, Literal
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
-from runtime.core.markup import Markup, element
-from runtime.core.table import Table
+from runtime.ground.markup import Markup, element
+from runtime.ground.table import Table
 from runtime.reporting.series import Series
 
 State = Literal["good", "doubtful", "no", "open", ""]

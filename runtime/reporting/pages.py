@@ -13,9 +13,9 @@ from typing import Any
 
 from runtime.core.cestac.result import Cestac, error_against_resolution
 from runtime.core.checklist import Checklist
-from runtime.core.part import Part
 from runtime.core.result import Identification
-from runtime.core.table import Table
+from runtime.ground.part import Part
+from runtime.ground.table import Table
 from runtime.reporting import figures as plots
 from runtime.reporting.page import Number, Page, Section, State, state_mark
 from runtime.reporting.parameters import parameter_section

@@ -14,10 +14,10 @@ from typing import Any, cast
 import numpy as np
 
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.markup import element, formula, symbol, unit
 from runtime.core.model import GeneratedModel
 from runtime.core.result import Identification
-from runtime.core.table import Table, csv_text, interval, number
+from runtime.ground.markup import element, formula, symbol, unit
+from runtime.ground.table import Table, csv_text, interval, number
 from runtime.reporting.page import Matrix, Section
 
 CORRELATIONS_SHOWN = 14

@@ -24,7 +24,7 @@ from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any
 
-from runtime.core.errors import InputError, encodable
+from runtime.ground.errors import InputError, encodable
 
 UNFINISHED = ".symgen-unfinished-"
 FINISHED = ".symgen-finished"

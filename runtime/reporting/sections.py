@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from runtime.core.part import Part
 from runtime.core.result import Identification
 from runtime.core.signals.decimation import CUTOFF
-from runtime.core.table import Table, number, percentage
 from runtime.core.validation import JointComparison
+from runtime.ground.part import Part
+from runtime.ground.table import Table, number, percentage
 from runtime.reporting import figures as plots
 from runtime.reporting.page import Section
 from runtime.reporting.parameters import correlation_section, every_section

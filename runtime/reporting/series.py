@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from runtime.core.limits import LIMIT
+from runtime.ground.limits import LIMIT
 
 if TYPE_CHECKING:  # a page of the studio needs no estimator
     from runtime.core.validation import JointComparison

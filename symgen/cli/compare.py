@@ -33,8 +33,8 @@ def compare(
     """
     with session.progress_lines(), session.results_in(output) as results:
         import runtime
-        from runtime.core.documents import json_text
-        from runtime.core.errors import InputError
+        from runtime.ground.documents import json_text
+        from runtime.ground.errors import InputError
 
         described = session.robot_of(robot, trust=trust, exact=exact)
         model = session.model_of(described)

@@ -66,7 +66,7 @@ def excite(
     with session.results_in(output) as results:
         import runtime
         from runtime.compose import records_of
-        from runtime.core.documents import json_text
+        from runtime.ground.documents import json_text
         from runtime.parallel.processes import processes
 
         model = session.model_of(session.robot_of(robot, trust=trust, exact=exact))

@@ -35,7 +35,7 @@ def report(
     with session.results_in(output) as results:
         import runtime
         from runtime.compose import assess, records_of
-        from runtime.core.documents import json_text
+        from runtime.ground.documents import json_text
 
         described = session.robot_of(robot, trust=trust, exact=exact)
         study = session.changed(session.study_of_arguments(record), cestac={"side": side})

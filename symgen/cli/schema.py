@@ -29,7 +29,7 @@ def schema(
     """
     if of not in KINDS:
         fail(f"--of {of}; expected one of {', '.join(KINDS)}")
-    from runtime.core.documents import json_text
+    from runtime.ground.documents import json_text
 
     if of == "robot":
         from symgen.description import json_schema

@@ -49,7 +49,7 @@ def reported_errors() -> Iterator[None]:
     1, never a traceback. A note is printed for each angle whose value differs from the text of the
     file.
     """
-    from runtime.core.errors import DataUnavailableError, InputError
+    from runtime.ground.errors import DataUnavailableError, InputError
     from symgen.errors import CertificateError, SymgenError
 
     single_thread()
@@ -73,7 +73,7 @@ def reported_errors() -> Iterator[None]:
 def _noted_warnings() -> Iterator[None]:
     import warnings
 
-    from runtime.core.errors import RecordWarning
+    from runtime.ground.errors import RecordWarning
     from symgen.description.angles import RobotFileWarning
 
     noted = (RobotFileWarning, RecordWarning)
@@ -133,7 +133,7 @@ def show(
     On a terminal, lines are wrapped at its width, and the answer of `verdict` (a checklist) has a
     colour.
     """
-    from runtime.core.errors import encodable
+    from runtime.ground.errors import encodable
 
     text = encodable(text)
     if sys.stdout.isatty() and not json:
@@ -257,8 +257,8 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
     recorded : whether the study must name a record.
     """
     from runtime import compose
-    from runtime.core.errors import InputError
     from runtime.documents.files import lines_of
+    from runtime.ground.errors import InputError
     from runtime.reading.formats import is_measured
     from runtime.study import located, study_of
 
@@ -294,7 +294,7 @@ def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
     If this fails, write a draft of the study from the column names, if they show enough.
     """
     from runtime.compose import reader_of
-    from runtime.core.errors import InputError
+    from runtime.ground.errors import InputError
     from runtime.reporting.result_files import write_all
     from runtime.study import draft, study_text, suggested
 
@@ -319,7 +319,7 @@ def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
 
 def require_record(study: Study, file: str) -> None:
     """Raise InputError if the study of `file` names no record."""
-    from runtime.core.errors import InputError
+    from runtime.ground.errors import InputError
 
     if not study.record:
         raise InputError(
@@ -330,7 +330,7 @@ def require_record(study: Study, file: str) -> None:
 
 def changed(study: Study, **sections: Mapping[str, Any]) -> Study:
     """Replace settings of a study and check them like a study file; None leaves a setting as is."""
-    from runtime.core.settings import to_mapping
+    from runtime.ground.settings import to_mapping
     from runtime.study import study_from_mapping
 
     mapping = to_mapping(study)
@@ -365,7 +365,7 @@ def progress_lines() -> Iterator[None]:
     import logging
     from time import monotonic
 
-    from runtime.core.progress import LOGGER
+    from runtime.ground.progress import LOGGER
 
     start, level = monotonic(), LOGGER.level
     handler = logging.StreamHandler()

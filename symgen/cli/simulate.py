@@ -40,7 +40,7 @@ def simulate(
     """
     with session.results_in(output) as results:
         import runtime
-        from runtime.core.documents import json_text
+        from runtime.ground.documents import json_text
 
         model = session.model_of(session.robot_of(robot, trust=trust, exact=exact))
         settings = session.study_of_arguments([study], recorded=False)

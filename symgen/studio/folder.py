@@ -24,9 +24,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from runtime.core.errors import InputError
-from runtime.core.settings import to_mapping
 from runtime.documents.yaml_text import yaml_text, yaml_values
+from runtime.ground.errors import InputError
+from runtime.ground.settings import to_mapping
 from runtime.reading.bags import stored_files
 from runtime.reading.datasets import DATASETS
 from runtime.reading.formats import endings, is_measured

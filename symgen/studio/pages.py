@@ -20,7 +20,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route
 
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 from symgen.derive.models import SYMBOLIC
 from symgen.description import packaged_robots
 from symgen.description.files import TREES, content_of

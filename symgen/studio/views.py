@@ -20,9 +20,9 @@ import numpy as np
 
 import runtime
 import symgen
-from runtime.core.errors import InputError
-from runtime.core.limits import LIMIT
 from runtime.core.model import joint_labels
+from runtime.ground.errors import InputError
+from runtime.ground.limits import LIMIT
 from runtime.reporting.result_files import write_all
 from runtime.reporting.series import extremes
 from symgen.derive.doubts import doubts
@@ -180,7 +180,7 @@ def preview(path: str, request: Mapping[str, Any]) -> dict[str, Any]:
     decimal mark that reads more columns is used. `currents` says whether a name in `tau` has a
     word for current or effort.
     """
-    from runtime.core.clock import time_stamps
+    from runtime.ground.clock import time_stamps
     from runtime.reading.formats import read_table
     from runtime.reading.likely_columns import known_columns, may_be_currents
     from runtime.reading.units import time_unit

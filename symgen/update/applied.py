@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from runtime.core.documents import json_text
-from runtime.core.table import Table, notebook, number
+from runtime.ground.documents import json_text
+from runtime.ground.table import Table, notebook, number
 from runtime.reporting.result_files import write_all
 
 NOTHING = 1e-12  # SI; smaller numbers are rounding

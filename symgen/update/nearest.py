@@ -33,7 +33,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from runtime.core.limits import limits
+from runtime.ground.limits import limits
 from runtime.physical.feasibility import blocked, feasibility, limit_rows, nearest_in, scales, units
 from runtime.physical.inertia import INERTIAL, PhysicalModel
 from runtime.physical.semidefinite import LinearBounds, Space, margin, solutions, within

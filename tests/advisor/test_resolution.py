@@ -17,8 +17,6 @@ from runtime.advisor.position_errors import perturbation
 from runtime.advisor.sign_errors import kernels, switch_with_error
 from runtime.compose import advise, observe
 from runtime.core.drives import encoder_drives
-from runtime.core.errors import InputError, ModelError, SettingsError
-from runtime.core.limits import limits
 from runtime.core.model import BoundModel, load_model
 from runtime.core.record import Record
 from runtime.core.rows.prepared import decimated_torque
@@ -26,6 +24,8 @@ from runtime.core.rows.switches import Switch, switches
 from runtime.core.signals.filters import decimated, filtered_states
 from runtime.core.signals.noise_gain import bandwidth
 from runtime.core.study import Decimate, Lowpass, Signals
+from runtime.ground.errors import InputError, ModelError, SettingsError
+from runtime.ground.limits import limits
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.reporting.sections import part_section

@@ -12,7 +12,7 @@ from ruamel.yaml import YAML
 from typer.testing import CliRunner
 
 import symgen
-from runtime.core.limits import LIMIT
+from runtime.ground.limits import LIMIT
 from symgen.cli.main import app
 
 OPEN = ("noise alone", "short")  # no values are printed

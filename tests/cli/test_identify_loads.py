@@ -15,8 +15,8 @@ from typer.testing import CliRunner
 import runtime
 import symgen
 from runtime.compose import payload
-from runtime.core.errors import InputError
 from runtime.core.model import load_model
+from runtime.ground.errors import InputError
 from runtime.reading.records import read_records
 from symgen.cli.main import app
 from symgen.description import load_robot

@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 
 from runtime import load_model
 from runtime.compose import observe
-from runtime.core.errors import SettingsError
 from runtime.core.essential import essential_of
 from runtime.core.validation import record_errors
+from runtime.ground.errors import SettingsError
 from runtime.reading.records import read_records
 from runtime.study import study_from_mapping
 from symgen.cli.main import app

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from runtime.core.table import interval, with_intervals
+from runtime.ground.table import interval, with_intervals
 from symgen.cli import session
 
 TEXT = "With care. " + "The model leaves a part unexplained. " * 4 + "\nZZ1R 1.79 +- 0.02"

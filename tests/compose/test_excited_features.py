@@ -8,7 +8,7 @@ from campaign import some
 from features import FEATURES, plain
 
 from runtime.compose import excite, static_poses
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 from runtime.study import study_from_mapping
 
 SEARCH = {

@@ -18,10 +18,10 @@ from features import FEATURES, Case
 
 from runtime import compose
 from runtime.advisor.advice import Advice
-from runtime.core.errors import InputError
 from runtime.core.problem import estimated
 from runtime.core.rows.prepared import stacked
 from runtime.friction import friction_curves
+from runtime.ground.errors import InputError
 from runtime.plausible.delay import delay as delay_of
 from runtime.plausible.plausibility import plausibility as plausibility_of
 from runtime.study import Study

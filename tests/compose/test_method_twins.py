@@ -15,7 +15,7 @@ from campaign import sampled
 from features import FEATURES, Case
 
 from runtime import compose
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 
 TWIN = "twinned"
 FOLDER = TemporaryDirectory()

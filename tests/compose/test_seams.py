@@ -11,7 +11,7 @@ from features import STRIBECK, arm, force_sensors, record, recorded_speeds, stud
 import runtime
 import symgen
 from runtime.compose import assess, cestac, compare, estimate
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.study import study_from_mapping

@@ -11,11 +11,11 @@ from features import arm, record
 from typer.testing import CliRunner
 
 from runtime import compose
-from runtime.core.check import Check
-from runtime.core.errors import InputError
 from runtime.core.identify import Identification, OnRequest
-from runtime.core.part import Figure, Part
-from runtime.core.table import Table
+from runtime.ground.check import Check
+from runtime.ground.errors import InputError
+from runtime.ground.part import Figure, Part
+from runtime.ground.table import Table
 from symgen.cli.main import app
 
 

@@ -11,16 +11,16 @@ from features import arm, record
 from typer.testing import CliRunner
 
 from runtime import compose
-from runtime.core import settings_errors
-from runtime.core.errors import SettingsError
 from runtime.core.least_squares.linear import ordinary
 from runtime.core.least_squares.method import Beginning, Fitted, Method
 from runtime.core.problem import Note, Problem
 from runtime.core.record import Record
-from runtime.core.settings import Count, Positive, Settings
 from runtime.core.signals.filters import States
 from runtime.core.signals.reader import Reader, lowpassed
 from runtime.core.study import Signals
+from runtime.ground import settings_errors
+from runtime.ground.errors import SettingsError
+from runtime.ground.settings import Count, Positive, Settings
 from runtime.reading import formats
 from runtime.reading.formats import Format
 from runtime.reading.text import read_text

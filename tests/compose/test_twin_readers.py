@@ -11,10 +11,10 @@ from features import FEATURES, Case, arm, motion, noise, record, study
 from test_matrix import case_of, quick
 
 from runtime import compose
-from runtime.core.errors import InputError, SettingsError
 from runtime.core.record import Record
 from runtime.core.signals.filters import States
 from runtime.core.signals.reader import LOWPASS, Reader, lowpassed
+from runtime.ground.errors import InputError, SettingsError
 
 TWIN = "another_name"
 SAMPLE = {

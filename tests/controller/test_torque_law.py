@@ -16,9 +16,9 @@ from planar_data import TRUE, motion
 from scipy.integrate import solve_ivp
 
 from runtime import InputError, identify
-from runtime.core.errors import SettingsError
 from runtime.core.parameter_sets import Sets
-from runtime.core.settings import to_mapping
+from runtime.ground.errors import SettingsError
+from runtime.ground.settings import to_mapping
 from runtime.reading.records import read_records
 from runtime.study import study_from_mapping
 

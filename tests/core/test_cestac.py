@@ -17,13 +17,13 @@ from runtime.core.cestac.perturbed import perturbed_position, perturbed_torque
 from runtime.core.cestac.result import deciding_names, level_result, runs_needed
 from runtime.core.cestac.runs import Level, Run, Runs
 from runtime.core.drives import Drives
-from runtime.core.errors import InputError, SettingsError
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import decimated_torque, observation_of
 from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import select_rows
 from runtime.core.signals.filters import filtered_states
 from runtime.core.study import CestacSettings, EstimateSettings, Lowpass, Signals
+from runtime.ground.errors import InputError, SettingsError
 from runtime.parallel.processes import processes
 from runtime.study import Rows, Study
 

@@ -13,11 +13,11 @@ from runtime import load_model
 from runtime.advisor.coarse_encoders import CoarseEncoders
 from runtime.compose import cestac, problem
 from runtime.core.cestac.perturbed import system_of
-from runtime.core.errors import InputError
 from runtime.core.model import GeneratedModel
 from runtime.core.record import Origin, Record
 from runtime.core.rows.regressor import Columns
 from runtime.core.study import CestacSettings, EstimateSettings, Lowpass, Signals
+from runtime.ground.errors import InputError
 from runtime.study import Rows, Study
 
 

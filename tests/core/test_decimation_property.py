@@ -10,10 +10,10 @@ import scipy.signal
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from runtime.core.errors import InputError
 from runtime.core.signals.decimation import decimated_parts
 from runtime.core.signals.filters import decimated, decimation_plan
 from runtime.core.study import Decimate
+from runtime.ground.errors import InputError
 
 SCIPY, MATLAB = Decimate(), Decimate(phase="last", padding="matlab")
 

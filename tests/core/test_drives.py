@@ -9,7 +9,7 @@ import runtime
 import symgen
 from runtime.commands import require_torques
 from runtime.core.drives import Drives
-from runtime.core.errors import InputError, SettingsError
+from runtime.ground.errors import InputError, SettingsError
 from runtime.study import study_from_mapping
 
 RATIO = np.array([[32.0, 0, 0], [0, -48, 0], [0, 32, 45]])

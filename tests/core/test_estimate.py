@@ -8,8 +8,8 @@ import pytest
 from planar_data import OLS, WLS, observation, one_joint_at_rest
 
 from runtime.compose import estimate_of
-from runtime.core.documents import json_text
 from runtime.core.least_squares.estimate import Estimate
+from runtime.ground.documents import json_text
 
 
 @pytest.fixture(scope="module")

@@ -13,12 +13,12 @@ from problems import linear_system
 from scipy.signal import lfilter
 
 from runtime.compose import METHODS, estimate_of
-from runtime.core.errors import SettingsError
 from runtime.core.least_squares.block_covariance import block_covariance
 from runtime.core.least_squares.solution import null_groups, solve
 from runtime.core.rows.factor import Factor, factor, merged
 from runtime.core.rows.observation import split_rows
 from runtime.core.study import EstimateSettings
+from runtime.ground.errors import SettingsError
 
 EVERY = [
     OLS,

@@ -12,9 +12,9 @@ from campaign import campaign
 import runtime
 import symgen
 from runtime.compose import estimate_of
-from runtime.core.errors import InputError
 from runtime.core.study import EstimateSettings
 from runtime.core.validation import prediction_errors
+from runtime.ground.errors import InputError
 from runtime.reading.records import read_records
 from runtime.study import study_from_mapping
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from runtime.core.limits import LIMIT, entries, limits
+from runtime.ground.limits import LIMIT, entries, limits
 
 ROOM = Path(__file__).parents[2] / "runtime"
 FOLDERS = sorted(path.parent.name for path in ROOM.glob("*/limits.toml"))
@@ -19,8 +19,8 @@ def used(folder):
 @pytest.mark.parametrize("folder", FOLDERS)
 def test_every_limit_is_used_and_described(folder):
     own = entries(f"runtime.{folder}")
-    assert set(own) <= used(ROOM if folder == "core" else ROOM / folder)
-    assert used(ROOM / folder) <= {*own, *entries("runtime.core")}
+    assert set(own) <= used(ROOM if folder == "ground" else ROOM / folder)
+    assert used(ROOM / folder) <= {*own, *entries("runtime.ground")}
     for name, limit in own.items():
         assert set(limit) == {"value", "unit", "meaning", "measured"}, name
         assert limit["meaning"] and getattr(limits(f"runtime.{folder}"), name) == limit["value"]

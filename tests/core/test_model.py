@@ -9,8 +9,8 @@ import planar_2r_model
 import pytest
 
 from runtime import load_model
-from runtime.core.errors import ModelError
 from runtime.core.model import check_states, joint_units, require
+from runtime.ground.errors import ModelError
 from symgen.description import load_robot
 from symgen.emit.generate import generate_module
 

@@ -17,7 +17,6 @@ from problems import linear_system
 
 from runtime import Record, estimate, load_model, observe
 from runtime.compose import estimate_of, problem
-from runtime.core.errors import InputError
 from runtime.core.essential import essential_of
 from runtime.core.model import BoundModel
 from runtime.core.record import Origin
@@ -30,6 +29,7 @@ from runtime.core.signals.filters import States, decimated, decimation_plan, fil
 from runtime.core.study import Decimate
 from runtime.core.uncertainty import block_bootstrap
 from runtime.core.validation import weak_directions
+from runtime.ground.errors import InputError
 from runtime.study import study_from_mapping
 from symgen.description import load_robot
 from symgen.emit import c_target, spec

@@ -15,8 +15,8 @@ import scipy.io
 
 from runtime import Record, read_record
 from runtime.core.drives import Drives
-from runtime.core.errors import InputError, SettingsError
 from runtime.core.record import Origin
+from runtime.ground.errors import InputError, SettingsError
 from runtime.reading.records import read_records
 from runtime.reading.settings import RecordSettings
 from runtime.study import study_from_mapping

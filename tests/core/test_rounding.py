@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import chi2
 
 from runtime.core.cestac.rounding import rounded, signs, stream
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 
 STEP = 0.02
 

@@ -11,7 +11,7 @@ import pytest
 import runtime
 from runtime.compose import json_schema
 from runtime.core.least_squares.estimate import Status
-from runtime.core.settings import to_mapping
+from runtime.ground.settings import to_mapping
 from runtime.reading.datasets import DATASETS, dataset_study
 from runtime.study import Study, study_from_mapping
 

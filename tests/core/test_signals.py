@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from runtime.core.errors import InputError
 from runtime.core.signals.filters import (
     decimated,
     decimation_factor,
@@ -17,6 +16,7 @@ from runtime.core.signals.filters import (
     median_filtered,
 )
 from runtime.core.study import Decimate, Lowpass, Signals
+from runtime.ground.errors import InputError
 
 RATE = 1000.0
 T = np.arange(3000) / RATE

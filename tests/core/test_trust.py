@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import symgen
 from runtime import load_model
-from runtime.core.errors import ModelError
+from runtime.ground.errors import ModelError
 from symgen.cli.main import app
 
 EMITTED = Path(__file__).parents[2] / "generated"

@@ -14,12 +14,12 @@ from scipy import stats
 from scipy.signal import lfilter
 
 from runtime.compose import estimate_of
-from runtime.core.documents import json_text
 from runtime.core.essential import essential_of
 from runtime.core.residuals import effective_share, joint_whiteness
 from runtime.core.study import EssentialSettings, EstimateSettings
 from runtime.core.uncertainty import block_bootstrap, f_tests, uncertainty
 from runtime.core.validation import JointComparison, direct_comparison
+from runtime.ground.documents import json_text
 
 
 def coloured(white):

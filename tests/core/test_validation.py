@@ -10,7 +10,6 @@ from planar_data import OLS, TRUE, motion, observation
 from problems import linear_system
 
 from runtime.compose import estimate_of, state_problem
-from runtime.core.errors import InputError
 from runtime.core.parameter_sets import held_out_validation
 from runtime.core.study import EstimateSettings
 from runtime.core.validation import (
@@ -20,6 +19,7 @@ from runtime.core.validation import (
     split_validation,
     weak_directions,
 )
+from runtime.ground.errors import InputError
 
 PROBLEM = state_problem(planar, ())
 

@@ -16,7 +16,7 @@ import pytest
 
 import runtime
 import symgen
-from runtime.core.errors import InputError, SettingsError
+from runtime.ground.errors import InputError, SettingsError
 from runtime.study import study_from_mapping
 from symgen.errors import SymgenError
 

@@ -10,7 +10,6 @@ from problems import observed_states
 import symgen
 from runtime.compose import cestac
 from runtime.core.cestac.rounding import rounded, stream
-from runtime.core.errors import InputError, SettingsError
 from runtime.core.record import Record
 from runtime.core.rows.prepared import decimated_torque, observation_of
 from runtime.core.rows.regressor import Columns
@@ -19,6 +18,7 @@ from runtime.core.signals.filters import filtered_states
 from runtime.core.study import CestacSettings, Lowpass, Signals
 from runtime.counts.own_encoder import own_encoder
 from runtime.counts.reading import read_counts
+from runtime.ground.errors import InputError, SettingsError
 from runtime.study import Rows, Study
 
 SIGNALS = Signals(median=1, lowpass=Lowpass(cutoff=20), reader="counts")

@@ -17,7 +17,6 @@ import runtime
 import symgen
 from runtime import load_model
 from runtime.compose import observe, problem
-from runtime.core.errors import InputError, SettingsError
 from runtime.core.model import drives_of
 from runtime.core.record import Record
 from runtime.core.rows.prepared import decimated_torque, observation_of
@@ -30,6 +29,7 @@ from runtime.counts.encoder_advice import encoder_sentences
 from runtime.counts.lattice import lattice
 from runtime.counts.reading import MARGIN, STRETCH, read_counts, stretches
 from runtime.counts.spline import Basis, Factor, next_density
+from runtime.ground.errors import InputError, SettingsError
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.study import Rows, Study, study_from_mapping

@@ -19,13 +19,13 @@ import symgen
 from runtime import load_model
 from runtime.compose import cestac, observe, read_record
 from runtime.core.drives import Drives
-from runtime.core.errors import InputError
 from runtime.core.missing import Missing, bridged
 from runtime.core.model import drives_of
 from runtime.core.record import Record
 from runtime.core.signals.filters import filtered_states
 from runtime.core.study import CestacSettings, Lowpass, Signals
 from runtime.counts.reader import encoder_position
+from runtime.ground.errors import InputError
 from runtime.reading.settings import RecordSettings
 from runtime.study import Rows, Study
 from symgen.cli.main import app

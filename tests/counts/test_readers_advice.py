@@ -12,9 +12,9 @@ from runtime.advisor.advice import crossing
 from runtime.advisor.coarse_encoders import PHASES, CoarseEncoders, mean_change
 from runtime.advisor.readers import curves
 from runtime.compose import advise, cestac, problem
-from runtime.core.limits import limits
 from runtime.core.signals.filters import filtered_states
 from runtime.core.study import CestacSettings
+from runtime.ground.limits import limits
 from runtime.reporting.sections import part_section
 from runtime.study import Rows, Study
 

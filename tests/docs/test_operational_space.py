@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from operational_space import operational_space
 
-from runtime.core.errors import InputError
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.model import load_model
+from runtime.ground.errors import InputError
 from symgen.description import load_robot
 from symgen.description.grammar import parse
 from symgen.description.robot import FIXED, Frame

@@ -6,8 +6,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from runtime.core.errors import InputError, SettingsError
-from runtime.core.settings import structure
+from runtime.ground.errors import InputError, SettingsError
+from runtime.ground.settings import structure
 from runtime.loop.trajectories import (
     AnyFamily,
     Fourier,

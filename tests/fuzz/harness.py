@@ -54,7 +54,7 @@ def judged(
     read: Callable[[Path], object], path: Path, named: tuple[str, ...] = ("case",)
 ) -> Outcome:
     """What reading the file gives, in this process; an error holds one of the texts `named`."""
-    from runtime.core.errors import InputError
+    from runtime.ground.errors import InputError
     from symgen.errors import SymgenError
 
     start = processor_time()

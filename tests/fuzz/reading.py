@@ -40,7 +40,7 @@ def read_and_derive(path: Path) -> object:
 
 
 def read_study(path: Path) -> object:
-    from runtime.core.settings import to_mapping
+    from runtime.ground.settings import to_mapping
     from runtime.study import load_study, located, study_text
 
     study = load_study(path)
@@ -139,7 +139,7 @@ def read_estimate(path: Path) -> object:
 
 def read_faulty(path: Path) -> object:
     """Does what its first line says: the harness is tested by it."""
-    from runtime.core.errors import InputError
+    from runtime.ground.errors import InputError
 
     match path.read_text():
         case "hang":

@@ -211,7 +211,7 @@ def bag_tables() -> tuple[dict, ...]:
 
 @cache
 def study_tables() -> tuple[dict, ...]:
-    from runtime.core.settings import to_mapping
+    from runtime.ground.settings import to_mapping
     from runtime.reading.datasets import dataset_study
     from runtime.study import Study, study_from_mapping
 

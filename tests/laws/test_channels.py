@@ -15,8 +15,8 @@ from scipy.optimize import least_squares
 import runtime
 import symgen
 from runtime.compose import problem
-from runtime.core.errors import InputError, ModelError
 from runtime.core.model import require
+from runtime.ground.errors import InputError, ModelError
 from runtime.reading.records import read_records
 from runtime.study import study_from_mapping
 from symgen.certify.modules import certified_files

@@ -15,9 +15,9 @@ from problems import loop_of_records
 
 from runtime import InputError, Record, identify, load_model
 from runtime.compose import estimate_of, observe
-from runtime.core.errors import SettingsError
 from runtime.core.essential import essential_of
 from runtime.core.study import EstimateSettings
+from runtime.ground.errors import SettingsError
 from runtime.loop.closed_loop import loop_of, slips
 from runtime.loop.control_law import parameters_of
 from runtime.loop.reference import Reference, reference_of

@@ -14,9 +14,9 @@ from scipy.integrate import solve_ivp
 
 from runtime import InputError, load_model
 from runtime.compose import simulate as simulate_study
-from runtime.core.errors import SettingsError
-from runtime.core.settings import structure
 from runtime.core.signals.filters import filtered_states
+from runtime.ground.errors import SettingsError
+from runtime.ground.settings import structure
 from runtime.loop.control_law import control_law, discrete_poles, parameters_of
 from runtime.loop.controller_tick import plant_function
 from runtime.loop.dry_friction import dry_friction

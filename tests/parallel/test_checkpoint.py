@@ -19,8 +19,8 @@ from planar_data import record
 
 from runtime.compose import cestac
 from runtime.core.cestac.runs import Run, Runs
-from runtime.core.errors import InputError
 from runtime.core.study import CestacSettings, Lowpass, Signals
+from runtime.ground.errors import InputError
 from runtime.parallel.checkpoint import Checkpoint
 from runtime.study import Study
 

@@ -12,7 +12,7 @@ from campaign import campaign
 from hang import HANG
 from threadpoolctl import threadpool_info
 
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 from runtime.parallel.processes import processes
 from runtime.threads import alone_each
 

@@ -9,8 +9,8 @@ import pytest
 
 from runtime import InputError, Record, observe
 from runtime.compose import problem
-from runtime.core.errors import SettingsError
 from runtime.core.model import load_model
+from runtime.ground.errors import SettingsError
 from runtime.payload.gains import drive_gains
 from runtime.payload.load import payload
 from runtime.physical.inertia import INERTIAL, physical_model

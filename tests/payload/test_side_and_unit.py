@@ -7,7 +7,7 @@ import planar_arm
 import pytest
 
 from runtime import compose
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 from runtime.payload.load import load_effect
 
 LOAD = {"M": 1.0, "MX": 0.1, "ZZ": 0.02}

@@ -13,7 +13,7 @@ from test_payload import BOX, emitted, observe, record
 from test_payload import STUDY as PAYLOAD_STUDY
 
 from runtime import InputError, load_model
-from runtime.core.errors import SettingsError
+from runtime.ground.errors import SettingsError
 from runtime.payload.load import load_effect, load_of_body, mount, payload, ten_parameters
 from runtime.physical.inertia import INERTIAL, physical_model, pseudo_inertia
 from runtime.study import PayloadSettings

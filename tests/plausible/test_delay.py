@@ -11,7 +11,7 @@ from scipy.stats import binom
 
 import runtime
 import symgen
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 from runtime.study import study_from_mapping
 
 STUDY = study_from_mapping({"signals": {"median": 1, "lowpass": {"cutoff": 30}}})

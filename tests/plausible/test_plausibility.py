@@ -16,9 +16,9 @@ import runtime
 import symgen
 from oracles.random_robots import random_parameters, random_robot
 from runtime.compose import estimate_of
-from runtime.core.limits import limits
 from runtime.core.rows.prepared import Prepared
 from runtime.core.signals.reader import LOWPASS
+from runtime.ground.limits import limits
 from runtime.physical.inertia import physical_model
 from runtime.physical.semidefinite import LinearBounds, closest, everything
 from runtime.plausible.bodies import Bodies, Grams, least_squares, physical_fit

@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 
 import runtime
 import symgen
-from runtime.core.check import Check
 from runtime.core.drives import Drives
+from runtime.ground.check import Check
 from runtime.plausible.causes import Robot, causes
 from runtime.reading.likely_columns import likely_columns
 from runtime.reading.units import torque_unit

@@ -11,7 +11,7 @@ from bag_files import KINDS, joint_states, write_bag
 from campaign import campaign, some
 
 from runtime import read_record
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 from runtime.reading.formats import read_table
 from runtime.study import study_from_mapping
 

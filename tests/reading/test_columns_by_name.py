@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from bag_files import joint_states, write_bag
 
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 from runtime.reading.records import read_records
 from runtime.reading.settings import Columns, RecordSettings
 

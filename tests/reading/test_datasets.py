@@ -6,7 +6,7 @@ import hashlib
 import pooch
 import pytest
 
-from runtime.core.errors import DataUnavailableError, InputError
+from runtime.ground.errors import DataUnavailableError, InputError
 from runtime.reading import datasets
 from runtime.reading.datasets import DATASETS, Dataset, dataset_study, fetch, locate
 from runtime.study import study_from_mapping

@@ -12,7 +12,7 @@ import pytest
 
 from runtime import read_record
 from runtime.core.drives import Drives
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 from runtime.reading.settings import RecordSettings
 from runtime.study import study_from_mapping
 

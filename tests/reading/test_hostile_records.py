@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 from rosbags.typesys import get_types_from_msg
 
 from runtime import read_record
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 from runtime.reading.formats import read_table
 from runtime.study import study_from_mapping
 

@@ -11,7 +11,7 @@ import pytest
 import scipy.io
 
 from runtime import Record, read_record
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 from runtime.study import study_from_mapping
 
 T = np.arange(40) / 100

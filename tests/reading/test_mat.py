@@ -13,7 +13,7 @@ from campaign import campaign
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from runtime.core.errors import InputError
+from runtime.ground.errors import InputError
 from runtime.reading.formats import read_table
 from runtime.reading.mat import read_mat as table_of
 from runtime.reading.table import Options

@@ -9,7 +9,7 @@ import pytest
 from bag_files import joint_states, write_bag
 
 from runtime import read_record
-from runtime.core.errors import InputError, RecordWarning
+from runtime.ground.errors import InputError, RecordWarning
 from runtime.study import study_from_mapping
 
 N, PERIOD = 400, 4_000_000  # ns
@@ -143,7 +143,7 @@ RIGHT = {
 }
 
 
-@pytest.mark.filterwarnings("error::runtime.core.errors.RecordWarning")
+@pytest.mark.filterwarnings("error::runtime.ground.errors.RecordWarning")
 @pytest.mark.parametrize("name", RIGHT)
 def test_a_right_record_is_read(tmp_path, name):
     stamps, tau = RIGHT[name]
@@ -154,7 +154,7 @@ def test_a_right_record_is_read(tmp_path, name):
     assert "publisher" not in record.origin.time
 
 
-@pytest.mark.filterwarnings("error::runtime.core.errors.RecordWarning")
+@pytest.mark.filterwarnings("error::runtime.ground.errors.RecordWarning")
 def test_a_node_that_starts_again_is_one_publisher(tmp_path):
     nodes = ["/driver_1"] * 150 + ["/driver_2"] * (N - 150)
     messages = joint_states(STAMPS, JOINTS, Q, TAU)
@@ -163,7 +163,7 @@ def test_a_node_that_starts_again_is_one_publisher(tmp_path):
     np.testing.assert_allclose(record.tau, TAU, atol=1e-12)
 
 
-@pytest.mark.filterwarnings("error::runtime.core.errors.RecordWarning")
+@pytest.mark.filterwarnings("error::runtime.ground.errors.RecordWarning")
 def test_messages_in_another_order_are_of_one_publisher(tmp_path):
     counts = np.arange(N).reshape(-1, 2)
     counts[::10] = counts[::10, ::-1]

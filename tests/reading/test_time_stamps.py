@@ -13,9 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from runtime import estimate, observe, read_record, resample
-from runtime.core.clock import remedy_text, time_stamps
-from runtime.core.errors import InputError
 from runtime.core.record import Record
+from runtime.ground.clock import remedy_text, time_stamps
+from runtime.ground.errors import InputError
 from runtime.reading.records import read_records
 from runtime.reading.resampling import resampled
 from runtime.reading.settings import Resample

@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from runtime import read_record
-from runtime.core.errors import InputError, SettingsError
+from runtime.ground.errors import InputError, SettingsError
 from runtime.reading.units import GRAMMAR, SI, TABLE, position_unit, speed, time_unit, torque_unit
 from runtime.study import study_from_mapping
 

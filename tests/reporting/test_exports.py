@@ -24,8 +24,8 @@ from runtime.compose import estimate_of, json_schema
 from runtime.core.cestac.result import Cestac, cestac_arrays, cestac_csv, level_result
 from runtime.core.cestac.runs import Level, Run, Runs
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.table import escaped, name_cell, number_cell, unit_cell
 from runtime.documents.estimates import load_estimate
+from runtime.ground.table import escaped, name_cell, number_cell, unit_cell
 from runtime.reporting.arrays import (
     array_files,
     estimate_arrays,

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from strict_html import Strict
 
-from runtime.core.markup import element, formula, symbol
-from runtime.core.table import Table
+from runtime.ground.markup import element, formula, symbol
+from runtime.ground.table import Table
 from runtime.reporting.page import Image, Matrix, Number, Page, Section, embedded, render
 from runtime.reporting.series import Series
 

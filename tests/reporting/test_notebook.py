@@ -120,7 +120,9 @@ def test_a_notebook_shows_them():
         nbformat.v4.new_code_cell(
             "import symgen\nsymgen.symbolic('planar_2r').formulas('base_parameters')"
         ),
-        nbformat.v4.new_code_cell("from runtime.core.markup import symbol\nprint(symbol('ZZ1R'))"),
+        nbformat.v4.new_code_cell(
+            "from runtime.ground.markup import symbol\nprint(symbol('ZZ1R'))"
+        ),
     ]
     NotebookClient(book, timeout=int(HANG), kernel_name="python3").execute()
     data = book.cells[0].outputs[0]["data"]

@@ -12,16 +12,16 @@ import numpy as np
 import pytest
 
 from runtime.advisor.advice import answer
-from runtime.core.check import Check, state_of
 from runtime.core.checklist import certain, checklist_of, lost_joints, separate
 from runtime.core.least_squares.estimate import Estimate, JointFit
-from runtime.core.markup import split, symbol, unit
 from runtime.core.model import load_model
-from runtime.core.part import Part
 from runtime.core.study import Decimate, Signals
-from runtime.core.table import percentage
 from runtime.core.validation import JointComparison
 from runtime.expected import Expected, expected_off
+from runtime.ground.check import Check, state_of
+from runtime.ground.markup import split, symbol, unit
+from runtime.ground.part import Part
+from runtime.ground.table import percentage
 from runtime.physical.consistency import Consistency
 from runtime.reporting.pages import checks_section, settings_section
 from runtime.reporting.parameters import (

@@ -21,8 +21,8 @@ import runtime
 import symgen
 from runtime.compose import problem
 from runtime.core.drives import Drives
-from runtime.core.errors import InputError
-from runtime.core.limits import limits
+from runtime.ground.errors import InputError
+from runtime.ground.limits import limits
 from runtime.plausible.causes import unchanged_study
 from runtime.plausible.samples import samples_of
 from runtime.plausible.trials import Baseline, baseline_of, regressor

@@ -19,8 +19,8 @@ import symgen
 from oracles import mjcf_robots, urdf_robots
 from oracles.applying import exact, motion, other_values, skeleton, torques_of
 from oracles.mjcf_robots import ARM, BRANCHES, GRIPPER
-from runtime.core.errors import InputError
 from runtime.core.study import EssentialSettings
+from runtime.ground.errors import InputError
 from symgen.description.files import read_robot
 from symgen.description.xml_text import MAX_BYTES
 from symgen.errors import DescriptionError

@@ -13,7 +13,7 @@ from dataclasses import replace
 import runtime
 from runtime import Estimate, Record
 from runtime.core.drives import Coupling, Drives
-from runtime.core.table import Table, number
+from runtime.ground.table import Table, number
 from symgen.demo import Prepared, prepare
 
 COUPLINGS: dict[Coupling, str] = {

@@ -44,10 +44,8 @@ from runtime.core.cestac.perturbed import (
 from runtime.core.cestac.result import LEAST_SQUARES, Cestac, level_result, names_judged
 from runtime.core.cestac.runs import Level, Run, Runs
 from runtime.core.cestac.sources import Checkpoint, EncoderOf, LoopOf
-from runtime.core.errors import InputError, SettingsError
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.method import method_of
-from runtime.core.limits import LIMIT
 from runtime.core.problem import Problem, estimate_of, point_estimate
 from runtime.core.provenance import processor
 from runtime.core.record import Record
@@ -55,8 +53,10 @@ from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import common_drives
 from runtime.core.rows.regressor import Columns
-from runtime.core.settings import to_mapping
 from runtime.core.study import CestacSettings
+from runtime.ground.errors import InputError, SettingsError
+from runtime.ground.limits import LIMIT
+from runtime.ground.settings import to_mapping
 
 Progress = Callable[[int, int], None]
 Key = tuple[int, int]

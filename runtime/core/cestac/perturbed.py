@@ -22,7 +22,6 @@ from runtime.core.cestac.rounding import rounded, stream
 from runtime.core.cestac.runs import Level
 from runtime.core.cestac.sources import EncoderOf, Loop, RecordEncoder
 from runtime.core.drives import Drives
-from runtime.core.errors import InputError
 from runtime.core.essential import essential_of
 from runtime.core.least_squares.method import Method
 from runtime.core.model import GeneratedModel, base_columns
@@ -35,6 +34,7 @@ from runtime.core.rows.selection import Selection
 from runtime.core.signals.filters import States, derivative
 from runtime.core.signals.reader import Reader
 from runtime.core.study import CestacSettings, EstimateSettings, Signals, Study
+from runtime.ground.errors import InputError
 
 Array = np.ndarray
 

@@ -37,11 +37,13 @@ import numpy as np
 from scipy.special import stdtrit
 
 from runtime.core.cestac.runs import Level, Runs
-from runtime.core.documents import Result, Vector, json_text
-from runtime.core.errors import InputError
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.limits import LIMIT
-from runtime.core.part import (
+from runtime.core.rows.observation import Observation
+from runtime.core.study import CestacSettings
+from runtime.ground.documents import Result, Vector, json_text
+from runtime.ground.errors import InputError
+from runtime.ground.limits import LIMIT
+from runtime.ground.part import (
     BLACK,
     BLUE,
     DOTTED,
@@ -53,9 +55,7 @@ from runtime.core.part import (
     Figure,
     Part,
 )
-from runtime.core.rows.observation import Observation
-from runtime.core.study import CestacSettings
-from runtime.core.table import Table, csv_text, notebook, number, percentage
+from runtime.ground.table import Table, csv_text, notebook, number, percentage
 
 Array = np.ndarray
 

@@ -25,8 +25,8 @@ from typing import Literal
 
 import numpy as np
 
-from runtime.core.errors import InputError
-from runtime.core.limits import LIMIT
+from runtime.ground.errors import InputError
+from runtime.ground.limits import LIMIT
 
 Array = np.ndarray
 Mode = Literal["two-point", "uniform", "gaussian", "quantise", "phase"]

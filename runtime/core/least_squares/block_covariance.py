@@ -34,8 +34,8 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from runtime.core.limits import LIMIT
 from runtime.core.rows.factor import Array
+from runtime.ground.limits import LIMIT
 
 
 def block_covariance(blocks: Iterable[Array], X: Array, T: Array) -> Array:

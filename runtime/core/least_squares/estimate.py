@@ -21,8 +21,16 @@ from typing import Any, Literal
 
 import numpy as np
 
-from runtime.core.documents import InfIfNull, Matrix, NanIfNull, Vector, Whole, from_text, json_text
-from runtime.core.table import Table, notebook, number, parameter_table, percentage
+from runtime.ground.documents import (
+    InfIfNull,
+    Matrix,
+    NanIfNull,
+    Vector,
+    Whole,
+    from_text,
+    json_text,
+)
+from runtime.ground.table import Table, notebook, number, parameter_table, percentage
 
 SCHEMA = "symgen-estimate/1"
 """Kind and version of the JSON layout; `symgen schema --of estimate` prints its JSON Schema."""

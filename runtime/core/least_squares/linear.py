@@ -16,15 +16,15 @@ from typing import Any
 import numpy as np
 import scipy
 
-from runtime.core.errors import SettingsError
 from runtime.core.least_squares.block_covariance import corrected_deviations
 from runtime.core.least_squares.estimate import Estimate, JointFit, Status
 from runtime.core.least_squares.solution import Solution, solve
 from runtime.core.model import GeneratedModel, joint_labels
 from runtime.core.rows.factor import Array, Factor
 from runtime.core.rows.observation import Observation
-from runtime.core.settings import Count, Positive, Settings, to_mapping
 from runtime.core.study import EstimateSettings
+from runtime.ground.errors import SettingsError
+from runtime.ground.settings import Count, Positive, Settings, to_mapping
 
 
 class LinearOptions(Settings):

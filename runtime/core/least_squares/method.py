@@ -14,15 +14,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
-from runtime.core.errors import SettingsError
 from runtime.core.least_squares.estimate import Status
 from runtime.core.least_squares.linear import LinearOptions, System
 from runtime.core.least_squares.solution import Solution
 from runtime.core.model import GeneratedModel
 from runtime.core.rows.factor import Array
 from runtime.core.rows.observation import Observation
-from runtime.core.settings import Settings, require, structure
 from runtime.core.study import EstimateSettings
+from runtime.ground.errors import SettingsError
+from runtime.ground.settings import Settings, require, structure
 
 OPTIONS = ("estimate", "options")
 WEIGHTINGS = ("none", "joint", "iterated", "covariance")

@@ -20,8 +20,8 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.sparse.csgraph import connected_components
 
-from runtime.core.limits import LIMIT
 from runtime.core.rows.factor import Array, Factor, triangularise
+from runtime.ground.limits import LIMIT
 
 
 @dataclass(frozen=True)

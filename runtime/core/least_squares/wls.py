@@ -22,14 +22,14 @@ from typing import Literal
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky, solve_triangular
 
-from runtime.core.errors import SettingsError
 from runtime.core.least_squares.estimate import Status
 from runtime.core.least_squares.linear import LinearOptions, System, ordinary
 from runtime.core.least_squares.solution import joint_scatter, solve
-from runtime.core.limits import LIMIT
 from runtime.core.rows.factor import Factor, factor
 from runtime.core.rows.observation import Observation, whitened
 from runtime.core.study import EstimateSettings, Weights
+from runtime.ground.errors import SettingsError
+from runtime.ground.limits import LIMIT
 
 
 def weighted(

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.errors import InputError
 from runtime.core.rows.factor import Factor, JointFactor, factor, joint_factors, merged, selected
+from runtime.ground.errors import InputError
 
 Array = np.ndarray
 Window = tuple[float | None, float | None]

@@ -21,7 +21,6 @@ from typing import Any
 import numpy as np
 
 from runtime.core.drives import Drives
-from runtime.core.errors import InputError
 from runtime.core.model import GeneratedModel, check_states, drives_of
 from runtime.core.record import JOINT_CHANNELS, Record
 from runtime.core.rows.observation import Observation, stack
@@ -31,6 +30,7 @@ from runtime.core.signals.decimation import decimate
 from runtime.core.signals.filters import States, median_filtered
 from runtime.core.signals.reader import Reader
 from runtime.core.study import Study
+from runtime.ground.errors import InputError
 
 Array = np.ndarray
 

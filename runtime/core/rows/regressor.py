@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.errors import InputError
 from runtime.core.model import GeneratedModel, channels_of
 from runtime.core.rows.observation import column_numbers
 from runtime.core.rows.tape import Tape, recorded
 from runtime.core.signals.decimation import PIECE, Plan, decimated_parts
 from runtime.core.signals.filters import States
+from runtime.ground.errors import InputError
 
 Array = np.ndarray
 

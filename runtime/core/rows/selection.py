@@ -14,15 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.errors import InputError
-from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel
 from runtime.core.record import Record
 from runtime.core.rows.switches import switches
-from runtime.core.settings import to_mapping
 from runtime.core.signals.decimation import Plan
 from runtime.core.signals.filters import States, decimation_factor, decimation_plan, kept_samples
 from runtime.core.study import Rows, Signals
+from runtime.ground.errors import InputError
+from runtime.ground.limits import LIMIT
+from runtime.ground.settings import to_mapping
 
 Array = np.ndarray
 

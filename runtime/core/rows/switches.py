@@ -13,8 +13,8 @@ from typing import Literal
 
 import numpy as np
 
-from runtime.core.errors import ModelError
 from runtime.core.model import GeneratedModel, elements_of
+from runtime.ground.errors import ModelError
 
 Array = np.ndarray
 

@@ -27,9 +27,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from runtime.core.limits import LIMIT
 from runtime.core.signals.filters import median_filtered
 from runtime.core.study import CHAPTER_CUTOFF, Lowpass, Signals
+from runtime.ground.limits import LIMIT
 
 Array = np.ndarray
 

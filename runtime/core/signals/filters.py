@@ -19,9 +19,9 @@ import numpy as np
 from scipy import ndimage
 from scipy.signal import butter, sosfiltfilt
 
-from runtime.core.errors import InputError
 from runtime.core.signals.decimation import CUTOFF, ORDER, Plan, decimate, plan
 from runtime.core.study import Decimate, Lowpass, Signals
+from runtime.ground.errors import InputError
 
 Array = np.ndarray
 

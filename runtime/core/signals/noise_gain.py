@@ -27,10 +27,10 @@ from math import ceil, log2
 import numpy as np
 from scipy.signal import cheby1, sosfreqz
 
-from runtime.core.errors import SettingsError
 from runtime.core.signals.decimation import CUTOFF, ORDER, RIPPLE
 from runtime.core.signals.filters import butterworth, decimation_factor
 from runtime.core.study import Signals
+from runtime.ground.errors import SettingsError
 
 Array = np.ndarray
 

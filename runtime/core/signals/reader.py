@@ -15,12 +15,12 @@ from functools import partial
 from typing import Any, TypeAlias, TypeVar
 
 from runtime.core.drives import Drives
-from runtime.core.errors import SettingsError
 from runtime.core.missing import COUNTS, require_positions
 from runtime.core.record import Record
-from runtime.core.settings import Settings, structure, to_mapping
 from runtime.core.signals.filters import States, filtered_states
 from runtime.core.study import Signals, Study
+from runtime.ground.errors import SettingsError
+from runtime.ground.settings import Settings, structure, to_mapping
 
 Steps: TypeAlias = float | tuple[float, ...] | None
 """Steps of the encoders, rad or m: one for all joints, or one for each; None: from the record."""

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from runtime.core.limits import LIMIT
 from runtime.core.signals.cutoff import white_noise
 from runtime.core.signals.filters import filtered_states, lowpass_filtered, median_filtered
 from runtime.core.study import Signals
+from runtime.ground.limits import LIMIT
 
 Array = np.ndarray
 

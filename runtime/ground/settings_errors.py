@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from runtime.core.errors import InputError, SettingsError
+from runtime.ground.errors import InputError, SettingsError
 
 Path = tuple[str | int, ...]
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.markup import Markup, element, symbol, unit
+from runtime.ground.markup import Markup, element, symbol, unit
 
 LINE = 80  # characters of a line
 

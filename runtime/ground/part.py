@@ -12,8 +12,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from runtime.core.check import Check
-from runtime.core.table import Table
+from runtime.ground.check import Check
+from runtime.ground.table import Table
 
 About = Literal["record", "prediction", "values"]
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.errors import InputError, first_line
+from runtime.ground.errors import InputError, first_line
 
 Array = np.ndarray
 

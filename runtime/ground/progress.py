@@ -1,6 +1,6 @@
-"""Messages about the progress of long work, by the logger "runtime.core.progress", level INFO.
+"""Messages about the progress of long work, by the logger "runtime.ground.progress", level INFO.
 
-    logging.getLogger("runtime.core.progress").setLevel(logging.INFO)
+    logging.getLogger("runtime.ground.progress").setLevel(logging.INFO)
 
 A handler is needed too; `symgen` has one, which prints the messages after two seconds.
 """
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import logging
 
-LOGGER = logging.getLogger("runtime.core.progress")
+LOGGER = logging.getLogger("runtime.ground.progress")
 
 
 def at(part: str) -> None:

@@ -37,10 +37,10 @@ from pydantic import (
 from pydantic.dataclasses import dataclass
 from pydantic_core import ArgsKwargs
 
-from runtime.core.documents import plain
-from runtime.core.errors import SettingsError
-from runtime.core.limits import LIMIT
-from runtime.core.settings_errors import gone, settings_error, shown
+from runtime.ground.documents import plain
+from runtime.ground.errors import SettingsError
+from runtime.ground.limits import LIMIT
+from runtime.ground.settings_errors import gone, settings_error, shown
 
 _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,

@@ -22,10 +22,10 @@ def entries(package: str) -> dict[str, dict[str, Any]]:
 
 @cache
 def limits(package: str) -> Any:
-    """Return the values of the limits of a feature, and of those of the core, as attributes."""
-    known = entries("runtime.core") | entries(package)
+    """Return the limits of a feature, and those that several rooms share, as attributes."""
+    known = entries("runtime.ground") | entries(package)
     return SimpleNamespace(**{name: limit["value"] for name, limit in known.items()})
 
 
-LIMIT: Any = limits("runtime.core")
-"""Values of the limits of the core."""
+LIMIT: Any = limits("runtime.ground")
+"""Values of the limits of the core, and of those that several rooms share."""

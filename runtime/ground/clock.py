@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.errors import InputError, instant
+from runtime.ground.errors import InputError, instant
 
 Array = np.ndarray
 

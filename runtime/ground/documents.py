@@ -18,8 +18,8 @@ import numpy as np
 from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError, WithJsonSchema
 from pydantic_core import core_schema
 
-from runtime.core.errors import InputError, encodable
-from runtime.core.settings_errors import settings_error
+from runtime.ground.errors import InputError, encodable
+from runtime.ground.settings_errors import settings_error
 
 
 class Result:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from functools import wraps
 from typing import Any, Literal, NamedTuple, ParamSpec
 
-from runtime.core.limits import LIMIT
+from runtime.ground.limits import LIMIT
 
 State = Literal["good", "doubtful", "no", "open"]
 WORST: tuple[State, ...] = ("no", "doubtful", "good")

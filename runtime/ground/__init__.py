@@ -1,0 +1,1 @@
+"""What every room stands on: errors, settings, limits, arrays, tables, JSON, parts of a report."""
