@@ -35,10 +35,9 @@ import distributed
 import numpy as np
 from rounds import processor
 
-from runtime import Record, Study, load_model, observe
-from runtime.compose import cestac
+from runtime import Record, Study, load_model
+from runtime.compose import cestac, essential
 from runtime.core.cestac.cestac import Cestac
-from runtime.core.essential import essential_of
 from runtime.core.model import GeneratedModel
 from runtime.parallel.processes import processes
 from runtime.reading.datasets import dataset_study
@@ -57,7 +56,7 @@ def prepared(folder: Path, runs: int) -> tuple[GeneratedModel, Record, Study, tu
     model = load_model(ROBOT, folder=folder, trust=True)
     study = study_from_mapping(dataset_study(ROBOT))
     record = read_records(study.record, model)[0]
-    names = essential_of(observe(model, record, study), study.essential, study.estimate).names
+    names = essential(model, record, study).names
     study = replace(study, cestac=replace(study.cestac, delta=(DELTA,), runs=runs))
     return model, record, study, names
 

@@ -1,7 +1,7 @@
 """Public functions of identification, and lists of preparation steps, readers, methods, analyses.
 
     STEPS      Problem -> Problem: changes of a problem before its rows are made, in this order
-    READERS    Record, Signals -> States: signals.reader of a study
+    READERS    Record, Signals -> States: signals.reader of a study (`runtime.core.signals.reader`)
     METHODS    Observation -> rows of a least squares -> their fit: estimate.method of a study
     EXTRAS     Identification -> Part: further analyses of the records
 
@@ -14,15 +14,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from runtime import robust as irls
 from runtime.advisor.advice import NoAdvice
-from runtime.agreement import agreement
-from runtime.commands import commands_for_torques
-from runtime.controller.fitted import doubt_of_gains, law_of_controller
 from runtime.core import identify as identification
 from runtime.core.arrays import kind_of, require_kind
 from runtime.core.automatic import automatic_cutoff
@@ -30,10 +25,10 @@ from runtime.core.errors import InputError, SettingsError
 from runtime.core.essential import Essential, essential_of
 from runtime.core.identify import Extra, OnRequest
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.least_squares.linear import ordinary
-from runtime.core.least_squares.method import LINEAR, Method, linear_companion
-from runtime.core.least_squares.wls import by_weights, weighted
-from runtime.core.model import GeneratedModel, require_emitted
+from runtime.core.least_squares.linear import LinearOptions, ordinary
+from runtime.core.least_squares.method import Method
+from runtime.core.least_squares.wls import weighted
+from runtime.core.model import GeneratedModel, channels_of, require_emitted
 from runtime.core.problem import (
     RECORD_EXPECTED,
     Note,
@@ -44,35 +39,24 @@ from runtime.core.problem import (
     prepared,
 )
 from runtime.core.problem import estimate_of as estimate_by
-from runtime.core.record import Record
+from runtime.core.record import WRENCH, Record
 from runtime.core.rows.observation import Observation
 from runtime.core.settings_errors import gone
-from runtime.core.signals.filters import SignalReader, lowpassed
-from runtime.core.study import EstimateSettings
+from runtime.core.signals.reader import LOWPASS, Reader
+from runtime.core.study import EstimateSettings, Signals
 from runtime.counts.encoder_advice import EncoderSteps
-from runtime.counts.own_encoder import own_encoder
-from runtime.counts.reader import counted
 from runtime.expected import ExpectedError
-from runtime.laws.scalars import fitted_scalars, scalars_of_laws
-from runtime.laws.transmitted import transmitted_torque
-from runtime.link_side import torques_of_links
-from runtime.loop import didim, iv
-from runtime.loop.cestac import loop_of
-from runtime.loop.closed_loop import observed_loop
-from runtime.loop.fixed_point import FixedPointOptions
-from runtime.loop.simulated_motion import beside_record
+from runtime.late import Late, Listed, PartWhen, When
+from runtime.link_side import stated_sides, torques_of_links
 from runtime.median import pulses_in_torques
-from runtime.payload.study import LOADED, load_of_study, payload_study
-from runtime.physical import feasible
-from runtime.physical.consistency import as_fitted, consistency
-from runtime.plausible.known import torque_unit
+from runtime.payload.settings import LOADED
+from runtime.reading.formats import is_measured
 from runtime.reading.records import read_records
 from runtime.reading.settings import RecordSettings
-from runtime.rest import at_rest, poses_at_rest
+from runtime.rest import STATIC, poses_at_rest
 from runtime.speeds import recorded_speeds
-from runtime.study import Study, study_schema
+from runtime.study import Study, study_of, study_schema
 from runtime.threads import alone_each, single_threaded
-from runtime.wrench import force_sensors
 
 if TYPE_CHECKING:
     from runtime.advisor.advice import Advice
@@ -88,87 +72,89 @@ if TYPE_CHECKING:
     from runtime.treatments import Ranking
 
 STEPS: list[Step] = [
-    commands_for_torques,
-    force_sensors,
+    stated_sides,
+    When(
+        Late("runtime.commands:commands_for_torques"),
+        lambda p: any(r.origin.command for r in (*p.records, *p.unseen)),
+    ),
+    When(
+        Late("runtime.wrench:force_sensors"),
+        lambda p: any(c.startswith(WRENCH) for r in (*p.records, *p.unseen) for c in r.channels),
+    ),
     torques_of_links,
     pulses_in_torques,
     recorded_speeds,
     automatic_cutoff,
     poses_at_rest,
-    transmitted_torque,
-    fitted_scalars,
-    law_of_controller,
+    When(Late("runtime.laws.transmitted:transmitted_torque"), lambda p: bool(channels_of(p.model))),
+    When(Late("runtime.laws.scalars:fitted_scalars"), lambda p: hasattr(p.model, "FIT")),
+    When(
+        Late("runtime.controller.fitted:law_of_controller"),
+        lambda p: any("law_v" in r.channels for r in p.records),
+    ),
 ]
-READERS: dict[str, SignalReader] = {
-    "lowpass": SignalReader(lowpassed),
-    "counts": SignalReader(counted),
-    "static": SignalReader(at_rest),
-}
-METHODS: dict[str, Method] = {
-    **LINEAR,
-    # robust least squares, Huber or Tukey
-    "irls": Method(irls.IrlsOptions, weighted, irls.fit, weights=("none",)),
-    # instrumental variables of the simulated closed loop
-    "iv": Method(
-        FixedPointOptions, ordinary, partial(beside_record, iv.fit), observe=observed_loop
-    ),
-    # torques on the regressor of the simulated motion
-    "didim": Method(
-        FixedPointOptions, ordinary, partial(beside_record, didim.fit), observe=observed_loop
-    ),
-    # least squares among physical robots
-    "feasible": Method(
-        feasible.FeasibleOptions,
-        by_weights,
-        feasible.fit,
-        brief={"explain": False},
-        any_rank=True,
-    ),
-}
-
-
-def later(module: str, name: str) -> Callable[..., Any]:
-    """Return a function that calls `name` of `module`, which is imported only at the first call.
-
-    So an analysis on request does not slow down other calls.
-    """
-
-    def called(*given: Any, **options: Any) -> Any:
-        return getattr(import_module(module), name)(*given, **options)
-
-    return called
-
-
+READERS: Listed[Reader] = Listed(
+    {"lowpass": LOWPASS, "counts": "runtime.counts.reader:COUNTS", "static": STATIC}
+)
+METHODS: Listed[Method] = Listed(
+    {
+        # ordinary least squares
+        "ols": Method(LinearOptions, ordinary, weights=("none",)),
+        # least squares weighted by joint
+        "wls": Method(LinearOptions, weighted),
+        # least squares among physical robots
+        "feasible": "runtime.physical.feasible:METHOD",
+        # robust least squares, Huber or Tukey
+        "irls": "runtime.robust:METHOD",
+        # instrumental variables of the simulated closed loop
+        "iv": "runtime.loop.iv:METHOD",
+        # torques on the regressor of the simulated motion
+        "didim": "runtime.loop.didim:METHOD",
+    }
+)
 EXTRAS: list[Extra] = [
-    torque_unit,
-    doubt_of_gains,
+    PartWhen(Late("runtime.plausible.known:torque_unit"), lambda r: bool(r.model.VALUES)),
+    PartWhen(
+        Late("runtime.controller.fitted:doubt_of_gains"),
+        lambda r: any("law_v" in record.channels for record in r.records),
+    ),
     OnRequest(
         "plausible",
         "plausibility of the record",
-        later("runtime.plausible.plausibility", "plausibility_of"),
+        Late("runtime.plausible.plausibility:plausibility_of"),
     ),
-    scalars_of_laws,
-    load_of_study,
+    PartWhen(Late("runtime.laws.scalars:scalars_of_laws"), lambda r: bool(r.problem.notes)),
+    PartWhen(
+        Late("runtime.payload.study:load_of_study"),
+        lambda r: getattr(r.study, "payload", None) is not None,
+    ),
     EncoderSteps,
-    agreement,
-    ExpectedError,
-    OnRequest("friction", "friction", later("runtime.friction", "friction")),
-    OnRequest("physical", "physical consistency", consistency, as_fitted),
-    OnRequest(
-        "advice", "resolution advice", later("runtime.advisor.advisor", "advice_of"), NoAdvice
+    PartWhen(
+        Late("runtime.agreement:agreement"),
+        lambda r: len(r.records) + len(r.problem.unseen) > 1,
     ),
+    ExpectedError,
+    OnRequest("friction", "friction", Late("runtime.friction:friction")),
+    OnRequest(
+        "physical",
+        "physical consistency",
+        Late("runtime.physical.consistency:consistency"),
+        Late("runtime.physical.consistency:as_fitted"),
+    ),
+    OnRequest("advice", "resolution advice", Late("runtime.advisor.advisor:advice_of"), NoAdvice),
     OnRequest(
         "resolution",
         "resolution study",
         partial(
-            later("runtime.core.cestac.cestac", "resolution"),
-            own_encoder=own_encoder,
-            loop_of=loop_of,
+            Late("runtime.core.cestac.cestac:resolution"),
+            own_encoder=Late("runtime.counts.own_encoder:own_encoder"),
+            loop_of=Late("runtime.loop.cestac:loop_of"),
         ),
     ),
 ]
 
 Records = Record | Sequence[Record]
+T = TypeVar("T")
 
 
 def require_study(study: Study | None) -> Study:
@@ -195,23 +181,26 @@ def list_records(records: Records) -> tuple[Record, ...]:
 
 
 def complete_study(study: Study) -> Study:
-    """Check that the method and the signal reader of a study exist; add missing reader options.
+    """Check that method and reader of a study exist; complete the settings of the reader.
 
     SettingsError if the method or the reader is unknown.
     """
-    signals = study.signals
-    for path, name, names in (
-        (("estimate", "method"), study.estimate.method, METHODS),
-        (("signals", "reader"), signals.reader, READERS),
-    ):
-        if name not in names:
-            *others, last = names
-            expected = f"{name!r}; expected {', '.join(others)} or {last}"
-            raise SettingsError(gone(path, name) or expected, path=path)
-    options = READERS[signals.reader].checked(signals)
-    if options == signals.options:
-        return study
-    return replace(study, signals=replace(signals, options=options))
+    _named(METHODS, study.estimate.method, ("estimate", "method"))
+    return reader_of(study.signals).settled(study)
+
+
+def reader_of(signals: Signals) -> Reader:
+    """Return the reader that signals.reader names; SettingsError if it is unknown."""
+    return _named(READERS, signals.reader, ("signals", "reader"))
+
+
+def _named(listed: Mapping[str, T], name: str, path: tuple[str, ...]) -> T:
+    """Return the entry `name` of a list of features; SettingsError with `path` if it is unknown."""
+    if name not in listed:
+        *others, last = listed
+        expected = f"{name!r}; expected {', '.join(others)} or {last}"
+        raise SettingsError(gone(path, name) or expected, path=path)
+    return listed[name]
 
 
 def state_problem(
@@ -225,7 +214,7 @@ def state_problem(
     study = complete_study(require_study(study))
     methods: Mapping[str, Method] = METHODS
     if simulator is not None:
-        observe = partial(observed_loop, simulator=simulator)
+        observe = partial(Late("runtime.loop.closed_loop:observed_loop"), simulator=simulator)
         methods = {
             name: method if method.observe is None else replace(method, observe=observe)
             for name, method in METHODS.items()
@@ -235,7 +224,7 @@ def state_problem(
         list_records(records),
         list_records(unseen),
         study,
-        READERS[study.signals.reader].states,
+        READERS[study.signals.reader],
         methods,
     )
 
@@ -272,11 +261,67 @@ def problem(
 
 
 def records_of(
-    settings: Sequence[RecordSettings], model: GeneratedModel, study: Study
+    settings: Sequence[RecordSettings],
+    model: GeneratedModel,
+    study: Study,
+    *,
+    folder: str | Path | None = None,
 ) -> list[Record]:
-    """Read the records of a study from their files."""
+    """Read the records of a study from their files, which are relative to `folder`."""
     require_emitted(model)
-    return read_records(settings, model, missing=study.signals.admits_missing)
+    missing = reader_of(study.signals).missing
+    return read_records(settings, model, folder=folder, missing=missing)
+
+
+def read_record(
+    path: str | Path | RecordSettings,
+    model: GeneratedModel | None = None,
+    *,
+    folder: str | Path = ".",
+    missing: bool = False,
+) -> Record:
+    """Read one measured record, converted to the joint side and SI units.
+
+    Parameters
+    ----------
+    path : str, Path or RecordSettings
+        A measured file whose columns are called t, q1 ..., tau1 ... (SI, joint side), a study file,
+        a dataset, or settings.
+    model : module, optional
+        Emitted model of the robot; needed if a side is "motor", because its drives convert the
+        record. The number of joints is checked against it.
+    folder : str or Path
+        Folder to which file names are relative. File names in a study file are relative to the
+        folder of that file.
+    missing : bool
+        Whether positions may be missing (nan or an empty field), as `signals.reader: counts`
+        allows; always true for a study file with this reader.
+
+    Raises
+    ------
+    InputError
+        Files that cannot be read or have other content, several records, or one record that
+        `resample` splits.
+    """
+    bare = False
+    if isinstance(path, RecordSettings):
+        settings: tuple[RecordSettings, ...] = (path,)
+    else:
+        require_kind(path, (str, Path), "path", "the name of a file, or RecordSettings")
+        named = Path(folder) / path
+        study, folder = study_of(named if named.exists() else path)
+        bare = is_measured(named)
+        settings = study.record
+        missing = missing or reader_of(study.signals).missing
+    records = read_records(settings, model, folder=folder, missing=missing)
+    if len(records) != 1:
+        names = ", ".join(record.name for record in records)
+        raise InputError(
+            f"the study has {len(records)} records (or pieces between gaps), but this function "
+            f"returns only one; use read_records, which returns all: {names}"
+        )
+    record = records[0]
+    return replace(record, origin=replace(record.origin, sides=None)) if bare else record
 
 
 @single_threaded
@@ -360,11 +405,9 @@ def essential(
     the same weights.
     """
     whole = problem(model, records, study, simulator=simulator)
-    settings = whole.settings
     return essential_of(
-        observe_rows(whole),
-        settings.essential,
-        linear_companion(settings.estimate),
+        whole.linear_system(observe_rows(whole)),
+        whole.settings.essential,
         model=whole.model,
         provenance=whole.provenance,
     )
@@ -496,7 +539,7 @@ def compare(
     problems = {name: prepared(_candidate(model, one), STEPS) for name, one in candidates.items()}
     of_the_best = []
     if variants is not None:
-        plausible = later("runtime.plausible.plausibility", "plausibility_of")
+        plausible = Late("runtime.plausible.plausibility:plausibility_of")
         of_the_best.append(partial(plausible, variants=variants))
     return comparing.compare(problems, extras({}), of_the_best)
 
@@ -521,8 +564,8 @@ def cestac(
 
     return resolution.cestac(
         problem(model, records, study, simulator=simulator),
-        own_encoder=own_encoder,
-        loop_of=partial(loop_of, simulator=simulator),
+        own_encoder=Late("runtime.counts.own_encoder:own_encoder"),
+        loop_of=partial(Late("runtime.loop.cestac:loop_of"), simulator=simulator),
         map=alone_each(map),
         **options,
     )
@@ -580,9 +623,11 @@ def payload(
 
     loaded : records with the load; default: the records of study.payload.record.
     """
+    from runtime.payload import study as loads
+
     whole = _with_loaded(model, records, study, (), loaded, None)
     note = whole.noted(LOADED)
-    return payload_study(whole, () if note is None else note.result)
+    return loads.payload_study(whole, () if note is None else note.result)
 
 
 @single_threaded
@@ -677,8 +722,7 @@ def simulate(
         )
     records: Sequence[Record] = ()
     if study.controller.reference.record is not None:
-        missing = study.signals.admits_missing
-        records = read_records(study.record, model, folder=folder, missing=missing)
+        records = records_of(study.record, model, study, folder=folder)
     return simulation.simulate(
         model, study.controller, records=records, folder=folder, ideal=ideal, name=name
     )

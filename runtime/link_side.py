@@ -15,18 +15,57 @@ OF_DRIVES = ("inertia", "viscous", "coulomb")
 """Kinds of elements in which sensors behind the gears have no part."""
 
 
+def stated_sides(problem: Problem) -> Problem:
+    """Note in each record the sides of the gears at which it was measured, as the study states them.
+
+    This is a step of the preparation of a problem. Records that tell their own sides
+    (`Origin.sides`) are not changed.
+    """
+    settings: Any = problem.settings
+    loaded = () if settings.payload is None else settings.payload.record
+    fitted, unseen = settings.record, (*settings.validate.record, *loaded)
+    records = _with_sides(problem.records, fitted)
+    others = _with_sides(problem.unseen, unseen or fitted)
+    if records == problem.records and others == problem.unseen:
+        return problem
+    return problem.changed(records=records, unseen=others)
+
+
+def _with_sides(records: Sequence[Record], stated: Sequence[Any]) -> tuple[Record, ...]:
+    """Give each record that does not tell its sides those of its settings, one for each record.
+
+    If the numbers of records and settings differ, all settings must have the same side of torques.
+    """
+    if not stated or all(record.origin.sides is not None for record in records):
+        return tuple(records)
+    if len(stated) != len(records):
+        _require_one_side([(", ".join(own.files) or "the study", own.sides[1]) for own in stated])
+        stated = [stated[0]] * len(records)
+    return tuple(
+        record
+        if record.origin.sides is not None
+        else replace(record, origin=replace(record.origin, sides=own.sides))
+        for record, own in zip(records, stated, strict=True)
+    )
+
+
 def torques_of_links(problem: Problem) -> Problem:
     """Leave friction and inertia of drives out of the fit if torques are measured behind gears.
 
-    This is a step of the preparation of a problem. It acts only if estimate.columns is all. Records
-    that do not tell their sides (`Origin.sides`) have those of the study.
+    This is a step of the preparation of a problem. It acts only if estimate.columns is all.
+
+    Raises
+    ------
+    SettingsError
+        Torques that are measured behind the gears in one record and not in another, or not in the
+        record of whose file the study states that they are.
     """
     settings: Any = problem.settings
-    stated = [
-        (", ".join(record.files) or "the study", record.sides)
-        for record in (*settings.record, *settings.validate.record)
-    ]
-    links = _behind_gears((*problem.records, *problem.unseen), stated)
+    sides = [(record.file, record.sides[1]) for record in (*problem.records, *problem.unseen)]
+    for own in (*settings.record, *settings.validate.record):
+        if own.sides[1] == "link" or not sides:
+            sides.append((", ".join(own.files) or "the study", own.sides[1]))
+    links = _require_one_side(sides)
     if settings.estimate.columns != "all" or not links:
         return problem
     kinds = {name: element[0] for name, element in elements_of(problem.model).items()}
@@ -37,19 +76,11 @@ def torques_of_links(problem: Problem) -> Problem:
     return problem.changed(settings=replace(settings, estimate=estimate))
 
 
-def _behind_gears(records: Sequence[Record], stated: Sequence[tuple[str, tuple[str, str]]]) -> bool:
-    """Whether the torques of the records are measured behind the gears.
+def _require_one_side(sides: Sequence[tuple[str, str]]) -> bool:
+    """Whether torques are measured behind the gears; SettingsError if in one file and not in another.
 
-    SettingsError if this is true for one record and false for another.
-
-    stated : files, and sides of positions and torques, by the settings of the study. They count if
-    a record does not tell its own, and wherever they say that torques are measured behind the
-    gears.
+    sides : file, and side of its torques.
     """
-    told = [(record.file, record.origin.sides) for record in records]
-    silent = not told or any(own is None for _, own in told)
-    sides = {(name, own[1]) for name, own in told if own is not None}
-    sides |= {(name, tau) for name, (_, tau) in stated if silent or tau == "link"}
     behind = sorted({name for name, tau in sides if tau == "link"})
     others = sorted({name for name, tau in sides if tau != "link"})
     message = (

@@ -30,7 +30,7 @@ import numpy as np
 from runtime.core.least_squares import wls
 from runtime.core.least_squares.block_covariance import corrected_deviations
 from runtime.core.least_squares.linear import LinearOptions, labels_of
-from runtime.core.least_squares.method import Beginning, Fitted
+from runtime.core.least_squares.method import Beginning, Fitted, Method
 from runtime.core.least_squares.solution import solve
 from runtime.core.rows.factor import Array, Factor, factor
 from runtime.core.rows.observation import Observation, split_rows
@@ -210,3 +210,7 @@ def _tuning(options: IrlsOptions, loss: str) -> float:
     1.345.
     """
     return options.tuning if options.tuning is not None and loss == options.loss else TUNING[loss]
+
+
+METHOD = Method(IrlsOptions, wls.weighted, fit, weights=("none",))
+"""The method `irls`."""

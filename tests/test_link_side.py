@@ -123,3 +123,19 @@ def test_sensors_behind_the_gears_are_no_doubt(arm):
     plain = runtime.identify(arm, run, planar_arm.study(), plausible=True)
     check = next(c for c in plain.checklist.checks if c.question == "Were the torques measured?")
     assert check.state == "doubtful" and "record.torque_side: link" in check.remedy
+
+
+def test_records_made_of_arrays_have_the_sides_of_the_study(arm):
+    run = planar_arm.record(arm, 0, planar_arm.parameters(arm, link=True))
+    (record,) = runtime.problem(arm, run, study("link")).records
+    assert run.origin.sides is None and record.sides == ("link", "link")
+
+
+def test_a_robot_behind_its_gears_has_the_physical_set(arm):
+    """It had none, because columns of friction are left out."""
+    run = planar_arm.record(arm, 0, planar_arm.parameters(arm, link=True))
+    settings = planar_arm.study(record={"files": "a.csv", "side": "link"})
+    result = runtime.identify(arm, run, settings, plausible=False)
+    physical = result.sets["feasible"]
+    assert physical.names == result.estimate.names
+    np.testing.assert_allclose(physical.X, result.estimate.X, atol=1e-3)

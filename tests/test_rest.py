@@ -110,7 +110,7 @@ def test_what_poses_cannot_do_is_refused():
     with pytest.raises(InputError, match="reader: static"):
         runtime.static_poses(model, [record])
     with pytest.raises(SettingsError, match="reader is static"):
-        at_rest(model, signals={"reader": "static", "step": 0.1})
+        runtime.problem(model, record, at_rest(model, signals={"reader": "static", "step": 0.1}))
 
 
 def test_a_robot_without_gravity_is_refused(tmp_path):

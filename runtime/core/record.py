@@ -63,9 +63,8 @@ class Origin:
     by_law : bool
         Whether the torque was computed by the law of a controller.
     sides : (str, str) or None
-        Sides of the gears at which the positions and the torques of the files were measured, each
-        "motor", "joint" or "link" (behind the gears); None: the record has no files, or no settings
-        were given for them.
+        Sides of the gears at which positions and torques were measured, each "motor", "joint" or
+        "link" (behind the gears); None: not told, so that those of the study count.
     """
 
     files: Mapping[str, str] = field(default_factory=dict)
@@ -174,6 +173,11 @@ class Record:
     def measured(self) -> frozenset[str]:
         """Names of the recorded channels: the signals besides time, positions and torques."""
         return frozenset(self.channels)
+
+    @property
+    def sides(self) -> tuple[str, str]:
+        """Sides of the gears at which positions and torques were measured; joint if not told."""
+        return self.origin.sides or ("joint", "joint")
 
     @property
     def q_r(self) -> Array | None:

@@ -18,15 +18,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
-from runtime.core.least_squares.linear import LinearOptions, System, standard_deviations
-from runtime.core.least_squares.method import Beginning, Fitted
-from runtime.core.least_squares.wls import weighted
+from runtime.core.least_squares.linear import System, ordinary, standard_deviations
+from runtime.core.least_squares.method import Beginning, Fitted, Method
+from runtime.core.least_squares.wls import weighted_system
 from runtime.core.rows.factor import Array
-from runtime.core.study import EstimateSettings
-from runtime.loop.closed_loop import loop_of
-from runtime.loop.fixed_point import Step, iterate, outcome_of
+from runtime.loop.closed_loop import loop_of, observed_loop
+from runtime.loop.fixed_point import FixedPointOptions, Step, iterate, outcome_of
 from runtime.loop.result import Simulation
+from runtime.loop.simulated_motion import beside_record
+
+ROUNDING = (
+    "{method} uses only the first recorded position, so rounding the record says nothing about an "
+    "encoder in the loop, whose steps the controller answers; place: loop studies that."
+)
 
 
 def fit(start: Beginning) -> Fitted:
@@ -39,7 +45,7 @@ def fit(start: Beginning) -> Fitted:
 
     def update(runs: Sequence[Simulation], X: Array) -> Step:
         rows = loop.simulated(runs, observation, exact=True)
-        system = weighted(rows, EstimateSettings("wls"), LinearOptions())
+        system = weighted_system(rows, "joint")
         solution = system.solve()
         C = standard_deviations(system, solution)[1]
         return Step(solution.X, C, solution.residual_norm, system)
@@ -49,3 +55,13 @@ def fit(start: Beginning) -> Fitted:
     system = replace(system, settings=start.settings, iterations=len(fixed.trail))
     status, message, details = outcome_of(loop, fixed, start.settings.method)
     return Fitted(system, system.solve(), status=status, message=message, details=details)
+
+
+METHOD = Method(
+    FixedPointOptions,
+    ordinary,
+    partial(beside_record, fit),
+    observe=observed_loop,
+    rounding=ROUNDING,
+)
+"""The method `didim`."""

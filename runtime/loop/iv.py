@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,16 +30,22 @@ from scipy.stats import chi2
 
 from runtime.core.errors import InputError
 from runtime.core.least_squares.block_covariance import deletions
-from runtime.core.least_squares.method import Beginning, Fitted
+from runtime.core.least_squares.linear import ordinary
+from runtime.core.least_squares.method import Beginning, Fitted, Method
 from runtime.core.least_squares.wls import common_scales, floored
 from runtime.core.limits import limits
 from runtime.core.rows.factor import Array
 from runtime.core.rows.observation import Observation, split_rows
-from runtime.loop.closed_loop import loop_of
-from runtime.loop.fixed_point import Step, iterate, outcome_of
+from runtime.loop.closed_loop import loop_of, observed_loop
+from runtime.loop.fixed_point import FixedPointOptions, Step, iterate, outcome_of
 from runtime.loop.result import Simulation
+from runtime.loop.simulated_motion import beside_record
 
 LIMIT = limits(__package__)
+ROUNDING = (
+    "The instruments of {method} do not depend on the rounding of recorded positions; place: loop "
+    "studies an encoder in the loop."
+)
 
 
 def fit(start: Beginning) -> Fitted:
@@ -165,3 +172,13 @@ def _by_block(observation: Observation, Z: Array, residual: Array, A: Array) -> 
         A @ R.T,
     )
     return U if len(U) > 1 else np.full_like(U, np.nan)
+
+
+METHOD = Method(
+    FixedPointOptions,
+    ordinary,
+    partial(beside_record, fit),
+    observe=observed_loop,
+    rounding=ROUNDING,
+)
+"""The method `iv`."""

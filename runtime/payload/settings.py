@@ -11,6 +11,10 @@ LOAD = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 """Standard parameters of a load."""
 
 
+LOADED = "loaded"
+"""Kind of the note that holds the records with the load, prepared."""
+
+
 class PayloadSettings(Settings):
     """Settings of a load fixed to a link in some records: the link, and known load parameters.
 

@@ -48,7 +48,8 @@ import numpy as np
 
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.least_squares.linear import System, assemble, percent
-from runtime.core.least_squares.method import Beginning, Fitted
+from runtime.core.least_squares.method import Beginning, Fitted, Method
+from runtime.core.least_squares.wls import by_weights
 from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel
 from runtime.core.progress import at
@@ -435,3 +436,9 @@ def solve_feasible(
 def residual_norm(rows: Factor, X: Array) -> float:
     """Compute ||Y - W X|| from the QR factor of the system Y = W X + rho."""
     return float(np.hypot(rows.r22, np.linalg.norm(rows.R11 @ X - rows.r12)))
+
+
+METHOD = Method(
+    FeasibleOptions, by_weights, fit, brief={"explain": False}, any_rank=True, physical=True
+)
+"""The method `feasible`."""

@@ -175,9 +175,7 @@ class Case:
 
         The side of the torques is "law" if the control law of a controller computed them.
         """
-        settings: Any = self.study
-        stated = settings.record[0].sides if settings.record else ("joint", "joint")
-        q, tau = self.records[0].origin.sides or stated
+        q, tau = self.records[0].sides
         return q, "law" if any(record.origin.by_law for record in self.records) else tau
 
     @cached_property

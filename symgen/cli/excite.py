@@ -65,9 +65,9 @@ def excite(
     """
     with session.results_in(output) as results:
         import runtime
+        from runtime.compose import records_of
         from runtime.core.documents import json_text
         from runtime.parallel.processes import processes
-        from runtime.reading.records import read_records
 
         model = session.model_of(session.robot_of(robot, trust=trust, exact=exact))
         study = session.changed(
@@ -81,7 +81,7 @@ def excite(
                 "seed": seed,
             },
         )
-        records = read_records(study.record, model, missing=study.signals.admits_missing)
+        records = records_of(study.record, model, study)
         with session.progress_bar("starts") as progress, processes(workers) as own_map:
             seek: Any = partial(runtime.excite, map=own_map, progress=progress)
             still = study.excitation is not None and study.excitation.poses is not None

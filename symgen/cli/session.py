@@ -293,6 +293,7 @@ def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
 
     If this fails, write a draft of the study from the column names, if they show enough.
     """
+    from runtime.compose import reader_of
     from runtime.core.errors import InputError
     from runtime.reporting.result_files import write_all
     from runtime.study import draft, study_text, suggested
@@ -303,7 +304,7 @@ def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
         )
     folder = path.resolve().parent
     try:
-        study, told = suggested(study, model)
+        study, told = suggested(study, model, missing=reader_of(study.signals).missing)
     except InputError as e:
         if text := draft(study, model):
             write_all(folder, {path.name: text})

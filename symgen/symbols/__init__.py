@@ -3,5 +3,5 @@
 The recursions of `derive` give every model as one computation graph, the same graph that emitted
 modules are written from. A closed form expands the graph and factors the result by parameter
 (`expansion`). A listing gives the recursion as equations, in the order in which they are computed
-(`listing`). Both are written by SymPy's printers with the letters of the literature (`printers`).
+(`symbolic_model`). Both are written by SymPy's printers with the letters of the literature (`printers`).
 """

@@ -26,10 +26,10 @@ from symgen.emit.render import WIDTH
 from symgen.errors import SymgenError
 from symgen.regroup.regrouping import Formula, Regrouping
 from symgen.symbols import expressions
-from symgen.symbols.derivation import source_of
 from symgen.symbols.expressions import Tree
 from symgen.symbols.printers import MathML, latex, latex_symbol, math, math_terms
 from symgen.symbols.printers import text as plain
+from symgen.symbols.source import source_of
 from symgen.symbols.symbolic_model import Objects, SymbolicModel, of_listing, of_model
 
 FORMS = ("closed", "recursive")

@@ -13,9 +13,9 @@ from symgen.derive.names import Names
 from symgen.description.files import load_robot
 from symgen.description.robot import Robot
 from symgen.errors import SymgenError
-from symgen.symbols.derivation import Source, source_of
 from symgen.symbols.documents import Formulas, printed
 from symgen.symbols.expressions import symbol
+from symgen.symbols.source import Source, source_of
 from symgen.symbols.symbolic_model import LARGEST, SymbolicModel, of_listing, of_model
 
 

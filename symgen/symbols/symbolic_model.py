@@ -30,9 +30,9 @@ from symgen.description.naming import Namespace
 from symgen.emit.printers import PLAIN, Text
 from symgen.errors import SymgenError
 from symgen.symbols import expressions
-from symgen.symbols.derivation import Source
 from symgen.symbols.expansion import Expansion, Polynomial, TooManyTermsError, length
 from symgen.symbols.expressions import Tree, angle, evaluated, rational, rounded, symbol
+from symgen.symbols.source import Source
 
 
 @dataclass(frozen=True)

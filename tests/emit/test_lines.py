@@ -13,7 +13,8 @@ from campaign import sampled
 
 from symgen.derive.names import FAMILIES, families_of
 from symgen.description import load_robot, packaged_robots
-from symgen.emit.generate import generate_files
+from symgen.emit import render
+from symgen.emit.generate import generate_files, generate_module
 
 
 @pytest.fixture(scope="module", params=sampled(packaged_robots(), 4, always=("tx40", "four_bar")))
@@ -120,3 +121,15 @@ def test_public_functions_have_hints(texts) -> None:
                 file,
                 f.name,
             )
+
+
+@pytest.mark.parametrize("error", [RuntimeError, PermissionError])
+def test_templates_are_compiled_where_no_folder_can_keep_them(monkeypatch, error) -> None:
+    def refused() -> None:
+        raise error("the folder belongs to another user")
+
+    expected = generate_module(load_robot("planar_2r"))
+    render._environment.cache_clear()
+    monkeypatch.setattr("jinja2.FileSystemBytecodeCache", refused)
+    assert generate_module(load_robot("planar_2r")) == expected
+    render._environment.cache_clear()
