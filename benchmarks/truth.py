@@ -303,14 +303,17 @@ def _alike(x: Array, j: int, other: int) -> Array:
     return x
 
 
-def verdict(k: int, seed: int, seeds: str) -> list[Row]:
-    """One study as `symgen identify` does it: word, doubts, error that it states, true error."""
+def verdict(k: int, seed: int, seeds: str, **sections: Any) -> list[Row]:
+    """One study as `symgen identify` does it: word, doubts, error that it states, true error.
+
+    sections : settings in place of the default ones.
+    """
     robots = robots_of(seeds)
     kind, robot = STUDIES[k % len(STUDIES)], robots[(k // len(STUDIES) + k) % len(robots)]
     truth, motion, move, q, tau, share = study_of(kind, robot, seed, k)
     model, variants = emitted(robot.name)
     result = runtime.identify(
-        model, record_of(move, tau, q), study(robot, motion), variants=variants
+        model, record_of(move, tau, q), study(robot, motion, **sections), variants=variants
     )
     checks = result.checklist.checks
     total, worst = Unseen(truth, seed).errors(result.model_estimate.names, result.model_estimate.X)
