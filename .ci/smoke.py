@@ -20,20 +20,6 @@ import symgen
 
 SYMGEN = str(Path(sys.executable).with_name("symgen"))
 EXTRAS = (  # extra, a command that needs it
-    (
-        "scale",
-        [
-            "cestac",
-            "planar_2r",
-            "run.csv",
-            "--scheduler",
-            "tcp://127.0.0.1:9",
-            "--delta",
-            "1e-3",
-            "--runs",
-            "2",
-        ],
-    ),
     ("tables", ["identify", "planar_2r", "run.parquet"]),
     ("tables", ["identify", "planar_2r", "run.mat"]),
     ("bags", ["identify", "planar_2r", "run.bag"]),

@@ -32,8 +32,7 @@ from scipy.special import stdtrit  # noqa: E402
 import symgen  # noqa: E402
 from runtime.advisor.advice import LIMITS, crossing  # noqa: E402
 from runtime.advisor.coarse_encoders import CoarseEncoders  # noqa: E402
-from runtime.compose import advise, cestac, observe, problem  # noqa: E402
-from runtime.core.essential import essential_of  # noqa: E402
+from runtime.compose import advise, cestac, essential, problem  # noqa: E402
 from runtime.core.model import drives_of  # noqa: E402
 from runtime.reading.datasets import dataset_study  # noqa: E402
 from runtime.reading.records import read_records  # noqa: E402
@@ -229,7 +228,7 @@ def main():
         with TemporaryDirectory() as folder:
             model = symgen.model(name)
             study, record = opened(name, model, Path(folder), HAPTIC_SHARE if real else 1)
-            found = essential_of(observe(model, record, study), study.essential, study.estimate)
+            found = essential(model, record, study)
             if real:
                 real_table(name, model, study, record, MAIN if name == "tx40" else found.names)
                 continue

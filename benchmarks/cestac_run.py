@@ -37,11 +37,10 @@ import scipy
 from rounds import interleave, processor, ratio
 
 from runtime import Record, Study, load_model
-from runtime.compose import cestac, observe, problem
+from runtime.compose import cestac, essential, problem
 from runtime.core.cestac.cestac import levels_of, one_run
 from runtime.core.cestac.perturbed import Task, perturbed_position, prepared_record
 from runtime.core.drives import Drives
-from runtime.core.essential import essential_of
 from runtime.core.model import GeneratedModel
 from runtime.core.signals.filters import filtered_states
 from runtime.counts.own_encoder import own_encoder
@@ -180,7 +179,7 @@ def main() -> None:
             ),
         )
         record = read_records(study.record, model)[0]
-        names = essential_of(observe(model, record, study), study.essential, study.estimate).names
+        names = essential(model, record, study).names
         every, whole = (
             tuple(model.BASE_PARAMETERS),
             replace(study, rows=replace(study.rows, window=(None, None))),

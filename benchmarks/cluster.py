@@ -26,7 +26,7 @@ import platform
 import signal
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -35,12 +35,10 @@ import distributed
 import numpy as np
 from rounds import processor
 
-from runtime import Record, Study, load_model, observe
-from runtime.compose import cestac
+from runtime import Record, Study, load_model
+from runtime.compose import cestac, essential
 from runtime.core.cestac.cestac import Cestac
-from runtime.core.essential import essential_of
 from runtime.core.model import GeneratedModel
-from runtime.parallel.cluster import cluster as mapped
 from runtime.parallel.processes import processes
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
@@ -58,7 +56,7 @@ def prepared(folder: Path, runs: int) -> tuple[GeneratedModel, Record, Study, tu
     model = load_model(ROBOT, folder=folder, trust=True)
     study = study_from_mapping(dataset_study(ROBOT))
     record = read_records(study.record, model)[0]
-    names = essential_of(observe(model, record, study), study.essential, study.estimate).names
+    names = essential(model, record, study).names
     study = replace(study, cestac=replace(study.cestac, delta=(DELTA,), runs=runs))
     return model, record, study, names
 
@@ -104,9 +102,12 @@ def main() -> None:
             dashboard_address="127.0.0.1:0",
             host="127.0.0.1",
         ) as cluster,
+        distributed.Client(cluster) as client,
     ):
         model, record, study, names = prepared(Path(folder), settings.runs)
-        address = cluster.scheduler_address
+
+        def dask_map(function: Callable, keys: Iterable) -> Iterator:
+            return (future.result() for future in client.map(function, keys))
 
         def way(**how: object) -> Cestac:
             return cestac(model, record, study, columns=names, **how)
@@ -118,11 +119,9 @@ def main() -> None:
                 return way(map=own_map)
 
         def on_cluster(**how: object) -> Cestac:
-            with mapped(address) as own_map:
-                return way(map=own_map, **how)
+            return way(map=dask_map, **how)
 
-        with mapped(address) as own_map:  # workers import and compile once
-            cestac(model, record, few, columns=names, map=own_map)
+        cestac(model, record, few, columns=names, map=dask_map)  # workers import once
         ways: dict[str, Callable[[], Cestac]] = {
             "one process": way,
             "2 workers": several,

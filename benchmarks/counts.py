@@ -36,8 +36,7 @@ from scipy.io import loadmat
 import symgen
 from runtime import InputError, load_model
 from runtime.advisor.coarse_encoders import READERS
-from runtime.compose import cestac, estimate_of, observe
-from runtime.core.essential import essential_of
+from runtime.compose import cestac, essential, estimate_of, observe
 from runtime.core.record import Record
 from runtime.core.rows.prepared import decimated_torque, observation_of
 from runtime.core.rows.regressor import Columns
@@ -89,8 +88,8 @@ def measured() -> tuple[Any, Study, Record, tuple[str, ...], Array]:
     )
     record = read_records(study.record, model)[0]
     full = observe(model, record, study)
-    essential = essential_of(full, study.essential, study.estimate).names
-    names = tuple(name for name in model.BASE_PARAMETERS if name in essential or name in MAIN)
+    kept = essential(model, record, study).names
+    names = tuple(name for name in model.BASE_PARAMETERS if name in kept or name in MAIN)
     reference = estimate_of(full.columns(names), study.estimate)
     return model, study, record, names, np.array([reference[name] for name in MAIN])
 
@@ -306,7 +305,7 @@ def haptic(runs: int) -> str:
         ("step, rad", "positions: rms %", "largest", "counts: rms %", "largest")
     ]
     found = []
-    names = essential_of(observe(model, record, study), study.essential, study.estimate).names
+    names = essential(model, record, study).names
     study = replace(study, cestac=replace(study.cestac, rounding="phase", delta=HAPTIC_STEPS))
     for reader in READERS:
         found.append(

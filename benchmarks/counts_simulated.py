@@ -45,6 +45,7 @@ from simulation import LAW
 
 from runtime.compose import estimate_of
 from runtime.core.essential import essential_of
+from runtime.core.least_squares.wls import weighted_system
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import decimated_torque, observation_of
@@ -196,7 +197,7 @@ def rows_of(kind: str, seed: int) -> Iterator[dict[str, Any]]:
     }
     exact = filtered_states(moved.q, RATE, settings().signals)
     sign = observed(exact, records["sign"], b.model.BASE_PARAMETERS)
-    essential = essential_of(sign, settings().essential, settings().estimate).names
+    essential = essential_of(weighted_system(sign), settings().essential).names
     names = [name for name in b.model.BASE_PARAMETERS if name in essential or name in MAIN]
     main = [names.index(name) for name in MAIN]
     W, Y = (

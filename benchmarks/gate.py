@@ -38,9 +38,8 @@ from cestac_run import KEY, plain_run, task_of
 from rounds import Clock, Times, interleave, user_time
 
 from runtime import identify, load_model
-from runtime.compose import observe
+from runtime.compose import essential
 from runtime.core.cestac.cestac import one_run
-from runtime.core.essential import essential_of
 from runtime.core.model import GeneratedModel
 from runtime.reading.datasets import dataset_study, fetch
 from runtime.reading.files import read_bytes
@@ -159,7 +158,7 @@ def ratios(folder: Path) -> list[Ratio]:
         cestac=replace(study.cestac, delta=(2 * np.pi / 5000,), rounding="two-point", side="joint"),
     )
     record = read_records(stepped.record, model)[0]
-    names = essential_of(observe(model, record, stepped), stepped.essential, stepped.estimate).names
+    names = essential(model, record, stepped).names
     task = task_of(model, record, stepped, names)
     columns = task.columns
 

@@ -156,7 +156,10 @@ def jobs(folder: Path) -> dict[str, Job]:
         (folder / which).mkdir()
         (folder / which / "arm.yaml").write_text(text.replace("9.81", gravity), encoding="utf-8")
         first, second = (which, "new" if which == "old" else "old")
-        for name, text_of in (("study.yaml", STUDY),):
+        for name, text_of in (
+            ("study.yaml", STUDY),
+            ("ols.yaml", STUDY.replace("feasible", "ols")),
+        ):
             settings = text_of.replace("FIRST", first).replace("SECOND", second)
             (folder / which / name).write_text(settings, encoding="utf-8")
         (folder / which / "loop.yaml").write_text(
@@ -186,7 +189,7 @@ def jobs(folder: Path) -> dict[str, Job]:
         which: [f"{which}-results", "arm.urdf", "-o", "OUT/changed.urdf", "--force"]
         for which in pairs
     }
-    studies = {which: [ROBOT, f"{which}/study.yaml", *out] for which in pairs}
+    studies = {which: [ROBOT, f"{which}/study.yaml", f"{which}/ols.yaml", *out] for which in pairs}
     pages = {which: [f"{which}/arm.yaml", "--html", "-o", "OUT/page.html"] for which in pairs}
     claims = {which: [f"{which}/arm.yaml", "--certificate", "OUT/claim.json"] for which in pairs}
     return {

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         observe,
         plausibility,
         problem,
+        read_record,
         simulate,
         static_poses,
     )
@@ -46,7 +47,7 @@ if TYPE_CHECKING:
     from runtime.core.rows.observation import Observation
     from runtime.files import report
     from runtime.reading.resampling import resample
-    from runtime.study import Study, load_study, read_record
+    from runtime.study import Study, load_study
 
 __all__ = [
     "Advice",
@@ -91,6 +92,7 @@ _MODULES = {
         "observe",
         "plausibility",
         "problem",
+        "read_record",
         "simulate",
         "static_poses",
     ),
@@ -105,7 +107,7 @@ _MODULES = {
     "runtime.advisor.advice": ("Advice",),
     "runtime.core.cestac.result": ("Cestac",),
     "runtime.core.rows.observation": ("Observation",),
-    "runtime.study": ("Study", "load_study", "read_record"),
+    "runtime.study": ("Study", "load_study"),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

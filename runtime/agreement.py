@@ -18,7 +18,7 @@ model lacks an effect that appears in the motion of only some records.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +27,8 @@ from runtime.core.check import Answer, Check, Question
 from runtime.core.documents import Result
 from runtime.core.errors import InputError
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.least_squares.method import linear_companion, linear_estimate
+from runtime.core.least_squares.linear import System, assemble
+from runtime.core.least_squares.wls import weighted_system
 from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel
 from runtime.core.part import Part
@@ -35,7 +36,6 @@ from runtime.core.provenance import record_names
 from runtime.core.residuals import unseen_by_blocks
 from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
-from runtime.core.study import EstimateSettings
 from runtime.core.table import Table
 
 DIFFERS = 3.0
@@ -182,23 +182,23 @@ def agreement(result: Identification) -> Homogeneity | None:
     records = [*result.records, *result.problem.unseen]
     if len(records) < 2:
         return None
-    settings = result.study.estimate
     parts = {
         name: result.observation.of_record(k)
         for k, name in enumerate(record_names(records)[: len(result.records)])
     }
     parts |= result.unseen_rows
     names = result.essential.all_parameters.names
-    in_all = homogeneity(parts, names, settings, model=result.model)
+    weigh = result.problem.linear_system
+    in_all = homogeneity(parts, names, weigh, model=result.model)
     if not in_all.untested:
         return in_all
-    return homogeneity(parts, result.essential.names, settings, model=result.model)
+    return homogeneity(parts, result.essential.names, weigh, model=result.model)
 
 
 def homogeneity(
     parts: Mapping[str, Observation],
     names: Sequence[str],
-    settings: EstimateSettings | None = None,
+    weigh: Callable[..., System] = weighted_system,
     *,
     model: GeneratedModel | None = None,
 ) -> Homogeneity:
@@ -210,18 +210,17 @@ def homogeneity(
         Rows of W and Y of each record, by the name of the record.
     names : sequence of str
         The b base parameters that are fitted.
-    settings : EstimateSettings, optional
-        Method and weights; a method that is not linear is replaced by its linear companion.
+    weigh : function of rows and `columns`, optional
+        Weighs the rows for linear least squares; default: equal weights.
     model : GeneratedModel, optional
         Gives the joint numbers.
     """
-    linear = linear_companion(settings or EstimateSettings())
     fits: dict[str, tuple[Estimate, Array]] = {}
     untested = []
     for record, part in parts.items():
-        alike = EstimateSettings(linear.method, linear.weights, tuple(names), linear.options)
         try:
-            fit = linear_estimate(part, alike, model=model)
+            system = weigh(part, columns=tuple(names))
+            fit = assemble(system, system.solve(), model=model)
         except InputError as e:
             untested.append(f"{record}, {e}")
             continue

@@ -1,7 +1,7 @@
 """Public functions of identification, and lists of preparation steps, readers, methods, analyses.
 
     STEPS      Problem -> Problem: changes of a problem before its rows are made, in this order
-    READERS    Record, Signals -> States: signals.reader of a study
+    READERS    Record, Signals -> States: signals.reader of a study (`runtime.core.signals.reader`)
     METHODS    Observation -> rows of a least squares -> their fit: estimate.method of a study
     EXTRAS     Identification -> Part: further analyses of the records
 
@@ -16,7 +16,7 @@ from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from runtime import robust as irls
 from runtime.advisor.advice import NoAdvice
@@ -30,8 +30,8 @@ from runtime.core.errors import InputError, SettingsError
 from runtime.core.essential import Essential, essential_of
 from runtime.core.identify import Extra, OnRequest
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.least_squares.linear import ordinary
-from runtime.core.least_squares.method import LINEAR, Method, linear_companion
+from runtime.core.least_squares.linear import LinearOptions, ordinary
+from runtime.core.least_squares.method import Method
 from runtime.core.least_squares.wls import by_weights, weighted
 from runtime.core.model import GeneratedModel, require_emitted
 from runtime.core.problem import (
@@ -47,11 +47,11 @@ from runtime.core.problem import estimate_of as estimate_by
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
 from runtime.core.settings_errors import gone
-from runtime.core.signals.filters import SignalReader, lowpassed
-from runtime.core.study import EstimateSettings
+from runtime.core.signals.reader import LOWPASS, Reader
+from runtime.core.study import EstimateSettings, Signals
 from runtime.counts.encoder_advice import EncoderSteps
 from runtime.counts.own_encoder import own_encoder
-from runtime.counts.reader import counted
+from runtime.counts.reader import COUNTS
 from runtime.expected import ExpectedError
 from runtime.laws.scalars import fitted_scalars, scalars_of_laws
 from runtime.laws.transmitted import transmitted_torque
@@ -66,11 +66,12 @@ from runtime.payload.study import LOADED, load_of_study, payload_study
 from runtime.physical import feasible
 from runtime.physical.consistency import as_fitted, consistency
 from runtime.plausible.known import torque_unit
+from runtime.reading.formats import is_measured
 from runtime.reading.records import read_records
 from runtime.reading.settings import RecordSettings
-from runtime.rest import at_rest, poses_at_rest
+from runtime.rest import STATIC, poses_at_rest
 from runtime.speeds import recorded_speeds
-from runtime.study import Study, study_schema
+from runtime.study import Study, study_of, study_schema
 from runtime.threads import alone_each, single_threaded
 from runtime.wrench import force_sensors
 
@@ -99,22 +100,29 @@ STEPS: list[Step] = [
     fitted_scalars,
     law_of_controller,
 ]
-READERS: dict[str, SignalReader] = {
-    "lowpass": SignalReader(lowpassed),
-    "counts": SignalReader(counted),
-    "static": SignalReader(at_rest),
-}
+READERS: dict[str, Reader] = {"lowpass": LOWPASS, "counts": COUNTS, "static": STATIC}
 METHODS: dict[str, Method] = {
-    **LINEAR,
+    # ordinary least squares
+    "ols": Method(LinearOptions, ordinary, weights=("none",)),
+    # least squares weighted by joint
+    "wls": Method(LinearOptions, weighted),
     # robust least squares, Huber or Tukey
     "irls": Method(irls.IrlsOptions, weighted, irls.fit, weights=("none",)),
     # instrumental variables of the simulated closed loop
     "iv": Method(
-        FixedPointOptions, ordinary, partial(beside_record, iv.fit), observe=observed_loop
+        FixedPointOptions,
+        ordinary,
+        partial(beside_record, iv.fit),
+        observe=observed_loop,
+        rounding=iv.ROUNDING,
     ),
     # torques on the regressor of the simulated motion
     "didim": Method(
-        FixedPointOptions, ordinary, partial(beside_record, didim.fit), observe=observed_loop
+        FixedPointOptions,
+        ordinary,
+        partial(beside_record, didim.fit),
+        observe=observed_loop,
+        rounding=didim.ROUNDING,
     ),
     # least squares among physical robots
     "feasible": Method(
@@ -123,6 +131,7 @@ METHODS: dict[str, Method] = {
         feasible.fit,
         brief={"explain": False},
         any_rank=True,
+        physical=True,
     ),
 }
 
@@ -169,6 +178,7 @@ EXTRAS: list[Extra] = [
 ]
 
 Records = Record | Sequence[Record]
+T = TypeVar("T")
 
 
 def require_study(study: Study | None) -> Study:
@@ -195,23 +205,26 @@ def list_records(records: Records) -> tuple[Record, ...]:
 
 
 def complete_study(study: Study) -> Study:
-    """Check that the method and the signal reader of a study exist; add missing reader options.
+    """Check that method and reader of a study exist; complete the settings of the reader.
 
     SettingsError if the method or the reader is unknown.
     """
-    signals = study.signals
-    for path, name, names in (
-        (("estimate", "method"), study.estimate.method, METHODS),
-        (("signals", "reader"), signals.reader, READERS),
-    ):
-        if name not in names:
-            *others, last = names
-            expected = f"{name!r}; expected {', '.join(others)} or {last}"
-            raise SettingsError(gone(path, name) or expected, path=path)
-    options = READERS[signals.reader].checked(signals)
-    if options == signals.options:
-        return study
-    return replace(study, signals=replace(signals, options=options))
+    _named(METHODS, study.estimate.method, ("estimate", "method"))
+    return reader_of(study.signals).settled(study)
+
+
+def reader_of(signals: Signals) -> Reader:
+    """Return the reader that signals.reader names; SettingsError if it is unknown."""
+    return _named(READERS, signals.reader, ("signals", "reader"))
+
+
+def _named(listed: Mapping[str, T], name: str, path: tuple[str, ...]) -> T:
+    """Return the entry `name` of a list of features; SettingsError with `path` if it is unknown."""
+    if name not in listed:
+        *others, last = listed
+        expected = f"{name!r}; expected {', '.join(others)} or {last}"
+        raise SettingsError(gone(path, name) or expected, path=path)
+    return listed[name]
 
 
 def state_problem(
@@ -235,7 +248,7 @@ def state_problem(
         list_records(records),
         list_records(unseen),
         study,
-        READERS[study.signals.reader].states,
+        READERS[study.signals.reader],
         methods,
     )
 
@@ -272,11 +285,67 @@ def problem(
 
 
 def records_of(
-    settings: Sequence[RecordSettings], model: GeneratedModel, study: Study
+    settings: Sequence[RecordSettings],
+    model: GeneratedModel,
+    study: Study,
+    *,
+    folder: str | Path | None = None,
 ) -> list[Record]:
-    """Read the records of a study from their files."""
+    """Read the records of a study from their files, which are relative to `folder`."""
     require_emitted(model)
-    return read_records(settings, model, missing=study.signals.admits_missing)
+    missing = reader_of(study.signals).missing
+    return read_records(settings, model, folder=folder, missing=missing)
+
+
+def read_record(
+    path: str | Path | RecordSettings,
+    model: GeneratedModel | None = None,
+    *,
+    folder: str | Path = ".",
+    missing: bool = False,
+) -> Record:
+    """Read one measured record, converted to the joint side and SI units.
+
+    Parameters
+    ----------
+    path : str, Path or RecordSettings
+        A measured file whose columns are called t, q1 ..., tau1 ... (SI, joint side), a study file,
+        a dataset, or settings.
+    model : module, optional
+        Emitted model of the robot; needed if a side is "motor", because its drives convert the
+        record. The number of joints is checked against it.
+    folder : str or Path
+        Folder to which file names are relative. File names in a study file are relative to the
+        folder of that file.
+    missing : bool
+        Whether positions may be missing (nan or an empty field), as `signals.reader: counts`
+        allows; always true for a study file with this reader.
+
+    Raises
+    ------
+    InputError
+        Files that cannot be read or have other content, several records, or one record that
+        `resample` splits.
+    """
+    bare = False
+    if isinstance(path, RecordSettings):
+        settings: tuple[RecordSettings, ...] = (path,)
+    else:
+        require_kind(path, (str, Path), "path", "the name of a file, or RecordSettings")
+        named = Path(folder) / path
+        study, folder = study_of(named if named.exists() else path)
+        bare = is_measured(named)
+        settings = study.record
+        missing = missing or reader_of(study.signals).missing
+    records = read_records(settings, model, folder=folder, missing=missing)
+    if len(records) != 1:
+        names = ", ".join(record.name for record in records)
+        raise InputError(
+            f"the study has {len(records)} records (or pieces between gaps), but this function "
+            f"returns only one; use read_records, which returns all: {names}"
+        )
+    record = records[0]
+    return replace(record, origin=replace(record.origin, sides=None)) if bare else record
 
 
 @single_threaded
@@ -360,11 +429,9 @@ def essential(
     the same weights.
     """
     whole = problem(model, records, study, simulator=simulator)
-    settings = whole.settings
     return essential_of(
-        observe_rows(whole),
-        settings.essential,
-        linear_companion(settings.estimate),
+        whole.linear_system(observe_rows(whole)),
+        whole.settings.essential,
         model=whole.model,
         provenance=whole.provenance,
     )
@@ -514,8 +581,7 @@ def cestac(
     """Compute how coarser encoders and torque sensors change the estimate, eqs. (15) to (22), (28).
 
     map : like the built-in map; makes the runs, in processes
-        (`runtime.parallel.processes.processes`) or on a Dask cluster
-        (`runtime.parallel.cluster.cluster`).
+        (`runtime.parallel.processes.processes`) or on a Dask cluster (docs/many_runs.md).
     options : columns, progress, checkpoint, provenance, as of `runtime.core.cestac.cestac.cestac`.
     """
     from runtime.core.cestac import cestac as resolution
@@ -678,8 +744,7 @@ def simulate(
         )
     records: Sequence[Record] = ()
     if study.controller.reference.record is not None:
-        missing = study.signals.admits_missing
-        records = read_records(study.record, model, folder=folder, missing=missing)
+        records = records_of(study.record, model, study, folder=folder)
     return simulation.simulate(
         model, study.controller, records=records, folder=folder, ideal=ideal, name=name
     )

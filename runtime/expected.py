@@ -42,16 +42,14 @@ from scipy.stats import chi2
 
 from runtime.core.check import Answer, Check, Question
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.least_squares.linear import assemble
-from runtime.core.least_squares.method import linear_companion, linear_system
+from runtime.core.least_squares.linear import System, assemble
+from runtime.core.least_squares.wls import weighted_system
 from runtime.core.limits import LIMIT
 from runtime.core.model import TRANSMITTED, GeneratedModel, channels_of, joint_units
 from runtime.core.part import Part
 from runtime.core.residuals import unseen_by_blocks
 from runtime.core.result import Identification
-from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared
-from runtime.core.study import EstimateSettings
 from runtime.counts.encoder_advice import acceleration_error
 from runtime.physical.inertia import INERTIAL, PhysicalModel, physical_model
 
@@ -127,14 +125,17 @@ class ExpectedError(Part):
         result = self.result
         if not result.usable:
             return Expected(*3 * (float("nan"),))
-        by_lowpass = [r for r in result.prepared if r.study.signals.reader == "lowpass"]
         steps = [
-            acceleration_error(r.record, r.states, r.study.signals, r.drives) for r in by_lowpass
+            acceleration_error(r.record, r.states, r.study.signals, r.drives)
+            for r in result.prepared
+            if r.reader.filters_positions
         ]
+        system = result.problem.linear_system(result.observation)
+        if system.settings.weights == "none":
+            system = weighted_system(result.observation, "joint", system.settings.columns)
         return expected_error(
             result.model,
-            result.observation,
-            result.study.estimate,
+            system,
             result.model_estimate,
             result.prepared,
             max(steps, default=0.0),
@@ -148,8 +149,7 @@ class ExpectedError(Part):
 
 def expected_error(
     model: GeneratedModel,
-    observation: Observation,
-    settings: EstimateSettings,
+    system: System,
     fit: Estimate,
     records: Sequence[Prepared],
     steps: float = 0.0,
@@ -162,12 +162,9 @@ def expected_error(
     Parameters
     ----------
     model : GeneratedModel
-    observation : Observation
-        Rows of the records.
-    settings : EstimateSettings
-        Method of the study. Standard deviations are those of its linear companion, weighted by
-        joint if the companion has no weights: residuals of a joint with large forces do not show
-        the noise of a wrist.
+    system : System
+        Rows of the records as linear least squares weighs them, with weights: residuals of a joint
+        with large forces do not show the noise of a wrist.
     fit : Estimate
         The parameters that are used.
     records : sequence of Prepared
@@ -181,10 +178,6 @@ def expected_error(
         D, still = regressors(model, states, records, fit)
     except ValueError:  # a loop that does not close
         return Expected(*3 * (float("nan"),))
-    linear = linear_companion(settings)
-    if linear.weights == "none":
-        linear = EstimateSettings("wls", "joint", linear.columns)
-    system = linear_system(observation, linear)
     least_squares = assemble(system, system.solve())
     columns = [model.BASE_PARAMETERS.index(name) for name in least_squares.names]
     D, still = D[:, :, columns], still[:, :, columns]
@@ -192,7 +185,7 @@ def expected_error(
         [dict(zip(fit.names, fit.X, strict=True)).get(name, 0.0) for name in least_squares.names]
     )
     ratio = least_squares.sigma_corrected / least_squares.sigma
-    wider = np.fmax(ratio, 1.0) * np.sqrt(unseen_by_blocks(observation, least_squares))
+    wider = np.fmax(ratio, 1.0) * np.sqrt(unseen_by_blocks(system.observation, least_squares))
     V = np.outer(wider, wider) * least_squares.covariance
     near = least_squares.X
     if dict(fit.details.get("options", {})).get("prior", "none") != "none":

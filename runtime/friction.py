@@ -46,7 +46,7 @@ from runtime.core.result import Identification
 from runtime.core.rows.observation import split_rows
 from runtime.core.rows.prepared import Prepared
 from runtime.core.rows.regressor import in_time
-from runtime.core.signals.filters import decimated, require_motion
+from runtime.core.signals.filters import decimated
 from runtime.core.table import Table, number
 from runtime.physical.inertia import physical_model
 
@@ -301,7 +301,7 @@ def friction_curves(problem: Problem, fit: Estimate) -> tuple[FrictionCurve, ...
 
     The estimate must contain all parameters.
     """
-    require_motion(problem.settings.signals, "a friction curve")
+    problem.require_motion("a friction curve")
     model = problem.model
     require(model, "inverse_dynamics")
     parts = [_terms(model, record, fit, k) for k, record in enumerate(problem.prepared)]

@@ -14,7 +14,8 @@ from runtime.core.missing import COUNTS, require_positions
 from runtime.core.problem import Note, Problem
 from runtime.core.record import Record
 from runtime.core.rows.prepared import stacked
-from runtime.core.signals.filters import States, require_motion
+from runtime.core.signals.filters import States
+from runtime.core.signals.reader import Reader
 from runtime.core.study import Signals
 
 ROUNDING = 1e-9  # of the largest entry of W: a column below it is zero
@@ -22,10 +23,14 @@ TEXT = "others (inertias, friction) are left out. Dry friction holds a joint wit
 
 
 def at_rest(record: Record, signals: Signals) -> States:
-    """Return the states of static poses: recorded q, with qd = qdd = 0 (reader `static`)."""
-    require_positions(record.missing, "reader: static", record.name, COUNTS)
+    """Return the states of static poses: recorded q, with qd = qdd = 0."""
+    require_positions(record.missing, f"reader: {signals.reader}", record.name, COUNTS)
     rest = np.zeros_like(record.q)
     return States(record.q, rest, rest)
+
+
+STATIC = Reader(at_rest, linear=True, at_rest=True)
+"""Each sample is a pose."""
 
 
 def poses_at_rest(problem: Problem) -> Problem:
@@ -42,10 +47,10 @@ def poses_at_rest(problem: Problem) -> Problem:
         A method that simulates the closed loop, because it needs a motion.
     """
     settings = problem.settings
-    if settings.signals.reader != "static" or not problem.records:
+    if not problem.reader.at_rest or not problem.records:
         return problem
     if problem.method.observe is not None:
-        require_motion(settings.signals, "a method that simulates the loop,")
+        problem.require_motion("a method that simulates the loop,")
     W, names = stacked(problem.model, problem.prepared).W, problem.model.BASE_PARAMETERS
     acting = np.abs(W).max(axis=0) > ROUNDING * np.abs(W).max()
     asked = names if settings.estimate.columns == "all" else settings.estimate.columns

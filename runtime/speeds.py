@@ -60,10 +60,10 @@ def recorded_speeds(problem: Problem) -> Problem:
     """Set the frequencies, Hz, above which recorded velocities replace differentiated positions.
 
     This is a step of the preparation of a problem. It acts if signals.velocity is auto, the reader
-    is lowpass, and all fitted records have velocities.
+    uses recorded velocities, and all fitted records have them.
     """
     signals = problem.settings.signals
-    if signals.velocity != "auto" or signals.reader != "lowpass" or not problem.records:
+    if signals.velocity != "auto" or not problem.reader.velocities or not problem.records:
         return problem
     if not all("qd" in record.channels for record in problem.records):
         return problem
@@ -73,7 +73,9 @@ def recorded_speeds(problem: Problem) -> Problem:
         parts.append((record.q[samples], {"qd": record.channels["qd"][samples]}, record.rate))
     low, known = signals.lowpass, signals
     if low is not None and low.cutoff == "auto":
-        hertz, _ = cutoff([(q, rate) for q, _, rate in parts], signals)
+        hertz, _ = cutoff(
+            [(q, rate) for q, _, rate in parts], signals, counts=problem.reader.encoder is not None
+        )
         known = replace(signals, lowpass=replace(low, cutoff=hertz))
     crossing, text = crossings(parts, known)
     settings = replace(problem.settings, signals=replace(signals, velocity=crossing))

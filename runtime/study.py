@@ -23,7 +23,6 @@ from runtime.core import study as chapter
 from runtime.core.arrays import require_kind
 from runtime.core.errors import InputError
 from runtime.core.model import GeneratedModel
-from runtime.core.record import Record
 from runtime.core.settings import NotNegative, PerJoint, Settings, structure, to_mapping
 from runtime.documents.files import settings_from_text, text_of
 from runtime.documents.yaml_text import yaml_text
@@ -183,63 +182,16 @@ def study_of(record: str | Path) -> tuple[Study, Path]:
     )
 
 
-def read_record(
-    path: str | Path | RecordSettings,
-    model: GeneratedModel | None = None,
-    *,
-    folder: str | Path = ".",
-    missing: bool = False,
-) -> Record:
-    """Read one measured record, converted to the joint side and SI units.
-
-    Parameters
-    ----------
-    path : str, Path or RecordSettings
-        A measured file whose columns are called t, q1 ..., tau1 ... (SI, joint side), a study file,
-        a dataset, or settings.
-    model : module, optional
-        Emitted model of the robot; needed if a side is "motor", because its drives convert the
-        record. The number of joints is checked against it.
-    folder : str or Path
-        Folder to which file names are relative. File names in a study file are relative to the
-        folder of that file.
-    missing : bool
-        Whether positions may be missing (nan or an empty field), as `signals.reader: counts`
-        allows; always true for a study file with this reader.
-
-    Raises
-    ------
-    InputError
-        Files that cannot be read or have other content, several records, or one record that
-        `resample` splits.
-    """
-    bare = False
-    if isinstance(path, RecordSettings):
-        settings: tuple[RecordSettings, ...] = (path,)
-    else:
-        require_kind(path, (str, Path), "path", "the name of a file, or RecordSettings")
-        named = Path(folder) / path
-        study, folder = study_of(named if named.exists() else path)
-        bare = is_measured(named)
-        settings = study.record
-        missing = missing or study.signals.admits_missing
-    records = read_records(settings, model, folder=folder, missing=missing)
-    if len(records) != 1:
-        names = ", ".join(record.name for record in records)
-        raise InputError(
-            f"the study has {len(records)} records (or pieces between gaps), but this function "
-            f"returns only one; use read_records, which returns all: {names}"
-        )
-    record = records[0]
-    return replace(record, origin=replace(record.origin, sides=None)) if bare else record
-
-
-def suggested(study: Study, model: GeneratedModel) -> tuple[Study, list[str]]:
+def suggested(
+    study: Study, model: GeneratedModel, *, missing: bool = False
+) -> tuple[Study, list[str]]:
     """Correct the settings of a study until all its records can be read.
 
     An error in reading may name a remedy, which is then applied; angles that wrap at full turns are
     unwrapped. Return the new study, and a sentence on each change. Remedies are guesses from names
     and time stamps, so a person should check them.
+
+    missing : whether positions may be missing, as for a reader of counts.
 
     Raises
     ------
@@ -249,7 +201,7 @@ def suggested(study: Study, model: GeneratedModel) -> tuple[Study, list[str]]:
     sentences: list[str] = []
     while True:
         try:
-            read_records(study.record, model, missing=study.signals.admits_missing)
+            read_records(study.record, model, missing=missing)
         except InputError as e:
             text = f"{e}; suggested: record: {' '.join(yaml_text(e.remedy or {}).split())}"
             if not e.remedy or text in sentences:
@@ -264,7 +216,6 @@ def suggested(study: Study, model: GeneratedModel) -> tuple[Study, list[str]]:
             study = study_from_mapping(mapping)
         else:
             break
-    missing = study.signals.admits_missing
     turns = [_starts_anew(one, model, missing) for one in study.record]
     if any(turns):
         sentences.append("positions start anew at full turns; suggested: record: {unwrap: true}")

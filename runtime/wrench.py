@@ -30,6 +30,7 @@ from typing import Any, cast
 import numpy as np
 
 from runtime.core.errors import InputError
+from runtime.core.least_squares.method import linear_method
 from runtime.core.model import BoundModel, GeneratedModel, channels_of, elements_of, joint_units
 from runtime.core.problem import Problem
 from runtime.core.record import JOINT_CHANNELS, WRENCH, Record
@@ -42,10 +43,6 @@ AXES = ("FX", "FY", "FZ", "NX", "NY", "NZ")
 TEN_UNITS = ("kg*m**2",) * 6 + ("kg*m",) * 3 + ("kg",)  # in the order of INERTIAL
 PROBED_STATES = 64  # random ones that tell columns apart
 LEFT_OF_COLUMN = 1e-8  # of the norm of a column: less is left of it beside those before
-
-
-READ_SAMPLE_BY_SAMPLE = ("lowpass", "static")
-"""Readers that take positions as they are, so that a joint at rest is one."""
 
 
 def force_sensors(problem: Problem) -> Problem:
@@ -89,7 +86,7 @@ def force_sensors(problem: Problem) -> Problem:
                 file=record.file,
             )
     settings = problem.settings
-    if settings.signals.reader not in READ_SAMPLE_BY_SAMPLE:
+    if not problem.reader.linear:
         raise InputError(
             f"signals.reader: {settings.signals.reader} does not support force sensors; write signals: {{reader: lowpass}} in the study, or remove record.columns.wrench"
         )
@@ -98,8 +95,9 @@ def force_sensors(problem: Problem) -> Problem:
     slow = per_joint(settings.rows.low_speed, n, "rows.low_speed") if torques else [UNMEASURED] * n
     low_speed = (*map(float, slow), *[0.0] * 6 * len(channels))
     settings = replace(settings, rows=replace(settings.rows, low_speed=low_speed))
-    if settings.estimate.method == "ols":  # N and N m in one sum
-        weighted = replace(settings.estimate, method="wls", weights="joint")
+    if problem.method.linear and not problem.method.weighs:  # N and N m in one sum
+        method = linear_method("joint", problem.methods)
+        weighted = replace(settings.estimate, method=method, weights="joint")
         settings = replace(settings, estimate=weighted)
     frames = [int(c.removeprefix(WRENCH)) for c in channels]
     return problem.changed(

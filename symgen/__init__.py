@@ -18,7 +18,7 @@ from symgen.errors import SymgenError
 if TYPE_CHECKING:
     from symgen.certify.certificate import Certificate
     from symgen.certify.modules import certify as certificate
-    from symgen.certify.modules import model
+    from symgen.certify.requests import model
     from symgen.certify.variants import variants
     from symgen.description import Robot, load_robot, packaged_robots, parse_robot
     from symgen.emit.generate import generate_module
@@ -61,7 +61,8 @@ _HOME = {
     **dict.fromkeys(
         ("Absorption", "BaseDifference", "absorptions", "base_difference"), "symgen.regroup.reasons"
     ),
-    **dict.fromkeys(("certificate", "model"), "symgen.certify.modules"),
+    "certificate": "symgen.certify.modules",
+    "model": "symgen.certify.requests",
     **dict.fromkeys(("SymbolicRobot", "symbolic"), "symgen.symbols.symbolic"),
     "Certificate": "symgen.certify.certificate",
     "generate_module": "symgen.emit.generate",

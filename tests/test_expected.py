@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import planar_arm
 import pytest
+from problems import linear_system
 
 import runtime
 import symgen
@@ -56,8 +57,9 @@ def test_range_not_known_and_not_determined(arm):
     result = runtime.identify(arm, record(arm, (1, 1)))
     bare = type("Bare", (), {**{k: getattr(arm, k) for k in dir(arm) if k[0] != "_"}, "LIMITS": {}})
     fit = result.model_estimate
-    assert np.isnan(expected_error(bare, result.observation, result.study.estimate, fit, ()).error)
-    lost = replace(result, estimate=replace(result.estimate, status="rank-deficient"))
+    assert np.isnan(expected_error(bare, linear_system(result.observation), fit, ()).error)
+    failed = replace(result.estimate, status="rank-deficient")
+    lost = replace(result, sets=replace(result.sets, all=failed))
     assert lost.expected_error == 999
 
 

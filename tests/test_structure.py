@@ -103,8 +103,8 @@ ONLY_IN = {  # library: files and folders that may import it
     "rosbags": ("runtime/reading/bags.py",),
     "clarabel": ("runtime/physical/semidefinite.py",),
     "array_api_compat": ("generated/",),
-    "dask": ("runtime/parallel/cluster.py",),
-    "distributed": ("runtime/parallel/cluster.py",),
+    "dask": (),
+    "distributed": (),
     "threadpoolctl": ("runtime/threads.py",),
     "scipy": ("runtime/",),
 }

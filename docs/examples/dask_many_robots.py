@@ -1,11 +1,10 @@
-"""Many records at once, on all cores or on a cluster: a record that cannot be read has its reason in the table and the others go on."""
+"""Many records at once, on a Dask cluster (pip install distributed): a record that cannot be read has its reason in the table and the others go on. Then the runs of one resolution study, on the same cluster."""
 
 import tempfile
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
+from distributed import Client, LocalCluster
 
 import runtime
 import symgen
@@ -13,7 +12,7 @@ from runtime.core.errors import InputError
 
 
 def identified(file: Path) -> str:
-    """One line of the table. A process of its own runs it."""
+    """One line of the table. A worker runs it."""
     try:
         model = symgen.model("planar_2r")
         result = runtime.identify(model, runtime.read_record(file, model))
@@ -43,7 +42,16 @@ def simulated(folder: Path) -> list[Path]:
 
 if __name__ == "__main__":
     files = simulated(Path(tempfile.mkdtemp()))
-    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
-        print(*pool.map(identified, files), sep="\n")
-    # on a cluster: client = dask.distributed.Client("tcp://10.0.0.1:8786")
-    #               print(*client.gather(client.map(identified, files)), sep="\n")
+    with (  # of other machines: Client("tcp://10.0.0.1:8786") alone
+        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        Client(cluster) as client,
+    ):
+
+        def on_cluster(function, keys):
+            return (future.result() for future in client.map(function, keys))
+
+        print(*on_cluster(identified, files), sep="\n")
+        model = symgen.model("planar_2r")
+        study = runtime.Study(cestac={"delta": [1e-4, 1e-3], "runs": 20})
+        record = runtime.read_record(files[0], model)
+        print(runtime.cestac(model, record, study, map=on_cluster).message)

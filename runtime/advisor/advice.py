@@ -621,7 +621,7 @@ class NoAdvice(Part):
 
     def checks(self) -> tuple[Check, ...]:
         """Return the check "Does the encoder resolve enough?" of the report, as a tuple."""
-        simulated = self.result.study.estimate.method in ("iv", "didim")
+        simulated = self.result.problem.method.observe is not None
         return (answer(None, *(("", 0.0) if simulated else visible_steps(self.result))),)
 
 

@@ -52,10 +52,9 @@ from runtime.core.cestac.rounding import VARIANCE, Mode
 from runtime.core.drives import Drives
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.least_squares.method import linear_estimate, linear_system
 from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, is_axis, joint_labels, joint_units
-from runtime.core.problem import Problem
+from runtime.core.problem import Problem, estimated
 from runtime.core.record import Record
 from runtime.core.result import Identification
 from runtime.core.rows.observation import stack
@@ -168,7 +167,7 @@ def advise(
     problem = problem.changed(settings=replace(settings, cestac=sought))
     model, study, as_measured = problem.model, problem.settings, list(problem.prepared)
     whole = list(problem.records)
-    _refuse(study)
+    _refuse(problem)
     law, drives = study.cestac.rounding, common_drives(model, as_measured)
     names = study_columns(problem, as_measured, columns)
     parts = tuple(perturbation(model, own, study, names, drives=drives) for own in as_measured)
@@ -176,8 +175,8 @@ def advise(
     measured = stack([part.observation for part in parts])
     rows = stacked(model, as_measured, names)
     origins = {**problem.provenance, **names_judged(study.cestac), **(provenance or {})}
-    reference = linear_estimate(rows, linear, model=model, provenance=origins)
-    system = linear_system(measured, linear)
+    reference = estimated(problem, rows, linear, provenance=origins)
+    system = problem.linear_system(measured, columns="all")
     predictor = Predictor(parts, 1 / np.array(system.scales), VARIANCE[law])
     decisive = [names.index(name) for name in deciding_names(reference)]
     every = range(len(model.JOINTS))
@@ -411,8 +410,9 @@ def assumptions(
     )
 
 
-def _refuse(study: Study) -> None:
-    if study.estimate.method not in ("ols", "wls"):
+def _refuse(problem: Problem) -> None:
+    study = problem.settings
+    if not problem.method.linear:
         raise SettingsError(
             f"the advisor cannot predict estimates by {study.estimate.method!r}; set method: "
             "ols or wls",

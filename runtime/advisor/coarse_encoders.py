@@ -36,10 +36,10 @@ from runtime.core.problem import Problem
 from runtime.core.rows.observation import stack
 from runtime.core.rows.prepared import observation_of
 from runtime.core.rows.selection import certain_rows
-from runtime.core.signals.filters import Reader, SpeedErrors, States, filtered_states, lowpassed
+from runtime.core.signals.filters import SpeedErrors, States, filtered_states
+from runtime.core.signals.reader import LOWPASS, Reader
 from runtime.counts.own_encoder import own_encoder
-from runtime.counts.reader import counted as counted_states
-from runtime.counts.reader import encoder_position
+from runtime.counts.reader import COUNTS, encoder_position
 from runtime.counts.reading import Starts, read_counts
 
 LIMIT = limits(__package__)
@@ -49,7 +49,7 @@ Array = np.ndarray
 ReaderName = Literal["lowpass", "counts"]
 
 READERS: tuple[ReaderName, ...] = ("lowpass", "counts")
-STATES: Mapping[ReaderName, Reader] = {"lowpass": lowpassed, "counts": counted_states}
+STATES: Mapping[ReaderName, Reader] = {"lowpass": LOWPASS, "counts": COUNTS}
 PHASES: Mapping[ReaderName, int] = {
     "lowpass": 8,
     "counts": 4,
@@ -109,8 +109,10 @@ class CoarseEncoders:
         for own in readings:
             require_positions(own.record.missing, "advice on encoders", own.record.file)
             part = prepared_record(own, study, own_encoder, drives)
-            read = part.states or filtered_states(part.q, part.rate, part.selection.signals)
-            states = replace(read, errors=None, channels=part.channels)
+            read = part.states
+            if reader == "lowpass":  # without recorded velocities, as the errors below
+                read = filtered_states(own.record.q, own.record.rate, part.selection.signals)
+            states = replace(read, errors=None, channels=own.channels)
             q = encoder_position(states.q, side)
             at_encoders = States(q, states.qd @ into, states.qdd @ into)
             x = encoder_position(own.record.q, side)
@@ -179,7 +181,7 @@ class CoarseEncoders:
         h = np.arange(1, LIMIT.SAWTOOTH_HARMONICS + 1)
         weight, most = 1 / h**2 / np.sum(1 / h**2), np.zeros(len(delta))
         for part in self.parts:
-            rate, low = part.record.rate, part.record.selection.signals.lowpass
+            rate, low = part.record.record.rate, part.record.selection.signals.lowpass
             band = 1.0 if low is None else 2 * low.hertz / rate
             every = max(1, len(part.x) // LIMIT.SPEEDS_COMPARED)
             speed = np.abs(part.at_encoders.qd[::every]) / rate  # per sample
@@ -276,10 +278,12 @@ class CoarseEncoders:
         for part, columns in zip(self.parts, drawn, strict=True):
             y, errors = np.column_stack(columns), np.zeros((4, *part.x.T.shape))
             if self.reader == "counts":
-                reading = read_counts(y, part.record.rate, delta, starts=part.starts.get(key))
+                reading = read_counts(
+                    y, part.record.record.rate, delta, starts=part.starts.get(key)
+                )
                 part.starts.setdefault(key, reading.starts)
                 y, errors[3].T[:, chosen] = reading.motion
-            read = filtered_states(y, part.record.rate, part.record.selection.signals)
+            read = filtered_states(y, part.record.record.rate, part.record.selection.signals)
             errors[:3, chosen] = [
                 read.q.T - part.at_encoders.q.T[chosen],
                 read.qd.T - part.at_encoders.qd.T[chosen],
@@ -322,11 +326,11 @@ class CoarseEncoders:
                 states,
                 record.torque,
                 replace(record.selection, mask=mask),
-                files=record.files,
+                files=record.record.files,
             )
             for (states, mask), record in zip(parts, self.task.records, strict=True)
         ]
-        return linear_system(stack(rows), self.task.estimate).solve().X
+        return linear_system(stack(rows), self.task.estimate, self.task.methods).solve().X
 
 
 def mean_change(ratios: Array) -> Array:

@@ -36,8 +36,9 @@ from runtime.core.rows.regressor import in_time
 from runtime.core.rows.selection import Selection
 from runtime.core.rows.switches import Switch, switches
 from runtime.core.settings import to_mapping
-from runtime.core.signals.filters import States, lowpassed
+from runtime.core.signals.filters import States
 from runtime.core.signals.noise_gain import Bandwidth, bandwidth
+from runtime.core.signals.reader import LOWPASS
 from runtime.core.study import Study
 
 Array = np.ndarray
@@ -176,8 +177,7 @@ def perturbation(
     drives : drives for encoders on the motor side; default: those of the record.
     """
     signals = replace(study.signals, median=study.cestac.median)
-    positions = replace(signals, reader="lowpass", step=None, side="joint")
-    own = replace(record, study=replace(study, signals=positions), reader=lowpassed)
+    own = replace(record, study=replace(study, signals=signals), reader=LOWPASS)
     own.take_states(record)
     band = bandwidth(signals, own.record.rate)
     require_positions(own.record.missing, "the effect of encoder steps", own.record.file)

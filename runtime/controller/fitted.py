@@ -26,7 +26,8 @@ import numpy as np
 from runtime.controller.law import late, torque_law
 from runtime.core.documents import Result
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.least_squares.method import linear_estimate
+from runtime.core.least_squares.linear import assemble
+from runtime.core.least_squares.wls import weighted_system
 from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, elements_of, joint_labels, joint_units
 from runtime.core.part import Doubt
@@ -35,7 +36,6 @@ from runtime.core.record import Record
 from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared, stacked, with_torques
-from runtime.core.study import EstimateSettings
 from runtime.loop.settings import Law
 
 LIMIT = limits(__package__)
@@ -316,7 +316,8 @@ class TorquesOfLaw:
             columns["delay"] = with_torques(self.rows, self.records, rates).Y
         W = np.column_stack([self.rows.W, *columns.values()])
         wide = replace(Y, W=W, names=(*self.rows.names, *columns))
-        return linear_estimate(wide, EstimateSettings("wls", "joint"), model=self.model)
+        system = weighted_system(wide, "joint")
+        return assemble(system, system.solve(), model=self.model)
 
     def misfit(self, kd: Array, delay: float) -> float:
         """Compute how badly the model fits the torques of a control law with given kd and delay.

@@ -25,7 +25,7 @@ def automatic_cutoff(problem: Problem) -> Problem:
     for record in problem.records:
         positions.append((record.q[excerpt(record, problem.settings.rows)], record.rate))
     crossing = np.inf if isinstance(signals.velocity, str) else signals.velocity
-    hertz, why = cutoff(positions, signals, crossing)
+    hertz, why = cutoff(positions, signals, crossing, problem.reader.encoder is not None)
     text = f"Low-pass at {hertz:g} Hz (cutoff: auto): {why}."
     settings = replace(
         problem.settings, signals=replace(signals, lowpass=replace(low, cutoff=hertz))

@@ -18,10 +18,8 @@ import numpy as np
 from runtime.core.documents import Result
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import System, assemble, standard_deviations
-from runtime.core.least_squares.method import linear_system
 from runtime.core.model import GeneratedModel
-from runtime.core.rows.observation import Observation
-from runtime.core.study import EssentialSettings, EstimateSettings
+from runtime.core.study import EssentialSettings
 from runtime.core.table import aligned, percentage
 
 THRESHOLDS = (1.02, 1.03, 1.04, 1.05, 1.06, 1.07, 1.08, 1.09, 1.10)
@@ -118,9 +116,8 @@ class Essential(Result):
 
 
 def essential_of(
-    observation: Observation,
+    system: System,
     settings: EssentialSettings | None = None,
-    estimate: EstimateSettings | None = None,
     *,
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
@@ -129,19 +126,16 @@ def essential_of(
 
     Parameters
     ----------
-    observation : Observation
-        Y = W X + rho.
+    system : System
+        Y = W X + rho, as least squares weighs its rows.
     settings : EssentialSettings, optional
         Threshold on sigma_rho.
-    estimate : EstimateSettings, optional
-        A method that solves one linear system.
     model : GeneratedModel, optional
         Model that gives units, joint numbers and the hash of the robot file.
     provenance : mapping, optional
         Further entries for Estimate.provenance.
     """
     settings = settings or EssentialSettings()
-    system = linear_system(observation, estimate or EstimateSettings())
     wanted = sorted({*THRESHOLDS, settings.threshold})
     steps = _trail(system, wanted[-1])
     removed = {threshold: _removals(steps, threshold) for threshold in wanted}

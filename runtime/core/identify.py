@@ -88,7 +88,6 @@ def identify(
     InputError
         A record or setting that does not suit.
     """
-    settings = problem.settings
     provenance = {**problem.provenance, **(provenance or {})}
     names = record_names([*problem.records, *problem.unseen])
     fitted_names = names[: len(problem.records)]
@@ -98,22 +97,22 @@ def identify(
     if notes:
         observation = replace(observation, findings=(*observation.findings, *notes))
     unseen = {name: observed_unseen(problem, k) for k, name in enumerate(unseen_names)}
-    fits = fit_problem(problem, observation, provenance)
-    fits, validation, missing = validated(
-        problem, fits, observation, unseen, ", ".join(fitted_names)
+    sets, essential = fit_problem(problem, observation, provenance)
+    sets, validation, missing = validated(
+        problem, sets, observation, unseen, ", ".join(fitted_names)
     )
-    comparison = direct_comparison(observation, fits.best(validation, settings))
+    comparison = direct_comparison(observation, sets.estimate(sets.used))
+    system = problem.linear_system(observation)
     result = Identification(
         problem=problem,
         observation=observation,
         unseen_rows=unseen,
-        estimate=fits.estimate,
-        essential=fits.reduced,
-        sets=fits.sets,
+        sets=sets,
+        essential=essential,
         validation=validation,
         comparison=comparison,
-        correlations=weak_directions(observation, settings.estimate),
-        uncertainty=uncertainty(observation, settings.estimate, fits.reduced, comparison),
+        correlations=weak_directions(system),
+        uncertainty=uncertainty(system, essential, comparison),
         missing=missing,
     )
     return with_parts(result, extras, progress)

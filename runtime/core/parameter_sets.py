@@ -23,90 +23,142 @@ fitted.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from typing import Any, Literal
 
 import numpy as np
 
+from runtime.core.documents import NanIfNull, Vector, Whole
 from runtime.core.errors import InputError, instant
 from runtime.core.essential import Essential, essential_of
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.least_squares.method import LINEAR, linear_companion
 from runtime.core.limits import LIMIT
 from runtime.core.problem import Problem, estimated
 from runtime.core.progress import at
 from runtime.core.rows.observation import Observation, halves
-from runtime.core.study import EstimateSettings, Study
+from runtime.core.study import EstimateSettings, Weights
 from runtime.core.validation import CrossValidation, cross_validation, split_validation
 
 SetName = Literal["essential", "feasible", "all"]
 ORDER: tuple[SetName, ...] = ("essential", "feasible", "all")
 
 
-def physical_asked(errors: Mapping[Any, float], first: bool) -> bool:
-    """Whether a fit of physically consistent parameters is needed for the final model.
+@dataclass(frozen=True, eq=False)
+class Sets(Mapping[SetName, Estimate]):
+    """Estimates of the sets of parameters from all rows, and which set answers which question.
 
-    Parameters
+        used     which set predicts best?                   `best_set`: printed first, verdict
+        whole    which set has a value for every column?    `whole_set`: robot files, programs
+
+    As a mapping it has the sets that were fitted, by name; it is empty if the method is not linear.
+    Then all parameters, by this method, answer both questions.
+
+    Attributes
     ----------
-    errors : mapping of float, %
-        Errors of the essential parameters and of all parameters on unseen data; empty if nothing
-        was predicted.
+    all : Estimate
+        All parameters, by the method of the study.
+    essential : Estimate or None
+        The essential parameters; None if the method is not linear.
+    feasible : Estimate or None
+        Parameters of a physical robot; None if they were not fitted.
+    settings : mapping of str to EstimateSettings
+        Settings that fit each set again, to parts of the rows.
     first : bool
-        essential.first of the study.
+        Whether the essential set may be used: essential.first of the study.
+    errors : mapping of str to float, %
+        Largest relative error of torques that each set predicts for unseen data; empty if nothing
+        was predicted.
     """
-    known = np.isfinite(errors.get("essential", np.nan))
-    stands = first and known and best_set(errors, essential=True) == "essential"
-    return bool(errors) and not stands
+
+    all: Estimate
+    essential: Estimate | None = None
+    feasible: Estimate | None = None
+    settings: Mapping[SetName, EstimateSettings] = field(default_factory=dict)
+    first: bool = False
+    errors: Mapping[SetName, float] = field(default_factory=dict)
+
+    @cached_property
+    def _fitted(self) -> dict[SetName, Estimate]:
+        if self.essential is None:
+            return {}
+        fits: dict[SetName, Estimate] = {"essential": self.essential, "all": self.all}
+        return fits if self.feasible is None else {**fits, "feasible": self.feasible}
+
+    def __getitem__(self, name: SetName) -> Estimate:
+        return self._fitted[name]
+
+    def __iter__(self) -> Iterator[SetName]:
+        return iter(self._fitted)
+
+    def __len__(self) -> int:
+        return len(self._fitted)
+
+    @property
+    def used(self) -> SetName:
+        """Name of the set that is used: it predicts unseen data best."""
+        return best_set(self.errors, self.first) if self else "all"
+
+    @property
+    def whole(self) -> SetName:
+        """Name of the set that is written where every base parameter needs a value."""
+        return whole_set(self, self.used) if self else "all"
+
+    def estimate(self, name: SetName) -> Estimate:
+        """Return the estimate of one set; that of all parameters if the method is not linear."""
+        return self.get(name, self.all)
 
 
-def physical_possible(settings: EstimateSettings, fit: Estimate) -> bool:
-    """Whether a second fit, of physically consistent parameters, is possible after this fit.
+@dataclass(frozen=True, eq=False)
+class SetDocument:
+    """One set of estimated parameters (essential, feasible or all), with its values and errors.
 
-    `fit` has all parameters. This needs all columns, a fit with status ok, and weights other than
-    "covariance".
+    See `runtime.core.parameter_sets`.
+
+    Attributes
+    ----------
+    name : str
+        essential, feasible or all.
+    count : int
+        Number of parameters b.
+    relative_error : float, %
+        100 ||Y - W X|| / ||Y||.
+    unseen : float, %
+        Error on data that the set was not fitted to; null if nothing was predicted.
+    names : tuple of str
+        Names in column order.
+    X : ndarray, shape (b,), SI
+        Values.
+    sigma_corrected : ndarray, shape (b,), SI
+        Standard deviations without the assumption of independent residuals.
+    standard : mapping, SI
+        Standard parameters of the physical robot, by name; empty for the other sets.
     """
-    whole = settings.columns == "all" and fit.status == "ok"
-    return whole and settings.weights != "covariance"
 
+    name: SetName
+    count: Whole
+    relative_error: NanIfNull
+    unseen: NanIfNull
+    names: tuple[str, ...]
+    X: Vector
+    sigma_corrected: Vector
+    standard: dict[str, float] = field(default_factory=dict)  # files of before have none
 
-def physical_set(problem: Problem, observation: Observation) -> tuple[Estimate, EstimateSettings]:
-    """Fit physically consistent parameters to all rows; return the fit, and settings to repeat it.
-
-    The settings are for later fits to parts of the rows: they fix the prior, its weight and the
-    bounds by reach as found from all rows.
-    """
-    at("physical parameters")
-    settings = problem.settings.estimate
-    options = {"linear": settings.options} if settings.options else {}
-    own = EstimateSettings(
-        "feasible", "none" if settings.method == "ols" else "joint", "all", options
-    )
-    fit = estimated(problem, observation, own)
-    decided = fit.details["options"]
-    known = {"prior": decided["prior"], "reach": decided["reach"]}
-    if decided["prior"] != "none":
-        known["weight"] = fit.details["weight"]
-    return fit, replace(own, options={**options, **known})
-
-
-def held_out_validation(
-    problem: Problem, observation: Observation, choices: Mapping[Any, EstimateSettings]
-) -> CrossValidation:
-    """Divide the record into equal parts, and predict each part by a fit of the other parts.
-
-    The number of parts is LIMIT.HELD_OUT_PARTS.
-    """
-    number, folds = observation.equal_parts(LIMIT.HELD_OUT_PARTS), []
-    for p in np.unique(number):
-        part = observation.where(number == p)
-        label = f"[{', '.join(map(instant, part.span))}] s"
-        rest, name = observation.where(number != p), f"all but {label}"
-        folds.append(cross_validation(problem, rest, {label: part}, choices, name=name))
-    predictions = tuple(p for fold in folds for p in fold.predictions if not p.fitted)
-    missing = tuple(text for fold in folds for text in fold.missing)
-    return CrossValidation(folds[0].joints, predictions, missing)
+    @classmethod
+    def of(cls, sets: Sets, name: SetName) -> SetDocument:
+        """Make the entry of estimate.json of one of the sets."""
+        fit = sets[name]
+        return cls(
+            name,
+            len(fit.names),
+            fit.relative_error,
+            sets.errors.get(name, np.nan),
+            fit.names,
+            fit.X,
+            fit.sigma_corrected,
+            fit.details.get("standard", {}),
+        )
 
 
 def best_set(errors: Mapping[Any, float], essential: bool = False) -> SetName:
@@ -137,6 +189,92 @@ def whole_set(names: Collection[SetName], model_columns: SetName) -> SetName:
     return "feasible" if "feasible" in names else "all"
 
 
+def physical_asked(errors: Mapping[Any, float], first: bool) -> bool:
+    """Whether a fit of physically consistent parameters is needed for the final model.
+
+    Parameters
+    ----------
+    errors : mapping of float, %
+        Errors of the essential parameters and of all parameters on unseen data; empty if nothing
+        was predicted.
+    first : bool
+        essential.first of the study.
+    """
+    known = np.isfinite(errors.get("essential", np.nan))
+    stands = first and known and best_set(errors, essential=True) == "essential"
+    return bool(errors) and not stands
+
+
+def physical_method(problem: Problem, fit: Estimate) -> str | None:
+    """Return the name of the method that fits the physical set after the fit of all parameters.
+
+    None if that is not possible: it needs such a method, a linear method of the study, all columns,
+    a fit with status ok, and weights other than "covariance".
+    """
+    settings = problem.settings.estimate
+    whole = settings.columns == "all" and fit.status == "ok" and settings.weights != "covariance"
+    if not (problem.method.linear and whole):
+        return None
+    return next((name for name, method in problem.methods.items() if method.physical), None)
+
+
+def with_physical(problem: Problem, observation: Observation, sets: Sets) -> tuple[Sets, str]:
+    """Fit physically consistent parameters to all rows, if possible, and add them to the sets.
+
+    The settings of the set are for later fits to parts of the rows: they fix the prior, its weight
+    and the bounds by reach as found from all rows. Return the sets, and a sentence if the fit
+    failed.
+    """
+    name = physical_method(problem, sets.all)
+    if name is None:
+        return sets, ""
+    at("physical parameters")
+    settings = problem.settings.estimate
+    options = {"linear": settings.options} if settings.options else {}
+    weights: Weights = "joint" if problem.method.weighs else "none"
+    own = EstimateSettings(name, weights, "all", options)
+    try:
+        fit = estimated(problem, observation, own)
+    except InputError as e:
+        return sets, f"physical parameters: {e}"
+    if fit.status != "ok":
+        return sets, f"physical parameters: {fit.status}. {fit.message.split('. ')[0]}"
+    decided = fit.details["options"]
+    known = {"prior": decided["prior"], "reach": decided["reach"]}
+    if decided["prior"] != "none":
+        known["weight"] = fit.details["weight"]
+    again = replace(own, options={**options, **known})
+    return replace(sets, feasible=fit, settings={**sets.settings, "feasible": again}), ""
+
+
+def written_sets(problem: Problem, observation: Observation, sets: Sets) -> Sets:
+    """Add the physical set if the essential set is used.
+
+    A robot file or a program needs all parameters, which the essential set does not have.
+    """
+    if sets.used != "essential" or sets.feasible is not None:
+        return sets
+    return with_physical(problem, observation, sets)[0]
+
+
+def held_out_validation(
+    problem: Problem, observation: Observation, choices: Mapping[Any, EstimateSettings]
+) -> CrossValidation:
+    """Divide the record into equal parts, and predict each part by a fit of the other parts.
+
+    The number of parts is LIMIT.HELD_OUT_PARTS.
+    """
+    number, folds = observation.equal_parts(LIMIT.HELD_OUT_PARTS), []
+    for p in np.unique(number):
+        part = observation.where(number == p)
+        label = f"[{', '.join(map(instant, part.span))}] s"
+        rest, name = observation.where(number != p), f"all but {label}"
+        folds.append(cross_validation(problem, rest, {label: part}, choices, name=name))
+    predictions = tuple(p for fold in folds for p in fold.predictions if not p.fitted)
+    missing = tuple(text for fold in folds for text in fold.missing)
+    return CrossValidation(folds[0].joints, predictions, missing)
+
+
 def ranking_text(errors: Mapping[SetName, float], counts: Mapping[SetName, int], where: str) -> str:
     """Write in one sentence how well each set of parameters predicts unseen data, best first.
 
@@ -152,109 +290,77 @@ def ranking_text(errors: Mapping[SetName, float], counts: Mapping[SetName, int],
     )
 
 
-@dataclass(frozen=True)
-class Fits:
-    """Estimates from all rows of the records, one for each set of parameters (essential, all, ...).
+def fit_problem(
+    problem: Problem, observation: Observation, provenance: Mapping[str, Any]
+) -> tuple[Sets, Essential]:
+    """Fit all parameters to the rows Y = W X + rho of a problem, then only the essential ones.
 
-    Attributes
-    ----------
-    estimate : Estimate
-        All parameters, by the method of the study.
-    reduced : Essential
-        The essential parameters, by the linear companion of that method.
-    sets : mapping of str to Estimate
-        Estimates of the sets "essential" and "all", and of "feasible" if it was fitted; empty if
-        the method is not linear.
-    settings : mapping of str to EstimateSettings
-        Settings that fit each set from parts of the rows.
+    The essential parameters, and their elimination, are those of the linear companion of the
+    method.
     """
-
-    estimate: Estimate
-    reduced: Essential
-    sets: Mapping[SetName, Estimate]
-    settings: Mapping[Any, EstimateSettings]
-
-    def best(self, validation: Sequence[CrossValidation], study: Study) -> Estimate:
-        """Return the estimate of the set of parameters that best predicts data not fitted.
-
-        If the method is not linear, return the estimate of all parameters.
-        """
-        errors = validation[-1].errors() if validation and self.sets else {}
-        return self.sets.get(best_set(errors, study.essential.first), self.estimate)
-
-
-def fit_problem(problem: Problem, observation: Observation, provenance: Mapping[str, Any]) -> Fits:
-    """Fit all parameters to the rows Y = W X + rho of a problem, then only the essential ones."""
-    study, model = problem.settings, problem.model
+    study = problem.settings
     at("least squares, essential parameters")
-    reduced = essential_of(
-        observation,
+    essential = essential_of(
+        problem.linear_system(observation),
         study.essential,
-        linear_companion(study.estimate),
-        model=model,
+        model=problem.model,
         provenance=provenance,
     )
-    essential = replace(study.estimate, columns=reduced.names)
-    if study.estimate.method in LINEAR:
-        return Fits(
-            reduced.all_parameters,
-            reduced,
-            {"essential": reduced.estimate, "all": reduced.all_parameters},
-            {"essential": essential, "all": study.estimate},
-        )
+    own = replace(study.estimate, columns=essential.names)
+    if problem.method.linear:
+        return Sets(
+            all=essential.all_parameters,
+            essential=essential.estimate,
+            settings={"essential": own, "all": study.estimate},
+            first=study.essential.first,
+        ), essential
     at(study.estimate.method)
-    return Fits(
-        estimated(problem, observation, provenance=provenance),
-        reduced,
-        {},
-        {"all": study.estimate, "essential": essential},
-    )
+    fit = estimated(problem, observation, provenance=provenance)
+    return Sets(fit, settings={"all": study.estimate, "essential": own}), essential
 
 
 def validated(
     problem: Problem,
-    fits: Fits,
+    sets: Sets,
     observation: Observation,
     unseen: Mapping[str, Observation],
     name: str,
-) -> tuple[Fits, tuple[CrossValidation, ...], tuple[str, ...]]:
+) -> tuple[Sets, tuple[CrossValidation, ...], tuple[str, ...]]:
     """Validate each set of parameters: predict the torques of data that were not fitted.
 
     The data are other parts of the records (time windows or fifths), then separate records.
 
-    Return three values: the fits, with the physical set if it may be used; the predictions; and
-    sentences on the predictions or fits that failed. Fifths of the records are used if their halves
-    prefer all parameters to the physical ones. Nothing is predicted if a nonlinear method did not
-    converge, because each prediction would simulate a wrong loop.
+    Return three values: the sets with their errors, and with the physical set if it may be used;
+    the predictions; and sentences on the predictions or fits that failed. Fifths of the records are
+    used if their halves prefer all parameters to the physical ones. Nothing is predicted if a
+    nonlinear method did not converge, because each prediction would simulate a wrong loop.
     """
     study = problem.settings
-    method, status = study.estimate.method, fits.estimate.status
-    if status != "ok" and method not in LINEAR:
-        return fits, (), (f"validation: {method} ended with status {status}",)
+    status = sets.all.status
+    if status != "ok" and not problem.method.linear:
+        return sets, (), (f"validation: {study.estimate.method} ended with status {status}",)
     at("validation")
     predict = partial(_validation, problem, observation, unseen, name)
-    validation, missing = predict(fits.settings, fits.sets or {"all": fits.estimate})
-    errors = validation[-1].errors() if validation else {}
-    linear = method in LINEAR
-    possible = linear and physical_possible(study.estimate, fits.estimate)
-    if possible and physical_asked(errors, study.essential.first):
-        try:
-            fit, settings = physical_set(problem, observation)
-        except InputError as e:
-            return fits, validation, (f"physical parameters: {e}", *missing)
-        if fit.status != "ok":
-            reason = f"physical parameters: {fit.status}. {fit.message.split('. ')[0]}"
-            return fits, validation, (reason, *missing)
-        sets, choices = {**fits.sets, "feasible": fit}, {**fits.settings, "feasible": settings}
-        fits = replace(fits, sets=sets, settings=choices)
-        physical, more = predict({"feasible": settings}, {"feasible": fit})
+    validation, missing = predict(sets.settings, sets or {"all": sets.all})
+    if physical_asked(_errors(validation), study.essential.first):
+        sets, failure = with_physical(problem, observation, sets)
+        missing = (failure, *missing) if failure else missing
+    if sets.feasible is not None:
+        choice = {"feasible": sets.settings["feasible"]}
+        physical, more = predict(choice, {"feasible": sets.feasible})
         validation = tuple(map(CrossValidation.beside, validation, physical))
         missing = tuple(dict.fromkeys((*missing, *more)))
-    halved = not unseen and not study.validate.split and "feasible" in fits.sets
-    if halved and validation and best_set(validation[0].errors()) == "all":
-        by_fifths = held_out_validation(problem, observation, fits.settings)
-        validation, missing = (by_fifths,), by_fifths.missing
-    return fits, validation, missing
+        halved = not unseen and not study.validate.split
+        if halved and validation and best_set(validation[0].errors()) == "all":
+            by_fifths = held_out_validation(problem, observation, sets.settings)
+            validation, missing = (by_fifths,), by_fifths.missing
+    return replace(sets, errors=_errors(validation)), validation, missing
+
+
+def _errors(validation: Sequence[CrossValidation]) -> dict[SetName, float]:
+    """Return the error of each set on the last data that it predicts, %, in the order of ORDER."""
+    errors = validation[-1].errors() if validation else {}
+    return {name: errors[name] for name in ORDER if name in errors}
 
 
 def _validation(

@@ -20,14 +20,14 @@ import numpy as np
 from runtime.core.arrays import require_kind
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.least_squares.linear import assemble
-from runtime.core.least_squares.method import Beginning, Method
+from runtime.core.least_squares.linear import System, assemble
+from runtime.core.least_squares.method import Beginning, Method, Methods, linear_system, method_of
 from runtime.core.model import GeneratedModel, drives_of, require_emitted
 from runtime.core.provenance import origin
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared, stacked
-from runtime.core.signals.filters import Reader
+from runtime.core.signals.reader import Reader
 from runtime.core.study import EstimateSettings, Study
 
 RECORD_EXPECTED = (
@@ -85,7 +85,7 @@ class Problem:
     unseen: tuple[Record, ...]
     settings: Study
     reader: Reader
-    methods: Mapping[str, Method]
+    methods: Methods
     notes: tuple[Note, ...] = ()
 
     def __post_init__(self) -> None:
@@ -124,9 +124,32 @@ class Problem:
         """Method of estimation that settings.estimate names."""
         return self.methods[self.settings.estimate.method]
 
+    def linear_system(self, rows: Observation, **changes: Any) -> System:
+        """Weigh the rows Y = W X + rho for linear least squares with the weights of the settings.
+
+        It is the system of the method, or of its companion if the method is not linear. changes :
+        other values of settings.estimate, such as columns.
+        """
+        settings = self.settings.estimate
+        return linear_system(
+            rows, replace(settings, **changes) if changes else settings, self.methods
+        )
+
     def noted(self, kind: str) -> Note | None:
         """Return the first message (note) on the subject `kind`; None if there is no message."""
         return next((note for note in self.notes if note.kind == kind), None)
+
+    def require_motion(self, who: str) -> None:
+        """Raise SettingsError if the records are poses at rest, for an analysis of a motion.
+
+        who : name of the analysis in the message.
+        """
+        if self.reader.at_rest:
+            raise SettingsError(
+                f"reader: {self.settings.signals.reader} is for poses at rest, but {who} needs "
+                "records of a motion; set another reader",
+                path=("signals", "reader"),
+            )
 
     @property
     def provenance(self) -> dict[str, Any]:
@@ -214,7 +237,7 @@ def estimated(
 def estimate_of(
     observation: Observation,
     settings: EstimateSettings,
-    methods: Mapping[str, Method],
+    methods: Methods,
     *,
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
@@ -254,17 +277,7 @@ def estimate_of(
     )
 
 
-def method_of(settings: EstimateSettings, methods: Mapping[str, Method]) -> Method:
-    """Return the method of estimation that `settings` names; SettingsError if it is unknown."""
-    if settings.method not in methods:
-        raise SettingsError(
-            f"unknown method {settings.method!r}; expected {' or '.join(methods)}",
-            path=("estimate", "method"),
-        )
-    return methods[settings.method]
-
-
-def point_estimate(settings: EstimateSettings, methods: Mapping[str, Method]) -> EstimateSettings:
+def point_estimate(settings: EstimateSettings, methods: Methods) -> EstimateSettings:
     """Return settings for a faster fit that gives X only, without explanations for the user.
 
     Methods that have no such options use the settings unchanged.

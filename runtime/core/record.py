@@ -147,66 +147,27 @@ class Record:
         origin: Origin | None = None,
         **named: ArrayLike | None,
     ) -> None:
-        if unknown := sorted(named.keys() - {*JOINT_CHANNELS}):
-            raise TypeError(
-                f"unexpected argument {unknown[0]}; expected some of {', '.join(JOINT_CHANNELS)}"
-            )
+        _require_known(named)
         require_kind(name, str, "name", "a text")
         require_kind(channels, (Mapping, type(None)), "channels", "a mapping of names to arrays")
         require_kind(origin, (Origin, type(None)), "origin", "an Origin")
         origin = origin or Origin()
         file = ", ".join(origin.files) or name
-        signals = {"t": t, "q": q, "tau": tau, "tau_known": tau_known}
-        given = {
-            label: _array(x, label, file)
-            for label, x in signals.items()
-            if x is not None or label != "tau_known"
-        }
-        shapes = {label: x.shape for label, x in given.items()}
-        given |= {label: x[:, None] for label, x in given.items() if label != "t" and x.ndim == 1}
-        N = len(given["t"]) if given["t"].ndim == 1 else -1
-        if given["q"].ndim != 2 or given["q"].shape != given["tau"].shape or len(given["q"]) != N:
-            text = ", ".join(f"{label} {shapes[label]}" for label in ("t", "q", "tau"))
-            raise InputError(
-                f"{text}; expected the shapes (N,), (N, n), (N, n) for N samples of n joints",
-                file=file,
-            )
-        if N < LIMIT.FEWEST_SAMPLES:
-            raise InputError(
-                f"the record has {N} samples; expected at least {LIMIT.FEWEST_SAMPLES}", file=file
-            )
-        for label, x in given.items():
-            if label != "t" and x.shape != given["q"].shape:
-                raise InputError(
-                    f"{label} has shape {shapes[label]}, but q has shape {given['q'].shape}; "
-                    "expected the same shape",
-                    file=file,
-                )
-        others = {**(channels or {}), **named}
-        own = {
-            label: _channel(label, x, given["q"].shape, file)
-            for label, x in others.items()
-            if x is not None
-        }
-        missing = _missing(missing, given["q"].shape, file)
+        signals = _signals({"t": t, "q": q, "tau": tau, "tau_known": tau_known}, file)
+        shape = signals["q"].shape
+        further = {**(channels or {}), **named}
+        own = {key: _channel(key, x, shape, file) for key, x in further.items() if x is not None}
+        missing = _missing(missing, shape, file)
         if missing is not None:
-            given["q"] = bridged(given["q"], missing.at_joints() & np.isnan(given["q"]))
-        for label, x in given.items():
-            column = label.replace("_", "")
-            require_finite(
-                x if x.ndim == 2 else x[:, None],
-                [column] if x.ndim == 1 else [f"{column}{j + 1}" for j in range(x.shape[1])],
-                file,
-                hint=f"{COUNTS} (here: missing=np.isnan(q))" if label == "q" else "",
-                largest=FINITE if label == "t" else LIMIT.LARGEST_NUMBER,
-            )
+            unknown = missing.at_joints() & np.isnan(signals["q"])
+            signals["q"] = bridged(signals["q"], unknown)
+        for label, x in signals.items():
+            _require_numbers(label, x, file)
             x.setflags(write=False)
-        rate = None if rate is None else real_number(rate, "rate", file)
-        if rate is not None and not (np.isfinite(rate) and rate > 0):
-            raise InputError(f"rate {rate} Hz; expected a positive number", file=file)
-        rate = rate_of(Stamps(file, rate=rate, jitter=origin.jitter), given["t"])
+        stamps = Stamps(file, rate=_positive(rate, file), jitter=origin.jitter)
+        rate = rate_of(stamps, signals["t"])
         rest = {"rate": rate, "name": name, "missing": missing, "channels": own, "origin": origin}
-        for label, value in (dict.fromkeys(signals) | given | rest).items():
+        for label, value in ({"tau_known": None} | signals | rest).items():
             object.__setattr__(self, label, value)
 
     @property
@@ -267,6 +228,78 @@ class Record:
         Values computed from the fields are not sent.
         """
         return partial(Record, **{f.name: getattr(self, f.name) for f in fields(self)}), ()
+
+
+def _require_known(named: Mapping[str, Any]) -> None:
+    """Raise TypeError for a keyword argument that is no channel of the joints."""
+    if unknown := sorted(named.keys() - {*JOINT_CHANNELS}):
+        raise TypeError(
+            f"unexpected argument {unknown[0]}; expected some of {', '.join(JOINT_CHANNELS)}"
+        )
+
+
+def _signals(given: Mapping[str, ArrayLike | None], file: str) -> dict[str, Array]:
+    """Convert t, q, tau and tau_known to arrays of the shapes (N,) and (N, n).
+
+    tau_known is left out if it is None. InputError if the shapes differ.
+    """
+    arrays = {
+        label: _array(x, label, file)
+        for label, x in given.items()
+        if x is not None or label != "tau_known"
+    }
+    signals = {k: x[:, None] if k != "t" and x.ndim == 1 else x for k, x in arrays.items()}
+    _require_shapes(signals, {label: x.shape for label, x in arrays.items()}, file)
+    return signals
+
+
+def _require_shapes(
+    signals: Mapping[str, Array], shapes: Mapping[str, tuple[int, ...]], file: str
+) -> None:
+    """Raise InputError unless t, q, tau and tau_known have the same N samples, enough of them.
+
+    shapes : those that were given, for the message.
+    """
+    t, q, tau = (signals[label] for label in ("t", "q", "tau"))
+    if t.ndim != 1 or q.ndim != 2 or q.shape != tau.shape or len(q) != len(t):
+        text = ", ".join(f"{label} {shapes[label]}" for label in ("t", "q", "tau"))
+        raise InputError(
+            f"{text}; expected the shapes (N,), (N, n), (N, n) for N samples of n joints",
+            file=file,
+        )
+    if len(t) < LIMIT.FEWEST_SAMPLES:
+        raise InputError(
+            f"the record has {len(t)} samples; expected at least {LIMIT.FEWEST_SAMPLES}", file=file
+        )
+    known = signals.get("tau_known", q)
+    if known.shape != q.shape:
+        raise InputError(
+            f"tau_known has shape {shapes['tau_known']}, but q has shape {q.shape}; "
+            "expected the same shape",
+            file=file,
+        )
+
+
+def _require_numbers(label: str, x: Array, file: str) -> None:
+    """Raise InputError unless the signal x, shape (N,) or (N, n), has finite numbers only."""
+    column = label.replace("_", "")
+    require_finite(
+        x if x.ndim == 2 else x[:, None],
+        [column] if x.ndim == 1 else [f"{column}{j + 1}" for j in range(x.shape[1])],
+        file,
+        hint=f"{COUNTS} (here: missing=np.isnan(q))" if label == "q" else "",
+        largest=FINITE if label == "t" else LIMIT.LARGEST_NUMBER,
+    )
+
+
+def _positive(rate: float | None, file: str) -> float | None:
+    """Return the rate, Hz, as a float; InputError unless it is positive. None stays None."""
+    if rate is None:
+        return None
+    rate = real_number(rate, "rate", file)
+    if not (np.isfinite(rate) and rate > 0):
+        raise InputError(f"rate {rate} Hz; expected a positive number", file=file)
+    return rate
 
 
 def _array(x: ArrayLike | None, label: str, file: str) -> Array:

@@ -12,21 +12,11 @@ import numpy as np
 
 from runtime.core.checklist import Checklist, checklist_of, lost_joints, negative_elements
 from runtime.core.documents import json_text
-from runtime.core.errors import InputError
 from runtime.core.essential import Essential
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.least_squares.method import LINEAR
 from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel, joint_labels, joint_torque_units
-from runtime.core.parameter_sets import (
-    ORDER,
-    SetName,
-    best_set,
-    physical_possible,
-    physical_set,
-    ranking_text,
-    whole_set,
-)
+from runtime.core.parameter_sets import SetDocument, SetName, Sets, ranking_text, written_sets
 from runtime.core.part import Part, printed
 from runtime.core.problem import SIGNALS, Problem
 from runtime.core.provenance import record_names
@@ -56,8 +46,10 @@ class Identification:
         Prepared: model, records, settings.
     observation : Observation
         Y = W X + rho of all records.
-    estimate : Estimate
-        All parameters, by the method of the study.
+    sets : Sets
+        The essential, the feasible and all parameters; which set is used, which one is written
+        (`runtime.core.parameter_sets`). A mapping of the estimates by name; empty if the method of
+        the study is not linear.
     essential : Essential
         The essential parameters and the elimination; if the method is not linear, by its linear
         companion.
@@ -71,9 +63,6 @@ class Identification:
     uncertainty : Uncertainty
         Standard deviations without the assumption of independent residuals, whiteness of the
         residuals, F-tests, essential sets by threshold.
-    sets : mapping of str to Estimate
-        The essential, the feasible and all parameters (`runtime.core.parameter_sets`);
-        empty if the method of the study is not linear.
     unseen_rows : mapping of str to Observation
         Rows of the records that are predicted, not fitted, by name.
     parts : tuple of Part
@@ -84,13 +73,12 @@ class Identification:
 
     problem: Problem
     observation: Observation
-    estimate: Estimate
+    sets: Sets
     essential: Essential
     comparison: tuple[JointComparison, ...]
     validation: tuple[CrossValidation, ...]
     correlations: WeakDirections
     uncertainty: Uncertainty
-    sets: Mapping[SetName, Estimate] = field(default_factory=dict)
     unseen_rows: Mapping[str, Observation] = field(default_factory=dict)
     parts: tuple[Part, ...] = ()
     missing: tuple[str, ...] = ()
@@ -157,14 +145,13 @@ class Identification:
         return self.estimate.status == "ok"
 
     @property
-    def set_errors(self) -> dict[SetName, float]:
+    def set_errors(self) -> Mapping[SetName, float]:
         """Relative error, %, of torques that each set of parameters predicts for unseen data.
 
         The sets are "essential", "feasible" (the physical set) and "all". If several parts or records are
         predicted, the error is the largest one. Empty if none is predicted.
         """
-        judged = self.validation[-1].errors() if self.validation else {}
-        return {name: judged[name] for name in ORDER if name in judged}
+        return self.sets.errors
 
     @property
     def unseen(self) -> str:
@@ -186,14 +173,17 @@ class Identification:
         return bool(self.validation) and self.validation[-1].further
 
     @property
+    def estimate(self) -> Estimate:
+        """Estimate of all parameters, by the method of the study."""
+        return self.sets.all
+
+    @property
     def model_columns(self) -> SetName:
         """Name of the set of parameters in the final model: "essential", "feasible" or "all".
 
         `runtime.core.parameter_sets` explains the choice; it is "all" if the method is not linear.
         """
-        if self.study.estimate.method not in LINEAR:
-            return "all"
-        return best_set(self.set_errors, self.study.essential.first)
+        return self.sets.used
 
     @property
     def model_estimate(self) -> Estimate:
@@ -201,7 +191,7 @@ class Identification:
 
         It is `estimate` if the method is not linear.
         """
-        return self.sets.get(self.model_columns, self.estimate)
+        return self.sets.estimate(self.sets.used)
 
     @property
     def whole_estimate(self) -> Estimate:
@@ -209,26 +199,12 @@ class Identification:
 
         It is `model_estimate`, or the physical set if the essential set is used.
         """
-        return self.written_sets.get(
-            whole_set(self.written_sets, self.model_columns), self.estimate
-        )
+        return self.written.estimate(self.written.whole)
 
     @cached_property
-    def written_sets(self) -> Mapping[SetName, Estimate]:
-        """Estimates of each set of parameters; for a final model "essential" also a physical set.
-
-        A robot file or a program needs all parameters, which the essential set does not have.
-        """
-        linear = self.study.estimate.method in LINEAR
-        if self.model_columns != "essential" or "feasible" in self.sets or not linear:
-            return self.sets
-        if not physical_possible(self.study.estimate, self.estimate):
-            return self.sets
-        try:
-            fit, _ = physical_set(self.problem, self.observation)
-        except InputError:
-            return self.sets
-        return {**self.sets, "feasible": fit} if fit.status == "ok" else self.sets
+    def written(self) -> Sets:
+        """The sets of estimate.json; for a final model "essential" also a physical set."""
+        return written_sets(self.problem, self.observation, self.sets)
 
     @property
     def torque_unit(self) -> str:
@@ -541,19 +517,7 @@ class Identification:
             **({"by_record": self.record_errors} if self.record_errors else {}),
             "verdict": self.verdict,
             "checklist": self.checklist,
-            "sets": [
-                {
-                    "name": name,
-                    "count": len(fit.names),
-                    "relative_error": fit.relative_error,
-                    "unseen": self.set_errors.get(name),
-                    "names": fit.names,
-                    "X": fit.X,
-                    "sigma_corrected": fit.sigma_corrected,
-                    "standard": fit.details.get("standard", {}),
-                }
-                for name, fit in self.written_sets.items()
-            ],
+            "sets": [SetDocument.of(self.written, name) for name in self.written],
             "model_columns": self.model_columns,
         }
         for part in self.parts:

@@ -147,26 +147,6 @@ class Signals(Settings):
     torque_median: OddWindow = 1
     options: Mapping[str, Any] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
-        for key, given in (
-            ("step", self.step is not None),
-            ("side", self.side != "joint"),
-        ):
-            require(
-                self.reader == "counts" or not given,
-                f"given, but reader is {self.reader}; set reader: counts, or remove this key",
-                key,
-            )
-        if self.reader == "static":
-            single = {"median": 1, "torque_median": 1, "lowpass": None, "decimate": None}
-            for key, value in single.items():
-                object.__setattr__(self, key, value)
-
-    @property
-    def admits_missing(self) -> bool:
-        """Whether records may lack positions at some samples, as the reader `counts` allows."""
-        return self.reader == "counts"
-
 
 class Rows(Settings):
     """Settings that select the rows of W and Y.
@@ -188,6 +168,9 @@ class Rows(Settings):
     low_speed: PerJoint[NotNegative] = 0.0
 
 
+Weights = Literal["none", "joint", "iterated", "covariance"]
+
+
 class EstimateSettings(Settings):
     """Method of estimation, weights of the rows, and columns of W that are fitted.
 
@@ -204,7 +187,7 @@ class EstimateSettings(Settings):
     """
 
     method: Text = "ols"
-    weights: Literal["none", "joint", "iterated", "covariance"] = "none"
+    weights: Weights = "none"
     columns: Literal["all"] | Many[Text] = "all"
     options: Mapping[str, Any] = field(default_factory=dict)
 

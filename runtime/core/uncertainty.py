@@ -29,11 +29,9 @@ from runtime.core.documents import Result
 from runtime.core.essential import Essential
 from runtime.core.least_squares.block_covariance import gram_solution, scatter
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.least_squares.method import linear_companion, linear_system
+from runtime.core.least_squares.linear import System
 from runtime.core.limits import LIMIT
 from runtime.core.residuals import Whiteness, effective_share, whiteness
-from runtime.core.rows.observation import Observation
-from runtime.core.study import EstimateSettings
 from runtime.core.table import Table
 from runtime.core.validation import JointComparison
 
@@ -262,8 +260,7 @@ class Uncertainty(Result):
 
 
 def uncertainty(
-    observation: Observation,
-    settings: EstimateSettings,
+    system: System,
     essential: Essential,
     comparison: Sequence[JointComparison],
 ) -> Uncertainty:
@@ -271,30 +268,28 @@ def uncertainty(
 
     Parameters
     ----------
-    observation : Observation
-        Rows from which the parameters were estimated.
-    settings : EstimateSettings
-        Method of the study; the tests use its linear companion.
+    system : System
+        Rows from which the parameters were estimated, as linear least squares weighs them.
     essential : Essential
         Parameters, and their elimination.
     comparison : sequence of JointComparison
         Residuals whose whiteness is tested.
     """
-    by_joint = whiteness(comparison, observation.rate)
+    rate = system.observation.rate
+    by_joint = whiteness(comparison, rate)
     share = effective_share(by_joint)
     return Uncertainty(
-        bootstrap=block_bootstrap(observation, settings, essential.estimate),
+        bootstrap=block_bootstrap(system, essential.estimate),
         whiteness=by_joint,
         f_tests=f_tests(essential, share),
         sets=sets(essential),
         all_count=len(essential.all_parameters.names),
-        memory=1 / (share * observation.rate) if share > 0 else 0.0,
+        memory=1 / (share * rate) if share > 0 else 0.0,
     )
 
 
 def block_bootstrap(
-    observation: Observation,
-    settings: EstimateSettings,
+    system: System,
     fit: Estimate,
     *,
     runs: int = LIMIT.BOOTSTRAP_RUNS,
@@ -302,9 +297,9 @@ def block_bootstrap(
 ) -> BlockBootstrap:
     """Compute the standard deviations of an estimate by a bootstrap over blocks of time.
 
-    runs : number of draws. The weights of the rows do not change.
+    system : rows as linear least squares weighs them, with the columns of `fit` among others. runs : number of draws. The weights of the rows do not change.
     """
-    system = linear_system(observation, linear_companion(settings)).select(fit.names)
+    system = system.select(fit.names)
     blocks, drawn = list(system.block_rows()), np.full(len(fit.names), np.nan)
     if len(blocks) > 1 and fit.status == "ok":
         drawn = scatter(blocks, gram_solution, runs, seed)

@@ -22,8 +22,7 @@ from scipy.sparse.csgraph import connected_components
 from runtime.core.documents import Result
 from runtime.core.errors import InputError, instant
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.least_squares.linear import percent
-from runtime.core.least_squares.method import linear_companion, linear_system
+from runtime.core.least_squares.linear import System, percent
 from runtime.core.least_squares.solution import unit_columns
 from runtime.core.limits import LIMIT
 from runtime.core.problem import Problem, estimated, point_estimate
@@ -373,16 +372,14 @@ class WeakDirections(Result, keys="threshold pairs groups directions", schema=1)
 
 
 def weak_directions(
-    observation: Observation,
-    settings: EstimateSettings | None = None,
+    system: System,
     *,
     threshold: float = LIMIT.CORRELATION,
 ) -> WeakDirections:
     """Find correlated parameters, and the three parameter combinations that change W X least.
 
-    threshold : smallest |correlation| that is reported.
+    system : rows as least squares weighs them. threshold : smallest |correlation| that is reported.
     """
-    system = linear_system(observation, linear_companion(settings or EstimateSettings()))
     names = system.names
     R, _ = unit_columns(system.weighted.R11)
     _, s, Vt = np.linalg.svd(R)

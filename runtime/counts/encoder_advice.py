@@ -44,7 +44,7 @@ class EncoderSteps(Part):
 
     def text(self) -> str:
         """Write one sentence of advice for each record that `reader: counts` would improve."""
-        readings = [r for r in self.result.prepared if r.study.signals.reader == "lowpass"]
+        readings = [r for r in self.result.prepared if r.reader.filters_positions]
         sentences = [
             sentence
             for r in readings
@@ -61,7 +61,7 @@ def visible_steps(result: Identification) -> tuple[str, float]:
     """
     said, most = "", -1.0
     for one in result.prepared:
-        if one.study.signals.reader == "lowpass":
+        if one.reader.filters_positions:
             found = _steps(one.record, one.states, one.study.signals, one.drives)
             if found is not None and float(found[1].max()) > most:
                 most, joint = float(found[1].max()), int(np.argmax(found[1]))

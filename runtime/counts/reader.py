@@ -7,6 +7,7 @@ are known.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from runtime.core.drives import Drives, encoder_drives, encoder_root
 from runtime.core.missing import Missing, held_samples
 from runtime.core.record import Record
 from runtime.core.signals.filters import SpeedErrors, States, filtered_states
+from runtime.core.signals.reader import Reader, Steps
 from runtime.core.study import Signals
 from runtime.counts.lattice import unwrapped_counts
 from runtime.counts.reading import read_counts
@@ -44,14 +46,27 @@ def counted(record: Record, signals: Signals) -> States:
     return replace(states, errors=errors, findings=findings)
 
 
+def rounded(record: Record, signals: Signals, step: Steps, side: Any) -> States:
+    """Compute the joint states of a record whose encoders have known steps on `side` of the gears.
+
+    The phase of the counts is not known. step : rad or m; 0: the positions are exact, and only the
+    filters of the study are used.
+    """
+    if not step:
+        return filtered_states(record.q, record.rate, signals)
+    return counted(record, replace(signals, step=step, side=side))
+
+
+def encoder(signals: Signals) -> tuple[Steps, str]:
+    """Return step and side of the encoders by the settings; step None: from the record."""
+    return signals.step, signals.side
+
+
 def unwrapped(record: Record, signals: Signals, drives: Drives | None = None) -> Record:
     """Return the record without the jumps of position that overflowing encoder counters cause.
 
-    Any reader except `counts` leaves the record unchanged. `drives` are the drives of the robot,
-    for encoders on the motor side.
+    `drives` are the drives of the robot, for encoders on the motor side.
     """
-    if signals.reader != "counts":
-        return record
     drives = encoder_drives(signals.side, drives)
     position = encoder_position(record.q, drives)
     known, counts, wraps = unwrapped_counts(position, signals.step, name=record.name)
@@ -65,3 +80,7 @@ def encoder_position(q: Array, drives: Drives | None, missing: Missing | None = 
     """Convert joint positions q to encoder positions, shape (N, n); nan at missing samples."""
     x = q.copy() if drives is None else drives.motor_position(q)
     return x if missing is None else np.where(missing.at_encoders(drives), np.nan, x)
+
+
+COUNTS = Reader(counted, missing=True, rounded=rounded, encoder=encoder, unwrapped=unwrapped)
+"""Positions are counts of encoders, which bound the motion."""

@@ -7,7 +7,7 @@ is null. Readers ignore keys that they do not know; keys may be added under the 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +18,11 @@ from pydantic_core import core_schema
 from runtime.core.cestac.result import SCHEMA as CESTAC
 from runtime.core.cestac.result import LevelResult, Verdict
 from runtime.core.cestac.runs import Run
-from runtime.core.documents import NanIfNull, Vector, Whole, from_text
+from runtime.core.documents import Vector, Whole, from_text
 from runtime.core.errors import InputError
 from runtime.core.least_squares.estimate import SCHEMA as ESTIMATE
 from runtime.core.least_squares.estimate import Estimate, JointFit
-from runtime.core.parameter_sets import SetName, whole_set
+from runtime.core.parameter_sets import SetDocument, SetName, whole_set
 from runtime.core.validation import RecordError, WeakDirections
 from runtime.documents.files import result_text
 
@@ -62,42 +62,6 @@ class EssentialDocument:
     per_joint: tuple[JointFit, ...]
     threshold: float
     trail: tuple[dict[str, Any], ...]
-
-
-@dataclass(frozen=True, eq=False)
-class SetDocument:
-    """One set of estimated parameters (essential, feasible or all), with its values and errors.
-
-    See `runtime.core.parameter_sets`.
-
-    Attributes
-    ----------
-    name : str
-        essential, feasible or all.
-    count : int
-        Number of parameters b.
-    relative_error : float, %
-        100 ||Y - W X|| / ||Y||.
-    unseen : float, %
-        Error on data that the set was not fitted to; null if nothing was predicted.
-    names : tuple of str
-        Names in column order.
-    X : ndarray, shape (b,), SI
-        Values.
-    sigma_corrected : ndarray, shape (b,), SI
-        Standard deviations without the assumption of independent residuals.
-    standard : mapping, SI
-        Standard parameters of the physical robot, by name; empty for the other sets.
-    """
-
-    name: SetName
-    count: Whole
-    relative_error: NanIfNull
-    unseen: NanIfNull
-    names: tuple[str, ...]
-    X: Vector
-    sigma_corrected: Vector
-    standard: dict[str, float] = field(default_factory=dict)  # files of before have none
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

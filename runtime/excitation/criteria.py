@@ -33,7 +33,6 @@ from runtime.core.problem import Problem
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.predicted import Weights
-from runtime.core.signals.filters import lowpassed
 from runtime.excitation.settings import ExcitationSettings
 from runtime.loop.dry_friction import dry_friction
 from runtime.loop.trajectories import Motion
@@ -227,7 +226,7 @@ def plan_rows(problem: Problem, motion: Motion, rate: float) -> Observation:
     settings = problem.settings
     settings = replace(settings, rows=replace(settings.rows, window=(None, None)))
     # planned positions are exact: a reader of encoder counts has nothing to read
-    reader = lowpassed if settings.signals.admits_missing else problem.reader
+    reader = problem.reader.at_step(0.0, "joint")
     return (
         problem.changed(settings=settings, records=(record,), unseen=(), reader=reader)
         .prepared[0]

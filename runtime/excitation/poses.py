@@ -112,7 +112,7 @@ def static_poses(problem: Problem) -> StaticPoses:
     model, settings = problem.model, cast(Any, problem.settings).excitation or ExcitationSettings()
     require_no_channels(model, "the search for poses")
     require_no_wrench(model, "the search for poses")
-    if problem.records and problem.settings.signals.reader != "static":
+    if problem.records and not problem.reader.at_rest:
         raise InputError(
             "new poses can be added only to a record of poses at rest; set signals: {reader: static}"
         )

@@ -20,11 +20,12 @@ import numpy as np
 
 from runtime.core.errors import InputError
 from runtime.core.essential import essential_of
+from runtime.core.least_squares.linear import assemble
+from runtime.core.least_squares.wls import weighted_system
 from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, require, require_no_channels, require_no_wrench
-from runtime.core.problem import Problem, estimated, observe_rows
+from runtime.core.problem import Problem, observe_rows
 from runtime.core.rows.predicted import Weights, kept_correlation
-from runtime.core.signals.filters import require_motion
 from runtime.core.study import Study
 from runtime.excitation.criteria import criterion_of, excesses, limits_of, plan_rows, weights_of
 from runtime.excitation.optimiser import Search, improve, one_start
@@ -68,7 +69,7 @@ def excite(
     study: Any = problem.settings
     require_no_channels(model, "the search for a motion")
     require_no_wrench(model, "the search for a motion")
-    require_motion(study.signals, "the search for a motion (poses: excitation: {poses: N})")
+    problem.require_motion("the search for a motion (poses: excitation: {poses: N})")
     settings = study.excitation or ExcitationSettings()
     limits = limits_of(model, settings.limits)
     known = _known_estimate(problem, settings)
@@ -169,14 +170,14 @@ def _known_estimate(problem: Problem, settings: ExcitationSettings) -> Known:
         weights = weights_of(model, settings, values, essential=kept)
         return Known(X, "values of the robot file", weights)
     observation = observe_rows(problem)
-    linear = replace(study.estimate, method="ols", weights="none", options={}, columns="all")
-    fit = estimated(problem, observation, linear)
+    system = weighted_system(observation)
+    fit = assemble(system, system.solve(), model=model)
     if fit.status == "rank-deficient":
         raise InputError(
             f"the record does not determine {', '.join(' '.join(group) for group in fit.groups)}; "
             "remove this record from the study, or use a record that determines these parameters"
         )
-    names = essential_of(observation, study.essential, linear).names
+    names = essential_of(system, study.essential).names
     deviations = [joint.sigma_rho for joint in fit.per_joint]
     weights = weights_of(
         model, settings, dict(zip(fit.names, fit.X, strict=True)), essential=names, s=deviations

@@ -38,7 +38,6 @@ from runtime.core.problem import Problem
 from runtime.core.rows.observation import LoopRows, Observation
 from runtime.core.rows.prepared import Prepared
 from runtime.core.settings import to_mapping
-from runtime.core.signals.filters import lowpassed
 from runtime.core.study import EstimateSettings
 from runtime.loop.closed_loop import ClosedLoop, closed_loop
 from runtime.loop.control_law import parameters_of
@@ -142,20 +141,13 @@ class Loop:
     @property
     def notes(self) -> tuple[str, ...]:
         """Remarks for the user of a study, such as an assumption on the reference motion."""
-        method = self.study.estimate.method
         notes = [self.closed.assumption] if self.closed.assumption else []
         if self.study.cestac.place == "loop":
             notes.append(
                 "The encoder rounds inside the simulated loop, whose parameters are the values of the robot file; every run is a record of its own, compared with the mean of as many records of the same seeds whose encoder is that of the study."
             )
-        elif method == "didim":
-            notes.append(
-                "didim uses only the first recorded position, so rounding the record says nothing about an encoder in the loop, whose steps the controller answers; place: loop studies that."
-            )
-        elif method == "iv":
-            notes.append(
-                "The instruments of iv do not depend on the rounding of recorded positions; place: loop studies an encoder in the loop."
-            )
+        elif rounding := self.problem.method.rounding:
+            notes.append(rounding.format(method=self.study.estimate.method))
         return tuple(notes)
 
     def measured(self) -> Observation:
@@ -203,22 +195,15 @@ class Loop:
     def _of(self, simulator: Any, seed: int, delta: float) -> ClosedLoop:
         """Simulate a record with `simulator`, and make the closed loop of this record.
 
-        The closed loop itself is simulated with the encoder of the settings. A reader of encoder
-        counts gets the step; without any step, the positions are low-pass filtered instead.
+        The closed loop itself is simulated with the encoder of the settings. The reader
+        is told the step; without any step, the positions are exact.
         """
         record = simulator.run(
             self.truth, self.reference, seed=seed, name=f"SIMULATED {self.model.NAME}"
         ).record()
-        signals, step = self.study.signals, delta or self.simulator.controller.encoder.step
-        if signals.reader == "counts" and step:
-            signals = replace(signals, step=step, side=self.study.cestac.side)
-        elif signals.reader == "counts":
-            signals = replace(signals, reader="lowpass", step=None, side="joint")
-        settings = replace(self.study, signals=signals)
-        reader = self.problem.reader if signals.reader == self.study.signals.reader else lowpassed
-        problem = self.problem.changed(
-            records=(record,), unseen=(), settings=settings, reader=reader
-        )
+        step = delta or self.simulator.controller.encoder.step or 0.0
+        reader = self.problem.reader.at_step(step, self.study.cestac.side)
+        problem = self.problem.changed(records=(record,), unseen=(), reader=reader)
         return closed_loop(problem, problem.prepared, self.simulator, **self.options)
 
 

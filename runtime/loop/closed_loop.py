@@ -44,7 +44,7 @@ from runtime.core.rows.prepared import Prepared, observation_of, stacked
 from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import Selection, certain_rows, select_rows
 from runtime.core.settings import NotNegative, Settings, structure
-from runtime.core.signals.filters import States, decimated, filtered_states
+from runtime.core.signals.filters import States, decimated
 from runtime.counts.reading import REACH
 from runtime.loop.law_check import LawFit, law_fits, law_text
 from runtime.loop.reference import Reference, of_record, reference_of, require_rate
@@ -105,6 +105,11 @@ class LoopPart:
     def record(self) -> Record:
         """Record of measured or simulated positions and torques."""
         return self.prepared.record
+
+    def exact_states(self, q: Array) -> States:
+        """Compute the states of simulated positions q, shape (N, n), as the record is read."""
+        reader = self.prepared.reader.at_step(0.0, "joint")
+        return reader.states(self.record.moved(q, missing=None), self.selection.signals)
 
     @property
     def selection(self) -> Selection:
@@ -199,9 +204,7 @@ class ClosedLoop:
         states = [
             States(run.q, run.qd, run.qdd)[: len(part.record)]
             if exact
-            else filtered_states(
-                run.q[: len(part.record)], part.record.rate, part.selection.signals
-            )
+            else part.exact_states(run.q[: len(part.record)])
             for run, part in zip(runs, self.parts, strict=True)
         ]
         Z = self._observed(states).columns(observation.names).W

@@ -19,14 +19,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from runtime.core.least_squares.linear import LinearOptions, System, standard_deviations
+from runtime.core.least_squares.linear import System, standard_deviations
 from runtime.core.least_squares.method import Beginning, Fitted
-from runtime.core.least_squares.wls import weighted
+from runtime.core.least_squares.wls import weighted_system
 from runtime.core.rows.factor import Array
-from runtime.core.study import EstimateSettings
 from runtime.loop.closed_loop import loop_of
 from runtime.loop.fixed_point import Step, iterate, outcome_of
 from runtime.loop.result import Simulation
+
+ROUNDING = (
+    "{method} uses only the first recorded position, so rounding the record says nothing about an "
+    "encoder in the loop, whose steps the controller answers; place: loop studies that."
+)
 
 
 def fit(start: Beginning) -> Fitted:
@@ -39,7 +43,7 @@ def fit(start: Beginning) -> Fitted:
 
     def update(runs: Sequence[Simulation], X: Array) -> Step:
         rows = loop.simulated(runs, observation, exact=True)
-        system = weighted(rows, EstimateSettings("wls"), LinearOptions())
+        system = weighted_system(rows, "joint")
         solution = system.solve()
         C = standard_deviations(system, solution)[1]
         return Step(solution.X, C, solution.residual_norm, system)

@@ -39,6 +39,10 @@ from runtime.loop.fixed_point import Step, iterate, outcome_of
 from runtime.loop.result import Simulation
 
 LIMIT = limits(__package__)
+ROUNDING = (
+    "The instruments of {method} do not depend on the rounding of recorded positions; place: loop "
+    "studies an encoder in the loop."
+)
 
 
 def fit(start: Beginning) -> Fitted:

@@ -1,1 +1,1 @@
-"""Parallel runs of a study in processes or on a cluster, and their storage on disk."""
+"""Parallel runs of a study in processes, and their storage on disk."""

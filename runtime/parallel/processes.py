@@ -3,6 +3,7 @@
     with processes(4) as several:
         result = cestac(model, record, study, map=several)
 
+A client of a Dask cluster gives such a function too: docs/examples/dask_many_robots.py.
 The processes are spawned, never forked (a fork after BLAS has started its threads may hang).
 Results are in the order of the arguments and agree in every bit with those of one process.
 """
@@ -45,7 +46,9 @@ def processes(count: int) -> Iterator[Map]:
     spawn = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(count, mp_context=spawn, initializer=_begin)
     try:
-        yield lambda function, keys: pool.map(partial(there, packed(function)), keys)
+        yield lambda function, keys: pool.map(
+            partial(_there, bytes(ForkingPickler.dumps(function))), keys
+        )
     except BrokenProcessPool as e:
         raise InputError(
             'a process died: the memory is full, or the script has no `if __name__ == "__main__":`; use fewer workers'
@@ -54,12 +57,7 @@ def processes(count: int) -> Iterator[Map]:
         pool.shutdown(cancel_futures=True)
 
 
-def packed(function: Callable[[Any], Any]) -> bytes:
-    """Pickle a function to bytes, so that it can be sent to another process."""
-    return bytes(ForkingPickler.dumps(function))
-
-
-def there(sent: bytes, key: Any) -> Any:
+def _there(sent: bytes, key: Any) -> Any:
     """Unpickle a function in a worker process, and return the result of the function for `key`."""
     return _unpacked(sent)(key)
 

@@ -22,20 +22,20 @@ and along the axes of frame f, and lTf the pose of f in the frame of its link l,
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 
 from runtime.core.documents import Result
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.least_squares.method import linear_estimate
+from runtime.core.least_squares.linear import System, assemble
+from runtime.core.least_squares.wls import weighted_system
 from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, elements_of, require
 from runtime.core.rows.observation import Observation, stack
-from runtime.core.study import EstimateSettings
 from runtime.core.table import Table, number
 from runtime.payload.settings import PayloadSettings
 from runtime.physical.inertia import INERTIAL, PhysicalModel, physical_model, pseudo_inertia
@@ -128,8 +128,9 @@ def payload(
     without: Sequence[Observation],
     loaded: Sequence[Observation],
     settings: PayloadSettings,
-    method: EstimateSettings | None = None,
+    weigh: Callable[..., System] = weighted_system,
     *,
+    columns: Sequence[str] | Literal["all"] = "all",
     provenance: Mapping[str, Any] | None = None,
 ) -> Payload:
     """Estimate a load and all base parameters together, from records without and with the load.
@@ -140,8 +141,10 @@ def payload(
         Rows of the records without and with the load.
     settings : PayloadSettings
         Where the load is fixed, and which of its parameters are known.
-    method : EstimateSettings, optional
-        ols or wls; default: ols.
+    weigh : function of rows and `columns`, optional
+        Weighs the rows for linear least squares; default: equal weights.
+    columns : sequence of str or "all", optional
+        Base parameters that are fitted.
     provenance : mapping, optional
         Further entries of the provenance of the estimate.
     """
@@ -167,13 +170,12 @@ def payload(
         Y = rows.Y - mounted * (rows.W @ load.torque)
         return replace(rows, W=np.asfortranarray(np.hstack([rows.W, of_load])), Y=Y, names=names)
 
-    method = method or EstimateSettings()
-    if method.columns != "all":
-        left_out = {*model.BASE_PARAMETERS} - {*method.columns}
-        used = tuple(name for name in names if name.removesuffix(LOAD) not in left_out)
-        method = replace(method, columns=used)
+    if columns != "all":
+        left_out = {*model.BASE_PARAMETERS} - {*columns}
+        columns = tuple(name for name in names if name.removesuffix(LOAD) not in left_out)
     both = stack([extended(stack(without), 0.0), extended(stack(loaded), 1.0)])
-    fit = linear_estimate(both, method, model=model, provenance=provenance)
+    system = weigh(both, columns=columns)
+    fit = assemble(system, system.solve(), model=model, provenance=provenance)
     units = {**fit.units, **{f"{family}{LOAD}": _unit(family) for family in load.unknown}}
     units |= {
         model.BASE_PARAMETERS[k] + LOAD: fit.units.get(model.BASE_PARAMETERS[k], "")

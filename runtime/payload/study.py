@@ -13,7 +13,6 @@ import numpy as np
 
 from runtime.core.documents import Result
 from runtime.core.errors import SettingsError
-from runtime.core.least_squares.method import linear_companion
 from runtime.core.model import (
     GeneratedModel,
     base_columns,
@@ -27,7 +26,6 @@ from runtime.core.record import Record
 from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared
-from runtime.core.signals.filters import require_motion
 from runtime.core.table import Table, in_lines, with_intervals
 from runtime.payload.gains import DriveGains, drive_gains, scaled
 from runtime.payload.load import Payload, payload
@@ -93,7 +91,7 @@ def load_of_study(result: Identification) -> PayloadStudy | None:
 
 
 def payload_study(problem: Problem, loaded: Sequence[Record]) -> PayloadStudy:
-    """Estimate the load of settings.payload by ols, or by wls if the settings have weights.
+    """Estimate the load of settings.payload by linear least squares with the weights of the settings.
 
     Parameters
     ----------
@@ -114,8 +112,8 @@ def payload_study(problem: Problem, loaded: Sequence[Record]) -> PayloadStudy:
             "no record with the load is given; name this record in payload.record",
             path=("payload", "record"),
         )
-    method = linear_companion(study.estimate)
-    columns = base_columns(model, method.columns, (), "estimate", "columns")
+    kept = study.estimate.columns
+    columns = base_columns(model, kept, (), "estimate", "columns")
     if lacking := [x for x in model.BASE_PARAMETERS if x not in {*columns, *elements_of(model)}]:
         raise SettingsError(
             f"a load needs all inertial base parameters, but {', '.join(lacking)} are left out; "
@@ -130,14 +128,22 @@ def payload_study(problem: Problem, loaded: Sequence[Record]) -> PayloadStudy:
             path=("payload",),
         )
     require_no_channels(model, "the study of a load")
-    require_motion(study.signals, "a load")
+    problem.require_motion("a load")
     full = [problem.reading(record) for record in loaded]
     gains = None
     if settings.gains:
         gains = drive_gains(model, problem.prepared, full, settings)
     rows = [_rows(model, record, gains) for record in problem.prepared]
     loaded_rows = [_rows(model, record, gains) for record in full]
-    load = payload(model, rows, loaded_rows, settings, method, provenance=problem.provenance)
+    load = payload(
+        model,
+        rows,
+        loaded_rows,
+        settings,
+        problem.linear_system,
+        columns=kept,
+        provenance=problem.provenance,
+    )
     if gains is not None:
         load = replace(load, sigma=np.fmax(load.sigma, gains.sigma_load))
     return PayloadStudy(load, gains)

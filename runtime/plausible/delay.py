@@ -26,7 +26,6 @@ from runtime.core.limits import limits
 from runtime.core.model import GeneratedModel, is_axis, joint_labels
 from runtime.core.problem import Problem
 from runtime.core.rows.regressor import in_time
-from runtime.core.signals.filters import require_motion
 from runtime.core.table import Table, number
 from runtime.plausible.bodies import Grams, solve_scaled
 from runtime.plausible.samples import Filtered, filtered, usable
@@ -99,7 +98,7 @@ def delay(problem: Problem, *, longest: float = LIMIT.LONGEST_DELAY) -> Delay:
     InputError
         `longest` is more than a tenth of the record, or there are too few rows.
     """
-    require_motion(problem.settings.signals, "a delay")
+    problem.require_motion("a delay")
     reading = problem.prepared[0]
     return delay_of(problem.model, filtered(reading, reading.study), longest)
 

@@ -21,15 +21,15 @@ import numpy as np
 
 from runtime.core.check import Answer, Question, State, first_names
 from runtime.core.errors import InputError
-from runtime.core.least_squares.method import LINEAR
+from runtime.core.least_squares.linear import percent
+from runtime.core.least_squares.wls import weighted_system
 from runtime.core.limits import limits
-from runtime.core.problem import estimate_of
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.predicted import Weights, kept_correlation
 from runtime.core.rows.prepared import stacked
 from runtime.core.rows.selection import per_joint
 from runtime.core.signals.velocities import agreement
-from runtime.core.study import EstimateSettings, Signals, Study
+from runtime.core.study import Signals, Study
 from runtime.plausible.case import Case
 from runtime.plausible.samples import Samples
 
@@ -63,10 +63,8 @@ def rest(case: Case) -> Answer:
         without = None
     if case.observation is None or without is None:
         return Answer("doubtful", text, remedy, change=change)
-    before, after = (
-        estimate_of(rows, EstimateSettings(), LINEAR, model=model).relative_error
-        for rows in (case.observation, without)
-    )
+    systems = map(weighted_system, (case.observation, without))
+    before, after = (percent(*system.norms(system.solve().X)) for system in systems)
     text += f"; without these rows, the error of the fit is {after:.1f} % instead of {before:.1f} %"
     state: State = "doubtful" if after < 0.8 * before else "good"
     if after < 0.5 * before and before > LIMIT.TOTAL_ERROR[0]:  # else friction of that joint alone

@@ -24,9 +24,7 @@ from runtime.core.part import Part
 from runtime.core.problem import Problem
 from runtime.core.progress import at
 from runtime.core.result import Identification
-from runtime.core.signals.filters import require_motion
 from runtime.core.table import Table
-from runtime.counts.reader import unwrapped
 from runtime.plausible.case import Case
 from runtime.plausible.delay import Delay
 from runtime.plausible.friction import friction
@@ -183,7 +181,7 @@ def plausibility_of(result: Identification, variants: GeneratedModel | None = No
 
     Static poses and robots with force sensors are refused with an InputError.
     """
-    if result.study.signals.reader == "static":
+    if result.problem.reader.at_rest:
         raise InputError(
             "record and study are not judged for poses at rest; the checks need a motion"
         )
@@ -209,7 +207,7 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
         The module of `symgen.variants`. With it, causes are tried in any case, and errors of the
         table of frames are among them.
     """
-    require_motion(problem.settings.signals, "a check of slips")
+    problem.require_motion("a check of slips")
     if any(is_axis(joint) for joint in problem.model.JOINTS):
         raise InputError(
             "plausibility of the record: not judged for a robot with force sensors; identify once "
@@ -271,11 +269,11 @@ def _case(problem: Problem, variants: GeneratedModel | None) -> Case | Check:
     own = [part for reading in problem.prepared for part in excerpts(reading)]
     try:
         require_no_channels(model, "a trial of another reading")
-        whole = [unwrapped(one.record, study.signals, one.drives) for one in own]
-        straight = [
-            one if record is one.record else replace(one, record=record)
-            for one, record in zip(own, whole, strict=True)
-        ]
+        straight = own
+        if (unwrapped := problem.reader.unwrapped) is not None:
+            straight = [
+                replace(one, record=unwrapped(one.record, study.signals, one.drives)) for one in own
+            ]
         through = [filtered(one, study) for one in straight]
         samples = samples_of(through, study)
     except InputError as e:

@@ -20,7 +20,6 @@ from runtime.core.rows.selection import window_of
 from runtime.core.signals.cutoff import stands
 from runtime.core.signals.filters import (
     States,
-    filtered_states,
     lowpass_filtered,
     median_filtered,
 )
@@ -169,7 +168,7 @@ def filtered(reading: Prepared, study: Study) -> Filtered:
     record = reading.record
     low = Lowpass(cutoff=motion_cutoff(record, reading.study))
     signals = replace(study.signals, lowpass=low)
-    states = filtered_states(record.q, record.rate, signals, record.channels.get("qd"))
+    states = reading.reader.at_step(0.0, "joint").states(record, signals)
     return Filtered(record, study, low, replace(states, channels=reading.channels))
 
 

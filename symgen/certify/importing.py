@@ -57,15 +57,15 @@ def cached_path(file: str, text: str) -> Path | None:
 
     Return None if there is no such file, or if its whole text is not marked as certified.
     """
-    folder = _entry(text)
+    folder = entry(text)
     if folder is None:
         return None
     try:
         whole = (folder / file).read_bytes().decode("utf-8")
     except (OSError, UnicodeError):
         return None
-    marked = (folder.parent / _key(whole)).is_dir()
-    return folder / file if marked and without_certificate(whole) == text else None
+    right = is_certified(whole) and without_certificate(whole) == text
+    return folder / file if right else None
 
 
 def stored_path(file: str, text: str) -> Path:
@@ -75,7 +75,7 @@ def stored_path(file: str, text: str) -> Path:
     after the whole text, marks the text as certified. If the cache cannot be written, the file is
     in a folder of this process. SymgenError is raised if no file can be written at all.
     """
-    folder, whole = _entry(without_certificate(text)), _entry(text)
+    folder, whole = entry(without_certificate(text)), entry(text)
     if folder is not None and whole is not None:
         try:
             whole.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -83,12 +83,18 @@ def stored_path(file: str, text: str) -> Path:
         except OSError:  # no right to write, full
             pass
     try:
-        return _write(_folder_of_this_process() / _key(text) / file, text)
+        return _write(_folder_of_this_process() / key_of(text) / file, text)
     except OSError as e:
         raise SymgenError(
             f"{file}: neither the cache folder nor a temporary file can be written: "
             f"{e.strerror or e}; set SYMGEN_CACHE or TMPDIR"
         ) from e
+
+
+def is_certified(text: str) -> bool:
+    """Whether the cache marks a source text as certified."""
+    whole = entry(text)
+    return whole is not None and whole.is_dir()
 
 
 def without_certificate(text: str) -> str:
@@ -142,11 +148,12 @@ def is_writable_by_others(folder: Path) -> bool:
     return False
 
 
-def _key(text: str) -> str:
+def key_of(text: str) -> str:
+    """Return the name of a text in the cache: the first digits of its SHA-256."""
     return sha256(text.encode("utf-8")).hexdigest()[:32]
 
 
-def _entry(text: str) -> Path | None:
+def entry(text: str) -> Path | None:
     """Return the cache folder of a source text; its name is a hash of the text.
 
     Return None if there is no home folder, or if other users may write to the cache. SymgenError is
@@ -164,7 +171,7 @@ def _entry(text: str) -> Path | None:
         )
     if shared:
         return None
-    return folder / _key(text)
+    return folder / key_of(text)
 
 
 def _write(path: Path, text: str) -> Path:

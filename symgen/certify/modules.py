@@ -1,18 +1,16 @@
-"""Certify emitted source files before they are returned, and import certified modules."""
+"""Certify emitted source files before they are returned or imported."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 
 from symgen.certify.certificate import Certificate, certify_formulas, hair_off
-from symgen.certify.importing import cached_path, imported, stored_path
+from symgen.certify.importing import cached_path, stored_path
 from symgen.certify.texts import text_check, with_certificate
-from symgen.certify.witness import Witness
+from symgen.certify.witness import Witness, ungrouped
 from symgen.derive.doubts import nearly_round
-from symgen.description.files import load_robot
 from symgen.description.robot import Robot
 from symgen.description.values import WITHIN
 from symgen.emit.generate import generate_files
@@ -107,43 +105,29 @@ def require_valid(certificate: Certificate) -> None:
         )
 
 
-def model(robot: str | Path | Robot, *, options: Sequence[str] = ()) -> ModuleType:
-    """Derive, certify and import the Python module of a robot.
+def certified_path(robot: Robot, options: Sequence[str] = ()) -> Path:
+    """Return the cache path of the certified Python module of a robot.
 
-    A module that is already in the cache is not certified again.
-
-    Parameters
-    ----------
-    robot : str, Path or Robot
-        Name of a packaged robot, path of a robot file (.yaml, .par, .urdf, MJCF), or a Robot.
-    options : sequence of str
-        Names of functions on request, as for `symgen generate --with`.
-
-    Returns
-    -------
-    module
-        The imported module. Other processes can load its file `__file__` as long as this process
-        lives.
-
-    Raises
-    ------
-    DescriptionError
-        The file cannot be read or describes no robot.
-    CertificateError
-        The certificate does not hold.
+    A text that is in the cache is not certified again.
     """
-    robot = robot if isinstance(robot, Robot) else load_robot(robot)
-    path = _certified_path(robot, "numpy", options)
-    assert path is not None  # it serves every robot
-    return imported(path)
+    ((file, text),) = generate_files(robot, options=options).items()
+    cached = cached_path(file, text)
+    return cached or stored_path(file, _certified(regroup(robot), {file: text}, options)[file])
 
 
-def _certified_path(robot: Robot, target: str, options: Sequence[str] = ()) -> Path | None:
-    """Return the cache path of a certified file of a robot; `target` is its kind, such as c.
+def ungrouped_path(robot: Robot) -> Path:
+    """Return the cache path of a module whose columns are all standard parameters.
 
-    Return None if the target cannot serve the robot.
+    A text that is in the cache is not checked again.
     """
-    for file, text in generate_files(robot, targets=(target,), options=options).items():
-        cached = cached_path(file, text)
-        return cached or stored_path(file, _certified(regroup(robot), {file: text}, options)[file])
-    return None
+    regrouping = ungrouped(robot)
+    ((file, text),) = generate_files(robot, regrouping=regrouping).items()
+    if cached := cached_path(file, text):
+        return cached
+    check = text_check(file, text, "numpy", Witness(regrouping))
+    if check.wrong:
+        raise CertificateError(
+            f"{robot.name}: {', '.join(check.wrong)} of the variant module differ from independent values",
+            check,
+        )
+    return stored_path(file, with_certificate(text, check, "of standard parameters"))

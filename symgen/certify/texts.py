@@ -14,6 +14,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
 from hashlib import sha256
@@ -198,21 +199,24 @@ def module_errors(
         uses |= {STACKED: _stacked, CASADI: _by_casadi}
     errors: dict[str, float] = {}
     raised = {}
-    for how, call in uses.items():
-        for name, checks in witness.checks.items():
-            if how == CASADI:
-                checks = [c for c in checks if _is_of_casadi(name, c)]
-            if not checks:
-                continue
-            found, text = largest(module, name, checks, call, witness)
-            errors[name] = max(errors.get(name, 0.0), found)
-            if text:
-                raised[name] = f"{text} ({how})"
-    if not witness.tied:
-        try:
-            errors[DERIVATIVES] = _derivative_error(module, witness)
-        except Exception as error:  # a text may fail in any way
-            errors[DERIVATIVES], raised[DERIVATIVES] = float("inf"), repr(error)
+    with _restored(module):
+        for how, call in uses.items():
+            for name, checks in witness.checks.items():
+                if how == CASADI:
+                    checks = [c for c in checks if _is_of_casadi(name, c)]
+                if not checks:
+                    continue
+                found, text = largest(module, name, checks, call, witness)
+                errors[name] = max(errors.get(name, 0.0), found)
+                if text:
+                    raised[name] = f"{text} ({how})"
+                elif how == CASADI and not any(c.keywords for c in checks):
+                    _share(module, name)
+        if not witness.tied:
+            try:
+                errors[DERIVATIVES] = _derivative_error(module, witness)
+            except Exception as error:  # a text may fail in any way
+                errors[DERIVATIVES], raised[DERIVATIVES] = float("inf"), repr(error)
     try:
         right = same_elements(
             module.elements(**witness.keywords), witness.constants, witness
@@ -330,6 +334,32 @@ def _by_casadi(
 @lru_cache(maxsize=64)
 def _function(module: ModuleType, name: str, *frame: int) -> Any:
     return module.casadi(name, frame=frame[0]) if frame else module.casadi(name)
+
+
+@contextmanager
+def _restored(module: ModuleType) -> Iterator[None]:
+    """Restore the functions of a module after the block."""
+    own = dict(vars(module))
+    try:
+        yield
+    finally:
+        vars(module).update(own)
+
+
+def _share(module: ModuleType, name: str) -> None:
+    """Let a checked function of CasADi take the place of the module's function `name`.
+
+    Other functions that call `name`, as forward_dynamics calls inverse_dynamics, then share its
+    expression graph and do not run its text again.
+    """
+    function = _function(module, name)
+
+    def shared(*columns: Any, **inputs: Any) -> Any:
+        given = dict(zip(function.name_in(), columns, strict=False))
+        values = [*function(**given, **inputs).values()]
+        return values if len(values) > 1 else values[0]
+
+    vars(module)[name] = shared
 
 
 def _derivative_error(module: ModuleType, witness: Witness) -> float:

@@ -23,14 +23,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from symgen.certify.importing import cached_path, imported, stored_path
-from symgen.certify.texts import text_check, with_certificate
-from symgen.certify.witness import Witness, ungrouped
+from symgen.certify.requests import module_of
 from symgen.description.expression import Expression
 from symgen.description.files import load_robot
 from symgen.description.robot import PRISMATIC, REVOLUTE, Frame, Robot
-from symgen.emit.generate import generate_files
-from symgen.errors import CertificateError
 
 FREE = "free_"
 """Prefix of the names of freed entries: free_alpha4, free_d3, free_gx."""
@@ -53,19 +49,14 @@ def variants(robot: str | Path | Robot) -> ModuleType:
         and b if a frame has them), free_gx, free_gy, free_gz. Their defaults are the values in the
         robot file.
     """
+
+    def derived(robot: Robot) -> Path:
+        from symgen.certify.modules import ungrouped_path  # slow to load
+
+        return ungrouped_path(robot)
+
     robot = freed(robot if isinstance(robot, Robot) else load_robot(robot))
-    regrouping = ungrouped(robot)
-    ((file, text),) = generate_files(robot, regrouping=regrouping).items()
-    path = cached_path(file, text)
-    if path is None:
-        check = text_check(file, text, "numpy", Witness(regrouping))
-        if check.wrong:
-            raise CertificateError(
-                f"{robot.name}: {', '.join(check.wrong)} of the variant module differ from independent values",
-                check,
-            )
-        path = stored_path(file, with_certificate(text, check, "of standard parameters"))
-    return imported(path)
+    return module_of(robot, "standard parameters", derived)
 
 
 def freed(robot: Robot) -> Robot:

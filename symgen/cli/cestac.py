@@ -43,7 +43,6 @@ def cestac(
     columns: options.Columns = None,
     seed: options.Seed = None,
     workers: options.Workers = 0,
-    scheduler: options.Scheduler = None,
     advise: options.Advise = False,
     trust: options.Trust = False,
     exact: options.Exact = False,
@@ -71,8 +70,9 @@ def cestac(
     with session.results_in(output) as results:
         import runtime
         from runtime.advisor.coarse_encoders import READERS
+        from runtime.compose import records_of
         from runtime.parallel.checkpoint import Checkpoint
-        from runtime.reading.records import read_records
+        from runtime.parallel.processes import processes
 
         described = session.robot_of(robot, trust=trust, exact=exact)
         study = session.changed(
@@ -94,7 +94,7 @@ def cestac(
         model = session.model_of(described, study=study)
         if study.cestac.place == "record":
             session.require_record(study, record[0])
-        records = read_records(study.record, model, missing=study.signals.admits_missing)
+        records = records_of(study.record, model, study)
         checkpoint = None if output is None or advise else Checkpoint(output)
         result: runtime.Cestac | runtime.Advice
         try:
@@ -107,7 +107,7 @@ def cestac(
                     )
                     said, good = advice.verdict, not advice.negative
                 else:
-                    with session.map_of(workers, scheduler) as own_map:
+                    with processes(workers) as own_map:
                         result = resolution = runtime.cestac(
                             model,
                             records,

@@ -65,8 +65,9 @@ def excite(
     """
     with session.results_in(output) as results:
         import runtime
+        from runtime.compose import records_of
         from runtime.core.documents import json_text
-        from runtime.reading.records import read_records
+        from runtime.parallel.processes import processes
 
         model = session.model_of(session.robot_of(robot, trust=trust, exact=exact))
         study = session.changed(
@@ -80,8 +81,8 @@ def excite(
                 "seed": seed,
             },
         )
-        records = read_records(study.record, model, missing=study.signals.admits_missing)
-        with session.progress_bar("starts") as progress, session.map_of(workers) as own_map:
+        records = records_of(study.record, model, study)
+        with session.progress_bar("starts") as progress, processes(workers) as own_map:
             seek: Any = partial(runtime.excite, map=own_map, progress=progress)
             still = study.excitation is not None and study.excitation.poses is not None
             result = (runtime.static_poses if still else seek)(model, records, study)

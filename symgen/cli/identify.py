@@ -62,14 +62,14 @@ def identify(
     """
     with session.progress_lines(), session.results_in(output) as results:
         import runtime
+        from runtime.compose import records_of
         from runtime.core.provenance import processor
-        from runtime.reading.records import read_records
 
         described = session.robot_of(robot, trust=trust, exact=exact)
         study = session.study_of_arguments(record)
         model = session.model_of(described, study=study)
         study = study if suggest is None else session.suggested_study(study, model, suggest)
-        records = read_records(study.record, model, missing=study.signals.admits_missing)
+        records = records_of(study.record, model, study)
         result = runtime.identify(
             model,
             records,

@@ -52,7 +52,7 @@ MAIN_PATH = (
 
 WENT = {
     "fleet": "symgen fleet was removed; use docs/examples/dask_many_robots.py, which identifies "
-    "many files on several cores or a cluster",
+    "many files on a cluster",
 }
 """Verbs of earlier versions, with the sentence that names what to use instead."""
 

@@ -67,12 +67,6 @@ Workers = Annotated[
         "on this number.",
     ),
 ]
-Scheduler = Annotated[
-    Text,
-    typer.Option(
-        help="Address of a Dask scheduler whose workers do the work, such as tcp://10.0.0.1:8786."
-    ),
-]
 Side = Annotated[
     Text,
     typer.Option(help="Side on which positions are rounded, as an encoder does: joint or motor."),

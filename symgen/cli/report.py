@@ -34,15 +34,14 @@ def report(
     """
     with session.results_in(output) as results:
         import runtime
-        from runtime.compose import assess
+        from runtime.compose import assess, records_of
         from runtime.core.documents import json_text
-        from runtime.reading.records import read_records
 
         described = session.robot_of(robot, trust=trust, exact=exact)
         study = session.changed(session.study_of_arguments(record), cestac={"side": side})
         model = session.model_of(described, study=study)
         asked = session.changed(study, cestac={"delta": encoder}).cestac.delta
-        records = read_records(study.record, model, missing=study.signals.admits_missing)
+        records = records_of(study.record, model, study)
         result = assess(
             model,
             records,

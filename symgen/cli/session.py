@@ -293,6 +293,7 @@ def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
 
     If this fails, write a draft of the study from the column names, if they show enough.
     """
+    from runtime.compose import reader_of
     from runtime.core.errors import InputError
     from runtime.reporting.result_files import write_all
     from runtime.study import draft, study_text, suggested
@@ -303,7 +304,7 @@ def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
         )
     folder = path.resolve().parent
     try:
-        study, told = suggested(study, model)
+        study, told = suggested(study, model, missing=reader_of(study.signals).missing)
     except InputError as e:
         if text := draft(study, model):
             write_all(folder, {path.name: text})
@@ -342,22 +343,6 @@ def changed(study: Study, **sections: Mapping[str, Any]) -> Study:
 def names_of(text: str | None) -> str | list[str] | None:
     """Split a text of names at its commas; the texts "essential" and "all" stay as they are."""
     return text if text in (None, "essential", "all") else text.split(",")
-
-
-@contextmanager
-def map_of(workers: int, scheduler: str | None = None) -> Iterator[Any]:
-    """Yield a function like `map` that runs its calls in worker processes or on a Dask cluster.
-
-    The options --workers and --scheduler specify which.
-    """
-    from runtime.core.errors import InputError
-    from runtime.parallel.cluster import cluster
-    from runtime.parallel.processes import processes
-
-    if scheduler and workers:
-        raise InputError("a scheduler uses its own workers; leave out --workers")
-    with cluster(scheduler) if scheduler else processes(workers) as own_map:
-        yield own_map
 
 
 def stopped(checkpoint: Checkpoint | None) -> NoReturn:

@@ -14,10 +14,20 @@ WIDTH = 100
 
 @lru_cache(maxsize=1)
 def _environment() -> Environment:
-    from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to load
+    from jinja2 import (  # slow to load
+        Environment,
+        FileSystemBytecodeCache,
+        PackageLoader,
+        StrictUndefined,
+    )
 
+    try:  # templates that an earlier process compiled
+        compiled = FileSystemBytecodeCache()
+    except (OSError, RuntimeError):  # no temporary folder, or one of another user
+        compiled = None
     return Environment(
         loader=PackageLoader("symgen.emit"),
+        bytecode_cache=compiled,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

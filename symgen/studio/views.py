@@ -284,7 +284,7 @@ def _read(path: str, study_file: Path, asked: str | None = None) -> tuple[Any, .
     fitted ones, or only the record called `asked`, by default the first. File names are relative to
     the study.
     """
-    from runtime.reading.records import read_records
+    from runtime.compose import records_of
     from runtime.study import located
 
     model = runtime.load_model(symgen.model(path))
@@ -295,8 +295,7 @@ def _read(path: str, study_file: Path, asked: str | None = None) -> tuple[Any, .
         for k, part in enumerate(settings)
     }
     chosen = study.record if asked is None else (named.get(asked, study.record[0]),)
-    missing = study.signals.admits_missing
-    return model, study, read_records(chosen, model, missing=missing), named
+    return model, study, records_of(chosen, model, study), named
 
 
 @answered

@@ -24,7 +24,7 @@ from runtime.core.least_squares.estimate import Estimate
 from runtime.core.model import load_model
 from runtime.documents.estimates import load_whole_estimate
 from runtime.physical.inertia import PhysicalModel, physical_model
-from symgen.certify.modules import model as emitted
+from symgen.certify.requests import model as emitted
 from symgen.description.files import content_of, read_robot
 from symgen.description.robot import Robot, one_joint_parameters, parameter
 from symgen.description.tree import Array, TreePart

@@ -23,14 +23,16 @@ import symgen
 from oracles.random_robots import random_robot
 from runtime import load_model
 from runtime.core import loading
-from symgen.certify import importing
+from symgen.certify import importing, requests
 from symgen.certify.importing import without_certificate
 from symgen.certify.lagrange import Lagrange
-from symgen.certify.modules import certified_files, certify, model, require_valid
+from symgen.certify.modules import certified_files, certify, require_valid
+from symgen.certify.requests import model
 from symgen.certify.texts import DERIVATIVES, TextCheck
 from symgen.cli.main import app
 from symgen.derive.loops import close
 from symgen.description import load_robot, packaged_robots
+from symgen.description.angles import AngleWarning
 from symgen.emit.generate import generate_files, generate_module
 from symgen.errors import CertificateError, SymgenError
 from symgen.regroup.regrouping import regroup
@@ -186,6 +188,83 @@ def test_a_second_call_takes_what_lies_in_the_cache(cache, monkeypatch) -> None:
     )  # not called again: what lies there has been certified
     assert symgen.model("planar_2r").__file__ == first.__file__
     assert sum(1 for path in cache.rglob("*") if path.is_file()) == 1
+
+
+@pytest.fixture
+def derivations(monkeypatch) -> list[str]:
+    """Names of the robots whose text is emitted, one entry for each emission."""
+    import symgen.certify.modules as certified
+
+    names: list[str] = []
+
+    def counted(robot, **options):
+        names.append(robot.name)
+        return generate_files(robot, **options)
+
+    monkeypatch.setattr(certified, "generate_files", counted)
+    return names
+
+
+@pytest.mark.parametrize("make", [symgen.model, symgen.variants])
+def test_a_second_call_derives_nothing(cache, derivations, make) -> None:
+    first = make("planar_2r")
+    assert derivations == ["planar_2r"]
+    assert make(load_robot("planar_2r")).__file__ == first.__file__
+    assert derivations == ["planar_2r"]
+
+
+MJCF = """<mujoco model="arm"><compiler angle="radian"/><include file="more.xml"/></mujoco>"""
+BODY = """<mujoco><worldbody><body name="upper"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+<joint name="a" axis="0 0 1"/><body name="fore" pos="{} 0 0">
+<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><joint name="b" axis="0 0 1"/></body></body>
+</worldbody></mujoco>"""
+
+
+def test_a_changed_file_a_changed_include_and_other_options_are_derived(
+    tmp_path, cache, derivations
+) -> None:
+    pytest.importorskip("mujoco")
+    yaml, xml, more = (tmp_path / name for name in ("arm.yaml", "arm.xml", "more.xml"))
+    yaml.write_text(ROBOT)
+    xml.write_text(MJCF)
+    more.write_text(BODY.format(0.3))
+    steps = [
+        lambda: symgen.model(yaml),
+        lambda: symgen.model(yaml, options=("coriolis",)),
+        lambda: symgen.model(replace(load_robot(yaml), assume=frozenset({"XY1"}))),
+        lambda: yaml.write_text(ROBOT.replace("D2: 0.4", "D2: 0.5")) and symgen.model(yaml),
+        lambda: symgen.model(xml),
+        lambda: more.write_text(BODY.format(0.4)) and symgen.model(xml),
+    ]
+    texts = [Path(step().__file__).read_text() for step in steps]
+    assert len(derivations) == len(steps)
+    assert len(set(texts)) == len(steps)
+
+
+def test_angles_read_exactly_and_rounded_are_two_models(tmp_path, cache) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(
+        '<robot name="arm"><link name="l0"/><link name="l1"/><link name="l2"/>'
+        '<joint name="a" type="continuous"><parent link="l0"/><child link="l1"/></joint>'
+        '<joint name="b" type="continuous"><parent link="l1"/><child link="l2"/>'
+        '<origin rpy="1.57080 0 0" xyz="0.3 0 0"/></joint></robot>'
+    )
+    with pytest.warns(AngleWarning):
+        rounded = symgen.model(path)
+    exact = symgen.model(load_robot(path, exact=True))
+    assert exact.__file__ != rounded.__file__
+    with pytest.warns(AngleWarning):  # from the cache too
+        assert symgen.model(path).__file__ == rounded.__file__
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("VERSION", "0.0.1"), ("_sources", lambda: "newer files")]
+)
+def test_another_version_derives_again(cache, derivations, monkeypatch, name, value) -> None:
+    symgen.model("planar_2r")
+    monkeypatch.setattr(requests, name, value)
+    symgen.model("planar_2r")
+    assert derivations == ["planar_2r"] * 2
 
 
 @pytest.mark.parametrize("spoiled", [b"", b"raise SystemExit\n", b"\xff\x00"])

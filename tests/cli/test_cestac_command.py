@@ -201,10 +201,3 @@ def test_many_runs_stay_in_their_archives(tmp_path, emps_data):
     assert json.loads((tmp_path / "cestac.json").read_text())["levels"][1]["runs"] is None
     with np.load(tmp_path / "runs.npz") as archive:
         assert archive["X"].shape == (1002, 4)  # the essential columns and M1R
-
-
-def test_scheduler_that_does_not_answer(emps_data):
-    result = run("emps", "emps", "--scheduler", "tcp://nowhere")
-    assert result.exit_code == 2 and "no answer from the scheduler tcp://nowhere" in result.stderr
-    result = run("emps", "emps", "--scheduler", "tcp://nowhere", "--workers", 2)
-    assert result.exit_code == 2 and "a scheduler uses its own workers" in result.stderr

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 from campaign import campaign
+from problems import linear_system
 from typer.testing import CliRunner
 
 from runtime import load_model
@@ -114,7 +115,9 @@ def test_errors_of_records_add_up(folder):
     study = study_from_mapping({"record": record})
     records = read_records(study.record, model, folder=folder)
     observation = observe(model, records, study)
-    fit = essential_of(observation, study.essential, study.estimate, model=model).all_parameters
+    fit = essential_of(
+        linear_system(observation, study.estimate), study.essential, model=model
+    ).all_parameters
     parts = record_errors(observation, fit, [record.name for record in records])
     sizes = [np.linalg.norm(observation.of_record(k).Y) for k in range(3)]
     total = np.sqrt(

@@ -18,7 +18,8 @@ from runtime.core.least_squares.method import Beginning, Fitted, Method
 from runtime.core.problem import Note, Problem
 from runtime.core.record import Record
 from runtime.core.settings import Count, Positive, Settings
-from runtime.core.signals.filters import SignalReader, States, lowpassed
+from runtime.core.signals.filters import States
+from runtime.core.signals.reader import Reader, lowpassed
 from runtime.core.study import Signals
 from runtime.reading import formats
 from runtime.reading.formats import Format
@@ -96,7 +97,7 @@ def toy_states(record: Record, signals: Signals) -> States:
 
 def test_a_reader_is_one_line_of_a_list(tmp_path, log, monkeypatch):
     """It has settings of its own, which are checked, and which the results hold."""
-    monkeypatch.setitem(compose.READERS, "toy", SignalReader(toy_states, ToyReaderOptions))
+    monkeypatch.setitem(compose.READERS, "toy", Reader(toy_states, ToyReaderOptions))
     _, before = identified(tmp_path, "")
     done, same = identified(tmp_path, "signals: {reader: toy}\n")
     assert done.exit_code in (0, 1), done.output
@@ -129,7 +130,7 @@ def test_a_reader_is_one_line_of_a_list(tmp_path, log, monkeypatch):
 )
 def test_settings_of_a_reader_are_checked(tmp_path, log, monkeypatch, study, said):
     if "toy" in study:
-        toy = SignalReader(toy_states, ToyReaderOptions)
+        toy = Reader(toy_states, ToyReaderOptions)
         monkeypatch.setitem(compose.READERS, "toy", toy)
     done, _ = identified(tmp_path, f"signals: {study}\n")
     assert done.exit_code == 2

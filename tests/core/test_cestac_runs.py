@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from problems import linear_system
 
 from runtime import load_model
 from runtime.advisor.coarse_encoders import CoarseEncoders
 from runtime.compose import cestac, problem
 from runtime.core.cestac.perturbed import system_of
 from runtime.core.errors import InputError
-from runtime.core.least_squares.method import linear_system
 from runtime.core.model import GeneratedModel
 from runtime.core.record import Origin, Record
 from runtime.core.rows.regressor import Columns

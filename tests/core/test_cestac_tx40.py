@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from problems import linear_system
 
 from runtime.compose import cestac, estimate_of, observe, state_problem
 from runtime.core.essential import essential_of
@@ -65,7 +66,7 @@ def observation(model, record, study):
 
 @pytest.fixture(scope="module")
 def found(observation, study, model):
-    return essential_of(observation, study.essential, study.estimate, model=model)
+    return essential_of(linear_system(observation, study.estimate), study.essential, model=model)
 
 
 def test_all_parameters_are_determined(found, observation):
@@ -103,7 +104,7 @@ def test_essential_parameters(found):
 
 def test_weights_sharpen_the_wrist(observation, study, model, found):
     weighted = essential_of(
-        observation, study.essential, EstimateSettings(method="wls"), model=model
+        linear_system(observation, EstimateSettings(method="wls")), study.essential, model=model
     ).all_parameters
     for name in ("Ia4", "FV4", "FS4", "Ia6", "FV6"):
         i = weighted.names.index(name)

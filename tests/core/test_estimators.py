@@ -9,12 +9,12 @@ from campaign import campaign
 from hypothesis import given
 from hypothesis import strategies as st
 from planar_data import OLS, TRUE, WLS, observation, one_joint_at_rest
+from problems import linear_system
 from scipy.signal import lfilter
 
 from runtime.compose import METHODS, estimate_of
 from runtime.core.errors import SettingsError
 from runtime.core.least_squares.block_covariance import block_covariance
-from runtime.core.least_squares.method import LINEAR, linear_system
 from runtime.core.least_squares.solution import null_groups, solve
 from runtime.core.rows.factor import Factor, factor, merged
 from runtime.core.rows.observation import split_rows
@@ -405,4 +405,4 @@ def test_each_joint_is_factored_on_its_own_columns():
     assert [list(joint.columns) for joint in system.raw.joints] == [
         list(np.flatnonzero(planar.STRUCTURE[:, j])) for j in range(2)
     ]
-    assert set(LINEAR) == {"ols", "wls"} <= set(METHODS)
+    assert {name for name, method in METHODS.items() if method.linear} == {"ols", "wls"}

@@ -13,6 +13,7 @@ import planar_2r_model as planar
 import pytest
 import scipy.signal
 from planar_data import TRUE, motion
+from problems import linear_system
 
 from runtime import Record, estimate, load_model, observe
 from runtime.compose import estimate_of, problem
@@ -26,7 +27,7 @@ from runtime.core.rows.prepared import decimated_torque, observation_of
 from runtime.core.rows.regressor import Columns, distinct_entries
 from runtime.core.rows.selection import select_rows
 from runtime.core.signals.filters import States, decimated, decimation_plan, filtered_states
-from runtime.core.study import Decimate, EssentialSettings, EstimateSettings
+from runtime.core.study import Decimate
 from runtime.core.uncertainty import block_bootstrap
 from runtime.core.validation import weak_directions
 from runtime.study import study_from_mapping
@@ -320,9 +321,10 @@ def test_rows_are_factored_once(record, monkeypatch):
         "runtime.core.rows.observation.factor", lambda *given: calls.append(1) or factor(*given)
     )
     o = observe(planar, record, study())
-    fits = estimate_of(o, model=planar), essential_of(o, EssentialSettings(), EstimateSettings())
-    weak_directions(o)
-    block_bootstrap(o, EstimateSettings(), fits[1].estimate)
+    system = linear_system(o)
+    fits = estimate_of(o, model=planar), essential_of(system)
+    weak_directions(system)
+    block_bootstrap(system, fits[1].estimate)
     assert len(calls) == 1 and fits[1].all_parameters.names == fits[0].names
     assert np.array_equal(fits[1].all_parameters.X, fits[0].X) and np.array_equal(
         estimate(planar, record, study()).X, fits[0].X

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from planar_data import OLS, WLS, observation
+from problems import linear_system
 from scipy import stats
 from scipy.signal import lfilter
 
@@ -117,7 +118,7 @@ def test_drawn_deviations_match_the_scatter_where_sigma_does_not():
         found.append(fit.X)
         sigma.append(fit.sigma)
         if seed < 30:
-            drawn.append(block_bootstrap(seen, settings, fit).drawn)
+            drawn.append(block_bootstrap(linear_system(seen, settings), fit).drawn)
     real = np.std(found, axis=0, ddof=1)
     assert np.mean(real / np.mean(sigma, axis=0)) > 1.4
     assert np.median(np.mean(drawn, axis=0) / real) == pytest.approx(1, abs=0.15)
@@ -129,18 +130,18 @@ def test_whole_record_drawn_once_is_the_estimate(settings):
     seen = observation(N=600, noise=(0.5, 0.1))
     fit = estimate_of(seen, settings)
     one, other = (
-        block_bootstrap(seen, settings, fit, runs=300, seed=1),
-        block_bootstrap(seen, settings, fit, runs=300, seed=2),
+        block_bootstrap(linear_system(seen, settings), fit, runs=300, seed=1),
+        block_bootstrap(linear_system(seen, settings), fit, runs=300, seed=2),
     )
     assert np.allclose(one.drawn, other.drawn, rtol=0.25) and np.array_equal(
-        one.drawn, block_bootstrap(seen, settings, fit, runs=300, seed=1).drawn
+        one.drawn, block_bootstrap(linear_system(seen, settings), fit, runs=300, seed=1).drawn
     )
     assert np.median(one.drawn / fit.sigma_corrected) == pytest.approx(1, abs=0.12)
 
 
 def test_f_is_that_of_two_nested_fits():
     seen = observation(noise=(6.0, 2.0), seed=3)
-    found = essential_of(seen, EssentialSettings(1.04), OLS)
+    found = essential_of(linear_system(seen), EssentialSettings(1.04))
     tests = f_tests(found)
     r, b = seen.W.shape
     S0 = np.sum((seen.Y - seen.W @ np.linalg.lstsq(seen.W, seen.Y, rcond=None)[0]) ** 2)
@@ -165,12 +166,12 @@ def test_f_is_that_of_two_nested_fits():
 
 def test_sets_by_threshold_and_what_is_shown():
     seen = observation(noise=(9.0, 4.0), seed=5)
-    found = essential_of(seen, EssentialSettings(1.03), OLS)
-    checked = uncertainty(seen, OLS, found, direct_comparison(seen, found.estimate))
+    found = essential_of(linear_system(seen), EssentialSettings(1.03))
+    checked = uncertainty(linear_system(seen), found, direct_comparison(seen, found.estimate))
     by_threshold = {threshold: (count, names) for threshold, count, names in checked.sets}
     assert by_threshold[1.03] == (len(found.names), ())
     for threshold, (count, names) in by_threshold.items():
-        kept = essential_of(seen, EssentialSettings(threshold), OLS).names
+        kept = essential_of(linear_system(seen), EssentialSettings(threshold)).names
         assert count == len(kept)
         expected = {f"-{n}" for n in found.names if n not in kept} | {
             f"+{n}" for n in kept if n not in found.names
@@ -195,6 +196,6 @@ def test_sets_by_threshold_and_what_is_shown():
 def test_a_record_that_determines_nothing_is_no_error():
     seen = observation()
     lost = replace(seen, W=np.column_stack([seen.W[:, 0], seen.W[:, :-1]]))
-    found = essential_of(lost, EssentialSettings(), OLS)
-    checked = uncertainty(lost, OLS, found, direct_comparison(lost, found.estimate))
+    found = essential_of(linear_system(lost), EssentialSettings())
+    checked = uncertainty(linear_system(lost), found, direct_comparison(lost, found.estimate))
     assert len(checked.bootstrap.drawn) == len(found.names)

@@ -7,6 +7,7 @@ import numpy as np
 import planar_2r_model as planar
 import pytest
 from planar_data import OLS, TRUE, motion, observation
+from problems import linear_system
 
 from runtime.compose import estimate_of, state_problem
 from runtime.core.errors import InputError
@@ -102,7 +103,7 @@ def test_parameters_that_trade_are_named():
     W = seen.W.copy()
     rng = np.random.default_rng(0)
     W[:, 2] = 40 * W[:, 1] + 0.1 * rng.standard_normal(len(W))  # MY1 nearly as MX1R
-    found = weak_directions(replace(seen, W=W, Y=W @ TRUE))
+    found = weak_directions(linear_system(replace(seen, W=W, Y=W @ TRUE)))
     assert (found.pairs[0].first, found.pairs[0].second) == ("MX1R", "MY1")
     assert found.pairs[0].correlation < -0.999
     assert ("MX1R", "MY1") in found.groups
@@ -122,7 +123,7 @@ def test_parameters_that_trade_are_named():
 
 def test_correlations_are_those_of_the_covariance():
     seen = observation(noise=(0.3, 0.05), seed=1)
-    found = weak_directions(seen, EstimateSettings(method="wls"), threshold=0.2)
+    found = weak_directions(linear_system(seen, EstimateSettings(method="wls")), threshold=0.2)
     assert len(found.warnings) == len(found.groups) and all(
         ", ".join(g[:-1]) in w for g, w in zip(found.groups, found.warnings, strict=True)
     )

@@ -494,9 +494,9 @@ def test_motor_counts_are_counts_whatever_the_coupling(coupling, tmp_path):
     assert np.isfinite(runtime.cestac(model, record, coarse).levels[0].mean).all()
 
 
-def test_settings_of_counts_need_the_reader():
-    with pytest.raises(SettingsError, match="reader: counts"):
-        Signals(step=0.01)
+def test_settings_of_counts_need_the_reader(planar, record):
+    with pytest.raises(SettingsError, match=r"signals.step: given.*reader: counts"):
+        problem(planar, record, Study(signals=Signals(step=0.01)))
 
 
 def test_a_record_that_counts_would_help_is_told(planar, record):

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 import symgen
 from runtime import load_model
-from runtime.compose import cestac, observe
+from runtime.compose import cestac, observe, read_record
 from runtime.core.drives import Drives
 from runtime.core.errors import InputError
 from runtime.core.missing import Missing, bridged
@@ -27,7 +27,7 @@ from runtime.core.signals.filters import filtered_states
 from runtime.core.study import CestacSettings, Lowpass, Signals
 from runtime.counts.reader import encoder_position
 from runtime.reading.settings import RecordSettings
-from runtime.study import Rows, Study, read_record
+from runtime.study import Rows, Study
 from symgen.cli.main import app
 
 GENERATED = Path(__file__).parents[2] / "generated"

@@ -36,9 +36,7 @@ from symgen.description.robot_file import json_schema
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
-EXAMPLES = sorted((ROOT / "docs" / "examples").glob("[0-9]*.py")) + [
-    ROOT / "docs" / "examples" / "dask_many_robots.py"
-]
+EXAMPLES = sorted((ROOT / "docs" / "examples").glob("[0-9]*.py"))
 FENCE = re.compile(r"^```(?P<kind>python|sh|yaml)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 SOON = ("README",)  # pages that the default run runs
 LONG = (

@@ -71,8 +71,8 @@ def two_joints() -> object:
 
 
 def read_record(path: Path) -> object:
+    from runtime.compose import read_record as read
     from runtime.reading.settings import RecordSettings
-    from runtime.study import read_record as read
 
     settings = RecordSettings(files=(path.name,), columns=columns_of(path))
     return read(settings, folder=path.parent)

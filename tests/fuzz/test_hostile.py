@@ -15,11 +15,12 @@ from campaign import campaign
 
 from fuzz.archives import npy_header, plain_npy
 from fuzz.seeds import csv_file, model_files, npz_members, robot_file, urdf_files
+from runtime.compose import read_record
 from runtime.core.errors import InputError
 from runtime.core.model import load_model
 from runtime.reading.files import read_bytes
 from runtime.reading.settings import RecordSettings
-from runtime.study import load_study, read_record
+from runtime.study import load_study
 from symgen.description import load_robot
 from symgen.errors import DescriptionError
 

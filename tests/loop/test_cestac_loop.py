@@ -10,7 +10,7 @@ from campaign import campaign
 from problems import loop_of_records
 from test_closed_loop import ARM, arm, away  # noqa: F401  (arm is a fixture)
 
-from runtime.compose import cestac, estimate_of, observe, problem
+from runtime.compose import METHODS, cestac, estimate_of, observe, problem
 from runtime.core.cestac.rounding import rounded, stream
 from runtime.core.cestac.runs import Level
 from runtime.core.errors import InputError, SettingsError
@@ -161,3 +161,20 @@ def test_what_cannot_be_asked(arm, study, record):  # noqa: F811
     once = method(study, "iv", passes=1, start=away(arm[3], arm[0].BASE_PARAMETERS), gains="one")
     with pytest.raises(InputError, match="iv finds no estimate from the measured record"):
         cestac(arm[0], record, once)
+
+
+@pytest.mark.parametrize("name", ["iv", pytest.param("didim", marks=campaign)])
+def test_a_simulating_method_under_another_name_is_the_method(
+    arm,  # noqa: F811
+    study,
+    record,
+    simulator,
+    monkeypatch,
+    name,
+):
+    monkeypatch.setitem(METHODS, "twinned", METHODS[name])
+    expected, found = (
+        cestac(arm[0], record, method(study, own), simulator=simulator).to_json()
+        for own in (name, "twinned")
+    )
+    assert name in expected and found.replace("twinned", name) == expected

@@ -323,8 +323,8 @@ def test_motor_encoder_saturation_and_seeds(tx40, truth):
 
 
 def test_record_and_csv_carry_the_reference(tx40, truth, tmp_path):
+    from runtime.compose import read_record
     from runtime.reading.settings import RecordSettings
-    from runtime.study import read_record
 
     settings = controller(record_every=5, reference={"points": {"duration": 0.4}})
     reference = reference_of(settings, tx40)

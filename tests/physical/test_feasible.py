@@ -11,6 +11,7 @@ from pathlib import Path
 import clarabel
 import numpy as np
 import pytest
+from problems import linear_system
 from scipy.optimize import minimize
 
 import symgen
@@ -20,7 +21,6 @@ from runtime.compose import estimate_of, state_problem
 from runtime.core.checklist import negative_elements
 from runtime.core.errors import SettingsError
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.least_squares.method import linear_companion, linear_system
 from runtime.core.model import load_model
 from runtime.core.rows.observation import Observation
 from runtime.core.study import EstimateSettings
@@ -169,9 +169,7 @@ def test_feasible_is_least_squares_where_that_is_feasible(name: str) -> None:
     assert found.details["least_squares"]["feasible"]
     np.testing.assert_array_equal(found.X, ols.X)
     physical, options = physical_model(model), FeasibleOptions(prior="none", margin=1e-9)
-    chi, weight = solve_with_weight(
-        linear_system(seen, linear_companion(FEASIBLE)).weighted, physical, options
-    )
+    chi, weight = solve_with_weight(linear_system(seen, FEASIBLE).weighted, physical, options)
     assert weight == 0 and np.abs((physical.K @ chi - ols.X) / ols.sigma).max() < 1e-2
 
 
@@ -541,7 +539,7 @@ def test_tx40_record(tx40, tx40_data) -> None:
             for how in (EstimateSettings(), FEASIBLE)
         ]
         assert errors[1] < 0.98 * errors[0]
-    system = linear_system(seen, linear_companion(FEASIBLE))
+    system = linear_system(seen, FEASIBLE)
     assert residual_norm(system.weighted, found.X) == pytest.approx(found.residual_norm, rel=1e-9)
 
 

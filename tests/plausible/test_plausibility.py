@@ -18,7 +18,7 @@ from oracles.random_robots import random_parameters, random_robot
 from runtime.compose import estimate_of
 from runtime.core.limits import limits
 from runtime.core.rows.prepared import Prepared
-from runtime.core.signals.filters import lowpassed
+from runtime.core.signals.reader import LOWPASS
 from runtime.physical.inertia import physical_model
 from runtime.physical.semidefinite import LinearBounds, closest, everything
 from runtime.plausible.bodies import Bodies, Grams, least_squares, physical_fit
@@ -208,7 +208,7 @@ def test_excerpts_of_a_long_record_are_spread_over_its_window(
 ) -> None:
     t = np.arange(5000) / 500
     study = study_from_mapping({"rows": {"window": [1.0, 9.0]}})
-    reading = Prepared(runtime.Record(t, t, t**2, tau_known=t), study, lowpassed)
+    reading = Prepared(runtime.Record(t, t, t**2, tau_known=t), study, LOWPASS)
     assert excerpts(reading) == [reading]
     monkeypatch.setattr(LIMIT, "EXCERPTS", (3, 400))
     parts = [part.record for part in excerpts(reading)]
@@ -343,7 +343,7 @@ def kr300_folder() -> Path:
 
 def test_samples_hold_the_motion_and_the_known_torque(right: slip_cases.Case) -> None:
     record = runtime.Record(right.t, right.q, right.tau, tau_known=np.full_like(right.q, 2.0))
-    samples = samples_of([Prepared(record, Study(), lowpassed)], Study())
+    samples = samples_of([Prepared(record, Study(), LOWPASS)], Study())
     assert np.allclose(samples.tau_known, 2.0) and np.allclose(
         samples.tau - 2.0, samples.tau - samples.tau_known
     )

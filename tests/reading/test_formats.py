@@ -17,6 +17,7 @@ import pytest
 import scipy.io
 from bag_files import joint_states, write_bag
 from campaign import sampled
+from problems import linear_system
 
 from runtime import load_model, observe
 from runtime.core.essential import essential_of
@@ -105,7 +106,9 @@ def estimates(model, path, columns, rate, *, stamps):
     )
     (record,) = read_records(study.record, model)
     found = essential_of(
-        observe(model, record, study), study.essential, study.estimate, model=model
+        linear_system(observe(model, record, study), study.estimate),
+        study.essential,
+        model=model,
     )
     return found.all_parameters, found.estimate
 
@@ -167,7 +170,9 @@ def whole_record(folder):
     (record,) = read_records(study_from_mapping(dataset_study("tx40")).record, model)
     study = study_from_mapping(dataset_study("tx40"))
     found = essential_of(
-        observe(model, record, study), study.essential, study.estimate, model=model
+        linear_system(observe(model, record, study), study.estimate),
+        study.essential,
+        model=model,
     )
     expected = [found.all_parameters, found.estimate]
     for kind in FORMATS:

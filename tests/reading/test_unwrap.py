@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import symgen
+from runtime.compose import read_record
 from runtime.core.record import Record
 from runtime.reading.settings import RecordSettings
-from runtime.study import Study, read_record, study_from_mapping, suggested
+from runtime.study import Study, study_from_mapping, suggested
 
 planar_2r = symgen.model("planar_2r")
 t = np.arange(2000) / 200

@@ -4,8 +4,10 @@ import warnings
 
 import pytest
 
+import symgen
 from symgen.description.angles import InertiaWarning
 from symgen.description.tree_robot import read_tree
+from symgen.emit.spec import spec_of
 from symgen.regroup.regrouping import regroup
 
 LINK = """<link name="{name}"><inertial><origin xyz="0.1 0.02 0.03"/><mass value="1"/>
@@ -51,6 +53,15 @@ def test_the_note_comes_once():
         regroup(robot)
         regroup(robot)
     assert [note.category for note in notes] == [InertiaWarning]
+
+
+def test_a_module_from_the_cache_has_the_note_too(tmp_path, monkeypatch):
+    monkeypatch.setenv("SYMGEN_CACHE", str(tmp_path))
+    robot, _ = read_tree(arm("upper"), "arm.urdf")
+    for _ in range(2):
+        spec_of.cache_clear()  # as in another process
+        with pytest.warns(InertiaWarning):
+            symgen.model(robot)
 
 
 def test_a_robot_of_bodies_that_exist_has_no_note(recwarn):

@@ -4,10 +4,12 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from runtime.compose import READERS, problem, state_problem
+from runtime.compose import METHODS, READERS, problem, state_problem
 from runtime.core.automatic import automatic_cutoff
+from runtime.core.least_squares import method
 from runtime.core.problem import prepared
 from runtime.core.record import Origin, Record
+from runtime.core.study import EstimateSettings
 from runtime.loop.closed_loop import closed_loop
 from runtime.speeds import recorded_speeds
 
@@ -36,6 +38,11 @@ def observed_states(q, rate, signals, drives=None, *, missing=None):
         origin=Origin(drives=drives),
     )
     return READERS[signals.reader].states(record, signals)
+
+
+def linear_system(rows, settings=None):
+    """The rows as linear least squares weighs them for a method of symgen; default: ols."""
+    return method.linear_system(rows, settings or EstimateSettings(), METHODS)
 
 
 def loop_of_records(model, records, study, simulator, **options):

@@ -35,22 +35,22 @@ from typing import Any
 import numpy as np
 
 from runtime.core.cestac.perturbed import (
-    PreparedRecord,
     Task,
     measured_rows,
     perturbed,
     prepared_record,
     study_columns,
 )
-from runtime.core.cestac.result import Cestac, level_result, names_judged
+from runtime.core.cestac.result import LEAST_SQUARES, Cestac, level_result, names_judged
 from runtime.core.cestac.runs import Level, Run, Runs
 from runtime.core.cestac.sources import Checkpoint, EncoderOf, LoopOf
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.least_squares.method import LINEAR, linear_system
+from runtime.core.least_squares.method import method_of
 from runtime.core.limits import LIMIT
 from runtime.core.problem import Problem, estimate_of, point_estimate
 from runtime.core.provenance import processor
+from runtime.core.record import Record
 from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import common_drives
@@ -93,8 +93,7 @@ def cestac(
         if settings.cestac.columns is "all".
     map : callable, optional
         Works like the built-in map and computes the runs, for instance in processes
-        (`runtime.parallel.processes.processes`) or on a Dask cluster
-        (`runtime.parallel.cluster.cluster`). The results are the same in every bit.
+        (`runtime.parallel.processes.processes`) or on a Dask cluster (docs/many_runs.md). The results are the same in every bit.
     progress : callable, optional
         Called with the number of runs done and their total.
     checkpoint : Checkpoint, optional
@@ -124,10 +123,17 @@ def cestac(
             ),
             path=("cestac", "side"),
         )
-    if study.signals.reader == "counts" and settings.delta and settings.rounding != "phase":
+    name = study.signals.reader
+    if settings.delta and not problem.reader.reads_rounded:
+        raise SettingsError(
+            f"steps, but signals.reader: {name} does not say how it reads rounded positions; set "
+            "another reader, or delta: []",
+            path=("cestac", "delta"),
+        )
+    if problem.reader.encoder is not None and settings.delta and settings.rounding != "phase":
         raise SettingsError(
             (
-                f"rounding: {settings.rounding} does not work with signals.reader: counts, because "
+                f"rounding: {settings.rounding} does not work with signals.reader: {name}, because "
                 "it rounds each sample independently and so destroys the changes of the encoder "
                 "count; set rounding: phase"
             ),
@@ -140,7 +146,10 @@ def cestac(
         study = replace(study, estimate=loop.estimate)
     rounded = () if settings.place == "loop" else as_measured
     task = Task(
-        records=tuple(prepared_record(own, study, own_encoder, drives) for own in rounded),
+        records=tuple(
+            prepared_record(own, study, own_encoder, drives, exact=bool(settings.delta))
+            for own in rounded
+        ),
         model=model,
         names=study_columns(problem, as_measured, columns, loop),
         estimate=replace(study.estimate, columns="all"),
@@ -174,12 +183,13 @@ def cestac(
     )
     by_level = [runs.where(runs.level == k) for k in range(len(task.levels))]
     levels = list(zip(task.levels, by_level, strict=True))
+    linear = method_of(task.estimate, task.methods).linear
     if settings.place == "loop":
         (_, exact), *levels = levels
-        X = np.nanmean(exact.X, axis=0)
-        reference = replace(
-            reference, X=X, residual_norm=float(np.linalg.norm(measured.Y - measured.W @ X))
-        )
+        reference = replace(reference, X=np.nanmean(exact.X, axis=0))
+    if settings.place == "loop" or not linear:  # their residuals are not those of `measured`
+        norm = float(np.linalg.norm(measured.Y - measured.W @ reference.X))
+        reference = replace(reference, residual_norm=norm)
     return Cestac(
         names=task.names,
         reference=reference,
@@ -190,6 +200,7 @@ def cestac(
             *(() if loop is None else loop.notes),
             *(record.note for record in task.records if record.note),
         ),
+        estimator=LEAST_SQUARES if linear else reference.method.upper(),
     )
 
 
@@ -274,13 +285,13 @@ def _all_runs(
     return Runs.joined(parts, b)
 
 
-def _measured(record: PreparedRecord) -> Iterator[memoryview]:
+def _measured(record: Record) -> Iterator[memoryview]:
     """Yield the bytes of the positions, torques and missing-sample flags of a record, for a hash.
 
     A hash of these bytes identifies the record.
     """
     missing = () if record.missing is None else (np.packbits(record.missing.samples),)
-    return (np.ascontiguousarray(x).data for x in (record.q, record.tau, *missing))
+    return (np.ascontiguousarray(x).data for x in (record.q, record.torque, *missing))
 
 
 def _identity(
@@ -306,7 +317,9 @@ def _identity(
         ],
         "robot": provenance.get("robot"),
         "robot_sha256": provenance.get("robot_sha256"),
-        "records": [sha256(b"".join(map(bytes, _measured(r)))).hexdigest() for r in task.records],
+        "records": [
+            sha256(b"".join(map(bytes, _measured(r.record)))).hexdigest() for r in task.records
+        ],
         "versions": provenance["versions"],
     }
 
@@ -362,8 +375,9 @@ def one_run(columns: Columns, task: Task, key: tuple[int, int]) -> Run:
 
 def _estimated(task: Task, observation: Observation) -> Array:
     """Estimate X, shape (b,), from the system of one run; nan if the method finds no estimate."""
-    if task.estimate.method in LINEAR:
-        return linear_system(observation, task.estimate).solve().X
+    method = method_of(task.estimate, task.methods)
+    if method.linear:
+        return method.system(observation, task.estimate).solve().X
     try:
         settings = point_estimate(task.estimate, task.methods)
         estimate = estimate_of(observation, settings, task.methods, model=task.model)

@@ -14,7 +14,7 @@ torque, and whatever records follow.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,23 +24,16 @@ from runtime.core.cestac.sources import EncoderOf, Loop, RecordEncoder
 from runtime.core.drives import Drives
 from runtime.core.errors import InputError
 from runtime.core.essential import essential_of
-from runtime.core.least_squares.method import Method, linear_companion
-from runtime.core.missing import COUNTS, Missing, require_positions
+from runtime.core.least_squares.method import Method
 from runtime.core.model import GeneratedModel, base_columns
 from runtime.core.problem import Problem
-from runtime.core.record import Origin, Record
+from runtime.core.record import Record
 from runtime.core.rows.observation import Observation, stack
 from runtime.core.rows.prepared import Prepared, decimated_torque, observation_of, stacked
 from runtime.core.rows.regressor import Columns
-from runtime.core.rows.selection import Selection, select_rows
-from runtime.core.signals.filters import (
-    Reader,
-    States,
-    derivative,
-    filtered_states,
-    lowpassed,
-    require_motion,
-)
+from runtime.core.rows.selection import Selection
+from runtime.core.signals.filters import States, derivative
+from runtime.core.signals.reader import Reader
 from runtime.core.study import CestacSettings, EstimateSettings, Signals, Study
 
 Array = np.ndarray
@@ -52,43 +45,30 @@ class PreparedRecord:
 
     Attributes
     ----------
-    q, tau : ndarray, shape (N, n)
-        Measured positions and torques of the joints, rad or m, N m or N.
-    rate : float, Hz
-    files : mapping
-        SHA-256 of the measured files, by file name.
+    record : Record
+        Measured positions and torques of the joints.
     selection : Selection
         Rows used, selected on the measured record.
     torque : ndarray, shape (n, K), N m or N
         Y before the selection of rows.
-    states : States or None
-        States of the measured record, if its positions can be read as counts; None: the low-pass
-        gives the states.
+    states : States
+        States of the measured record.
     own : RecordEncoder or None
         Encoder that measured the record, under law phase.
-    missing : Missing or None
-        Samples without a position, the same in every run.
-    channels : mapping
-        Functions of time on which laws of the model depend, (N,) by name.
     note : str
-        Sentence for the user if the study uses counts, but the measured record is read by the
-        low-pass; else "".
+        Sentence for the user if the study uses counts, but the positions of the record count as
+        exact; else "".
     slip : ndarray or None, shape (N, n), rad/s or m/s
         Recorded velocities minus the differences of q, if signals.velocity uses recorded
         velocities. A drive computes its velocity from its encoder, so that coarser steps change
         both alike and leave this difference.
     """
 
-    q: Array
-    tau: Array
-    rate: float
-    files: Mapping[str, str]
+    record: Record
     selection: Selection
     torque: Array
-    states: States | None = None
+    states: States
     own: RecordEncoder | None = None
-    missing: Missing | None = None
-    channels: Mapping[str, Array] = field(default_factory=dict)
     note: str = ""
     slip: Array | None = None
 
@@ -108,7 +88,7 @@ class Task:
     drives : Drives or None
         Drives between motor side and joint side.
     reader : Reader
-        Function that computes the states q, qd, qdd of a record.
+        Computes the states q, qd, qdd of a record.
     methods : mapping of str to Method
         Estimation methods by name, that of `estimate` among them.
     loop : Loop or None
@@ -137,6 +117,8 @@ def prepared_record(
     study: Study,
     own_encoder: EncoderOf,
     drives: Drives | None = None,
+    *,
+    exact: bool = True,
 ) -> PreparedRecord:
     """Filter one measured record and select its rows, once for all runs of a study.
 
@@ -144,49 +126,51 @@ def prepared_record(
     selected by the measured velocities, unless `own` has selected rows.
 
     own_encoder : function that returns the encoder that measured the record, or None.
+    exact : whether encoders are studied, beside whose steps the positions of counts are exact.
     """
-    signals, record = replace(study.signals, median=study.cestac.median), own.record
-    encoder, counts, note = own_encoder(record, study, drives), None, ""
-    if signals.reader == "counts" and (
-        signals.step is not None or record.missing or (encoder is not None and encoder.read)
-    ):
-        known = (
-            signals
-            if signals.step is not None or encoder is None
-            else replace(signals, step=tuple(encoder.step), side=study.cestac.side)
-        )
-        own = replace(own, study=replace(study, signals=known))
-        counts = own.states
-    elif signals.reader == "counts":
-        note = (
-            f"Beside these steps the positions of {record.name} count as exact: the estimate "
-            "that runs are compared with reads them by the low-pass."
-        )
-    if counts is None:
-        require_positions(record.missing, "reader: lowpass", record.file, COUNTS)
-    if own.selected is not None:
-        selection, torque = own.selected, own.torque
-    else:  # without a limit any speed will do
-        speeds = record.q
-        if np.any(study.rows.low_speed):
-            v = record.channels.get("qd")
-            speeds = (counts or filtered_states(record.q, record.rate, signals, v)).qd
-        selection = select_rows(record, speeds, signals, study.rows)
-        torque = decimated_torque(record.torque, selection)
+    signals = replace(study.signals, median=study.cestac.median)
+    encoder = own_encoder(own.record, study, drives)
+    reader, note = _reader_of_measured(own, study, encoder) if exact else (own.reader, "")
+    own = replace(own, study=replace(study, signals=signals), reader=reader)
+    q = np.asfortranarray(own.record.q)  # one signal after the other, as filters read them
     return PreparedRecord(
-        np.asfortranarray(record.q),  # one signal after the other, as filters read them
-        record.torque,
-        record.rate,
-        dict(record.files),
-        selection,
-        torque,
-        counts,
+        replace(own.record, q=_read_only(q)),
+        own.selection,
+        own.torque,
+        own.states,
         encoder,
-        record.missing,
-        own.channels,
         note,
-        _slip(record, signals),
+        _slip(own.record, signals),
     )
+
+
+def _reader_of_measured(
+    own: Prepared, study: Study, encoder: RecordEncoder | None
+) -> tuple[Reader, str]:
+    """Return the reader of a measured record, and a note if its positions count as exact.
+
+    Beside coarser steps, positions of counts are exact, unless the study gives their step, some are
+    missing, or the study needs the counts of the record itself.
+    """
+    reader, side = own.reader, study.cestac.side
+    known = reader.encoder is None or reader.encoder(study.signals)[0] is not None
+    if known:
+        return reader, ""
+    if encoder is not None and (encoder.read or own.record.missing is not None):
+        return reader.at_step(tuple(encoder.step), side), ""
+    if own.record.missing is not None:
+        return reader, ""
+    return reader.at_step(0.0, side), (
+        f"Beside these steps the positions of {own.record.name} count as exact: the estimate "
+        "that runs are compared with reads them by the low-pass."
+    )
+
+
+def _read_only(x: Array) -> Array:
+    """Return a view of x that a Record uses without a copy."""
+    view = x.view()
+    view.setflags(write=False)
+    return view
 
 
 def _slip(record: Record, signals: Signals) -> Array | None:
@@ -212,32 +196,30 @@ def study_columns(
     Raises SettingsError for a name that is no base parameter, and for static poses.
     """
     settings, asked = problem.settings, problem.settings.cestac.columns
-    require_motion(settings.signals, "the study of encoders")
+    problem.require_motion("the study of encoders")
     named = base_columns(problem.model, asked, (), "cestac", "columns")
     if asked == "all":
         return named
     if columns is None:
         rows = _measured(problem, records) if loop is None else loop.measured()
-        linear = linear_companion(settings.estimate)
-        columns = essential_of(rows, settings.essential, linear).names
+        columns = essential_of(problem.linear_system(rows), settings.essential).names
     return (*named, *(name for name in columns if name not in named))
 
 
 def _measured(problem: Problem, records: Sequence[Prepared]) -> Observation:
     """Build the system Y = W X + rho of the measured records, without any rounding.
 
-    If the study reads encoder counts and the positions are no counts, the low-pass gives the
-    states.
+    If the study reads encoder counts of unknown step and the positions are no counts, they count as
+    exact.
     """
+    reader = problem.reader
     try:
         return stacked(problem.model, records)
     except InputError:
-        signals = problem.settings.signals
-        if signals.reader != "counts" or signals.step is not None:
+        if reader.encoder is None or reader.encoder(problem.settings.signals)[0] is not None:
             raise
-    signals = replace(signals, reader="lowpass", side="joint", options={})
-    study = replace(problem.settings, signals=signals)
-    return stacked(problem.model, [replace(own, study=study, reader=lowpassed) for own in records])
+    exact = reader.at_step(0.0, "joint")
+    return stacked(problem.model, [replace(own, reader=exact) for own in records])
 
 
 def stream_keys(draw: tuple[int, ...], k: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -290,7 +272,8 @@ def torque_rows(task: Task, record: PreparedRecord, level: Level, key: Sequence[
     if not level.torque:
         return record.torque
     return decimated_torque(
-        perturbed_torque(record.tau, level, task.settings, task.drives, key), record.selection
+        perturbed_torque(record.record.torque, level, task.settings, task.drives, key),
+        record.selection,
     )
 
 
@@ -319,8 +302,8 @@ def perturbed(columns: Columns, task: Task, level: Level, draw: tuple[int, ...])
 def measured_rows(task: Task, records: Sequence[Prepared]) -> Observation:
     """Build the system Y = W X + rho of the records without rounding, as reference of the study.
 
-    It is the system of a run without steps if a loop is simulated, or if a record that should be
-    read as counts is read by the low-pass.
+    It is the system of a run without steps if a loop is simulated, or if the positions of a record
+    count as exact.
     """
     if task.loop is not None or any(record.note for record in task.records):
         return perturbed(task.columns, task, Level(0.0), ())
@@ -333,7 +316,7 @@ def run_position(task: Task, record: PreparedRecord, level: Level, key: Sequence
     The measured positions are rounded. If the steps are hardly coarser than those of the record, a
     random motion that agrees with the recorded counts is rounded instead.
     """
-    q = record.q
+    q = record.record.q
     if level.delta and record.own is not None:
         q = record.own.positions(q, level.delta, stream(task.settings.seed, *key, 0))
     return perturbed_position(q, level, task.settings, task.drives, key)
@@ -342,28 +325,28 @@ def run_position(task: Task, record: PreparedRecord, level: Level, key: Sequence
 def run_states(task: Task, record: PreparedRecord, q: Array, level: Level) -> States:
     """Compute the states q, qd, qdd of one run from its positions q, shape (N, n).
 
-    A reader of counts knows the steps of the level, but not their phase.
+    The reader knows the steps of the level, but not the phase of its counts.
     """
-    signals = record.selection.signals
-    if signals.reader == "lowpass" or not level.delta:
-        v = None if record.slip is None else derivative(q, record.rate, signals.ends) + record.slip
-        states = record.states or filtered_states(q, record.rate, signals, v)
-    else:
-        known = replace(signals, step=level.delta, side=task.settings.side)
-        try:
-            states = task.reader(_moved(task, record, q), known)
-        except np.linalg.LinAlgError as e:
-            raise InputError(
-                f"an encoder step of {level.label} is too coarse for this motion ({e}); use finer steps"
-            ) from e
-    return replace(states, channels=record.channels)
+    if q is record.record.q:
+        return record.states
+    reader = task.reader.at_step(level.delta, task.settings.side)
+    try:
+        states = reader.states(_moved(record, q, task.drives), record.selection.signals)
+    except np.linalg.LinAlgError as e:
+        raise InputError(
+            f"an encoder step of {level.label} is too coarse for this motion ({e}); use finer steps"
+        ) from e
+    return replace(states, channels=record.states.channels)
 
 
-def _moved(task: Task, record: PreparedRecord, q: Array) -> Record:
-    """Make a Record with the positions q of one run, for a reader of encoder counts."""
-    origin = Origin(drives=task.drives)
-    t = np.arange(len(q)) / record.rate
-    return Record(t, q, record.tau, rate=record.rate, missing=record.missing, origin=origin)
+def _moved(record: PreparedRecord, q: Array, drives: Drives | None) -> Record:
+    """Return the record with the positions q of one run, and velocities that have moved with them."""
+    measured = record.record
+    moved = measured.moved(_read_only(q), origin=replace(measured.origin, drives=drives))
+    if record.slip is None:
+        return moved
+    v = derivative(q, measured.rate, record.selection.signals.ends) + record.slip
+    return replace(moved, channels={**moved.channels, "qd": v})
 
 
 def system_of(
@@ -376,7 +359,7 @@ def system_of(
     """Build the system Y = W X + rho of all records from positions and torques of each record.
 
     positions : shape (N, n) each. torques : rows of Y, shape (n, K) each.
-    level : steps for the counts reader; default: none, positions as they are.
+    level : steps that the reader is told; default: none, positions as they are.
     """
     observations = [
         observation_of(
@@ -384,7 +367,7 @@ def system_of(
             run_states(task, record, q, level or Level(0.0)),
             torque,
             record.selection,
-            files=record.files,
+            files=record.record.files,
         )
         for record, q, torque in zip(task.records, positions, torques, strict=True)
     ]

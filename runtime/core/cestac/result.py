@@ -40,7 +40,6 @@ from runtime.core.cestac.runs import Level, Runs
 from runtime.core.documents import Result, Vector, json_text
 from runtime.core.errors import InputError
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.least_squares.method import LINEAR
 from runtime.core.limits import LIMIT
 from runtime.core.part import (
     BLACK,
@@ -67,6 +66,7 @@ SCHEMA = "symgen-cestac/1"
 """Kind and version of the JSON layout; `symgen schema --of cestac` prints its JSON Schema."""
 JUDGED = "judged"
 """Key of the provenance of a reference: names that study.cestac.columns asks for."""
+LEAST_SQUARES = "LS"
 Verdict = Literal["unbiased", "doubtful", "biased"]
 
 
@@ -151,6 +151,8 @@ class Cestac(Result, Part):
     provenance : mapping
     notes : tuple of str
         Remarks for the user, a sentence each.
+    estimator : str
+        Short name of the method in tables; LS for linear least squares, weighted or not.
     """
 
     names: tuple[str, ...]
@@ -159,6 +161,7 @@ class Cestac(Result, Part):
     settings: Mapping[str, Any] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    estimator: str = LEAST_SQUARES
 
     name = "resolution"
     title = "Resolution study"
@@ -232,13 +235,8 @@ class Cestac(Result, Part):
         parts = [
             f"{meaning[verdict]} at {', '.join(labels)}" for verdict, labels in by_verdict.items()
         ]
-        method = "Least squares" if self.estimator == "LS" else self.estimator
+        method = "Least squares" if self.estimator == LEAST_SQUARES else self.estimator
         return f"{method} is {'; '.join(parts)}."
-
-    @property
-    def estimator(self) -> str:
-        """Short name of the estimation method in tables; LS for least squares, weighted or not."""
-        return "LS" if self.reference.method in LINEAR else self.reference.method.upper()
 
     @property
     def lists_runs(self) -> bool:
@@ -510,7 +508,8 @@ def level_result(
 
     Eqs. (18) to (22).
 
-    measured : the unperturbed system with the columns of the runs.
+    measured : the unperturbed system with the columns of the runs. reference : estimate from this
+    system, with the residual norm of its rows.
     """
     found = np.isfinite(runs.X).all(axis=1)
     runs, failed = runs.where(found), int(np.sum(~found))
@@ -522,11 +521,7 @@ def level_result(
         )
     mean, sigma = X.mean(axis=0), X.std(axis=0, ddof=1)
     norm_Y = float(np.linalg.norm(measured.Y))
-    rho_ls = (
-        reference.residual_norm
-        if reference.method in LINEAR
-        else float(np.linalg.norm(measured.Y - measured.W @ reference.X))
-    )
+    rho_ls = reference.residual_norm
     rho = float(np.linalg.norm(measured.Y - measured.W @ mean))
     own = float(runs.residual_norm.mean())
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -3,20 +3,21 @@
     start = rows(observation, settings, options)     least squares, solved once for every method
     fitted = fit(start)                              the result of the method; None: nothing more
 
-A new method is a file with a function `fit` and a line in METHODS (`runtime.compose`).
+A new method is a file with a function `fit` and a line in METHODS (`runtime.compose`), the only
+place with its name. Other code asks what a Method says of itself: whether it is linear, weighs rows
+by joint, simulates the closed loop (`observe`), or gives a physical robot.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias
 
 from runtime.core.errors import SettingsError
-from runtime.core.least_squares.estimate import Estimate, Status
-from runtime.core.least_squares.linear import LinearOptions, System, assemble, ordinary
+from runtime.core.least_squares.estimate import Status
+from runtime.core.least_squares.linear import LinearOptions, System
 from runtime.core.least_squares.solution import Solution
-from runtime.core.least_squares.wls import weighted
 from runtime.core.model import GeneratedModel
 from runtime.core.rows.factor import Array
 from runtime.core.rows.observation import Observation
@@ -104,6 +105,12 @@ class Method:
         Options of the method that give the estimate alone, such as {"explain": False}.
     any_rank : bool
         Whether the method gives an estimate if the rows do not determine all parameters.
+    physical : bool
+        Whether its estimates are those of a physical robot; the first such method of a list fits
+        the physical set of an identification (`runtime.core.parameter_sets`).
+    rounding : str
+        Sentence of the method on a study that rounds recorded positions (CESTAC), with {method} for
+        its name; "" for nothing to say.
     """
 
     options: type[Settings]
@@ -113,6 +120,18 @@ class Method:
     observe: Callable[[Any], Observation] | None = None
     brief: Mapping[str, Any] = field(default_factory=dict)
     any_rank: bool = False
+    physical: bool = False
+    rounding: str = ""
+
+    @property
+    def linear(self) -> bool:
+        """Whether the result is that of one least squares, so that eqs. (7) to (11) hold."""
+        return self.fit is None
+
+    @property
+    def weighs(self) -> bool:
+        """Whether the method accepts weights by joint."""
+        return "joint" in self.weights
 
     def checked(self, settings: EstimateSettings) -> Any:
         """Check options and weights of the settings for this method, and return the options.
@@ -136,55 +155,41 @@ class Method:
         return self.rows(observation, settings, options)
 
 
-LINEAR: Mapping[str, Method] = {
-    "ols": Method(LinearOptions, ordinary, weights=("none",)),  # ordinary least squares
-    "wls": Method(LinearOptions, weighted),  # least squares weighted by joint
-}
-"""Methods that are one least-squares problem in the rows of the observation."""
+Methods: TypeAlias = Mapping[str, Method]
+"""Methods of estimation by the name that estimate.method gives them (METHODS of `compose`)."""
 
 
-def linear_system(observation: Observation, settings: EstimateSettings) -> System:
-    """Build the weighted linear system, in QR form, for the method ols or wls of `settings`.
+def method_of(settings: EstimateSettings, methods: Methods) -> Method:
+    """Return the method of estimation that `settings` names; SettingsError if it is unknown."""
+    if settings.method not in methods:
+        raise SettingsError(
+            f"unknown method {settings.method!r}; expected {' or '.join(methods)}",
+            path=("estimate", "method"),
+        )
+    return methods[settings.method]
 
-    SettingsError for a method that is not one linear system.
+
+def linear_companion(settings: EstimateSettings, methods: Methods) -> EstimateSettings:
+    """Replace a method that is not linear by linear least squares with the same weights.
+
+    The companion is the first linear method that accepts these weights. A linear method stays as it
+    is. Weights and columns stay the same. Essential parameters and weak directions of a method that
+    is not linear are those of its companion.
     """
-    if settings.method not in LINEAR:
-        message = f"{settings.method!r} is not a linear least-squares method; expected {' or '.join(LINEAR)}"
-        raise SettingsError(message, path=("estimate", "method"))
-    return LINEAR[settings.method].system(observation, settings)
-
-
-def linear_companion(settings: EstimateSettings) -> EstimateSettings:
-    """Replace a nonlinear method in the settings by linear least squares with the same weights.
-
-    A linear method stays as it is. Weights and columns stay the same. Essential parameters and weak
-    directions of a method that is not linear are those of its companion.
-    """
-    if settings.method in LINEAR:
+    if method_of(settings, methods).linear:
         return settings
-    return EstimateSettings(
-        "ols" if settings.weights == "none" else "wls", settings.weights, settings.columns
+    companion = linear_method(settings.weights, methods)
+    return EstimateSettings(companion, settings.weights, settings.columns)
+
+
+def linear_method(weights: str, methods: Methods) -> str:
+    """Return the name of the first linear method that accepts these weights."""
+    return next(
+        name for name, method in methods.items() if method.linear and weights in method.weights
     )
 
 
-def linear_estimate(
-    observation: Observation,
-    settings: EstimateSettings | None = None,
-    *,
-    model: GeneratedModel | None = None,
-    provenance: Mapping[str, Any] | None = None,
-) -> Estimate:
-    """Estimate X of Y = W X + rho by the method ols or wls; SettingsError for another method.
-
-    Parameters
-    ----------
-    observation : Observation
-    settings : EstimateSettings, optional
-        Method, weights, columns, options; default: ols.
-    model : GeneratedModel, optional
-        Gives units, joint numbers and the hash of the robot file.
-    provenance : mapping, optional
-        Further entries for Estimate.provenance.
-    """
-    system = linear_system(observation, settings or EstimateSettings())
-    return assemble(system, system.solve(), model=model, provenance=provenance)
+def linear_system(observation: Observation, settings: EstimateSettings, methods: Methods) -> System:
+    """Weigh the rows Y = W X + rho for the linear companion of the method that `settings` names."""
+    linear = linear_companion(settings, methods)
+    return method_of(linear, methods).system(observation, linear)

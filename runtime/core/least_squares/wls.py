@@ -17,6 +17,7 @@ The chapter leaves weights open; Gautier (1997) and BIRDy use the first and the 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky, solve_triangular
@@ -28,7 +29,7 @@ from runtime.core.least_squares.solution import joint_scatter, solve
 from runtime.core.limits import LIMIT
 from runtime.core.rows.factor import Factor, factor
 from runtime.core.rows.observation import Observation, whitened
-from runtime.core.study import EstimateSettings
+from runtime.core.study import EstimateSettings, Weights
 
 
 def weighted(
@@ -57,6 +58,16 @@ def by_weights(
     """Weight the rows as `settings.weights` specifies; "none" leaves them unchanged."""
     rows = ordinary if settings.weights == "none" else weighted
     return rows(observation, settings, options)
+
+
+def weighted_system(
+    observation: Observation,
+    weights: Weights = "none",
+    columns: tuple[str, ...] | Literal["all"] = "all",
+) -> System:
+    """Weight the rows of the given columns for least squares that no setting chooses."""
+    settings = EstimateSettings(weights=weights, columns=columns)
+    return by_weights(observation, settings, LinearOptions())
 
 
 def common_scales(raw: Factor, X: np.ndarray, rank: int) -> np.ndarray:

@@ -359,44 +359,59 @@ def stack(observations: Sequence[Observation]) -> Observation:
     """
     if not observations:
         raise InputError("no observation to stack; give at least one")
-    first = observations[0]
     if len(observations) == 1:
-        return first
+        return observations[0]
+    _require_same_columns(observations)
+    n = observations[0].n
+    rows = [(o, o.joint(j)) for j in range(n) for o in _numbered(observations)]
+    known = all(o.speed is not None for o in observations)
+    return Observation(
+        W=np.asfortranarray(_joined("W", rows)),
+        Y=_joined("Y", rows),
+        rows=tuple(sum(o.rows[j] for o in observations) for j in range(n)),
+        names=observations[0].names,
+        t=_joined("t", rows),
+        record=_joined("record", rows),
+        rate=max(o.rate for o in observations),
+        dropped=_dropped(observations),
+        settings=same_settings([o.settings for o in observations]),
+        files=all_files([o.files for o in observations]),
+        findings=tuple(dict.fromkeys(text for o in observations for text in o.findings)),
+        rates=tuple(rate for o in observations for rate in (o.rates or (o.rate,))),
+        speed=_joined("speed", rows) if known else None,
+    )
+
+
+def _require_same_columns(observations: Sequence[Observation]) -> None:
+    """Raise InputError unless all observations have the columns and the joints of the first one."""
+    first = observations[0]
     for o in observations:
         if o.names != first.names or o.n != first.n:
             raise InputError(
                 f"columns {o.names} on {o.n} joints; expected the columns of the first record, "
                 f"{first.names} on {first.n} joints"
             )
-    offsets = np.cumsum([0] + [int(o.record.max(initial=0)) + 1 for o in observations])
-    numbered = [
-        replace(o, record=o.record + k) for o, k in zip(observations, offsets, strict=False)
-    ]
-    order = [(o, o.joint(j)) for j in range(first.n) for o in numbered]
-    speeds = [o.speed[rows] for o, rows in order if o.speed is not None]
-    W = np.empty((sum(sum(o.rows) for o in observations), len(first.names)), order="F")
-    np.concatenate([o.W[rows] for o, rows in order], out=W)
-    return Observation(
-        W=W,
-        Y=np.concatenate([o.Y[rows] for o, rows in order]),
-        rows=tuple(sum(o.rows[j] for o in observations) for j in range(first.n)),
-        names=first.names,
-        t=np.concatenate([o.t[rows] for o, rows in order]),
-        record=np.concatenate([o.record[rows] for o, rows in order]),
-        rate=max(o.rate for o in observations),
-        dropped={
-            reason: tuple(
-                sum(o.dropped.get(reason, (0,) * first.n)[j] for o in observations)
-                for j in range(first.n)
-            )
-            for reason in first.dropped
-        },
-        settings=same_settings([o.settings for o in observations]),
-        files=all_files([o.files for o in observations]),
-        findings=tuple(dict.fromkeys(text for o in observations for text in o.findings)),
-        rates=tuple(rate for o in observations for rate in (o.rates or (o.rate,))),
-        speed=np.concatenate(speeds) if len(speeds) == len(order) else None,
-    )
+
+
+def _numbered(observations: Sequence[Observation]) -> list[Observation]:
+    """Number the records of all observations in one sequence, from 0."""
+    first = np.cumsum([0] + [int(o.record.max(initial=0)) + 1 for o in observations])
+    return [replace(o, record=o.record + k) for o, k in zip(observations, first, strict=False)]
+
+
+def _joined(name: str, rows: Sequence[tuple[Observation, slice]]) -> Array:
+    """Join the rows `own` of the array `name` of each observation."""
+    return np.concatenate([getattr(o, name)[own] for o, own in rows])
+
+
+def _dropped(observations: Sequence[Observation]) -> dict[str, tuple[int, ...]]:
+    """Sum the numbers of the rows that were left out, per joint, by reason of the first record."""
+    first = observations[0]
+    nothing = (0,) * first.n
+    counts = {
+        reason: [o.dropped.get(reason, nothing) for o in observations] for reason in first.dropped
+    }
+    return {reason: tuple(map(sum, zip(*own, strict=True))) for reason, own in counts.items()}
 
 
 def same_settings(settings: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:

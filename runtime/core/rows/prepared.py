@@ -28,7 +28,8 @@ from runtime.core.rows.observation import Observation, stack
 from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import Selection, certain_rows, nothing_left, select_rows
 from runtime.core.signals.decimation import decimate
-from runtime.core.signals.filters import Reader, States, median_filtered
+from runtime.core.signals.filters import States, median_filtered
+from runtime.core.signals.reader import Reader
 from runtime.core.study import Study
 
 Array = np.ndarray
@@ -45,7 +46,7 @@ class Prepared:
     study : Study
         Settings of signals and rows, with numbers in place of "auto".
     reader : Reader
-        Function that computes the states of the record.
+        Computes the states of the record.
     selected : Selection or None
         Rows to use; None: the settings choose them.
     """
@@ -66,7 +67,7 @@ class Prepared:
     @cached_property
     def states(self) -> States:
         """Filtered joint states q, qd, qdd of the record, shape (N, n) each."""
-        states = self.reader(self.record, self.study.signals)
+        states = self.reader.states(self.record, self.study.signals)
         return replace(states, channels=self.channels)
 
     @property
@@ -115,7 +116,7 @@ class Prepared:
         """Copy the filtered states of another Prepared if positions and filters are the same."""
         same = self.record.q is other.record.q and self.record.missing is other.record.missing
         same &= self.record.channels.get("qd") is other.record.channels.get("qd")
-        same &= self.reader is other.reader and self.study.signals == other.study.signals
+        same &= self.reader == other.reader and self.study.signals == other.study.signals
         if same and "states" in vars(other):
             vars(self)["states"] = replace(other.states, channels=self.channels)
 

@@ -123,7 +123,6 @@ def instants_of(record: Record, signals: Signals, rows: Rows) -> tuple[slice, in
     """
     auto, low = rows.trim == "auto", signals.lowpass
     trim = LIMIT.TRIM if rows.trim == "auto" else rows.trim
-    trim = 0 if signals.reader == "static" else trim
     margin = ceil(LIMIT.END_PERIODS * record.rate / low.hertz) if auto and low is not None else 0
     start, stop = window_of(record.t, rows.window, record.file, margin)
     factor = decimation_factor(signals, record.rate)

@@ -38,6 +38,7 @@ def cutoff(
     positions: Sequence[tuple[Array, float]],
     signals: Signals,
     crossing: float | tuple[float, ...] = np.inf,
+    counts: bool = False,
 ) -> tuple[float, str]:
     """Choose the cut-off frequency of the low-pass filter for records that are fitted together.
 
@@ -46,11 +47,11 @@ def cutoff(
     positions : q, shape (N, n), rad or m, and rate, Hz, of each record.
     crossing : frequency, Hz, above which recorded velocities replace differences of q
         (`runtime.speeds`).
+    counts : whether positions are read as counts of encoders.
     """
     low, parts = signals.lowpass or Lowpass(), []
     highest = LIMIT.HIGHEST_CUTOFF * min((rate for _, rate in positions), default=np.inf)
     positions = [(q, rate) for q, rate in positions if len(q) > LIMIT.FEWEST_LINES]
-    counts = signals.reader == "counts"
     if not positions or (counts and not all(np.isfinite(q).all() for q, _ in positions)):
         return min(CHAPTER_CUTOFF, highest), "the value of the chapter"
     lowest = max(

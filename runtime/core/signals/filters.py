@@ -6,27 +6,20 @@
 Never the (b, a) form: for decimation it is wrong by 2e-3 at a factor of 40 and diverges at 100.
 Both ends are extended by odd reflection: MATLAB's filtfilt uses 3*(filter length - 1) samples,
 scipy's default is 3*(filter length).
-
-A reader computes the joint states q, qd, qdd of a record from its positions; that of this file is
-`lowpass`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import floor
-from typing import Any, TypeAlias
 
 import numpy as np
 from scipy import ndimage
 from scipy.signal import butter, sosfiltfilt
 
-from runtime.core.errors import InputError, SettingsError
-from runtime.core.missing import COUNTS, require_positions
-from runtime.core.record import Record
-from runtime.core.settings import Settings, structure, to_mapping
+from runtime.core.errors import InputError
 from runtime.core.signals.decimation import CUTOFF, ORDER, Plan, decimate, plan
 from runtime.core.study import Decimate, Lowpass, Signals
 
@@ -267,60 +260,4 @@ def require_longer(samples: int, pad: int) -> None:
         raise InputError(
             f"the record has {samples} samples; this zero-phase filter needs more than {pad}, use "
             "a longer record or window, or a lower order"
-        )
-
-
-Reader: TypeAlias = Callable[[Record, Signals], States]
-"""From a record to its joint states q, qd, qdd, shape (N, n) each, by the settings of the signals."""
-
-
-@dataclass(frozen=True)
-class SignalReader:
-    """A reader that the setting signals.reader can name: it computes the joint states of a record.
-
-    Attributes
-    ----------
-    states : Reader
-        Function that computes the states.
-    options : type or None
-        Settings class of signals.options; None: the reader has no options.
-    """
-
-    states: Reader
-    options: type[Settings] | None = None
-
-    def checked(self, signals: Signals) -> dict[str, Any]:
-        """Check the options of the reader, and return all options with defaults.
-
-        SettingsError if they do not suit.
-        """
-        path = ("signals", "options")
-        if self.options is not None:
-            return to_mapping(structure(self.options, signals.options, path))
-        if signals.options:
-            raise SettingsError(
-                f"the reader {signals.reader} has no options; remove this key", path=path
-            )
-        return {}
-
-
-def lowpassed(record: Record, signals: Signals) -> States:
-    """Compute the joint states of a record by median, low-pass and central differences.
-
-    This is the reader `lowpass` (`runtime.core.signals.filters`).
-    """
-    require_positions(record.missing, "reader: lowpass", record.name, COUNTS)
-    return filtered_states(record.q, record.rate, signals, record.channels.get("qd"))
-
-
-def require_motion(signals: Signals, who: str) -> None:
-    """Raise SettingsError if the records are static poses, for an analysis that needs a motion.
-
-    who : name of the analysis in the message.
-    """
-    if signals.reader == "static":
-        raise SettingsError(
-            f"reader: static is for poses at rest, but {who} needs records of a motion; "
-            "set another reader",
-            path=("signals", "reader"),
         )
