@@ -77,8 +77,8 @@ def plain_run(task: Task, key: tuple[int, int]) -> Array:
     """The same estimate as anyone would write it."""
     (part,), n = task.records, len(task.model.JOINTS)
     chosen = part.selection
-    q = perturbed_position(part.q, task.levels[key[0]], task.settings, task.drives, key)
-    states = filtered_states(q, part.rate, chosen.signals)[chosen.samples]
+    q = perturbed_position(part.record.q, task.levels[key[0]], task.settings, task.drives, key)
+    states = filtered_states(q, part.record.rate, chosen.signals)[chosen.samples]
     W = task.model.observation_matrix(states.q, states.qd, states.qdd)
     numbers = [task.model.BASE_PARAMETERS.index(name) for name in task.names]
     W_j = [W[j * len(states) : (j + 1) * len(states), numbers] for j in range(n)]
