@@ -32,7 +32,8 @@ from scipy.special import stdtrit  # noqa: E402
 import symgen  # noqa: E402
 from runtime.advisor.advice import LIMITS, crossing  # noqa: E402
 from runtime.advisor.coarse_encoders import CoarseEncoders  # noqa: E402
-from runtime.compose import advise, cestac, essential, problem  # noqa: E402
+from runtime.advisor.position_errors import value_reader  # noqa: E402
+from runtime.compose import READERS, advise, cestac, essential, problem  # noqa: E402
 from runtime.core.model import drives_of  # noqa: E402
 from runtime.reading.datasets import dataset_study  # noqa: E402
 from runtime.reading.records import read_records  # noqa: E402
@@ -64,16 +65,8 @@ def steps_table(name, model, study, record, names):
     """Predicted and sampled steps of every parameter that matters."""
     advice = advise(model, record, study, columns=names, encoders=("all",), confirm=False)
     first = advice.encoders[0]
-    level = CoarseEncoders(
-        model,
-        [problem(model, record, study).prepared[0]],
-        study,
-        names,
-        drives_of(model),
-        {},
-        study.cestac.rounding,
-        "lowpass",
-    ).sampled
+    law, whole = study.cestac.rounding, problem(model, record, study)
+    level = CoarseEncoders(whole, names, drives_of(model), law, value_reader(whole.reader)).sampled
     low, high = first.limits[0].delta / RATIO**2, first.delta[-1] / RATIO
     grid = np.geomspace(low, high, round(np.log(high / low) / np.log(RATIO)) + 1)
     points = [level(range(record.n), delta, RUNS[name]) for delta in grid]
@@ -175,8 +168,8 @@ def real_table(name, model, study, record, names):
         flush=True,
     )
     for reader in advice.real:
-        own = [problem(model, record, law).prepared[0]]
-        real = CoarseEncoders(model, own, law, names, drives_of(model), {}, "phase", reader.reader)
+        whole, read = problem(model, record, law), READERS[reader.reader]
+        real = CoarseEncoders(whole, names, drives_of(model), "phase", read)
         first, ratios = reader.encoders[0], []
         for limit in first.limits:
             if not np.isfinite(limit.delta):

@@ -35,7 +35,6 @@ from scipy.io import loadmat
 
 import symgen
 from runtime import InputError, load_model
-from runtime.advisor.coarse_encoders import READERS
 from runtime.compose import cestac, essential, estimate_of, observe
 from runtime.core.record import Record
 from runtime.core.rows.prepared import decimated_torque, observation_of
@@ -307,7 +306,7 @@ def haptic(runs: int) -> str:
     found = []
     names = essential(model, record, study).names
     study = replace(study, cestac=replace(study.cestac, rounding="phase", delta=HAPTIC_STEPS))
-    for reader in READERS:
+    for reader in ("lowpass", "counts"):
         found.append(
             cestac(
                 model,

@@ -141,7 +141,12 @@ EXTRAS: list[Extra] = [
         Late("runtime.physical.consistency:consistency"),
         Late("runtime.physical.consistency:as_fitted"),
     ),
-    OnRequest("advice", "resolution advice", Late("runtime.advisor.advisor:advice_of"), NoAdvice),
+    OnRequest(
+        "advice",
+        "resolution advice",
+        partial(Late("runtime.advisor.advisor:advice_of"), listed=READERS),
+        NoAdvice,
+    ),
     OnRequest(
         "resolution",
         "resolution study",
@@ -573,16 +578,28 @@ def cestac(
 
 @single_threaded
 def advise(
-    model: GeneratedModel, records: Records, study: Study | None = None, **options: Any
+    model: GeneratedModel,
+    records: Records,
+    study: Study | None = None,
+    *,
+    readers: Sequence[str] | None = None,
+    **options: Any,
 ) -> Advice:
     """Predict the coarsest encoders that change the estimate by less than 1 % and by less than 5 %.
 
-    options : columns, asked, encoders, confirm, progress, provenance, readers, as of
+    readers : names of the readers for which real encoders are judged; default: all that read
+        encoders if study.cestac.rounding is phase, otherwise none.
+    options : columns, asked, encoders, confirm, progress, provenance, as of
         `runtime.advisor.advisor.advise`.
     """
     from runtime.advisor import advisor
 
-    return advisor.advise(problem(model, records, study), **options)
+    whole = problem(model, records, study)
+    suited = {name: reader for name, reader in READERS.items() if reader.reads_encoders}
+    chosen = {name: _named(suited, name, ("signals", "reader")) for name in readers or ()}
+    if not chosen:
+        chosen = advisor.readers_of_law(whole, READERS)
+    return advisor.advise(whole, readers=chosen, **options)
 
 
 @single_threaded

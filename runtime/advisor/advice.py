@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,25 @@ Array = np.ndarray
 LOWEST, HIGHEST = 0.03, 300.0  # %, of the axes of the figure
 LIMITS = (LIMIT.NEGLIGIBLE, LIMIT.BIASED)  # %e at which a step is sought
 ALL = "all"  # Label of the advice on all encoders alike
-NAMES = {"lowpass": "positions", "counts": "counts"}  # of the readers, in words
+
+
+@dataclass(frozen=True)
+class EncoderGroup:
+    """Encoders that are coarse together, while all others are exact.
+
+    Attributes
+    ----------
+    label : str
+        "all", or the joint.
+    encoders : tuple of int
+        Their numbers, from 0.
+    unit : str
+        Unit of their steps: "rad", "m", or "rad or m".
+    """
+
+    label: str
+    encoders: tuple[int, ...]
+    unit: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +166,9 @@ class ReaderAdvice:
     Attributes
     ----------
     reader : str
-        lowpass if read as positions, or counts.
+        Name of the reader, such as lowpass.
+    read_as : str
+        "positions", or "counts".
     encoders : tuple of EncoderAdvice
         All together first, then one at a time.
     notes : tuple of str
@@ -156,6 +177,7 @@ class ReaderAdvice:
     """
 
     reader: str
+    read_as: str
     encoders: tuple[EncoderAdvice, ...]
     notes: tuple[str, ...] = ()
     steps: Array = field(default_factory=lambda: np.empty((0, 0)))
@@ -242,7 +264,7 @@ class Advice(Result, Part):
         choice of encoders. The chapter's law is first, with an empty label, unless only real
         encoders were judged. Real encoders follow, once for each reader.
         """
-        real = tuple((NAMES[one.reader], one.encoders, one.steps) for one in self.real)
+        real = tuple((one.read_as, one.encoders, one.steps) for one in self.real)
         if self.real and self.encoders is self.real[0].encoders:
             return real
         return (("", self.encoders, self.steps), *real)
@@ -270,7 +292,7 @@ class Advice(Result, Part):
         step : number of the requested step, from 0.
         steps : changes at the requested steps; default: those of the advice.
         """
-        decisive = [self.names.index(name) for name in self.deciding]
+        decisive = deciding_columns(self.reference)
         e = np.abs((self.steps if steps is None else steps)[step])[decisive]
         k = int(np.argmax(e)) if len(e) else 0
         return (self.names[decisive[k]], float(e[k])) if len(e) else ("", float("nan"))
@@ -513,13 +535,13 @@ def advice_figure(advice: Advice) -> Figure:
     """Plot the change %e of each parameter of small %sigma against the step Delta of all encoders.
 
     Lines are predicted; points are CESTAC runs with their Student intervals. If real encoders were
-    judged, both readers are shown, otherwise the rounding law of the paper.
+    judged, all readers are shown, otherwise the rounding law of the paper.
     """
     curves = [("", advice.encoders[0], BLUE, ORANGE)]
     if advice.real:
         curves = [
-            (f"{NAMES[r.reader]}, ", r.encoders[0], color, color)
-            for r, color in zip(advice.real, (ORANGE, BLUE), strict=True)
+            (f"{r.read_as}, ", r.encoders[0], color, color)
+            for r, color in zip(advice.real, cycle((ORANGE, BLUE)), strict=False)
         ]
 
     def draw(name: str, ax: Any) -> None:
@@ -666,6 +688,11 @@ def confirm_by_runs(
     return replace(
         advice, limits=tuple(limits), sampled=tuple(made[delta] for delta in sorted(made))
     )
+
+
+def deciding_columns(reference: Estimate) -> list[int]:
+    """Numbers of the parameters that decide the verdict: those of small %sigma."""
+    return [reference.names.index(name) for name in deciding_names(reference)]
 
 
 def limits_of(delta: Array, change: Array, reference: Estimate) -> tuple[Limit, ...]:

@@ -26,7 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial, reduce
+from functools import cache, cached_property, partial, reduce
 from itertools import count
 from operator import add
 from typing import Any
@@ -38,25 +38,28 @@ from runtime.advisor.advice import (
     LIMITS,
     Advice,
     EncoderAdvice,
+    EncoderGroup,
     Limit,
     ReaderAdvice,
     confirm_by_runs,
+    deciding_columns,
     limits_of,
 )
-from runtime.advisor.coarse_encoders import READERS, CoarseEncoders, ReaderName
-from runtime.advisor.position_errors import Perturbation, perturbation, solution
-from runtime.advisor.readers import reader_advice
+from runtime.advisor.coarse_encoders import CoarseEncoders
+from runtime.advisor.position_errors import Perturbation, perturbation, solution, value_reader
+from runtime.advisor.readers import encoder_readers, reader_advice, readers_in_words
 from runtime.core.cestac.perturbed import study_columns
 from runtime.core.cestac.result import deciding_names, names_judged
-from runtime.core.cestac.rounding import VARIANCE, Mode
+from runtime.core.cestac.rounding import VARIANCE
 from runtime.core.drives import Drives
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.model import GeneratedModel, is_axis, joint_labels, joint_units
 from runtime.core.problem import Problem, estimated
 from runtime.core.record import Record
 from runtime.core.result import Identification
-from runtime.core.rows.observation import stack
+from runtime.core.rows.observation import Observation, stack
 from runtime.core.rows.prepared import common_drives, stacked
+from runtime.core.signals.reader import Reader
 from runtime.core.study import Study
 from runtime.ground.errors import InputError, SettingsError
 from runtime.ground.limits import limits
@@ -114,27 +117,68 @@ class Predictor:
         return reduce(add, [part.expected(variance, encoders) for part in self.parts])
 
 
+@dataclass(frozen=True, eq=False)
+class MeasuredFit:
+    """Least squares of the records as measured, and how errors of the positions change it.
+
+    Attributes
+    ----------
+    problem : Problem
+        Prepared, without steps of encoders.
+    names : tuple of str
+        Fitted columns.
+    drives : Drives or None
+        Drives of all records.
+    reference : Estimate
+    rows : Observation
+        Rows of the filtered positions, without errors.
+    predictor : Predictor
+    """
+
+    problem: Problem
+    names: tuple[str, ...]
+    drives: Drives | None
+    reference: Estimate
+    rows: Observation
+    predictor: Predictor
+
+    @property
+    def every(self) -> range:
+        """Numbers of all encoders, from 0."""
+        return range(len(self.problem.model.JOINTS))
+
+    def first_step(self, encoders: Sequence[int], share: float) -> float:
+        """Compute the encoder step of the first limit, if the change is as Delta^2; inf if none.
+
+        share : variance of the rounding over Delta^2.
+        """
+        rates = replace(self.predictor, share=share).rate(encoders)
+        rate = np.abs(rates[deciding_columns(self.reference)]).max(initial=0.0)
+        return float(np.sqrt(LIMITS[0] / rate)) if np.isfinite(rate) and rate > 0 else np.inf
+
+
 def advise(
     problem: Problem,
     *,
+    readers: Mapping[str, Reader],
     columns: Sequence[str] | None = None,
     asked: Sequence[float] = (),
     encoders: Sequence[str] | None = None,
     confirm: bool = True,
     progress: Progress | None = None,
     provenance: Mapping[str, Any] | None = None,
-    readers: Sequence[ReaderName] | None = None,
 ) -> Advice:
     """Predict the coarsest encoders that change the estimate by less than 1 % and by less than 5 %.
 
     Side, rounding law, columns and number of runs are those of study.cestac. Real encoders (law
-    phase) are judged for each of `readers`: their signals are read as positions, or read as counts
-    (`runtime.advisor.readers`).
+    phase) are judged for each of `readers` (`runtime.advisor.readers`).
 
     Parameters
     ----------
     problem : Problem
         Prepared.
+    readers : mapping of str to Reader
+        Readers for which real encoders are judged, by name; at least one for law phase.
     columns : sequence of str, optional
         Names of the essential parameters, if they are known; default: by study.cestac.columns.
     asked : sequence of float, rad or m
@@ -148,9 +192,6 @@ def advise(
         Called with the number of choices of encoders done and their total.
     provenance : mapping, optional
         Further entries of Advice.provenance, besides the names and time stamps of the records.
-    readers : sequence of "lowpass" or "counts", optional
-        Readers for which real encoders are judged; default: both if study.cestac.rounding is phase,
-        otherwise none.
 
     Raises
     ------
@@ -158,100 +199,118 @@ def advise(
         The method is not linear least squares, or there is a median filter, for which no prediction
         is possible.
     """
-    if any(is_axis(joint) for joint in problem.model.JOINTS):
-        raise InputError(
-            "the advisor supports only encoders of joints, but the record has a force sensor; remove record.columns.wrench"
-        )
-    settings = problem.settings
-    sought = replace(settings.cestac, delta=())  # steps are what is sought
-    problem = problem.changed(settings=replace(settings, cestac=sought))
-    model, study, as_measured = problem.model, problem.settings, list(problem.prepared)
-    whole = list(problem.records)
     _refuse(problem)
-    law, drives = study.cestac.rounding, common_drives(model, as_measured)
-    names = study_columns(problem, as_measured, columns)
-    parts = tuple(perturbation(model, own, study, names, drives=drives) for own in as_measured)
-    linear = replace(study.estimate, columns="all")
-    measured = stack([part.observation for part in parts])
-    rows = stacked(model, as_measured, names)
-    origins = {**problem.provenance, **names_judged(study.cestac), **(provenance or {})}
-    reference = estimated(problem, rows, linear, provenance=origins)
-    system = problem.linear_system(measured, columns="all")
-    predictor = Predictor(parts, 1 / np.array(system.scales), VARIANCE[law])
-    decisive = [names.index(name) for name in deciding_names(reference)]
-    every = range(len(model.JOINTS))
-    joints = joint_units(model) if study.cestac.side == "joint" else ["rad" for _ in every]
-    selections = _selections(model, encoders)
-    units = {
-        label: " or ".join(sorted({joints[i] for i in own}, reverse=True))
-        for label, own in selections.items()
-    }
-    readers = readers or (READERS if law == "phase" else ())
-    total = len(selections) * ((law != "phase") + len(readers))
-    done = count(1)
-
-    def advance() -> None:
-        if progress is not None:
-            progress(next(done), total)
-
-    def coarse(law: Mode, reader: ReaderName) -> CoarseEncoders:
-        return CoarseEncoders(problem, names, drives, law, reader)
-
-    rate = replace(predictor, share=VARIANCE["phase"]).rate(every)[decisive]
-    fastest = np.abs(rate).max(initial=0.0)
-    start = float(np.sqrt(LIMITS[0] / fastest)) if np.isfinite(fastest) and fastest > 0 else np.inf
-    by_reader: list[ReaderAdvice] = []
-    advices = []
-    for reader in readers:
-        by_reader.append(
-            reader_advice(
-                coarse("phase", reader),
-                reference,
-                selections,
-                units,
-                start,
-                asked=asked,
-                confirm=confirm,
-                progress=advance,
-            )
-        )
-    runs = coarse(law, "lowpass") if confirm and law != "phase" else None
-    for label, own in selections.items() if law != "phase" else ():
-        advice = _advice(predictor, label, own, reference, units[label])
-        if runs is not None:
-            advice = confirm_by_runs(advice, reference, partial(runs.sampled, own))
-        advices.append(advice)
-        advance()
-    steps = np.array([predictor.change(delta, every) for delta in asked]).reshape(
-        len(asked), len(names)
-    )
+    fit = measured_fit(problem, columns, provenance or {})
+    study, law = fit.problem.settings, fit.problem.settings.cestac.rounding
+    groups = encoder_groups(problem.model, study.cestac.side, encoders)
+    total = len(groups) * ((law != "phase") + len(readers))
+    advance = _counter(progress, total)
+    real = advice_by_reader(fit, groups, readers, asked, confirm, advance)
     if law == "phase":
-        readings = {one.reader: one.steps for one in by_reader}
-        steps = readings.get(study.signals.reader, by_reader[0].steps)
+        own = next((one for one in real if one.reader == study.signals.reader), real[0])
+        by_group, steps = real[0].encoders, own.steps
+    else:
+        by_group = advice_by_law(fit, groups, confirm, advance)
+        changes = [fit.predictor.change(delta, fit.every) for delta in asked]
+        steps = np.array(changes).reshape(len(asked), len(fit.names))
     return Advice(
-        names=names,
-        reference=reference,
-        encoders=tuple(advices) if advices else by_reader[0].encoders,
-        real=tuple(by_reader),
+        names=fit.names,
+        reference=fit.reference,
+        encoders=by_group,
+        real=real,
         asked=tuple(asked),
         steps=steps,
-        torque_sigma=torque_sigma(predictor, drives),
-        assumptions=assumptions(study, whole, parts, reference, real=bool(by_reader)),
+        torque_sigma=torque_sigma(fit.predictor, fit.drives),
+        assumptions=assumptions(
+            study, problem.records, fit.predictor.parts, fit.reference, real=bool(real)
+        ),
         settings={
-            **measured.settings,
+            **fit.rows.settings,
             "estimate": to_mapping(study.estimate),
             "cestac": to_mapping(study.cestac),
-            "rate": [record.rate for record in whole],
+            "rate": [record.rate for record in problem.records],
         },
-        provenance={**reference.provenance, "seed": study.cestac.seed},
+        provenance={**fit.reference.provenance, "seed": study.cestac.seed},
     )
 
 
-def _selections(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str, tuple[int, ...]]:
+def measured_fit(
+    problem: Problem, columns: Sequence[str] | None, provenance: Mapping[str, Any]
+) -> MeasuredFit:
+    """Fit the records as measured, and compute how errors of the positions change the fit.
+
+    columns : names of the essential parameters, if they are known.
+    provenance : further entries of the provenance of the estimate.
+    """
+    sought = replace(problem.settings.cestac, delta=())  # steps are what is sought
+    problem = problem.changed(settings=replace(problem.settings, cestac=sought))
+    model, study, records = problem.model, problem.settings, problem.prepared
+    drives = common_drives(model, records)
+    names = study_columns(problem, records, columns)
+    parts = tuple(perturbation(model, own, study, names, drives=drives) for own in records)
+    reference = estimated(
+        problem,
+        stacked(model, records, names),
+        replace(study.estimate, columns="all"),
+        provenance={**problem.provenance, **names_judged(sought), **provenance},
+    )
+    rows = stack([part.observation for part in parts])
+    weights = 1 / np.array(problem.linear_system(rows, columns="all").scales)
+    predictor = Predictor(parts, weights, VARIANCE[sought.rounding])
+    return MeasuredFit(problem, names, drives, reference, rows, predictor)
+
+
+def advice_by_reader(
+    fit: MeasuredFit,
+    groups: Sequence[EncoderGroup],
+    readers: Mapping[str, Reader],
+    asked: Sequence[float],
+    confirm: bool,
+    advance: Callable[[], None],
+) -> tuple[ReaderAdvice, ...]:
+    """Compute how coarse real encoders may be, by each reader."""
+    start = fit.first_step(fit.every, VARIANCE["phase"])
+    words = readers_in_words(readers)
+    return tuple(
+        reader_advice(
+            CoarseEncoders(fit.problem, fit.names, fit.drives, "phase", reader),
+            name,
+            words[name],
+            fit.reference,
+            groups,
+            start,
+            asked=asked,
+            confirm=confirm,
+            progress=advance,
+        )
+        for name, reader in readers.items()
+    )
+
+
+def advice_by_law(
+    fit: MeasuredFit, groups: Sequence[EncoderGroup], confirm: bool, advance: Callable[[], None]
+) -> tuple[EncoderAdvice, ...]:
+    """Predict how coarse encoders may be that round by the law of the study, for each group."""
+    problem, advices = fit.problem, []
+    if confirm:
+        law, reader = problem.settings.cestac.rounding, value_reader(problem.reader)
+        runs = CoarseEncoders(problem, fit.names, fit.drives, law, reader)
+    for group in groups:
+        advice = predicted_advice(fit, group)
+        if confirm:
+            advice = confirm_by_runs(advice, fit.reference, partial(runs.sampled, group.encoders))
+        advices.append(advice)
+        advance()
+    return tuple(advices)
+
+
+def encoder_groups(
+    model: GeneratedModel, side: str, wanted: Sequence[str] | None
+) -> tuple[EncoderGroup, ...]:
     """List the groups of encoders that are made coarse together: all, or a single one.
 
-    Return a mapping from the label of a group, "all" or that of a joint, to the numbers of its
-    encoders, from 0.
+    side : side of the gears where the encoders are, joint or motor; those of motors turn.
+    wanted : "all" and numbers of joints; default: all together, then every joint.
     """
     n = len(model.JOINTS)
     every = {ALL: tuple(range(n)), **{str(joint): (i,) for i, joint in enumerate(model.JOINTS)}}
@@ -263,46 +322,58 @@ def _selections(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str
             f"of {', '.join(every)}"
         )
     names = dict(zip(list(every)[1:], joint_labels(model), strict=True))
-    return {names.get(label, label): every[label] for label in labels}
+    units = joint_units(model) if side == "joint" else ["rad"] * n
+    return tuple(
+        EncoderGroup(
+            names.get(label, label),
+            every[label],
+            " or ".join(sorted({units[i] for i in every[label]}, reverse=True)),
+        )
+        for label in dict.fromkeys(labels)
+    )
 
 
-def _advice(
-    predictor: Predictor, label: str, encoders: Sequence[int], reference: Estimate, unit: str
-) -> EncoderAdvice:
+def _counter(progress: Progress | None, total: int) -> Callable[[], None]:
+    """Return a function that reports one more of `total` choices of encoders as done."""
+    done = count(1)
+
+    def advance() -> None:
+        if progress is not None:
+            progress(next(done), total)
+
+    return advance
+
+
+def predicted_advice(fit: MeasuredFit, group: EncoderGroup) -> EncoderAdvice:
     """Compute how the estimate changes with the step of some encoders, and how coarse they may be.
 
     Steps are tried in geometric progression until both limits are passed; the curve of all encoders
     extends beyond them.
     """
-    decisive = [reference.names.index(name) for name in deciding_names(reference)]
-    rate = np.abs(predictor.rate(encoders)[decisive]).max(initial=0.0)
-    if not (np.isfinite(rate) and rate > 0):
+    start = fit.first_step(group.encoders, fit.predictor.share)
+    if not np.isfinite(start):
         limits = tuple(Limit(percent, np.inf, "") for percent in LIMITS)
-        return EncoderAdvice(
-            label, limits, np.empty(0), np.empty((0, len(reference.names))), unit=unit
-        )
-    start = float(np.sqrt(LIMITS[0] / rate))
-    known: dict[int, Array] = {}
+        nothing = np.empty((0, len(fit.names)))
+        return EncoderAdvice(group.label, limits, np.empty(0), nothing, unit=group.unit)
+    decisive = deciding_columns(fit.reference)
+
+    @cache
+    def change(k: int) -> Array:
+        return fit.predictor.change(start * LIMIT.CURVE_RATIO**k, group.encoders)
 
     def worst(k: int) -> float:
-        if k not in known:
-            known[k] = predictor.change(start * LIMIT.CURVE_RATIO**k, encoders)
-        return float(np.abs(known[k][decisive]).max())
+        return float(np.abs(change(k)[decisive]).max())
 
-    low = next(
-        (k for k in range(0, -LIMIT.CURVE_STEPS, -1) if worst(k) < LIMITS[0]), -LIMIT.CURVE_STEPS
-    )
-    high = next(
-        (k for k in range(low, LIMIT.CURVE_STEPS) if worst(k) > LIMITS[-1]), LIMIT.CURVE_STEPS - 1
-    )
-    if label == ALL:
+    down, last = range(0, -LIMIT.CURVE_STEPS, -1), LIMIT.CURVE_STEPS - 1
+    low = next((k for k in down if worst(k) < LIMITS[0]), -LIMIT.CURVE_STEPS)
+    high = next((k for k in range(low, last + 1) if worst(k) > LIMITS[-1]), last)
+    if group.label == ALL:
         low, high = low - LIMIT.CURVE_BELOW, high + LIMIT.CURVE_ABOVE
-    for k in range(low, high + 1):
-        worst(k)
-    order = sorted(known)
-    delta = start * LIMIT.CURVE_RATIO ** np.array(order, dtype=float)
-    change = np.array([known[k] for k in order])
-    return EncoderAdvice(label, limits_of(delta, change, reference), delta, change, unit=unit)
+    exponents = range(low, max(high, 0) + 1)
+    delta = start * LIMIT.CURVE_RATIO ** np.array(exponents, dtype=float)
+    changes = np.array([change(k) for k in exponents])
+    found = limits_of(delta, changes, fit.reference)
+    return EncoderAdvice(group.label, found, delta, changes, unit=group.unit)
 
 
 def torque_sigma(predictor: Predictor, drives: Drives | None) -> Array:
@@ -411,6 +482,11 @@ def assumptions(
 
 
 def _refuse(problem: Problem) -> None:
+    """Raise an error for problems for which no prediction is possible."""
+    if any(is_axis(joint) for joint in problem.model.JOINTS):
+        raise InputError(
+            "the advisor supports only encoders of joints, but the record has a force sensor; remove record.columns.wrench"
+        )
     study = problem.settings
     if not problem.method.linear:
         raise SettingsError(
@@ -426,11 +502,24 @@ def _refuse(problem: Problem) -> None:
         )
 
 
-def advice_of(result: Identification, encoder: Sequence[float] = ()) -> Advice:
+def readers_of_law(problem: Problem, listed: Mapping[str, Reader]) -> dict[str, Reader]:
+    """Return the readers of a list for which real encoders are judged; none unless law phase."""
+    settings = problem.settings
+    if settings.cestac.rounding != "phase":
+        return {}
+    return encoder_readers(listed, settings.signals.reader)
+
+
+def advice_of(
+    result: Identification, encoder: Sequence[float] = (), *, listed: Mapping[str, Reader]
+) -> Advice:
     """Predict how coarse encoders may be for the essential parameters of an identification.
 
     encoder : steps of the encoders in use, rad or m.
+    listed : readers by name.
     """
     if not result.determined:
         raise InputError("the record does not determine the parameters; record a richer motion")
-    return advise(result.problem, columns=result.essential.names, asked=tuple(encoder))
+    readers = readers_of_law(result.problem, listed)
+    names = result.essential.names
+    return advise(result.problem, readers=readers, columns=names, asked=tuple(encoder))

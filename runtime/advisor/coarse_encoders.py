@@ -6,7 +6,7 @@
     change at Delta
             mean of the least squares, over that of the record on the same rows, less 1
 
-The reader of counts leaves out rows in which dry friction has no certain direction. The effect of
+A reader of counts leaves out rows in which dry friction has no certain direction. The effect of
 this choice of rows is no error of the encoder and is not part of the change;
 `runtime.core.cestac.cestac`, which compares with all rows of the record, includes both.
 
@@ -19,9 +19,9 @@ the knots of the motion, which the other phases use again.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any
 
 import numpy as np
 
@@ -36,24 +36,15 @@ from runtime.core.rows.observation import stack
 from runtime.core.rows.prepared import observation_of
 from runtime.core.rows.selection import certain_rows
 from runtime.core.signals.filters import SpeedErrors, States, filtered_states
-from runtime.core.signals.reader import LOWPASS, Reader
+from runtime.core.signals.reader import Reader
 from runtime.counts.own_encoder import own_encoder
-from runtime.counts.reader import COUNTS, encoder_position
-from runtime.counts.reading import Starts, read_counts
+from runtime.counts.reader import encoder_position
 from runtime.ground.limits import limits
 
 LIMIT = limits(__package__)
 
 Array = np.ndarray
 
-ReaderName = Literal["lowpass", "counts"]
-
-READERS: tuple[ReaderName, ...] = ("lowpass", "counts")
-STATES: Mapping[ReaderName, Reader] = {"lowpass": LOWPASS, "counts": COUNTS}
-PHASES: Mapping[ReaderName, int] = {
-    "lowpass": 8,
-    "counts": 4,
-}  # nodes of the quadrature over the phase
 QUADRATURE = 1 << 20  # number of the first stream of the nodes: beyond those of runs
 
 
@@ -70,16 +61,15 @@ class Encoders:
         States of the joints, as measured.
     at_encoders : States
         The same states on the side of the encoders.
-    starts : mapping
-        By step and encoders, results of the first phase that make reading counts of other phases
-        faster.
+    known : dict
+        By step and encoders, results of the first phase that make reading other phases faster.
     """
 
     record: PreparedRecord
     x: Array
     states: States
     at_encoders: States
-    starts: dict[tuple[float, ...], Starts] = field(default_factory=dict)
+    known: dict[tuple[float, ...], Any] = field(default_factory=dict)
 
 
 class CoarseEncoders:
@@ -94,25 +84,23 @@ class CoarseEncoders:
         names: Sequence[str],
         drives: Drives | None,
         law: Mode,
-        reader: ReaderName,
+        reader: Reader,
     ) -> None:
         model, study = problem.model, problem.settings
         signals = study.signals
-        own_reader = problem.reader
-        if (own_reader.encoder is not None) != (reader == "counts"):
-            own_reader = STATES[reader]
-            signals = replace(signals, reader=reader, step=None, side="joint")
+        if reader != problem.reader:
+            signals = replace(signals, options={}, step=None, side="joint")
         settings = replace(study.cestac, rounding=law, delta=(), place="record")
-        study = replace(study, signals=signals, cestac=settings)
+        study = reader.settled(replace(study, signals=signals, cestac=settings))
         side = encoder_drives(settings.side, drives, "cestac")
         self.reader, self.root, self.parts = reader, encoder_root(side, len(model.JOINTS)), []
         into = np.linalg.inv(self.root).T
-        readings = problem.changed(settings=study, reader=own_reader).prepared
+        readings = problem.changed(settings=study, reader=reader).prepared
         for own in readings:
             require_positions(own.record.missing, "advice on encoders", own.record.file)
             part = prepared_record(own, study, own_encoder, drives)
             read = part.states
-            if reader == "lowpass":  # without recorded velocities, as the errors below
+            if reader.motion is None:  # without recorded velocities, as the errors below
                 read = filtered_states(own.record.q, own.record.rate, part.selection.signals)
             states = replace(read, errors=None, channels=own.channels)
             q = encoder_position(states.q, side)
@@ -127,7 +115,7 @@ class CoarseEncoders:
             settings,
             (),
             drives,
-            own_reader,
+            reader,
             problem.methods,
         )
         self.columns = self.task.columns
@@ -143,6 +131,12 @@ class CoarseEncoders:
         """
         spans = np.min([np.ptp(part.x, axis=0) for part in self.parts], axis=0)
         return np.where(spans > 0, spans / LIMIT.LINES_IN_MOTION, np.inf)
+
+    @property
+    def phases(self) -> int:
+        """First number of nodes (phases) of the quadrature."""
+        values = self.reader.motion is None
+        return int(LIMIT.PHASES_OF_POSITIONS if values else LIMIT.PHASES_OF_COUNTS)
 
     @property
     def finest(self) -> float:
@@ -196,12 +190,12 @@ class CoarseEncoders:
     def nodes(self, delta: float, moving: Sequence[int], read: int = 0) -> list[list[Array]]:
         """Compute errors of q, qd and qdd for several offsets (phases) of simulated encoder lines.
 
-        These phases are the nodes of a quadrature. At first there are PHASES nodes. If `read` nodes
+        These phases are the nodes of a quadrature. At first there are `phases` nodes. If `read` nodes
         are known already, as many new ones are computed, in the middle between the known ones.
 
         moving : numbers of the coarse encoders.
         """
-        few, seed, n = PHASES[self.reader], self.task.settings.seed, len(self.root)
+        few, seed, n = self.phases, self.task.settings.seed, len(self.root)
         count, first = read or few, stream(seed, QUADRATURE).random(n)
         order = [stream(seed, QUADRATURE + i + n * read).permutation(count) for i in range(n)]
         phases = (np.transpose(order) + ((first * read / few + 0.5) % 1 if read else first)) / count
@@ -279,13 +273,12 @@ class CoarseEncoders:
         of_records, key, chosen = [], (delta, *encoders), list(encoders)
         for part, columns in zip(self.parts, drawn, strict=True):
             y, errors = np.column_stack(columns), np.zeros((4, *part.x.T.shape))
-            if self.reader == "counts":
-                reading = read_counts(
-                    y, part.record.record.rate, delta, starts=part.starts.get(key)
-                )
-                part.starts.setdefault(key, reading.starts)
-                y, errors[3].T[:, chosen] = reading.motion
-            read = filtered_states(y, part.record.record.rate, part.record.selection.signals)
+            rate = part.record.record.rate
+            if self.reader.motion is not None:
+                y, deviation, known = self.reader.motion(y, rate, delta, part.known.get(key))
+                part.known.setdefault(key, known)
+                errors[3].T[:, chosen] = deviation
+            read = filtered_states(y, rate, part.record.selection.signals)
             errors[:3, chosen] = [
                 read.q.T - part.at_encoders.q.T[chosen],
                 read.qd.T - part.at_encoders.qd.T[chosen],

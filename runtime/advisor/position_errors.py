@@ -37,7 +37,7 @@ from runtime.core.rows.selection import Selection
 from runtime.core.rows.switches import Switch, switches
 from runtime.core.signals.filters import States
 from runtime.core.signals.noise_gain import Bandwidth, bandwidth
-from runtime.core.signals.reader import LOWPASS
+from runtime.core.signals.reader import LOWPASS, Reader
 from runtime.core.study import Study
 from runtime.ground.settings import to_mapping
 
@@ -149,6 +149,11 @@ class Perturbation:
         return self.known[key]
 
 
+def value_reader(reader: Reader) -> Reader:
+    """Return a reader that uses positions as they are: the given one if it does, or the low-pass."""
+    return reader if reader.filters_positions else LOWPASS
+
+
 def solution(gram: Array, weights: Array) -> Array:
     """Solve least squares for X, shape (b,), with the rows of joint j multiplied by weights[j].
 
@@ -177,7 +182,7 @@ def perturbation(
     drives : drives for encoders on the motor side; default: those of the record.
     """
     signals = replace(study.signals, median=study.cestac.median)
-    own = replace(record, study=replace(study, signals=signals), reader=LOWPASS)
+    own = replace(record, study=replace(study, signals=signals), reader=value_reader(record.reader))
     own.take_states(record)
     band = bandwidth(signals, own.record.rate)
     require_positions(own.record.missing, "the effect of encoder steps", own.record.file)

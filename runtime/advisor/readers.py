@@ -11,6 +11,7 @@ limit is certain to LIMIT.CURVE_SHARPNESS. Runs of random phase confirm the limi
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise, product
 
@@ -18,16 +19,17 @@ import numpy as np
 
 from runtime.advisor.advice import (
     LIMITS,
-    NAMES,
     EncoderAdvice,
+    EncoderGroup,
     ReaderAdvice,
     confirm_by_runs,
+    deciding_columns,
     limits_of,
     step_text,
 )
-from runtime.advisor.coarse_encoders import CoarseEncoders, ReaderName, mean_change
-from runtime.core.cestac.result import deciding_names
+from runtime.advisor.coarse_encoders import CoarseEncoders, mean_change
 from runtime.core.least_squares.estimate import Estimate
+from runtime.core.signals.reader import Reader
 from runtime.ground.limits import limits
 
 LIMIT = limits(__package__)
@@ -35,46 +37,74 @@ LIMIT = limits(__package__)
 Array = np.ndarray
 
 
+def encoder_readers(listed: Mapping[str, Reader], own: str) -> dict[str, Reader]:
+    """Choose the readers by which real encoders are judged, by name.
+
+    A reader with two names is judged once: by the name `own` of the study, or else by the first.
+    """
+    suited = {name: reader for name, reader in listed.items() if reader.reads_encoders}
+    names: dict[Reader, str] = {}
+    for name, reader in suited.items():
+        names[reader] = name if name == own else names.get(reader, name)
+    return {name: reader for reader, name in names.items()}
+
+
+def readers_in_words(readers: Mapping[str, Reader]) -> dict[str, str]:
+    """Say of each reader what it reads positions as: "positions" or "counts".
+
+    The name of the reader is added if another one reads them as the same.
+    """
+    read_as = {
+        name: "positions" if reader.motion is None else "counts" for name, reader in readers.items()
+    }
+    alike = list(read_as.values())
+    return {
+        name: f"{word} ({name})" if alike.count(word) > 1 else word
+        for name, word in read_as.items()
+    }
+
+
 def reader_advice(
     real: CoarseEncoders,
+    name: str,
+    read_as: str,
     reference: Estimate,
-    selections: Mapping[str, tuple[int, ...]],
-    units: Mapping[str, str],
+    groups: Sequence[EncoderGroup],
     start: float,
     *,
     asked: Sequence[float] = (),
     confirm: bool = True,
     progress: Callable[[], None] = lambda: None,
 ) -> ReaderAdvice:
-    """Compute how coarse real encoders may be if they are read as positions, or as counts.
+    """Compute how coarse real encoders may be if one reader reads them.
 
+    name, read_as : name of the reader, and what it reads positions as, in words.
     reference : estimate of the records as measured, whose deciding parameters decide here.
-    selections : numbers (from 0) of the coarse encoders, by label.
-    units : unit of the steps, by label.
+    groups : the choices of coarse encoders.
     start : a step about which the curve begins, rad or m.
     asked : further steps, of all encoders.
     confirm : whether random runs confirm the limits.
     progress : called after each choice of encoders.
     """
-    decisive = [reference.names.index(name) for name in deciding_names(reference)]
-    by_label, encoders = curves(real, selections, start, decisive), []
-    for label, own in selections.items():
-        delta, change = by_label[label][0], by_label[label][1][:, 0]
-        limits = limits_of(delta, change, reference)
-        advice = EncoderAdvice(label, limits, delta, change, unit=units[label])
+    selections = {group.label: group.encoders for group in groups}
+    by_label, encoders = curves(real, selections, start, deciding_columns(reference)), []
+    for group in groups:
+        delta, change = by_label[group.label][0], by_label[group.label][1][:, 0]
+        found = limits_of(delta, change, reference)
+        advice = EncoderAdvice(group.label, found, delta, change, unit=group.unit)
         if confirm:
-            advice = confirm_by_runs(advice, reference, partial(real.sampled, own))
+            advice = confirm_by_runs(advice, reference, partial(real.sampled, group.encoders))
         encoders.append(advice)
         progress()
-    deviation = by_label[encoders[0].label][1][:, 1]
+    deviation = by_label[groups[0].label][1][:, 1]
+    notes = [part.record.note for part in real.parts if part.record.note]
+    steps = np.array([real.asked(delta) for delta in asked])
     return ReaderAdvice(
-        real.reader,
+        name,
+        read_as,
         tuple(encoders),
-        (
-            *(part.record.note for part in real.parts if part.record.note),
-            *uncertain(real.reader, encoders[0], deviation, reference.names),
-        ),
-        np.array([real.asked(delta) for delta in asked]).reshape(len(asked), len(reference.names)),
+        (*notes, *uncertain(read_as, encoders[0], deviation, reference.names)),
+        steps.reshape(len(asked), len(reference.names)),
     )
 
 
@@ -86,83 +116,152 @@ def curves(
 ) -> dict[str, tuple[Array, Array]]:
     """Compute, for each group of coarse encoders, how the estimate changes with their step.
 
-    Steps go from `start` down until all changes are below the first limit, and up until all are
-    above the last limit. They are finer where constant speeds of the record lock to the sampling.
-
     A label names a group of encoders. Return for each label the steps, shape (m,), and the changes
     with their standard deviations, shape (m, 2, b), %.
     """
-    known: dict[str, dict[float, Array]] = {label: {} for label in selections}
-    finest, coarsest = real.finest, real.coarsest
-    start = min(max(start, finest), float(coarsest.min()))
+    start = min(max(start, real.finest), float(real.coarsest.min()))
+    steps = ReadSteps(real, selections, start, decisive, {label: {} for label in selections})
+    read_until_limits(steps)
+    if real.reader.motion is None:
+        read_locked_steps(steps)
+    read_vague_steps(steps)
+    return {label: steps.curve(label) for label in selections}
 
-    def changes(label: str) -> dict[float, Array]:
-        return {k: mean_change(ratios) for k, ratios in sorted(known[label].items())}
 
-    def worst(label: str, k: float) -> float:
-        return float(np.abs(mean_change(known[label][k])[0, decisive]).max(initial=0.0))
+@dataclass(frozen=True, eq=False)
+class ReadSteps:
+    """Store of the estimates X with coarse encoders, by group of encoders and by step.
 
-    def read(k: float, labels: Iterable[str], nodes: int = 0) -> list[str]:
-        """Compute and store how the estimate X changes at one more encoder step of the curve. The
-        step is start*LIMIT.READER_RATIO^k.
+    The step of exponent k is start*LIMIT.READER_RATIO^k.
 
-        The changes are computed at the first phases of the encoder, or at `nodes` more phases.
-        Return the labels of the groups of encoders for which this is possible.
+    Attributes
+    ----------
+    real : CoarseEncoders
+    selections : mapping
+        Numbers of the encoders of each group, by label.
+    start : float, rad or m
+    decisive : sequence of int
+        Parameters that decide.
+    ratios : dict
+        By label and exponent k: estimates at the phases of the encoders over the exact estimate,
+        shape (phases, b).
+    """
+
+    real: CoarseEncoders
+    selections: Mapping[str, tuple[int, ...]]
+    start: float
+    decisive: Sequence[int]
+    ratios: dict[str, dict[float, Array]]
+
+    def step(self, k: float | Array) -> Array:
+        """Compute the steps of exponents k, rad or m."""
+        return np.asarray(self.start * LIMIT.READER_RATIO**k)
+
+    def read(self, k: float, labels: Iterable[str], more: int = 0) -> list[str]:
+        """Store the estimates of some groups at the step of exponent k.
+
+        They are those at the first phases of the encoders, or at `more` further phases. Return the
+        labels of the groups for which the step can be simulated and read.
         """
-        delta = start * LIMIT.READER_RATIO**k
-        labels = [label for label in labels if (delta <= coarsest[[*selections[label]]]).all()]
-        moving = {i for label in labels for i in selections[label] if np.isfinite(coarsest[i])}
-        if delta < finest * (1 - 1e-9) or not moving:
+        real, delta = self.real, self.start * LIMIT.READER_RATIO**k
+        coarsest = real.coarsest
+        own = {label: self.selections[label] for label in labels}
+        own = {label: group for label, group in own.items() if (delta <= coarsest[[*group]]).all()}
+        moving = {i for group in own.values() for i in group if np.isfinite(coarsest[i])}
+        if delta < real.finest * (1 - 1e-9) or not moving:
             return []
         try:
-            errors = real.nodes(delta, sorted(moving), nodes)
-            ratios = {label: real.ratios(errors, selections[label]) for label in labels}
+            errors = real.nodes(delta, sorted(moving), more)
+            ratios = {label: real.ratios(errors, group) for label, group in own.items()}
         except np.linalg.LinAlgError:  # steps that this reader does not resolve
             return []
-        for label, own in ratios.items():
-            known[label][k] = np.concatenate([known[label][k], own]) if nodes else own
-        return labels
+        for label, added in ratios.items():
+            known = self.ratios[label]
+            known[k] = np.concatenate([known[k], added]) if more else added
+        return list(own)
 
-    for step, most, limit in ((-1, LIMIT.READER_DOWN, LIMITS[0]), (1, LIMIT.READER_UP, LIMITS[-1])):
-        for i in range(0 if step < 0 else 1, most):
-            e = [worst(label, step * i) for label in read(step * i, selections)]
-            if not e or (max(e) < limit if step < 0 else min(e) > limit):
-                break
-    tried = sorted({k for own in known.values() for k in own})
-    for a, b in pairwise(tried) if real.reader == "lowpass" else ():
+    def exponents(self) -> list[float]:
+        """List the exponents of all steps that were read, ascending."""
+        return sorted({k for known in self.ratios.values() for k in known})
+
+    def changes(self, label: str) -> dict[float, Array]:
+        """Compute change and standard deviation, shape (2, b), %, by exponent, ascending."""
+        return {k: mean_change(ratios) for k, ratios in sorted(self.ratios[label].items())}
+
+    def worst(self, label: str, k: float) -> float:
+        """Compute the largest change of a deciding parameter at the step of exponent k, %."""
+        return float(np.abs(mean_change(self.ratios[label][k])[0, self.decisive]).max(initial=0.0))
+
+    def curve(self, label: str) -> tuple[Array, Array]:
+        """Return steps, shape (m,), and changes with standard deviations, shape (m, 2, b), %."""
+        changes, b = self.changes(label), len(self.real.reference)
+        delta = self.step(np.array(list(changes), dtype=float))
+        return delta, np.array(list(changes.values())).reshape(len(changes), 2, b)
+
+
+def read_until_limits(steps: ReadSteps) -> None:
+    """Read steps from the start down until all changes are below the first limit, then up until all
+    are above the last limit.
+    """
+    groups = list(steps.selections)
+    for k in range(0, -LIMIT.READER_DOWN, -1):
+        e = [steps.worst(label, k) for label in steps.read(k, groups)]
+        if not e or max(e) < LIMITS[0]:
+            break
+    for k in range(1, LIMIT.READER_UP):
+        e = [steps.worst(label, k) for label in steps.read(k, groups)]
+        if not e or min(e) > LIMITS[-1]:
+            break
+
+
+def read_locked_steps(steps: ReadSteps) -> None:
+    """Read finer steps where constant speeds of the record lock to the sampling."""
+    for a, b in pairwise(steps.exponents()):
         between = np.linspace(a, b, LIMIT.LOCKED_STEPS + 1)
-        share = real.locking(start * LIMIT.READER_RATIO**between)
+        share = steps.real.locking(steps.step(between))
         if share[1:-1].max() > LIMIT.LOCKED_POWER * max(share[0], share[-1]):
             for k in between[1:-1].tolist():
-                read(k, selections)
-    exhausted = set[tuple[str, float]]()  # steps at which no more nodes can be read
-    while True:
-        vague: dict[tuple[float, int], dict[str, None]] = {}
-        for label, limit in product(selections, LIMITS):
-            for k in vague_steps(changes(label), decisive, limit):
-                nodes = len(known[label][k])
-                if nodes < LIMIT.PHASES_TAKEN and (label, k) not in exhausted:
-                    vague.setdefault((k, nodes), {})[label] = None
-        if not vague:
-            break
-        for (k, nodes), labels in vague.items():
-            done = read(k, labels, nodes)
+                steps.read(k, steps.selections)
+
+
+def read_vague_steps(steps: ReadSteps) -> None:
+    """Double the phases at the steps beside the limits, until the limits are certain.
+
+    A curve that ends below the last limit then goes on.
+    """
+    exhausted = set[tuple[str, float]]()  # steps at which no more phases can be read
+    while vague := vague_groups(steps, exhausted):
+        for (k, phases), labels in vague.items():
+            done = steps.read(k, labels, phases)
             exhausted.update((label, k) for label in labels if label not in done)
-            for label, last in dict.fromkeys(done, k).items():  # a walk that ended below the limit
-                while (
-                    last == max(known[label])
-                    and worst(label, last) < LIMITS[-1]
-                    and read(last + 1, [label])
-                ):
-                    last += 1
-    by_label, b = {label: changes(label) for label in selections}, len(real.reference)
-    return {
-        label: (
-            start * LIMIT.READER_RATIO ** np.array(list(own), dtype=float),
-            np.array(list(own.values())).reshape(len(own), 2, b),
-        )
-        for label, own in by_label.items()
-    }
+            for label in done:
+                read_on(steps, label, k)
+
+
+def vague_groups(
+    steps: ReadSteps, exhausted: set[tuple[str, float]]
+) -> dict[tuple[float, int], list[str]]:
+    """List the groups whose change is too uncertain, by exponent and number of known phases.
+
+    exhausted : groups and exponents that are left out.
+    """
+    vague: dict[tuple[float, int], dict[str, None]] = {}
+    for label, limit in product(steps.selections, LIMITS):
+        for k in vague_steps(steps.changes(label), steps.decisive, limit):
+            phases = len(steps.ratios[label][k])
+            if phases < LIMIT.PHASES_TAKEN and (label, k) not in exhausted:
+                vague.setdefault((k, phases), {})[label] = None
+    return {key: list(labels) for key, labels in vague.items()}
+
+
+def read_on(steps: ReadSteps, label: str, k: float) -> None:
+    """Read steps above exponent k, if k is the last one of a group and below the last limit."""
+    while (
+        k == max(steps.ratios[label])
+        and steps.worst(label, k) < LIMITS[-1]
+        and steps.read(k + 1, [label])
+    ):
+        k += 1
 
 
 def vague_steps(
@@ -194,11 +293,10 @@ def vague_steps(
     return [steps[j] for j, x in zip(pair, moved, strict=True) if x > LIMIT.CURVE_SHARPNESS]
 
 
-def uncertain(
-    reader: ReaderName, advice: EncoderAdvice, error: Array, names: Sequence[str]
-) -> list[str]:
+def uncertain(read_as: str, advice: EncoderAdvice, error: Array, names: Sequence[str]) -> list[str]:
     """Write a warning if the curve of the change is too flat to find the step of 1 or 5 % change.
 
+    read_as : what the reader reads positions as, in words.
     error : standard deviation of the change, shape (m, b), %.
     """
     found = []
@@ -218,7 +316,7 @@ def uncertain(
         )
         if last > LIMIT.FLAT_CURVE * first:
             found.append(
-                f"Read as {NAMES[reader]}, all encoders alike, from "
+                f"Read as {read_as}, all encoders alike, from "
                 f"{step_text(first, advice.unit)} to {step_text(last, advice.unit)}: the predicted "
                 f"change of {limit.parameter} is {limit.percent:g} %, within the accuracy of the "
                 "prediction. Simulate the encoder's own step: symgen cestac --rounding phase "

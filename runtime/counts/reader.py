@@ -57,6 +57,16 @@ def rounded(record: Record, signals: Signals, step: Steps, side: Any) -> States:
     return counted(record, replace(signals, step=step, side=side))
 
 
+def motion(x: Array, rate: float, step: float, starts: Any = None) -> tuple[Array, Array, Any]:
+    """Estimate the motion of m encoders of one step from their positions x, shape (N, m).
+
+    Return positions, standard deviations of the velocities, and `starts` for the same motion at
+    other phases.
+    """
+    reading = read_counts(x, rate, step, starts=starts)
+    return *reading.motion, reading.starts
+
+
 def encoder(signals: Signals) -> tuple[Steps, str]:
     """Return step and side of the encoders by the settings; step None: from the record."""
     return signals.step, signals.side
@@ -82,5 +92,12 @@ def encoder_position(q: Array, drives: Drives | None, missing: Missing | None = 
     return x if missing is None else np.where(missing.at_encoders(drives), np.nan, x)
 
 
-COUNTS = Reader(counted, missing=True, rounded=rounded, encoder=encoder, unwrapped=unwrapped)
+COUNTS = Reader(
+    counted,
+    missing=True,
+    rounded=rounded,
+    encoder=encoder,
+    unwrapped=unwrapped,
+    motion=motion,
+)
 """Positions are counts of encoders, which bound the motion."""

@@ -69,8 +69,8 @@ def cestac(
     """
     with session.results_in(output) as results:
         import runtime
-        from runtime.advisor.coarse_encoders import READERS
-        from runtime.compose import records_of
+        from runtime.advisor.readers import encoder_readers
+        from runtime.compose import READERS, records_of
         from runtime.parallel.checkpoint import Checkpoint
         from runtime.parallel.processes import processes
 
@@ -101,7 +101,8 @@ def cestac(
             with session.progress_bar("encoders" if advise else "runs") as progress:
                 if advise:
                     asked, real = study.cestac.delta if delta else (), rounding in (None, "phase")
-                    readers = [one for one in READERS if real and reader in (None, one)]
+                    judged = encoder_readers(READERS, study.signals.reader) if real else {}
+                    readers = [one for one in judged if reader in (None, one)]
                     result = advice = runtime.advise(
                         model, records, study, asked=asked, progress=progress, readers=readers
                     )

@@ -65,7 +65,7 @@ def test_positions_moved_by_an_encoder(planar, method):
     q = record.q.copy()
     q[:, 1] = step * np.round(q[:, 1] / step)
     whole, names = problem(planar, record, settings), planar.BASE_PARAMETERS
-    real = CoarseEncoders(whole, names, None, "phase", "lowpass")
+    real = CoarseEncoders(whole, names, None, "phase", whole.reader)
     found = real.reference * real.ratios([real._counts(step, np.zeros(2), (1,), ())], (1,))[0]
     task = real.task
     system = system_of(Columns(planar, task.names), task, [q], [task.records[0].torque])

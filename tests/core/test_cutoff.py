@@ -51,9 +51,11 @@ def test_a_joint_at_rest_and_the_reader_of_counts():
     assert cutoff([(still, RATE)], Signals()) == cutoff([(q, RATE)], Signals())
     coarse = motion(1e-2)
     own = cutoff([(coarse, RATE)], Signals())[0]
-    assert own < 25 and cutoff([(coarse, RATE)], Signals(), counts=True)[0] == pytest.approx(16, rel=0.05)
+    assert own < 25 and cutoff([(coarse, RATE)], Signals(), counts=True)[0] == pytest.approx(
+        16, rel=0.05
+    )
     coarse[100:110] = np.nan
-    assert cutoff([(coarse, RATE)], counts)[0] == 50
+    assert cutoff([(coarse, RATE)], Signals(), counts=True)[0] == 50
     assert cutoff([(np.ones((500, 2)), RATE)], Signals())[0] == 50
     assert cutoff([(np.ones((500, 2)), 100.0)], Signals())[0] == 40
 

@@ -15,6 +15,7 @@ from campaign import campaign
 
 import runtime
 import runtime.core.rows.prepared
+import runtime.core.signals.reader
 from runtime import InputError
 from runtime.compose import assess
 from runtime.core.provenance import origin, record_names
@@ -96,7 +97,7 @@ def test_work_is_done_once(model, monkeypatch):
     coupled = SimpleNamespace(**{**vars(model), "DRIVES": drives, "regressor": regressor})
     keep = {"filtered_states": filtered, "factor": factored}
     for place in (
-        "runtime.core.signals.filters.filtered_states",
+        "runtime.core.signals.reader.filtered_states",
         "runtime.core.rows.observation.factor",
     ):
         calls, real = keep[place.rpartition(".")[2]], pydoc.locate(place)
@@ -122,21 +123,23 @@ def test_work_is_done_once(model, monkeypatch):
 
 def test_a_record_is_filtered_once_for_all_checks(model, monkeypatch):
     """Identification, plausibility, delay, friction, and the advice on encoders share what the
-    filters of the study made of the record; none is filtered twice by the same settings.
+    filters of the study made of the record. Plausibility filters it by a cut-off of its own, which
+    is that of the study here.
     """
-    passes, real = [], runtime.core.signals.filters.filtered_states
+    passes, real, record = [], runtime.core.signals.reader.filtered_states, measured(model, 0)
 
     def counted(q, rate, signals, v=None):
-        passes.append((signals.median, signals.lowpass))
+        if np.array_equal(q, record.q):  # not the positions of other encoders
+            passes.append((signals.median, signals.lowpass))
         return real(q, rate, signals, v)
 
-    monkeypatch.setattr("runtime.core.signals.filters.filtered_states", counted)
+    monkeypatch.setattr("runtime.core.signals.reader.filtered_states", counted)
     lowpass = Lowpass(cutoff=5)
     study = replace(STUDY, signals=Signals(median=1, lowpass=lowpass))
-    result = assess(model, measured(model, 0), study)
+    result = assess(model, record, study)
     assert all(result.part(name) for name in ("plausibility", "friction", "advice"))
     assert result.part("resolution") is not None and str(result) and result.remarks is not None
-    assert passes.count((1, lowpass)) == 1, passes
+    assert passes.count((1, lowpass)) == 2, passes
 
 
 def test_records_of_one_name_stay_apart(model):
@@ -300,14 +303,12 @@ def test_the_status_of_every_method_decides(model):
         and list(result.sets) == ["essential", "all", "feasible"]
         and result.ranking.startswith("Predicts a part of the record")
     )
-    bad = replace(
-        result,
-        estimate=replace(
-            result.estimate,
-            status="not-converged",
-            message="DIDIM has not converged after 3 passes. More.",
-        ),
+    unfinished = replace(
+        result.estimate,
+        status="not-converged",
+        message="DIDIM has not converged after 3 passes. More.",
     )
+    bad = replace(result, sets=replace(result.sets, all=unfinished))
     assert not bad.usable and bad.checklist.state == "no"
     assert bad.verdict == (
         "No values of planar_2r: ols ended with status not-converged. DIDIM has not converged "

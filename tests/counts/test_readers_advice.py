@@ -9,11 +9,13 @@ from campaign import campaign
 from test_cestac_counts import RECORD, SIGNALS, STEP, planar
 
 from runtime.advisor.advice import crossing
-from runtime.advisor.coarse_encoders import PHASES, CoarseEncoders, mean_change
+from runtime.advisor.coarse_encoders import CoarseEncoders, mean_change
 from runtime.advisor.readers import curves
 from runtime.compose import advise, cestac, problem
 from runtime.core.signals.filters import filtered_states
+from runtime.core.signals.reader import LOWPASS
 from runtime.core.study import CestacSettings
+from runtime.counts.reader import COUNTS
 from runtime.ground.limits import limits
 from runtime.reporting.sections import part_section
 from runtime.study import Rows, Study
@@ -37,7 +39,7 @@ def test_quadrature_over_the_phase_is_the_mean_of_cestac():
     """
     found = cestac(planar, RECORD, replace(STUDY, cestac=replace(STUDY.cestac, runs=60)))
     names = found.reference.names  # the essential ones and those of the study
-    real = CoarseEncoders(problem(planar, RECORD, STUDY), names, None, "phase", "lowpass")
+    real = CoarseEncoders(problem(planar, RECORD, STUDY), names, None, "phase", LOWPASS)
     change = real.asked(STEP)
     level = found.levels[0]
     sampled = 100 * (level.mean / found.reference.X - 1)
@@ -134,7 +136,7 @@ def test_steps_of_constant_speeds_that_lock_are_tried(monkeypatch):
             states.q, states.qd, states.qdd, planar.base_parameters(planar.VALUES)
         ),
     )
-    real = CoarseEncoders(problem(planar, record, STUDY), NAMES, None, "phase", "lowpass")
+    real = CoarseEncoders(problem(planar, record, STUDY), NAMES, None, "phase", LOWPASS)
     locked, free, half = real.locking(np.array([2e-3, 2.3e-3, 4e-3]))
     assert locked > 5 * free and half > 2 * free
     monkeypatch.setattr(LIMIT, "READER_UP", 2)
@@ -149,7 +151,7 @@ class Scattered:
     phase; encoder 2 rests.
     """
 
-    reader, reference, finest, coarsest = "counts", np.ones(1), 0.1, np.array([1e3, np.inf])
+    reader, reference, finest, coarsest = COUNTS, np.ones(1), 0.1, np.array([1e3, np.inf])
 
     def nodes(self, delta, moving, read=0):
         assert moving == [0]
@@ -175,9 +177,9 @@ def test_more_phases_at_the_steps_beside_a_limit():
 
 
 def test_further_nodes_lie_in_the_middle_between_those_before():
-    real = CoarseEncoders(problem(planar, PART, STUDY), NAMES, None, "phase", "lowpass")
+    real = CoarseEncoders(problem(planar, PART, STUDY), NAMES, None, "phase", LOWPASS)
     real._counts = lambda delta, phases, moving, key: phases
-    few = PHASES["lowpass"]
+    few = real.phases
     phases = np.concatenate([real.nodes(2.0, (0, 1), read) for read in (0, few, 2 * few)])
     apart = np.diff(np.sort(phases, axis=0), axis=0)
     assert len(phases) == 4 * few and np.allclose(apart, 2.0 / len(phases))

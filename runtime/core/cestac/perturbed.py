@@ -131,13 +131,14 @@ def prepared_record(
     signals = replace(study.signals, median=study.cestac.median)
     encoder = own_encoder(own.record, study, drives)
     reader, note = _reader_of_measured(own, study, encoder) if exact else (own.reader, "")
-    own = replace(own, study=replace(study, signals=signals), reader=reader)
+    filtered = replace(own, study=replace(study, signals=signals), reader=reader)
+    filtered.take_states(own)
     q = np.asfortranarray(own.record.q)  # one signal after the other, as filters read them
     return PreparedRecord(
-        replace(own.record, q=_read_only(q)),
-        own.selection,
-        own.torque,
-        own.states,
+        replace(filtered.record, q=_read_only(q)),
+        filtered.selection,
+        filtered.torque,
+        filtered.states,
         encoder,
         note,
         _slip(own.record, signals),

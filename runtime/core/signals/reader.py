@@ -14,6 +14,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, TypeAlias, TypeVar
 
+import numpy as np
+
 from runtime.core.drives import Drives
 from runtime.core.missing import COUNTS, require_positions
 from runtime.core.record import Record
@@ -21,6 +23,8 @@ from runtime.core.signals.filters import States, filtered_states
 from runtime.core.study import Signals, Study
 from runtime.ground.errors import SettingsError
 from runtime.ground.settings import Settings, structure, to_mapping
+
+Array = np.ndarray
 
 Steps: TypeAlias = float | tuple[float, ...] | None
 """Steps of the encoders, rad or m: one for all joints, or one for each; None: from the record."""
@@ -60,6 +64,11 @@ class Reader:
         reads positions as counts: a count bounds the motion. None: positions are values.
     unwrapped : function of Record, Signals and drives to Record, or None
         Record without the jumps of encoder counters that overflow.
+    motion : function of positions, rate, step and earlier result, or None
+        Motion of m encoders of known step, from their positions x, shape (N, m): returns x and the
+        standard deviation of its velocity, shape (N, m), and a result that saves time if it is
+        given with the same motion and other phases of the steps. None: the positions are the
+        motion.
     """
 
     states: Callable[[Record, Signals], States]
@@ -71,11 +80,17 @@ class Reader:
     rounded: Callable[[Record, Signals, Any, str], States] | None = None
     encoder: Callable[[Signals], tuple[Steps, str]] | None = None
     unwrapped: Callable[[Record, Signals, Drives | None], Record] | None = None
+    motion: Callable[[Array, float, float, Any], tuple[Array, Array, Any]] | None = None
 
     @property
     def filters_positions(self) -> bool:
         """Whether errors of positions reach the states by the filters of the signals alone."""
         return self.linear and not self.at_rest
+
+    @property
+    def reads_encoders(self) -> bool:
+        """Whether the motion of single encoders of known step can be read from their positions."""
+        return self.filters_positions or self.motion is not None
 
     @property
     def reads_rounded(self) -> bool:
