@@ -223,7 +223,6 @@ BODY = """<mujoco><worldbody><body name="upper"><inertial pos="0 0 0" mass="1" d
 def test_a_changed_file_a_changed_include_and_other_options_are_derived(
     tmp_path, cache, derivations
 ) -> None:
-    pytest.importorskip("mujoco")
     yaml, xml, more = (tmp_path / name for name in ("arm.yaml", "arm.xml", "more.xml"))
     yaml.write_text(ROBOT)
     xml.write_text(MJCF)
