@@ -20,7 +20,7 @@ from runtime.ground.settings import to_mapping
 from runtime.study import Study
 from symgen.cli.main import VERBS, app
 from symgen.description import load_robot, packaged_robots
-from symgen.description.robot_file import json_schema
+from symgen.description.yaml import json_schema
 from symgen.regroup.regrouping import Regrouping, regroup
 
 HERE = Path(__file__).resolve().parent.parent

@@ -16,7 +16,7 @@ def new(
 ) -> None:
     """Write a robot file with an explanation of every section; never overwrite an existing file."""
     with reported_errors():
-        from symgen.description.robot_file import skeleton_for
+        from symgen.description.yaml import skeleton_for
 
         text = skeleton_for(file)
         if file.exists():

@@ -6,7 +6,7 @@ from symgen.description.files import load_robot, packaged_robots, read_robot
 from symgen.description.grammar import parse
 from symgen.description.par import read_par
 from symgen.description.robot import Drives, Element, Frame, Loop, Robot
-from symgen.description.robot_file import json_schema, parse_robot, skeleton, write_yaml
+from symgen.description.yaml import json_schema, parse_robot, skeleton, write_yaml
 
 __all__ = [
     "AngleWarning",

@@ -13,7 +13,7 @@ from pathlib import Path
 from symgen.description.fields import located
 from symgen.description.par import read_par
 from symgen.description.robot import Robot
-from symgen.description.robot_file import parse_robot, write_yaml
+from symgen.description.yaml import parse_robot, write_yaml
 from symgen.errors import DescriptionError
 
 TREES = (".urdf", ".xml", ".mjcf")  # suffixes of the formats of links and joints by name

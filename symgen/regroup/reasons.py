@@ -20,7 +20,7 @@ from symgen.derive.regressor import inertial_names
 from symgen.description.expression import ONE, ZERO
 from symgen.description.fields import Path, dotted
 from symgen.description.robot import PRISMATIC, REVOLUTE, Robot
-from symgen.description.robot_file import flow, tables_of
+from symgen.description.yaml import flow, tables_of
 from symgen.regroup.regrouping import Formula, Regrouping
 from symgen.regroup.rules import Transfer
 

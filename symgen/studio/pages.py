@@ -24,7 +24,7 @@ from runtime.ground.errors import InputError
 from symgen.derive.models import SYMBOLIC
 from symgen.description import packaged_robots
 from symgen.description.files import TREES, content_of
-from symgen.description.robot_file import skeleton
+from symgen.description.yaml import skeleton
 from symgen.emit.targets import TARGETS
 from symgen.errors import SymgenError
 from symgen.studio import table, views

@@ -20,7 +20,7 @@ from runtime.core.record import Record
 from runtime.reading.records import read_records
 from runtime.study import Study, study_from_mapping
 from runtime.wrench import WrenchModel
-from symgen.description.robot_file import parse_robot
+from symgen.description.yaml import parse_robot
 
 ARM = """
 symgen: 1

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from symgen.description import AngleWarning, load_robot, packaged_robots, read_par, write_yaml
-from symgen.description.robot_file import parse_robot
+from symgen.description.yaml import parse_robot
 from symgen.errors import DescriptionError
 from symgen.regroup.regrouping import regroup
 

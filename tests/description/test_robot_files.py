@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from symgen.description import json_schema, load_robot, packaged_robots, parse_robot, skeleton
-from symgen.description.robot_file import MAX_BYTES
+from symgen.description.yaml import MAX_BYTES
 from symgen.errors import DescriptionError
 
 ARM = """\

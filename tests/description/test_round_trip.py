@@ -13,7 +13,7 @@ from symgen.description import load_robot, packaged_robots, parse_robot
 from symgen.description.element import Element
 from symgen.description.parts import Drives, Frame, Loop
 from symgen.description.robot import Robot
-from symgen.description.robot_file import write_yaml
+from symgen.description.yaml import write_yaml
 
 READ_FROM_OTHERS = (
     "angles",

@@ -10,9 +10,9 @@ from oracles.urdf_robots import joint, link, robot
 from symgen.certify.lagrange import Lagrange
 from symgen.description import parse_robot
 from symgen.description.robot import INERTIAL
-from symgen.description.robot_file import write_yaml
 from symgen.description.tree import TreePart
 from symgen.description.tree_robot import read_tree
+from symgen.description.yaml import write_yaml
 from symgen.errors import DescriptionError
 
 TEXT = robot(

@@ -32,7 +32,7 @@ from typer.main import get_command
 
 from runtime.study import study_from_text
 from symgen.cli.main import app
-from symgen.description.robot_file import json_schema
+from symgen.description.yaml import json_schema
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]

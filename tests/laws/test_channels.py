@@ -20,7 +20,7 @@ from runtime.ground.errors import InputError, ModelError
 from runtime.reading.records import read_records
 from runtime.study import study_from_mapping
 from symgen.certify.modules import certified_files
-from symgen.description.robot_file import parse_robot
+from symgen.description.yaml import parse_robot
 from symgen.errors import DescriptionError, SymgenError
 
 ARM = """

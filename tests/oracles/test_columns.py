@@ -18,7 +18,7 @@ from symgen.description.element import KINDS, LawScalar
 from symgen.description.expression import ONE
 from symgen.description.grammar import LAWS, parse
 from symgen.description.robot import Element, Robot
-from symgen.description.robot_file import parse_robot, write_yaml
+from symgen.description.yaml import parse_robot, write_yaml
 from symgen.errors import DescriptionError
 from symgen.regroup.regrouping import EXACT, regroup
 

@@ -26,7 +26,7 @@ from runtime.plausible.motion import excited, low_speed_of_rest, standing_share,
 from runtime.plausible.samples import Samples, excerpts, samples_of
 from runtime.reading.records import read_records
 from runtime.study import Rows, Study, study_from_mapping
-from symgen.description.robot_file import parse_robot
+from symgen.description.yaml import parse_robot
 
 LIMIT = limits("runtime.plausible")
 

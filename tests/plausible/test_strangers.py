@@ -19,7 +19,7 @@ from runtime.plausible.causes import Robot, causes
 from runtime.reading.likely_columns import likely_columns
 from runtime.reading.units import torque_unit
 from symgen.cli.main import app
-from symgen.description.robot_file import parse_robot
+from symgen.description.yaml import parse_robot
 
 TIED = """
 symgen: 1

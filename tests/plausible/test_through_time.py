@@ -10,7 +10,7 @@ import pytest
 import runtime
 import symgen
 from runtime.plausible.plausibility import Plausibility
-from symgen.description.robot_file import parse_robot
+from symgen.description.yaml import parse_robot
 
 ARM = b"""\
 symgen: 1

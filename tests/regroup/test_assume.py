@@ -13,7 +13,7 @@ from oracles.random_robots import random_robot
 from runtime.assumptions import assumptions_asked
 from runtime.study import study_from_mapping
 from symgen.certify.modules import certify
-from symgen.description.robot_file import parse_robot, write_yaml
+from symgen.description.yaml import parse_robot, write_yaml
 from symgen.errors import DescriptionError
 from symgen.regroup.regrouping import regroup
 

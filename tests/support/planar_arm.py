@@ -10,7 +10,7 @@ import numpy as np
 import runtime
 import symgen
 from runtime.study import Study, study_from_mapping
-from symgen.description.robot_file import parse_robot
+from symgen.description.yaml import parse_robot
 
 Array = np.ndarray
 RATE = 200.0  # Hz

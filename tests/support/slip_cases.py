@@ -27,7 +27,7 @@ from runtime.plausible.causes import unchanged_study
 from runtime.plausible.samples import samples_of
 from runtime.plausible.trials import Baseline, baseline_of, regressor
 from runtime.study import study_from_mapping
-from symgen.description.robot_file import parse_robot
+from symgen.description.yaml import parse_robot
 from symgen.errors import SymgenError
 
 LIMIT = limits("runtime.plausible")
