@@ -299,6 +299,16 @@ def motor_side(folder: Path) -> Case:
     return Case(model, *pair(model), settings)
 
 
+def drive_commands(folder: Path) -> Case:
+    """Torques in amperes of drives of unknown torque constant."""
+    model = arm()
+
+    def commanded(record: Record) -> Record:
+        return replace(record, tau=record.tau / 2, origin=replace(record.origin, command="A"))
+
+    return Case(model, *pair(model, commanded), study())
+
+
 def different_rates(folder: Path) -> Case:
     model = arm()
     records = (record(model, 0, rate=250.0), record(model, 2, rate=125.0))
@@ -338,6 +348,7 @@ FEATURES: Mapping[str, Callable[[Path], Case]] = {
     "own columns": own_columns,
     "channels": channels,
     "motor side": motor_side,
+    "drive commands": drive_commands,
     "different rates": different_rates,
     "gaps": gaps,
 }

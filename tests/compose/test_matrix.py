@@ -266,5 +266,6 @@ def test_the_features_change_what_is_fitted() -> None:
     assert changed["automatic cut-off"].study.signals.lowpass.cutoff == pytest.approx(23, rel=0.1)
     assert "set torque_median: 1" in str(changed["torque median"].problem.notes)
     assert not isinstance(changed["recorded speeds"].study.signals.velocity, str)
+    assert changed["drive commands"].estimate.units["FV1"] == "A*s/rad"
     assert changed["different rates"].observation.rates[:2] == (50.0, 62.5)
     assert len(changed["gaps"].records) == 2
