@@ -120,7 +120,7 @@ def test_a_reader_is_one_line_of_a_list(tmp_path, log, monkeypatch):
         ("{reader: toy, options: {gian: 2}}", "line 3: signals.options.gian: unknown key"),
         (
             "{reader: tyo}",
-            "line 3: signals.reader: 'tyo'; expected lowpass, counts",
+            "line 3: signals.reader: 'tyo'; expected lowpass, counts or static",
         ),
         (
             "{options: {gain: 2}}",

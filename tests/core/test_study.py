@@ -145,7 +145,7 @@ def test_one_record_or_several():
         (
             {"estimate": {"method": "magic"}},
             ("estimate", "method"),
-            "expected ols, wls, ",
+            "expected ols, wls, feasible, irls, iv or didim",
         ),
         ({"essential": {"threshold": 1}}, ("essential", "threshold"), "expected more than 1"),
         (
