@@ -28,7 +28,7 @@ from runtime.ground.arrays import require_kind
 from runtime.ground.errors import InputError
 from runtime.ground.settings import NotNegative, PerJoint, Settings, structure, to_mapping
 from runtime.loop.settings import Controller
-from runtime.payload import settings as load
+from runtime.payload.settings import PayloadSettings
 from runtime.reading.datasets import DATASETS, dataset_study
 from runtime.reading.formats import endings, is_measured, read_table
 from runtime.reading.likely_columns import candidates, known_columns
@@ -60,18 +60,6 @@ class ValidateSettings(chapter.ValidateSettings):
     ----------
     record : tuple of RecordSettings
         Further records, predicted with the parameters of the study.
-    """
-
-    record: Records = ()
-
-
-class PayloadSettings(load.PayloadSettings):
-    """Records with a load fixed to a link; the records of the study itself are without the load.
-
-    Attributes
-    ----------
-    record : tuple of RecordSettings
-        Records with the load.
     """
 
     record: Records = ()

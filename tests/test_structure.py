@@ -44,7 +44,10 @@ EDGES = {  # of runtime: a feature imports the ground, the core and itself; what
         "physical": "predictions are those of bodies that exist",
     },
     "friction": {"physical": "which base parameters are friction alone follows from the bodies"},
-    "payload": {"physical": "a load is a body"},
+    "payload": {
+        "physical": "a load is a body",
+        "reading": "the records with the load have the settings of all records",
+    },
     "plausible": {
         "physical": "a cause is judged by bodies that exist",
         "counts": "a counter that starts anew after its turn is no jump of the position",

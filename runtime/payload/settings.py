@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import field
 
 from runtime.ground.settings import Flag, Real, Settings, Text, Whole, require
+from runtime.reading.settings import Records
 
 LOAD = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 """Standard parameters of a load."""
@@ -35,6 +36,8 @@ class PayloadSettings(Settings):
     gains : bool
         Whether the torque constants of the drives are also estimated from the load; its M must
         be known.
+    record : tuple of RecordSettings
+        Records with the load.
     """
 
     link: Whole | None = None
@@ -42,6 +45,7 @@ class PayloadSettings(Settings):
     known: Mapping[Text, Real] = field(default_factory=dict)
     friction: Flag = False
     gains: Flag = False
+    record: Records = ()
 
     def __post_init__(self) -> None:
         for family in self.known:
