@@ -4,10 +4,10 @@
     to_mapping(study)                  # complete, defaults filled: written into every result
 
 Defaults are those of the chapter (sections 2.2.2, 2.2.3 and 4.1.1), with two exceptions: the
-cut-off follows from the record, and torques have no median filter. They are: Butterworth of order 4 forward and backward on q and qd, central
-differences, parallel decimation by eq. (13), ordinary least squares, essential parameters by the
-threshold 1.04, five CESTAC runs. Units: SI, rad, Hz. Values are checked when a Study is made, so
-every Study is valid.
+cut-off follows from the record, and torques have no median filter. They are: Butterworth of order 4
+forward and backward on q and qd, central differences, parallel decimation by eq. (13), ordinary
+least squares, essential parameters by the threshold 1.04, five CESTAC runs. Units: SI, rad, Hz.
+Values are checked when a Study is made, so every Study is valid.
 """
 
 from __future__ import annotations
