@@ -2,6 +2,7 @@
 refused; a right record is read as it is.
 """
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,8 @@ JOINTS = ("a", "b")
 Q = np.stack([np.sin(6 * T), np.cos(4 * T)], axis=1)
 NOISE = np.random.default_rng(1).standard_normal((N, 2))
 TAU = np.stack([9 * np.cos(6 * T), 5 + 3 * np.sin(4 * T)], axis=1) + 0.1 * NOISE
-CASE = Path(__file__).resolve().parents[3] / "shared" / "cases5" / "second_publisher"
+DATA = os.environ.get("SYMGEN_DATA") or Path(__file__).resolve().parents[3] / "shared" / "data"
+CASE = Path(DATA).parent / "cases5" / "second_publisher"
 
 
 def read(path, **record):
