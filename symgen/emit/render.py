@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from jinja2 import Environment
+    from jinja2.bccache import Bucket
 
 WIDTH = 100
 
@@ -21,8 +23,13 @@ def _environment() -> Environment:
         StrictUndefined,
     )
 
+    class Compiled(FileSystemBytecodeCache):
+        def dump_bytecode(self, bucket: Bucket) -> None:
+            with suppress(OSError):  # the disk is full
+                super().dump_bytecode(bucket)
+
     try:  # templates that an earlier process compiled
-        compiled = FileSystemBytecodeCache()
+        compiled = Compiled()
     except (OSError, RuntimeError):  # no temporary folder, or one of another user
         compiled = None
     return Environment(

@@ -125,11 +125,23 @@ def test_public_functions_have_hints(texts) -> None:
 
 @pytest.mark.parametrize("error", [RuntimeError, PermissionError])
 def test_templates_are_compiled_where_no_folder_can_keep_them(monkeypatch, error) -> None:
-    def refused() -> None:
+    def refused(*given) -> None:
         raise error("the folder belongs to another user")
 
     expected = generate_module(load_robot("planar_2r"))
     render._environment.cache_clear()
-    monkeypatch.setattr("jinja2.FileSystemBytecodeCache", refused)
+    monkeypatch.setattr("jinja2.FileSystemBytecodeCache.__init__", refused)
+    assert generate_module(load_robot("planar_2r")) == expected
+    render._environment.cache_clear()
+
+
+def test_templates_are_compiled_where_the_disk_is_full(monkeypatch) -> None:
+    def full(*given) -> None:
+        raise OSError("no space left on device")
+
+    expected = generate_module(load_robot("planar_2r"))
+    render._environment.cache_clear()
+    monkeypatch.setattr("jinja2.FileSystemBytecodeCache.load_bytecode", lambda *given: None)
+    monkeypatch.setattr("jinja2.FileSystemBytecodeCache.dump_bytecode", full)
     assert generate_module(load_robot("planar_2r")) == expected
     render._environment.cache_clear()
