@@ -18,16 +18,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
-from runtime.core.least_squares.linear import System, ordinary, standard_deviations
-from runtime.core.least_squares.method import Beginning, Fitted, Method
+from runtime.core.least_squares.linear import System, standard_deviations
+from runtime.core.least_squares.method import Beginning, Fitted
 from runtime.core.least_squares.wls import weighted_system
 from runtime.core.rows.factor import Array
-from runtime.loop.closed_loop import loop_of, observed_loop
-from runtime.loop.fixed_point import FixedPointOptions, Step, iterate, outcome_of
+from runtime.loop.closed_loop import loop_of
+from runtime.loop.fixed_point import Step, iterate, outcome_of
 from runtime.loop.result import Simulation
-from runtime.loop.simulated_motion import beside_record
+from runtime.loop.simulated_motion import simulating_method
 
 ROUNDING = (
     "{method} uses only the first recorded position, so rounding the record says nothing about an "
@@ -57,11 +56,5 @@ def fit(start: Beginning) -> Fitted:
     return Fitted(system, system.solve(), status=status, message=message, details=details)
 
 
-METHOD = Method(
-    FixedPointOptions,
-    ordinary,
-    partial(beside_record, fit),
-    observe=observed_loop,
-    rounding=ROUNDING,
-)
+METHOD = simulating_method(fit, ROUNDING)
 """The method `didim`."""

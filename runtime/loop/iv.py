@@ -21,7 +21,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,17 +28,16 @@ from scipy.linalg import LinAlgError
 from scipy.stats import chi2
 
 from runtime.core.least_squares.block_covariance import deletions
-from runtime.core.least_squares.linear import ordinary
-from runtime.core.least_squares.method import Beginning, Fitted, Method
+from runtime.core.least_squares.method import Beginning, Fitted
 from runtime.core.least_squares.wls import common_scales, floored
 from runtime.core.rows.factor import Array
 from runtime.core.rows.observation import Observation, split_rows
 from runtime.ground.errors import InputError
 from runtime.ground.limits import limits
-from runtime.loop.closed_loop import loop_of, observed_loop
-from runtime.loop.fixed_point import FixedPointOptions, Step, iterate, outcome_of
+from runtime.loop.closed_loop import loop_of
+from runtime.loop.fixed_point import Step, iterate, outcome_of
 from runtime.loop.result import Simulation
-from runtime.loop.simulated_motion import beside_record
+from runtime.loop.simulated_motion import simulating_method
 
 LIMIT = limits(__package__)
 ROUNDING = (
@@ -174,11 +172,5 @@ def _by_block(observation: Observation, Z: Array, residual: Array, A: Array) -> 
     return U if len(U) > 1 else np.full_like(U, np.nan)
 
 
-METHOD = Method(
-    FixedPointOptions,
-    ordinary,
-    partial(beside_record, fit),
-    observe=observed_loop,
-    rounding=ROUNDING,
-)
+METHOD = simulating_method(fit, ROUNDING)
 """The method `iv`."""

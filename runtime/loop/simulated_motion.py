@@ -14,18 +14,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from runtime.core.least_squares.estimate import Status
-from runtime.core.least_squares.linear import percent
-from runtime.core.least_squares.method import Beginning, Fitted
+from runtime.core.least_squares.linear import ordinary, percent
+from runtime.core.least_squares.method import Beginning, Fitted, Method
 from runtime.core.model import joint_labels
 from runtime.core.rows.observation import Observation
 from runtime.ground.errors import InputError
 from runtime.ground.limits import limits
-from runtime.loop.closed_loop import ClosedLoop, loop_of
+from runtime.loop.closed_loop import ClosedLoop, loop_of, observed_loop
+from runtime.loop.fixed_point import FixedPointOptions
 from runtime.loop.law_check import law_text
 
 LIMIT = limits(__package__)
@@ -158,4 +160,18 @@ def beside_record(fit: Callable[[Beginning], Fitted], start: Beginning) -> Fitte
         status=status if fitted.status == "ok" else fitted.status,
         message=" ".join(text for text in (fitted.message, note) if text),
         details={**fitted.details, **motion},
+    )
+
+
+def simulating_method(fit: Callable[[Beginning], Fitted], rounding: str) -> Method:
+    """Make the Method of an estimator that simulates the closed loop of the records.
+
+    rounding : its sentence on a study that rounds recorded positions.
+    """
+    return Method(
+        FixedPointOptions,
+        ordinary,
+        partial(beside_record, fit),
+        observe=observed_loop,
+        rounding=rounding,
     )

@@ -69,6 +69,7 @@ class Sent:
         return np.asarray(self.efforts.any() & ((tau == 0) | np.isnan(tau)).all(axis=1))
 
     def refused(self, reason: str) -> InputError:
+        """Make the error that names the file, the reason, and what to record instead."""
         return InputError(f"{reason}; {REMEDY}", file=self.file)
 
 
