@@ -416,7 +416,7 @@ def _carried(T: Array, Td: Array, base: Array) -> Array:
 
 def _hat(w: Array) -> Array:
     """Return the matrix of the cross product w x, shape (..., 3, 3)."""
-    return np.asarray(np.cross(np.eye(3), -w[..., None, :]))
+    return np.asarray(np.cross(np.eye(3), w[..., None, :]))
 
 
 def _axial(W: Array) -> Array:
