@@ -41,6 +41,7 @@ def identify(
     ] = True,
     trust: options.Trust = False,
     exact: options.Exact = False,
+    base: options.Base = None,
     verbose: Annotated[
         bool,
         typer.Option(
@@ -65,7 +66,7 @@ def identify(
         from runtime.compose import records_of
         from runtime.core.provenance import processor
 
-        described = session.robot_of(robot, trust=trust, exact=exact)
+        described = session.robot_of(robot, trust=trust, exact=exact, base=base)
         study = session.study_of_arguments(record)
         model = session.model_of(described, study=study)
         study = study if suggest is None else session.suggested_study(study, model, suggest)
