@@ -27,6 +27,7 @@ from runtime.core.least_squares.linear import LinearOptions, ordinary
 from runtime.core.least_squares.method import Method
 from runtime.core.least_squares.wls import weighted
 from runtime.core.model import GeneratedModel, channels_of, require_emitted
+from runtime.core.moving_base import moved_base
 from runtime.core.problem import (
     RECORD_EXPECTED,
     Note,
@@ -72,6 +73,7 @@ if TYPE_CHECKING:
     from runtime.treatments import Ranking
 
 STEPS: list[Step] = [
+    moved_base,
     stated_sides,
     When(
         Late("runtime.commands:commands_for_torques"),

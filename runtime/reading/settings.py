@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from runtime.core.record import WRENCH
+from runtime.core.signals.base import MOTION, POSITION, QUATERNION
 from runtime.ground.settings import (
     Flag,
     Many,
@@ -141,6 +142,55 @@ class Columns(Settings):
         object.__setattr__(self, "qr", ())
 
 
+class BaseColumns(Settings):
+    """Columns of the motion of a base that moves, in the file of the positions, SI.
+
+    One of two forms: the nine signals, or the pose of frame 0 in the world, in whose axes the robot
+    file gives gravity. The filters are those of the joints.
+
+    Attributes
+    ----------
+    motion : tuple of nine str
+        Angular velocity w0 (rad/s), angular acceleration wd0 (rad/s**2), and acceleration a0 of the
+        origin of frame 0 minus gravity (m/s**2), in the axes of frame 0.
+    position : tuple of three str
+        Origin of frame 0 in the world, m.
+    quaternion : tuple of four str
+        Orientation of frame 0 in the world.
+    order : str
+        Order of the columns of the quaternion: wxyz or xyzw.
+    """
+
+    motion: Names = ()
+    position: Names = ()
+    quaternion: Names = ()
+    order: Literal["wxyz", "xyzw"] = "wxyz"
+
+    def __post_init__(self) -> None:
+        require(
+            not (self.motion and (self.position or self.quaternion)),
+            "given together with a pose; give the motion or the pose",
+            "motion",
+        )
+        require(
+            bool(self.position) == bool(self.quaternion),
+            "position and quaternion belong together; give both",
+            "position",
+        )
+        for key, count in (("motion", 9), ("position", 3), ("quaternion", 4)):
+            names = getattr(self, key)
+            require(
+                len(names) in (0, count), f"{len(names)} columns; expected {count} columns", key
+            )
+
+    @property
+    def columns(self) -> dict[str, tuple[str, ...]]:
+        """Columns by channel of the record; those of the quaternion with the scalar first."""
+        Q = self.quaternion if self.order == "wxyz" else (*self.quaternion[3:], *self.quaternion[:3])
+        found = {MOTION: self.motion, POSITION: self.position, QUATERNION: Q}
+        return {channel: names for channel, names in found.items() if names}
+
+
 class Units(Settings):
     """Units of the columns of a record: one unit, such as deg, for all joints, or one per joint.
 
@@ -219,6 +269,8 @@ class RecordSettings(Settings):
         the known torques. Relative to the study file, or files of `dataset`.
     columns : Columns
         Names of the columns.
+    base : BaseColumns
+        Columns of the motion of the base, for a robot whose base moves.
     side : str
         motor (qm = R (q - offset), tau = R' u, by the drives of the robot), joint, or link: joint
         torques of sensors behind the gears, in which the drive has no part: inertia, viscous and
@@ -269,6 +321,7 @@ class RecordSettings(Settings):
 
     files: Many[Text] = ()
     columns: Columns = field(default_factory=Columns)
+    base: BaseColumns = field(default_factory=BaseColumns)
     side: Literal["motor", "joint", "link"] = "joint"
     torque_side: Literal["motor", "joint", "link"] | None = None
     rate: Positive | None = None
