@@ -176,14 +176,20 @@ class Model(NamedTuple):
 
         Raises SymgenError for a model that has no meaning on a moving base.
         """
-        if not robot.base_moves or self.base == RELATIVE:
-            return self
-        if self.base == UNDEFINED:
+        if not self.defined_on(robot):
             raise SymgenError(
                 f"{robot.name}: the model {self.name} has no meaning on a moving base; leave it out, "
                 "or write base: fixed"
             )
-        return self._replace(arguments=("base", *self.arguments))
+        return (
+            self._replace(arguments=("base", *self.arguments))
+            if robot.base_moves and self.base == READ
+            else self
+        )
+
+    def defined_on(self, robot: Robot) -> bool:
+        """Whether the model has a meaning on the base of the robot."""
+        return not (robot.base_moves and self.base == UNDEFINED)
 
     @property
     def summary(self) -> str:
