@@ -186,7 +186,11 @@ class BaseColumns(Settings):
     @property
     def columns(self) -> dict[str, tuple[str, ...]]:
         """Columns by channel of the record; those of the quaternion with the scalar first."""
-        Q = self.quaternion if self.order == "wxyz" else (*self.quaternion[3:], *self.quaternion[:3])
+        Q = (
+            self.quaternion
+            if self.order == "wxyz"
+            else (*self.quaternion[3:], *self.quaternion[:3])
+        )
         found = {MOTION: self.motion, POSITION: self.position, QUATERNION: Q}
         return {channel: names for channel, names in found.items() if names}
 

@@ -397,8 +397,8 @@ class Lagrange:
         qd, qdd of the actuated joints have shape (..., n_a), in the order of `robot.joints`; `base`
         is that of `regressor`.
         """
-        *state, G = self.motion(q, qd, qdd)
-        return np.swapaxes(G, -1, -2) @ self.regressor(*state, base)
+        x, xd, xdd, G = self.motion(q, qd, qdd)
+        return np.swapaxes(G, -1, -2) @ self.regressor(x, xd, xdd, base)
 
 
 def _carried(T: Array, Td: Array, base: Array) -> Array:

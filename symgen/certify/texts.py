@@ -140,9 +140,15 @@ def text_check(file: str, text: str, target: str, witness: Witness) -> TextCheck
     key = sha256(text.encode("utf-8")).hexdigest()
     compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc")
     if file.endswith(".h"):
-        return TextCheck(target, key, not_run=f"it declares the functions of {file[:-2]}.c, where their certificate stands")
+        return TextCheck(
+            target,
+            key,
+            not_run=f"it declares the functions of {file[:-2]}.c, where their certificate stands",
+        )
     if not file.endswith((".py", ".c")):
-        return TextCheck(target, key, not_run=f"not run: nothing here runs {TARGETS[target].language}")
+        return TextCheck(
+            target, key, not_run=f"not run: nothing here runs {TARGETS[target].language}"
+        )
     if file.endswith(".c") and compiler is None:
         return TextCheck(target, key, not_run="not run: there is no C compiler")
     left_out = tuple(sorted(witness.left_out))
@@ -369,8 +375,8 @@ def _derivative_error(module: ModuleType, witness: Witness) -> float:
     Return the larger of the two errors.
     """
     function = module.casadi(DERIVATIVES)
-    states = (witness.q[0], witness.qd[0], witness.qdd[0], witness.X)
-    states = states if witness.base is None else (witness.base[0], *states)
+    base = () if witness.base is None else (witness.base[0],)
+    states = (*base, witness.q[0], witness.qd[0], witness.qdd[0], witness.X)
     *_, A, D = map(np.asarray, function(*states, *witness.keywords.values()))
     return max(
         difference(A, witness.A[0], np.abs(witness.A).max()),

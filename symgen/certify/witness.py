@@ -254,8 +254,9 @@ class Witness:
             ]
         if not self.tied:  # more samples than a block of the NumPy module has
             rows = np.arange(BLOCKS) % N
-            arguments = (x[rows] for x in (*(() if self.base is None else (self.base,)), q))
-            checks["gravity"].append(Check((*arguments, X), self.rest[rows], largest))
+            arguments = tuple(given[a] for a in MODELS["gravity"].on(self.robot).states)
+            many = (*(x[rows] for x in arguments), X)
+            checks["gravity"].append(Check(many, self.rest[rows], largest))
         return {name: check for name, check in checks.items() if name not in self.left_out}
 
     def value(

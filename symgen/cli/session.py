@@ -180,7 +180,9 @@ def robot_of(
     path = Path(source)
     if path.suffix == ".py":
         if base is not None:
-            fail(f"{source} is a generated module, whose base is that of its robot file; leave out --base")
+            fail(
+                f"{source} is a generated module, whose base is that of its robot file; leave out --base"
+            )
         return load_model(path, trust=trust)
     if path.is_file() and is_measured(path):
         fail(f"{source} is a measured file; the robot comes first, then the record")

@@ -30,8 +30,8 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
 from fractions import Fraction
+from typing import Literal
 
 import numpy as np
 

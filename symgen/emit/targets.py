@@ -40,7 +40,10 @@ TARGETS = {
     ),
     "c": Target("{}.c", "C", iterates=True, on_moving_base=False),
     "h": Target(
-        "{}.h", "C", "{0}.h declares what {0}.c has; --target c writes both", iterates=True,
+        "{}.h",
+        "C",
+        "{0}.h declares what {0}.c has; --target c writes both",
+        iterates=True,
         on_moving_base=False,
     ),
     "xp": Target(

@@ -12,9 +12,9 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+from certify.text_faults import code_lines, turned_sign
 
 import symgen
-from certify.text_faults import code_lines, turned_sign
 from oracles.urdf_robots import NAMED, panda, random_tree, ur5
 from symgen.certify.certificate import certify_formulas
 from symgen.certify.claim import claim
@@ -77,8 +77,9 @@ def test_torques_are_those_of_pinocchio_with_a_free_flyer(text):
     q, qd, qdd = rng.uniform(-2, 2, (3, 20, len(joints)))
     base, expected = np.empty((20, 9)), np.empty_like(q)
     for k in range(20):
-        Q, v, a = pin.randomConfiguration(model, -np.ones(model.nq), np.ones(model.nq)), *rng.normal(
-            size=(2, model.nv)
+        Q, v, a = (
+            pin.randomConfiguration(model, -np.ones(model.nq), np.ones(model.nq)),
+            *rng.normal(size=(2, model.nv)),
         )
         for i, joint in enumerate(joints):
             given = [q[k, i]] if joint.nq == 1 else [np.cos(q[k, i]), np.sin(q[k, i])]
@@ -210,7 +211,7 @@ def test_a_claim_is_verified_by_a_script_that_shares_no_code(tmp_path):
 
     def verdict() -> str:
         file.write_text(json.dumps(stated), encoding="utf-8")
-        run = subprocess.run([sys.executable, script, file], capture_output=True, text=True)  # noqa: PLW1510
+        run = subprocess.run([sys.executable, script, file], capture_output=True, text=True)
         return run.stdout
 
     assert "verified: rank 22" in verdict()

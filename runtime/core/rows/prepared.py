@@ -26,8 +26,8 @@ from runtime.core.record import JOINT_CHANNELS, Record
 from runtime.core.rows.observation import Observation, stack
 from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import Selection, certain_rows, nothing_left, select_rows
-from runtime.core.signals.decimation import decimate
 from runtime.core.signals.base import base_motion
+from runtime.core.signals.decimation import decimate
 from runtime.core.signals.filters import States, median_filtered
 from runtime.core.signals.reader import Reader
 from runtime.core.study import Study
