@@ -22,6 +22,7 @@ from symgen.certify.importing import (
     key_of,
     without_certificate,
 )
+from symgen.description.bodies import impossible_links
 from symgen.description.expression import Expression
 from symgen.description.files import load_robot
 from symgen.description.robot import Robot
@@ -72,7 +73,7 @@ def module_of(robot: Robot, request: object, derived: Callable[[Robot], Path]) -
     if asked is None:
         return imported(derived(robot))
     asked = asked.with_name(f"asked-{asked.name}")  # no text has such a name
-    path = None if robot.impossible else _answer(asked, f"{robot.name}.py")
+    path = None if impossible_links(robot) else _answer(asked, f"{robot.name}.py")
     if path is None:
         path = derived(robot)
         if path.is_relative_to(asked.parent):

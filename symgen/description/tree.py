@@ -140,7 +140,9 @@ class Tree:
     gravity : tuple of float, m/s^2
         Acceleration of gravity in the root link.
     notes : tuple of str
-        What was not read.
+        What was left out and has no effect on the torques.
+    not_read : tuple of str
+        What was left out and changes the torques.
     places : mapping
         For an MJCF, in the order of its bodies: pose (4, 4) of the frame of each body in the frame
         of its link. A URDF has one frame for both.
@@ -158,6 +160,7 @@ class Tree:
     notes: tuple[str, ...] = ()
     places: Mapping[str, Array] = field(default_factory=dict)
     angles: str = ""
+    not_read: tuple[str, ...] = ()
 
 
 def turn(axis: int, angle: float) -> Array:

@@ -423,6 +423,7 @@ def _robot(table: Table, file: str, sha256: str) -> Robot:
             for own in map(table.tree.links.__getitem__, body.links)
             if own is not None and own.wrong
         ),
+        not_read=table.tree.not_read,
         file=file,
         sha256=sha256,
     )

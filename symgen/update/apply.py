@@ -25,7 +25,7 @@ from runtime.core.model import load_model
 from runtime.documents.estimates import load_whole_estimate
 from runtime.physical.inertia import PhysicalModel, physical_model
 from symgen.certify.requests import model as emitted
-from symgen.description.files import content_of, read_robot
+from symgen.description.files import content_of, read_robot, warn_not_read
 from symgen.description.robot import Robot, one_joint_parameters, parameter
 from symgen.description.tree import Array, TreePart
 from symgen.errors import DescriptionError
@@ -214,6 +214,7 @@ def apply(
         (text.robot, text.file) if robot is None else (read_robot(robot)[0], Path(robot).name)
     )
     require_same_frames(text, described, of)
+    warn_not_read(text.robot)
     result = _estimate(estimate)
     require_torques(result)
     _require_same_joints(result, described, of)
