@@ -213,10 +213,11 @@ def described_robot(source: str, at_values: bool = False, exact: bool = False) -
     from symgen.derive.doubts import doubts
     from symgen.description import load_robot
     from symgen.description.angles import RobotFileWarning
+    from symgen.description.distal import frames_text
     from symgen.description.values import at_values as with_values
 
     robot = load_robot(source, exact=exact)
-    for sentence in doubts(robot):
+    for sentence in filter(None, (*doubts(robot), frames_text(robot))):
         warnings.warn(sentence, RobotFileWarning, stacklevel=1)
     return with_values(robot) if at_values else robot
 

@@ -357,12 +357,15 @@ def parse_mjcf(content: bytes, file: str, *, exact: bool = False, sites: bool = 
     for b in range(1, model.nbody):
         _body(growing, b)
     places = dict(list(growing.place.values())[1:])
-    if sites:
-        for s in range(model.nsite):
-            link, pose = growing.place[int(model.site_bodyid[s])]
-            name = _new(growing, model.site(s).name or f"site{s}")
+    of_links: dict[str, tuple[str, Array]] = {}
+    for s in range(model.nsite):
+        link, pose = growing.place[int(model.site_bodyid[s])]
+        name = _new(growing, model.site(s).name or f"site{s}")
+        rule = angles if sites else Angles(exact=True)
+        own = _turned(model.site_pos[s], model.site_quat[s], f"site {name!a:.60}", rule)
+        of_links[name] = link, pose @ own
+        if sites:
             growing.links[name] = None
-            own = _turned(model.site_pos[s], model.site_quat[s], f"site {name!a:.60}", angles)
             growing.joints.append(_fixed(name, link, pose @ own))
     gx, gy, gz = (0.0 if mjcf.weightless else float(x) + 0.0 for x in model.opt.gravity)
     relations, joints = _relations(growing), tuple(growing.joints)
@@ -379,6 +382,7 @@ def parse_mjcf(content: bytes, file: str, *, exact: bool = False, sites: bool = 
         places,
         text,
         mjcf.not_read,
+        of_links,
     )
 
 

@@ -214,6 +214,8 @@ class Robot:
     impossible: Annotated[tuple[tuple[int, str], ...], *UNWRITTEN] = ()
     # parts of a foreign file that change the torques and are not in the equations
     not_read: Annotated[tuple[str, ...], *UNWRITTEN] = ()
+    # of a foreign file, on which a load is mounted: name, link, pose in its frame (`mounts`)
+    mounts: Annotated[tuple[tuple[str, int, Any], ...], *UNWRITTEN] = ()
     distal: Annotated[int, *UNWRITTEN] = 0  # rows of a classic table in the file; 0: Khalil's
     file: Annotated[str, *UNWRITTEN] = ""
     sha256: Annotated[str, *UNWRITTEN] = ""

@@ -148,6 +148,8 @@ class Tree:
         of its link. A URDF has one frame for both.
     angles : str
         How angles near multiples of pi/12 were read.
+    sites : mapping
+        For an MJCF: the link of each site, and the pose (4, 4) of the site in the frame of this link.
     """
 
     name: str
@@ -161,6 +163,7 @@ class Tree:
     places: Mapping[str, Array] = field(default_factory=dict)
     angles: str = ""
     not_read: tuple[str, ...] = ()
+    sites: Mapping[str, tuple[str, Array]] = field(default_factory=dict)
 
 
 def turn(axis: int, angle: float) -> Array:

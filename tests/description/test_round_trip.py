@@ -19,6 +19,7 @@ READ_FROM_OTHERS = (
     "angles",
     "impossible",
     "not_read",
+    "mounts",
     "distal",
     "file",
     "sha256",
