@@ -128,7 +128,7 @@ def place_on(
         return Place(f"frame {frame}", f"frame {frame}, Khalil's", T)
     usual = next((name for name in PREFERRED if name in names), None)
     name = at or usual or names[-1]
-    last = "" if at or usual else f", the last place of the robot file on link {link}"
+    last = "" if at or usual else f" (the last of the file on link {link})"
     return Place(name, f"{name}{last}", np.array(mounts[name][1]))
 
 

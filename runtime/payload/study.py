@@ -69,7 +69,7 @@ class PayloadStudy(Result, Part, keys="payload drive_gains:gains"):
     def brief(self) -> str:
         """Return the load and the torque constants, with 95 % confidence intervals, as text."""
         load, body, gains = self.payload, self.payload.body, self.gains
-        lines = [] if body is None else [*_brief(body), ""]
+        lines = [] if body is None else _brief(body)
         given = [f"{name} {value:.4g} (given)" for name, value in load.given.items()]
         estimated = with_intervals(load.names, load.value, load.sigma)
         lines += [f"The load on {load.place}, SI, +- 95 %", *in_lines([*given, *estimated])]
@@ -90,11 +90,12 @@ def _brief(body: Body) -> list[str]:
         labels, values, sigma = ([row[k] for row in rows] for k in range(3))
         return with_intervals([name.split()[-1] for name in labels], values, sigma)
 
+    mass, centre = " ".join(cells("mass")[0].split()), cells("centre")
     return [
-        f"The load at {body.place.words}, +- 95 %: {' '.join(cells('mass')[0].split())} kg",
-        *(["Centre of mass, m", *in_lines(centre)] if (centre := cells("centre")) else []),
+        f"The load at {body.place.words}, +- 95 %: {mass} kg{', centre, m' * bool(centre)}",
+        *in_lines(centre),
         *(
-            ["Inertia about the centre of mass, kg m^2", *in_lines(inertia)]
+            ["Inertia about the centre, kg m^2", *in_lines(inertia)]
             if (inertia := cells("inertia"))
             else []
         ),

@@ -101,8 +101,8 @@ def test_text_names_frame_unit_and_interval(tmp_path, monkeypatch):
     write(tmp_path, noise=0.05)
     monkeypatch.chdir(tmp_path)
     said = CliRunner().invoke(app, ["identify", "arm.urdf", "load.yaml", "--no-plausible"]).stdout
-    assert "The load at flange, +- 95 %: mass 2.4" in said and "Centre of mass, m\nx " in said
-    assert "Inertia about the centre of mass, kg m^2\nxx " in said
+    assert "The load at flange, +- 95 %: mass 2.4" in said and " kg, centre, m\nx " in said
+    assert "Inertia about the centre, kg m^2\nxx " in said
     assert "The load on link 3, in Khalil's frame 3, SI, +- 95 %" in said
 
 
