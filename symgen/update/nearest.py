@@ -50,6 +50,7 @@ LINEARISED, STILL = 10, 1e-4  # of the distance: how often, and the sizes that i
 FAR = 1e6  # sizes that a number may move
 ROTORS = 1e6  # size of a motor inertia beside that of the file
 NEAR = 1e-6  # of the size of a number: nearer to the file is rounding
+EQUAL = 1e-9  # of the size of a number: so near, a number of the file stays in any case
 BARRIER = 2 * LIMIT.LEAST_EIGENVALUE  # what the program keeps an element from zero
 STRANGE = 2.0  # mass over that of the file
 NO_MASS = 1e-15  # kg; a link with no more has no mass, as in MuJoCo
@@ -348,9 +349,13 @@ def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple
     near[alone] += BARRIER
     moved = np.abs(u - part.u0) > near
     clean = _solve(part, K, rest, np.where(moved, u, part.u0), moved)
-    if clean is None or np.abs(K @ part.chi(clean) - rest).max() > MISSED * sizes.max():
-        return u, ""
-    return (u if _violated(part, clean) else clean), ""
+    kept = np.where(np.abs(u - part.u0) > EQUAL * part.size, u, part.u0)
+    for v in (clean, kept):
+        if v is None or np.abs(K @ part.chi(v) - rest).max() > MISSED * sizes.max():
+            continue
+        if not _violated(part, v):
+            return v, ""
+    return u, ""
 
 
 def _violated(part: Numbers, u: Array) -> bool:
