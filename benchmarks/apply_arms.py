@@ -77,7 +77,11 @@ class Arm:
         m, c, I = link
         radius = np.sqrt(np.trace(I) / m)
         moments = np.diag(I) * rng.uniform(0.8, 1.2)
-        return m * rng.uniform(0.75, 1.3), c + 0.15 * radius * rng.standard_normal(3), np.diag(moments)
+        return (
+            m * rng.uniform(0.75, 1.3),
+            c + 0.15 * radius * rng.standard_normal(3),
+            np.diag(moments),
+        )
 
     def urdf(self) -> str:
         def words(x: Any) -> str:
@@ -85,7 +89,9 @@ class Arm:
 
         lines = ['<robot name="arm">', '<link name="base"/>']
         for j, (m, c, I) in enumerate(self.file, 1):
-            parts = zip(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), I[np.triu_indices(3)], strict=True)
+            parts = zip(
+                ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), I[np.triu_indices(3)], strict=True
+            )
             inertia = " ".join(f'{key}="{float(x)!r}"' for key, x in parts)
             lines += [
                 f'<link name="l{j}"><inertial><origin xyz="{words(c)}"/><mass value="{m!r}"/>'
@@ -170,7 +176,9 @@ def deviations(links: list[Link], truth: list[Link]) -> dict[str, list[float]]:
     """Deviations from the truth in %, of each link."""
     rows: dict[str, list[float]] = {"mass": [], "centre": [], "inertia": []}
     for (m, c, I), (m0, c0, I0) in zip(links, truth, strict=True):
-        J, J0 = (M * (x @ x * np.eye(3) - np.outer(x, x)) + T for M, x, T in ((m, c, I), (m0, c0, I0)))
+        J, J0 = (
+            M * (x @ x * np.eye(3) - np.outer(x, x)) + T for M, x, T in ((m, c, I), (m0, c0, I0))
+        )
         rows["mass"].append(100 * abs(m / m0 - 1))
         rows["centre"].append(100 * float(np.linalg.norm(c - c0) / np.sqrt(np.trace(I0) / m0)))
         rows["inertia"].append(100 * float(np.abs(J - J0).max() / np.abs(J0).max()))

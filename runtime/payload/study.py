@@ -84,7 +84,6 @@ class PayloadStudy(Result, Part, keys="payload drive_gains:gains"):
 def _brief(body: Body) -> list[str]:
     """Write mass, centre and inertia of a load in lines, with 95 % confidence intervals."""
 
-
     def cells(of: str) -> list[str]:
         rows = [row for row in body.rows if row[0].startswith(of)]
         labels, values, sigma = ([row[k] for row in rows] for k in range(3))

@@ -51,8 +51,12 @@ def impossible_links(robot: Robot) -> tuple[tuple[int, str], ...]:
     """
     if robot.impossible:
         return robot.impossible
-    found = ((j, _impossible([robot.values.get(parameter(p, j)) for p in INERTIAL])) for j in robot.links)
-    return tuple((j, f"link {j} ({robot.file or robot.name}): {wrong}") for j, wrong in found if wrong)
+    found = (
+        (j, _impossible([robot.values.get(parameter(p, j)) for p in INERTIAL])) for j in robot.links
+    )
+    return tuple(
+        (j, f"link {j} ({robot.file or robot.name}): {wrong}") for j, wrong in found if wrong
+    )
 
 
 def _impossible(given: Sequence[float | None]) -> str:

@@ -198,7 +198,8 @@ def _not_read(root: XmlElement) -> Iterator[str]:
         of = of if "reference" in gazebo.attrib else " in <gazebo>"
         for child in gazebo:
             closes = child.tag == "joint" and child.find("parent") is not None
-            if closes or child.content.strip() not in FORCES.get(child.tag, (child.content.strip(),)):
+            acts = child.tag in FORCES and child.content.strip() not in FORCES[child.tag]
+            if closes or acts:
                 yield _named(child, of)
 
 
