@@ -128,8 +128,9 @@ def place_on(
         return Place(f"frame {frame}", f"frame {frame}, Khalil's", T)
     usual = next((name for name in PREFERRED if name in names), None)
     name = at or usual or names[-1]
+    shown = f"{name!a}"[1:-1][:60]  # as in messages: whatever the file calls it, on one line
     last = "" if at or usual else f" (the last of the file on link {link})"
-    return Place(name, f"{name}{last}", np.array(mounts[name][1]))
+    return Place(shown, f"{shown}{last}", np.array(mounts[name][1]))
 
 
 def body_at(
