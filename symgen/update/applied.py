@@ -162,7 +162,7 @@ class Applied:
             )
         if not self.placeless:
             return [*lines, f"Everything identified has a place in the {self.format}."]
-        lines.append(f"Without a place in a {self.format}, set these in your program:")
+        lines.append(f"Without a place in the {self.format}, set these in your program:")
         return lines + [f"  {line}" for line in self._rest()]
 
     def _rest(self) -> list[str]:

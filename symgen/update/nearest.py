@@ -338,12 +338,24 @@ def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple
             f"no inertial values in this file can give the identified {lost}, because a moving "
             "link has no <inertial>; add <inertial> to this link"
         )
+    missed_most = MISSED * float(sizes.max())
     u = _solve(part, K, rest, part.u0, ~part.masses)
-    if u is None or _violated(part, u):
-        answer = feasibility(part.physical, names, rest)
-        if not answer.feasible:
-            return None, answer.text
-        u = _physical(part, K, rest, part.u0 if u is None else u, answer.chi)
+    if u is not None and not _violated(part, v := _clean(part, K, rest, u, missed_most)):
+        return v, ""
+    answer = feasibility(part.physical, names, rest)
+    if not answer.feasible:
+        return None, answer.text
+    u = _physical(part, K, rest, part.u0 if u is None else u, answer.chi)
+    v = _clean(part, K, rest, u, missed_most)
+    return (u if _violated(part, v) else v), ""
+
+
+def _clean(part: Numbers, K: Array, rest: Array, u: Array, missed_most: float) -> Array:
+    """Set numbers that have hardly moved to those of the file; the others then give K chi = rest.
+
+    A number that moved by NEAR of its size is one of the file if the others can do without it, and
+    one that moved by EQUAL of its size in any case that K chi = rest allows.
+    """
     near = NEAR * part.size
     alone = [c.numbers[0] for c in part.physical.conditions if len(c.numbers) == 1]
     near[alone] += BARRIER
@@ -351,11 +363,9 @@ def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple
     clean = _solve(part, K, rest, np.where(moved, u, part.u0), moved)
     kept = np.where(np.abs(u - part.u0) > EQUAL * part.size, u, part.u0)
     for v in (clean, kept):
-        if v is None or np.abs(K @ part.chi(v) - rest).max() > MISSED * sizes.max():
-            continue
-        if not _violated(part, v):
-            return v, ""
-    return u, ""
+        if v is not None and np.abs(K @ part.chi(v) - rest).max() <= missed_most:
+            return v
+    return u
 
 
 def _violated(part: Numbers, u: Array) -> bool:
