@@ -86,8 +86,8 @@ def _brief(body: Body) -> list[str]:
 
     def cells(of: str) -> list[str]:
         rows = [row for row in body.rows if row[0].startswith(of)]
-        labels, values, sigma = ([row[k] for row in rows] for k in range(3))
-        return with_intervals([name.split()[-1] for name in labels], values, sigma)
+        labels = [name.split()[-1] for name, *_ in rows]
+        return with_intervals(labels, [x for _, x, *_ in rows], [s for _, _, s, _ in rows])
 
     mass, centre = " ".join(cells("mass")[0].split()), cells("centre")
     return [
