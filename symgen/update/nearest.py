@@ -340,8 +340,9 @@ def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple
         )
     missed_most = MISSED * float(sizes.max())
     u = _solve(part, K, rest, part.u0, ~part.masses)
-    if u is not None and not _violated(part, v := _clean(part, K, rest, u, missed_most)):
-        return v, ""
+    for v in () if u is None else (_clean(part, K, rest, u, missed_most), u):
+        if not _violated(part, v):
+            return v, ""
     answer = feasibility(part.physical, names, rest)
     if not answer.feasible:
         return None, answer.text
