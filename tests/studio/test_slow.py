@@ -118,7 +118,11 @@ def test_a_wrong_file_leaves_the_record_and_undo_brings_it_back(
     answering(page, "true")
     give(page, "#record-file", tmp_path / "other.csv")
     wait_for((studio.work / "record/other.csv").is_file)
-    until(page, "document.querySelector('h1')?.textContent.includes('other.csv')")
+    until(
+        page,
+        "document.querySelector('h1')?.textContent.includes('other.csv')"
+        " && document.readyState === 'complete'",
+    )
     assert not (studio.work / "study.yaml").exists()
     page.click("form[hx-post='do/earlier_record'] button")
     until(page, "document.querySelector('h1')?.textContent.includes('run.csv')")
