@@ -15,7 +15,7 @@ from runtime.advisor.advice import answer
 from runtime.core.checklist import certain, checklist_of, lost_joints, separate
 from runtime.core.least_squares.estimate import Estimate, JointFit
 from runtime.core.model import load_model
-from runtime.core.study import Decimate, Signals
+from runtime.core.study import Decimate
 from runtime.core.validation import JointComparison
 from runtime.expected import Expected, expected_off
 from runtime.ground.check import Check, state_of
@@ -37,6 +37,7 @@ from runtime.reporting.sections import (
     torque_section,
 )
 from runtime.reporting.series import extremes, gaps, series
+from runtime.study import Signals
 from symgen.symbols.printers import letter as other_symbol
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
