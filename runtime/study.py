@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import TypeAdapter, field_validator
+from pydantic import TypeAdapter
 
 from runtime.core import study as chapter
 from runtime.core.model import GeneratedModel
@@ -35,36 +35,10 @@ from runtime.reading.datasets import DATASETS, dataset_study
 from runtime.reading.formats import endings, is_measured, read_table
 from runtime.reading.likely_columns import candidates, known_columns
 from runtime.reading.records import read_records
-from runtime.reading.settings import Records, RecordSettings, with_law
-from runtime.reading.units import speed
+from runtime.reading.settings import Records, RecordSettings, Rows, ValidateSettings, with_law
 
 RARE_WRAPS = 0.05
 """Share of the steps between two samples that may be jumps of an angle by a full turn."""
-
-
-class Rows(chapter.Rows):
-    """Settings that select the rows of W and Y that are used.
-
-    Attributes
-    ----------
-    low_speed : float or tuple of float, rad/s or m/s
-        Rows of joint j with |qd_j| below this speed are left out, because sign(qd) is noise in
-        them. A text may have another unit: 2 rpm.
-    """
-
-    _with_unit = field_validator("low_speed", mode="before")(speed)
-
-
-class ValidateSettings(chapter.ValidateSettings):
-    """Settings for validation: data to which parameters are fitted, and data that they predict.
-
-    Attributes
-    ----------
-    record : tuple of RecordSettings
-        Further records, predicted with the parameters of the study.
-    """
-
-    record: Records = ()
 
 
 class Recorded(Settings):

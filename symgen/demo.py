@@ -37,12 +37,12 @@ from runtime.files import Files, identification_files, part_files
 from runtime.ground.errors import DataUnavailableError
 from runtime.ground.table import Table, number, percentage
 from runtime.loop.reference import Reference, point_to_point
-from runtime.loop.settings import Points
+from runtime.loop.settings import CestacSettings, Points
 from runtime.reading.datasets import dataset_study
 from runtime.reading.settings import Columns, RecordSettings
 from runtime.reporting.page import Section
 from runtime.reporting.pages import resolution_section
-from runtime.study import CestacSettings, located, study_from_mapping
+from runtime.study import located, study_from_mapping
 
 # Table 2 with its %sigma; Table 3 at Delta 1 ... 4; Table 4 at Phi 1 ... 4, each five times the one
 # before: their values are not given.
