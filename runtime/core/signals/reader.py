@@ -42,10 +42,10 @@ class Reader:
     ----------
     states : function of Record and Signals to States
         Joint states, shape (N, n) each.
-    settings : type
-        Class of its section `signals`: that of the chapter, or a subclass with settings of its own.
     options : type or None
         Settings class of signals.options; None: the reader has no options.
+    settings : type
+        Class of its section `signals`: that of the chapter, or a subclass with settings of its own.
     linear : bool
         Whether each position is used as it is, and the states are linear in the positions of the
         same joint: a joint that stands is read as standing, and rounded positions are read like
@@ -74,8 +74,8 @@ class Reader:
     """
 
     states: Callable[[Record, Any], States]
-    settings: type[Signals] = Signals
     options: type[Settings] | None = None
+    settings: type[Signals] = Signals
     linear: bool = False
     velocities: bool = False
     at_rest: bool = False
