@@ -135,7 +135,9 @@ def test_a_setting_of_another_reader_is_refused_by_the_list_of_readers(monkeypat
     model = arm()
     for key, value in {"step": 1e-3, "side": "motor"}.items():
         settings = study(signals={key: value})
-        said = f"signals.{key}: given, but reader is lowpass; set reader: counts or {TWIN}, or remove"
+        said = (
+            f"signals.{key}: given, but reader is lowpass; set reader: counts or {TWIN}, or remove"
+        )
         with pytest.raises(SettingsError, match=said):
             compose.problem(model, [record(model, 0)], settings)
     twin = study(signals={"reader": TWIN, "step": 1e-3})
