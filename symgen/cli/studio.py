@@ -59,4 +59,13 @@ def studio(
             name: [sys.executable, "-P", "-c", WATCHED + text] for name, text in PROGRAMS.items()
         }
         say = partial(typer.echo, err=True)
-        serve(output, programs, say, robot=robot, record=record, port=port, browser=browser, renew=renew)
+        serve(
+            output,
+            programs,
+            say,
+            robot=robot,
+            record=record,
+            port=port,
+            browser=browser,
+            renew=renew,
+        )

@@ -652,7 +652,9 @@ def test_the_server_ends_some_time_after_its_last_page_and_run(
             own.pages = 1
             loop.call_later(seconds, lambda: setattr(own, "pages", 0))
         else:
-            own.jobs.add("01-ols", ("symgen", "identify"), "runs/01-ols/estimate.json", run="01-ols")
+            own.jobs.add(
+                "01-ols", ("symgen", "identify"), "runs/01-ols/estimate.json", run="01-ols"
+            )
             loop.call_later(seconds, lambda: setattr(own.jobs.all[0], "state", "done"))
         await asyncio.wait_for(serving.idle(own, lambda: ended.append(loop.time() - start)), HANG)
 
