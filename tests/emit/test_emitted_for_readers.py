@@ -76,7 +76,9 @@ def test_X_of_the_robot_file(tx40, tmp_path) -> None:
     path = tmp_path / "tx40.c"
     path.write_text(generate_files(load_robot("tx40"), targets=("c",))["tx40.c"], encoding="utf-8")
     library = tmp_path / "tx40.so"
-    subprocess.run(["cc", "-shared", "-fPIC", "-O0", str(path), "-o", str(library), "-lm"], check=True)
+    subprocess.run(
+        ["cc", "-shared", "-fPIC", "-O0", str(path), "-o", str(library), "-lm"], check=True
+    )
     values = (ctypes.c_double * 60).in_dll(ctypes.CDLL(str(library)), "tx40_values")
     np.testing.assert_allclose([*values], tx40.BASE_VALUES, rtol=1e-14)
     text = generate_module(load_robot("two_branch"))
@@ -113,7 +115,9 @@ def power(monkeypatch) -> None:
         yield Case([Entry((), sum(x * d.algebra.qd(j) for j, x in d.torque.items()))])
 
     of = ("q", "qd", "qdd", "X")
-    row = Model("power", "PW", of, (), "W", "mechanical power of the actuators", entries, result="PW")
+    row = Model(
+        "power", "PW", of, (), "W", "mechanical power of the actuators", entries, result="PW"
+    )
     for table in (models.MODELS, models.EMITTED):
         monkeypatch.setitem(table, "power", row)
 
