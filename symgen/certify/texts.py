@@ -140,9 +140,15 @@ def text_check(file: str, text: str, target: str, witness: Witness) -> TextCheck
     key = sha256(text.encode("utf-8")).hexdigest()
     compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc")
     if file.endswith(".h"):
-        return TextCheck(target, key, not_run=f"it declares the functions of {file[:-2]}.c, where their certificate stands")
+        return TextCheck(
+            target,
+            key,
+            not_run=f"it declares the functions of {file[:-2]}.c, where their certificate stands",
+        )
     if not file.endswith((".py", ".c")):
-        return TextCheck(target, key, not_run=f"not run: nothing here runs {TARGETS[target].language}")
+        return TextCheck(
+            target, key, not_run=f"not run: nothing here runs {TARGETS[target].language}"
+        )
     if file.endswith(".c") and compiler is None:
         return TextCheck(target, key, not_run="not run: there is no C compiler")
     left_out = tuple(sorted(witness.left_out))
