@@ -16,6 +16,7 @@ of them; `classes` was run once on it for docs/reliability.md (truth_classes_fin
     counts         the reader of counts beside the best low-pass of a grid, and with faults
     counts_random  random readings: which contradict their counts, which are refused
     classes        right studies of seven classes: causes, intervals, expected error, verdict
+    rests          right records with rests and stick friction, by the defaults
     physics        feasibility of right records, and what bounds by reach cut off
 
 Truth of base parameters: least squares of pinocchio's torques in random states on the emitted
@@ -42,6 +43,7 @@ import truth_simulator as world
 from scipy.stats import spearmanr
 from truth_classes import classes, classes_table, share, stribeck
 from truth_counts import counts, counts_random, counts_random_table, counts_table
+from truth_rests import rests, rests_table
 from truth_shared import (
     LEVEL,
     Array,
@@ -668,6 +670,7 @@ QUESTIONS: dict[
     "counts_random": (counts_random, counts_random_table, 10_000),
     "physics": (physics, physics_table, 60),
     "classes": (classes, classes_table, 700),
+    "rests": (rests, rests_table, 100),
 }
 
 

@@ -14,7 +14,7 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import field, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, TypeAdapter
@@ -45,12 +45,15 @@ class Rows(chapter.Rows):
 
     Attributes
     ----------
-    low_speed : float or tuple of float, rad/s or m/s
+    low_speed : float or tuple of float or str, rad/s or m/s
         Rows of joint j with |qd_j| below this speed are left out, because sign(qd) is noise in
-        them. A text may have another unit: 2 rpm.
+        them. A text may have another unit: 2 rpm. auto: found from the record for joints whose
+        torques at rest are not those of the model; zero for other joints.
     """
 
-    low_speed: Annotated[PerJoint[NotNegative], BeforeValidator(speed)] = 0.0
+    low_speed: Annotated[
+        PerJoint[NotNegative] | Literal["auto"], BeforeValidator(speed)
+    ] = "auto"
 
 
 class ValidateSettings(chapter.ValidateSettings):
