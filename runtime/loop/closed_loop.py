@@ -31,7 +31,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from scipy.ndimage import minimum_filter1d
 
 from runtime.core.model import GeneratedModel, is_axis, joint_labels
 from runtime.core.problem import Problem
@@ -285,7 +284,7 @@ def closed_loop(
     controller, model, study = simulator.controller, problem.model, problem.settings
     parts = []
     every = controller.record_every
-    around = 2 * round(asked.around * (controller.rate / every)) + 1  # samples
+    rows = replace(study.rows, around=max(study.rows.around, asked.around))
     for k, own in enumerate(measured):
         record = own.record
         require_rate(record, controller)
@@ -306,9 +305,9 @@ def closed_loop(
         speed = slips(followed.qd[::every][: len(record)], simulator.friction.G)
         selection = select_rows(
             record,
-            minimum_filter1d(speed, around, axis=0, mode="nearest"),
+            speed,
             study.signals,
-            study.rows,
+            rows,
             keep=_usable(simulator, record),
         )
         torques = [
