@@ -31,7 +31,7 @@ from runtime.ground.check import Answer, Question, State, first_names
 from runtime.ground.errors import InputError
 from runtime.ground.limits import limits
 from runtime.plausible.case import Case
-from runtime.plausible.rests import rounded_up
+from runtime.plausible.rests import friction_determined, rounded_up
 from runtime.plausible.samples import Samples
 
 LIMIT = limits(__package__)
@@ -67,6 +67,12 @@ def rest(case: Case) -> Answer:
     systems = map(weighted_system, (case.observation, without))
     before, after = (percent(*system.norms(system.solve().X)) for system in systems)
     text += f"; without these rows, the error of the fit is {after:.1f} % instead of {before:.1f} %"
+    slow = per_joint(proposed, case.samples.n, "rows.low_speed")
+    lost = slow > per_joint(study.rows.slow, case.samples.n, "rows.low_speed")
+    lost &= [not friction_determined(model, without, j) for j in range(len(lost))]
+    if lost.any():
+        text += f", but do not determine the friction of joint {case.joints(lost)}"
+        remedy, change = f"move joint {case.joints(lost)} in both directions, at several speeds", {}
     state: State = "doubtful" if after < 0.8 * before else "good"
     if after < 0.5 * before and before > LIMIT.TOTAL_ERROR[0]:  # else friction of that joint alone
         state = "no"

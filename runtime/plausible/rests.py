@@ -147,7 +147,8 @@ def without_loss(
 def friction_determined(model: GeneratedModel, rows: Observation, j: int) -> bool:
     """Whether the rows of joint j (from 0) determine the friction and the offset of this joint alone.
 
-    The condition number of their columns, of norm 1, must be below LIMIT.CONDITION.
+    The condition number of their columns, of norm 1, must be below LIMIT.FRICTION_CONDITION: a
+    joint that moves in one direction only does not separate FS from OFFSET.
     """
     own = [
         column
@@ -158,7 +159,7 @@ def friction_determined(model: GeneratedModel, rows: Observation, j: int) -> boo
     ]
     C = rows.W[rows.joint(j)][:, own]
     norms = np.linalg.norm(C, axis=0)
-    return not own or bool(norms.all() and np.linalg.cond(C / norms) < LIMIT.CONDITION)
+    return not own or bool(norms.all() and np.linalg.cond(C / norms) < LIMIT.FRICTION_CONDITION)
 
 
 def disobeying(observation: Observation, moving: Array) -> Array:
