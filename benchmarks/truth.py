@@ -96,7 +96,7 @@ def coverage(k: int, seed: int, seeds: str) -> list[Row]:
     )
     tau = truth.torque(move)
     record = record_of(move, tau + noise(tau, world.NOISES[kind], SHARE, seed))
-    settings = study(robot, motion)
+    settings = study()
     result = runtime.identify(model, record, settings)
     fits = dict(result.sets) or {"all": result.estimate}
     unseen = Unseen(truth, seed)
@@ -174,7 +174,7 @@ def ends(k: int, seed: int, seeds: str) -> list[Row]:
             "2/cutoff + 27 samples": {"rows": {"trim": 27 + int(2 * world.RATE / cutoff / factor)}},
         }
         for label, more in cases.items():
-            settings = study(robot, motion, signals={"lowpass": {"cutoff": cutoff}}, **more)
+            settings = study(signals={"lowpass": {"cutoff": cutoff}}, **more)
             fit = runtime.estimate(model, record, settings)
             z = np.abs(fit.X - X) / deviations(fit)
             rows.append({"robot": robot.name, "motion": motion, "cutoff": cutoff, "ends": label, "left": fit.relative_error,
@@ -220,9 +220,7 @@ def homogeneity(k: int, seed: int, seeds: str) -> list[Row]:
         move = world.MOTIONS[motion](robot, seed + 250_000 * i, seconds=seconds)
         tau = own.torque(move)
         records.append(record_of(move, tau + noise(tau, world.NOISES[kind], SHARE, seed + i)))
-    agree = runtime.identify(emitted(robot.name)[0], records, study(robot, motion)).part(
-        "homogeneity"
-    )
+    agree = runtime.identify(emitted(robot.name)[0], records, study()).part("homogeneity")
     assert agree is not None
     tested = len(agree.records) > 1
     return [{"noise": kind, "robot": robot.name, "motion": motion, "seconds": seconds, "different": different, "tested": tested,
@@ -314,9 +312,7 @@ def verdict(k: int, seed: int, seeds: str, **sections: Any) -> list[Row]:
     kind, robot = STUDIES[k % len(STUDIES)], robots[(k // len(STUDIES) + k) % len(robots)]
     truth, motion, move, q, tau, share = study_of(kind, robot, seed, k)
     model, variants = emitted(robot.name)
-    result = runtime.identify(
-        model, record_of(move, tau, q), study(robot, motion, **sections), variants=variants
-    )
+    result = runtime.identify(model, record_of(move, tau, q), study(**sections), variants=variants)
     checks = result.checklist.checks
     total, worst = Unseen(truth, seed).errors(result.model_estimate.names, result.model_estimate.X)
     if not result.determined:  # no values are printed
@@ -486,7 +482,7 @@ def causes(k: int, seed: int, seeds: str) -> list[Row]:
         q, tau = wrong.spoil(truth, move, q, tau, j, rng)
     model, variants = emitted(robot.name)
     record = runtime.Record(np.arange(len(q)) / world.RATE, q, tau)
-    found = runtime.plausibility(model, record, study(robot, motion), variants=variants)
+    found = runtime.plausibility(model, record, study(), variants=variants)
     told = [c for c in found.checks() if c.state in ("doubtful", "no")]
     named = [one["cause"] for one in found.named_causes]
     texts = [*(f"{c.question} {c.finding}" for c in told), *named]
@@ -580,7 +576,7 @@ def physics(k: int, seed: int, seeds: str) -> list[Row]:
         "said": "",
     }
     try:
-        result = runtime.identify(model, record, study(robot, "fourier"), physical=True)
+        result = runtime.identify(model, record, study(), physical=True)
     except (runtime.InputError, ValueError) as e:
         return [row | {"said": str(e)}]
     row["said"] = "; ".join(result.missing) if label == "one joint at rest" else ""
@@ -591,7 +587,7 @@ def physics(k: int, seed: int, seeds: str) -> list[Row]:
             "margin": float(judged.margin),
             "blocking": [c for c, _ in judged.blocking],
         }
-    own = study(robot, "fourier", estimate={"method": "feasible"})
+    own = study(estimate={"method": "feasible"})
     try:
         fit = runtime.estimate(model, record, own)
     except (runtime.InputError, ValueError) as e:

@@ -51,9 +51,7 @@ class Rows(chapter.Rows):
         torques at rest are not those of the model; zero for other joints.
     """
 
-    low_speed: Annotated[
-        PerJoint[NotNegative] | Literal["auto"], BeforeValidator(speed)
-    ] = "auto"
+    low_speed: Annotated[PerJoint[NotNegative] | Literal["auto"], BeforeValidator(speed)] = "auto"
 
 
 class ValidateSettings(chapter.ValidateSettings):

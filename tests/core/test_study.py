@@ -345,7 +345,9 @@ def test_settings_are_values():
     study = study_from_text(DESIGN)
     assert hash(study.rows) == hash(study_from_text(DESIGN).rows)
     assert study == pickle.loads(pickle.dumps(study))  # noqa: S301
-    assert replace(study, rows=replace(study.rows, trim=0)).rows == Rows(window=(0, 7.5), trim=0, low_speed=0)
+    assert replace(study, rows=replace(study.rows, trim=0)).rows == Rows(
+        window=(0, 7.5), trim=0, low_speed=0
+    )
     with pytest.raises(FrozenInstanceError):
         study.rows = Rows()
 

@@ -217,7 +217,9 @@ def test_a_study_of_resolution_has_the_rows_of_the_measured_record() -> None:
     found = runtime.cestac(model, record, study)
     rows = runtime.observe(model, record, study)
     low = rows.settings["rows"]
-    fixed = replace(study, rows=replace(study.rows, low_speed=low["low_speed"], around=low["around"]))
+    fixed = replace(
+        study, rows=replace(study.rows, low_speed=low["low_speed"], around=low["around"])
+    )
     same = runtime.cestac(model, record, fixed)
     assert rows.dropped["low_speed"][0] > 0
     np.testing.assert_array_equal(found.reference.X, same.reference.X)

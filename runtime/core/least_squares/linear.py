@@ -128,7 +128,9 @@ class System:
 
     def band_rows(self) -> Iterator[Array]:
         """Yield the weighted rows [W Y] of every band (interval) of speed, shape (rows, b + 1)."""
-        return self.observation.band_rows(self.names, 1 / np.array(self.scales), self.row_covariance)
+        return self.observation.band_rows(
+            self.names, 1 / np.array(self.scales), self.row_covariance
+        )
 
 
 def ordinary(

@@ -161,7 +161,7 @@ def select_rows(
     for reason, allowed in (
         ("trim", (number >= trim) & (number < len(kept) - trim)),
         *([("torque", slow < UNMEASURED)] if slow.max() >= UNMEASURED else ()),
-        ("low_speed", speed[instants].T >= slow),
+        ("low_speed", slow <= speed[instants].T),
         ("mask", True if usable is None else usable[instants].T),
     ):
         before = mask.sum(axis=1)
