@@ -131,7 +131,7 @@ def without_loss(
             rows = observation.where(moving_rows(whole, with_speeds(whole, speeds)))
         except InputError:  # no row is left
             return False
-        own = all(friction_determined(whole.model, rows, j) for j in np.flatnonzero(speeds))
+        own = all(friction_determined(whole.model, rows, int(j)) for j in np.flatnonzero(speeds))
         return own and weighted_system(rows).solve().rank == rank
 
     if enough(speeds):
