@@ -17,6 +17,7 @@ of them; `classes` was run once on it for docs/reliability.md (truth_classes_fin
     counts_random  random readings: which contradict their counts, which are refused
     classes        right studies of seven classes: causes, intervals, expected error, verdict
     rests          right records with rests and stick friction, by the defaults
+    weights        true error by weights by joint over that of the default
     physics        feasibility of right records, and what bounds by reach cut off
 
 Truth of base parameters: least squares of pinocchio's torques in random states on the emitted
@@ -61,6 +62,7 @@ from truth_shared import (
     true_parameters,
 )
 from truth_simulator import Encoder, Motion, Robot, Truth, encoded, noise
+from truth_weights import weights, weights_table
 
 import runtime
 
@@ -667,6 +669,7 @@ QUESTIONS: dict[
     "physics": (physics, physics_table, 60),
     "classes": (classes, classes_table, 700),
     "rests": (rests, rests_table, 100),
+    "weights": (weights, weights_table, 204),
 }
 
 
