@@ -79,9 +79,7 @@ def lacking(truth: Truth, move: Motion, *, load: bool) -> Array:
         rigid = truth.torque(move) - truth.friction(move.qd)
         return np.asarray(0.06 * np.abs(rigid) * np.sign(move.qd))
     slow = np.array([0.1 * joint.speed for joint in truth.robot.joints])
-    return np.asarray(
-        0.5 * truth.bodies.dry * np.sign(move.qd) * np.exp(-((move.qd / slow) ** 2))
-    )
+    return np.asarray(0.5 * truth.bodies.dry * np.sign(move.qd) * np.exp(-((move.qd / slow) ** 2)))
 
 
 def weights_table(rows: list[Row]) -> str:
