@@ -96,6 +96,10 @@ STEPS: list[Step] = [
         Late("runtime.controller.fitted:law_of_controller"),
         lambda p: any("law_v" in r.channels for r in p.records),
     ),
+    When(
+        Late("runtime.plausible.rests:rows_at_rest"),
+        lambda p: p.settings.rows.low_speed == "auto" and bool(p.records),
+    ),
 ]
 READERS: Listed[Reader] = Listed(
     {"lowpass": LOWPASS, "counts": "runtime.counts.reader:COUNTS", "static": STATIC}

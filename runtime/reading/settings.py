@@ -404,9 +404,10 @@ class Rows(chapter.Rows):
 
     Attributes
     ----------
-    low_speed : float or tuple of float, rad/s or m/s
+    low_speed : float or tuple of float or str, rad/s or m/s
         Rows of joint j with |qd_j| below this speed are left out, because sign(qd) is noise in
-        them. A text may have another unit: 2 rpm.
+        them. A text may have another unit: 2 rpm. auto: found from the record for joints whose
+        torques at rest are not those of the model; zero for other joints.
     """
 
     _with_unit = field_validator("low_speed", mode="before")(speed)
