@@ -106,6 +106,11 @@ class Ordered:
 class Grammar(Ordered, StrPrinter):  # type: ignore[misc]
     """Printer that writes an expression in the grammar of robot files."""
 
+    def _print_Function(self, x: Tree) -> str:
+        return f"{x.func.__name__.lower()}({self.stringify(x.args, ', ')})"
+
+    _print_Abs = _print_Max = _print_Function
+
 
 def text(x: Tree) -> str:
     """Write an expression in the grammar of robot files."""
