@@ -208,9 +208,10 @@ class Presentation(MathMLPresentationPrinter):  # type: ignore[misc]
     def _print_Mul(self, x: Tree) -> Any:
         if is_negative(x):
             return self.term(x)
-        number, _ = split_sign(x)
-        if number == 1 and not all(y.is_Integer or y.free_symbols for y in x.args):
-            return self.row(*super()._print_Mul(x).childNodes)  # pi/2
+        number, rest = x.as_coeff_Mul()
+        if rest is sympy.pi and number.q != 1:  # 2*pi/3
+            above = rest if number.p == 1 else sympy.Mul(number.p, rest, evaluate=False)
+            return self.element("mfrac", self._print(above), self._print(sympy.Integer(number.q)))
         parts: list[Any] = []
         for y in x.args:
             times = [self.element("mo", "\u2062"), self.element("mspace", width="0.14em")]

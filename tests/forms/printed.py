@@ -67,7 +67,8 @@ class Form:
         """Labels of equations that are missing, wrong, or cannot be read."""
         labels, texts = zip(*self.equations, strict=True) if self.equations else ((), ())
         found = self.values(texts, self.known)
-        return [label for label in self.right if label not in labels] + [
+        missing = [label for label in self.right if label not in labels]
+        return [label for label in missing if graph.differs(0, self.right[label])] + [
             label for label, x in zip(labels, found, strict=True) if self.is_wrong(label, x)
         ]
 
@@ -352,11 +353,10 @@ def recursive_form(regrouping: Regrouping, known: Mapping[str, Any]) -> Form:
     chain = {name: graph.number(name) for name, _ in formulas}
     received: dict[str, dict[str, Any]] = {}
     for source, target, c in regrouping.steps:
-        received.setdefault(target, {})[source] = c
+        if target not in regrouping.no_effect:
+            received.setdefault(target, {})[source] = c
     right = {}
     for target, terms in received.items():
-        if target in regrouping.no_effect:
-            continue
         values = {**known, **chain}
         inside = [
             graph.expression(c, values) * values[f"{p}R" if p in received else p]

@@ -351,7 +351,7 @@ def _items(node: ElementTree.Element) -> Iterator[Item]:
             yield Item(FRACTION, "", tuple([*_items(x)] for x in children))
         case "msqrt":
             yield Item(ROOT, "", ([*_side_by_side(children)],))
-        case "mn":
+        case "mn" if re.fullmatch(r"\d+(\.\d+)?", text):
             yield Item(NUMBER, text)
         case "mi":
             name = LETTERS.get(text, text)
@@ -384,7 +384,7 @@ def _named(nodes: list[ElementTree.Element]) -> Item:
     letter = (first.text or "").strip().replace("\u2032", "'")
     stem = letter.rstrip("'")
     letter = LETTERS.get(stem, stem) + letter[len(stem) :] + dots
-    return Item(NAME, letter, tuple([*_items(x)] for x in below))
+    return Item(NAME, letter, tuple([Item(NAME, "".join(x.itertext()))] for x in below))
 
 
 def of_mathml(text: str) -> list[Item]:
