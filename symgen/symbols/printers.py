@@ -28,6 +28,7 @@ GREEK = {
     "gamma": "γ",
     "delta": "δ",
     "theta": "θ",
+    "vartheta": "ϑ",
     "phi": "φ",
     "psi": "ψ",
     "pi": "π",
@@ -40,7 +41,7 @@ FAMILIES = {
     "FVM": ("F", "vm"),
     "FSM": ("F", "sm"),
     "GAM": ("Gamma", ""),
-    "th": ("theta", ""),
+    "th": ("vartheta", ""),
 }
 DOTS = {"QP": "dot", "QDP": "ddot"}
 ANGLE = re.compile(r"(C|S|th)(\d[\d_mox]*)(b*)")
@@ -127,6 +128,11 @@ class Latex(Ordered, LatexPrinter):  # type: ignore[misc]
 
     def _print_Symbol(self, x: Tree) -> str:
         return latex_symbol(x.name)
+
+    def _print_ExpBase(self, x: Tree, exp: str | None = None) -> str:
+        """A constant of a robot may be called e."""
+        power = f"^{{{exp}}}" if exp else ""
+        return rf"\exp{power}{{\left({self._print(x.args[0])} \right)}}"
 
 
 def latex(x: Tree) -> str:
@@ -238,6 +244,8 @@ class Presentation(MathMLPresentationPrinter):  # type: ignore[misc]
         else:
             shown = GREEK.get(stem, stem.replace("'", "\u2032"))
             base = self.element("mn" if stem[0].isdigit() else "mi", shown)
+            if ENTRY.fullmatch(x.name):  # C(1,2) beside C1_2, the cosine of q1 + q2
+                base.setAttribute("class", "matrix")
         if subscript:
             pieces = re.findall(rf"\d[\d,{MINUS_SIGN}]*|[^\d]+", subscript.replace("-", MINUS_SIGN))
             below = [self.element("mn" if p[0].isdigit() else "mi", p) for p in pieces]

@@ -161,10 +161,11 @@ def latex_index(text: str, known: Collection[str]) -> str:
 def mathml_label(text: str, model: SymbolicModel, known: Collection[str]) -> str:
     (item,) = of_mathml(text)
     inside = "".join(x.text for x in item.rows[0]) if item.rows else ""
-    letter = IN_MATHML.get(item.text, item.text)
-    label = _entry(letter, inside)
-    own = {model.label(place) for place in model.places} | {model.model.denominator}
-    return label if label in own else _name(item, known)
+    letter = item.text.removesuffix("*")
+    scalar = {model.model.denominator} if model.model.axes else {model.model.letter}
+    if item.text.endswith("*") or letter in scalar:
+        return _entry(IN_MATHML.get(letter, letter), inside)
+    return _name(item, known)
 
 
 def _entry(letter: str, inside: str) -> str:

@@ -52,8 +52,8 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
 # --- names ---
 
 LETTERS = {"π": "pi", "Γ": "Gamma", "α": "alpha", "β": "beta", "γ": "gamma", "δ": "delta"}
-LETTERS |= {"θ": "theta", "φ": "phi", "ψ": "psi"}
-STEMS = {"Gamma": ("GAM", "Gamma"), "theta": ("th", "theta"), "q.": ("QP",), "q..": ("QDP",)}
+LETTERS |= {"ϑ": "vartheta", "θ": "theta", "φ": "phi", "ψ": "psi"}
+STEMS = {"Gamma": ("GAM", "Gamma"), "vartheta": ("th",), "q.": ("QP",), "q..": ("QDP",)}
 """What a letter, or a letter with dots, stands for besides itself."""
 SMALL = {("I", "a"): "Ia", ("F", "v"): "FV", ("F", "s"): "FS", ("F", "vm"): "FVM"}
 SMALL |= {("F", "sm"): "FSM"}
@@ -136,6 +136,9 @@ class _Row:
         match item.kind:
             case _ if item.kind == NUMBER:
                 return complex(float(item.text))
+            case _ if item.kind == NAME and item.text == "ⅇ":
+                power = self.accept(SUP)
+                return np.exp(self.inside(power.rows[0]) if power else 1)
             case _ if item.kind == NAME:
                 return self.value(*_letter(item))
             case _ if item.kind == FRACTION:
@@ -232,7 +235,7 @@ def of_text(text: str) -> list[Item]:
 
 # --- LaTeX ---
 
-COMMANDS = {r"\,": TIMES, r"\cdot": TIMES, "+": SIGN, "-": SIGN, "=": MARK, ",": MARK}
+COMMANDS = {r"\,": TIMES, r"\cdot": TIMES, "+": SIGN, "-": SIGN, "/": OVER, "=": MARK, ",": MARK}
 COMMANDS |= dict.fromkeys("()|", MARK)
 LATEX = re.compile(r"\\(?:[A-Za-z]+|.)|\d+(?:\.\d+)?|[A-Za-z]+'*|\s+|.", re.DOTALL)
 UNSEEN = (r"\left", r"\right", r"\quad", "&", r"\\", r"\;")
@@ -384,6 +387,7 @@ def _named(nodes: list[ElementTree.Element]) -> Item:
     letter = (first.text or "").strip().replace("\u2032", "'")
     stem = letter.rstrip("'")
     letter = LETTERS.get(stem, stem) + letter[len(stem) :] + dots
+    letter += "*" * (first.get("class") == "matrix")
     return Item(NAME, letter, tuple([Item(NAME, "".join(x.itertext()))] for x in below))
 
 
