@@ -22,7 +22,7 @@ from symgen.regroup.regrouping import Regrouping
 from symgen.symbols.symbolic_model import SymbolicModel
 
 Values = Mapping[str, Any]
-DRAWS = 2
+DRAWS = 4
 
 @cache
 def number(name: str) -> Any:
@@ -30,7 +30,8 @@ def number(name: str) -> Any:
     if name == "pi":
         return np.full(DRAWS, np.pi + 0j)
     rng = random.Random(name)
-    return np.array([rng.uniform(0.5, 2.0) * sign for sign in (1, rng.choice((1, -1)))]) + 0j
+    signs = (1, -1, *(rng.choice((1, -1)) for _ in range(DRAWS - 2)))
+    return np.array([rng.uniform(0.5, 2.0) * sign for sign in signs]) + 0j
 
 class Numbers:
     """The domain of these numbers, for nodes of the graph."""
