@@ -95,23 +95,17 @@ def of_forms(forms: Sequence[Form], count: int, seed: int) -> Iterator[Mutant]:
     """Mutants of equations that are drawn at random; kinds of mutants take turns."""
     rng, made = random.Random(seed), 0
     forms = [form for form in forms if form.equations]
+    kinds = mutators(forms[0])
     while made < count:
-        form = rng.choice(forms)
-        kinds = mutators(form)
         kind = [*kinds][made % len(kinds)]
         for _ in range(300):
+            form = rng.choice(forms)
             k = rng.randrange(len(form.equations))
             label, text = form.equations[k]
             wrong = kinds[kind](text, rng)
             if wrong != text:
                 break
-            form = rng.choice(forms)
-        else:
-            kind = rng.choice([*kinds])  # no formula here has a quotient, say
-            continue_with = kinds[kind](text, rng)
-            if continue_with == text:
-                continue
-            wrong = continue_with
+            kind = rng.choice([*kinds]) if rng.random() < 0.05 else kind  # none has a quotient, say
         made += 1
         yield Mutant(kind, label, text, wrong, form.refuses(k, wrong))
 

@@ -163,7 +163,7 @@ def mathml_label(text: str, model: SymbolicModel, known: Collection[str]) -> str
     inside = "".join(x.text for x in item.rows[0]) if item.rows else ""
     letter = item.text.removesuffix("*")
     scalar = {model.model.denominator} if model.model.axes else {model.model.letter}
-    if item.text.endswith("*") or letter in scalar:
+    if item.text.endswith("*") or letter in scalar or IN_MATHML.get(letter) == model.model.letter:
         return _entry(IN_MATHML.get(letter, letter), inside)
     return _name(item, known)
 
@@ -259,11 +259,15 @@ def sympy_equations(source: str, model: SymbolicModel) -> Equations:
     exec(compile(source, "<printed>", "exec"), {})  # noqa: S102 it runs
     *steps, last = [s for s in ast.parse(source).body if isinstance(s, ast.Assign)]
     assigned = [s for s in steps if isinstance(s.targets[0], ast.Name) and not _of_symbols(s)]
-    found = [(s.targets[0].id, ast.unparse(s.value)) for s in assigned]
+
+    def text(e: ast.expr) -> str:
+        return str(ast.get_source_segment(source, e))
+
+    found = [(s.targets[0].id, text(s.value)) for s in assigned]
     rows = [[last.value]]
     if isinstance(last.value, ast.Call) and ast.unparse(last.value.func).endswith(".Matrix"):
         rows = [row.elts for row in last.value.args[0].elts]
-    entries = ((i, k, ast.unparse(e)) for i, row in enumerate(rows) for k, e in enumerate(row))
+    entries = ((i, k, text(e)) for i, row in enumerate(rows) for k, e in enumerate(row))
     return found + [(_place(model, i, k), e) for i, k, e in entries if e != "0"]
 
 
