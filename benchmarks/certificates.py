@@ -20,6 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
 from certify.forgeries import edited, packaged, true_claims, with_dependent_laws
+
 from symgen.description import packaged_robots
 
 SCRIPT = ROOT / "docs" / "examples" / "check_certificate.py"

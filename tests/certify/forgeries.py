@@ -180,12 +180,20 @@ def edited(count: int, seed: int) -> Iterator[tuple[str, Claim]]:
 
 def _coefficient(c: Claim, rng: random.Random) -> tuple[Claim, str]:
     pairs = [(b["coefficients"], n) for b in c["base_parameters"] for n in b["coefficients"]]
-    return rng.choice([(m, n) for m, n in pairs if not any(m is b["coefficients"] and n == b["own"] for b in c["base_parameters"])])
+    return rng.choice(
+        [
+            (m, n)
+            for m, n in pairs
+            if not any(m is b["coefficients"] and n == b["own"] for b in c["base_parameters"])
+        ]
+    )
 
 
 def another_coefficient(c: Claim, rng: random.Random) -> str:
     of, n = _coefficient(c, rng)
-    of[n] = rng.choice(["-({})", "2*({})", "({}) + 1", "({})*cos(1)", "({})*pi", "({})/3", "({}) - 0.0001"]).format(of[n])
+    of[n] = rng.choice(
+        ["-({})", "2*({})", "({}) + 1", "({})*cos(1)", "({})*pi", "({})/3", "({}) - 0.0001"]
+    ).format(of[n])
     return f"{n}: {of[n]}"
 
 
@@ -236,7 +244,11 @@ def no_effect_that_has_one(c: Claim, rng: random.Random) -> str:
 
 
 def effect_that_is_none(c: Claim, rng: random.Random) -> str:
-    return str(c["no_effect"].pop(rng.randrange(len(c["no_effect"])))) if c["no_effect"] else no_effect_that_has_one(c, rng)
+    return (
+        str(c["no_effect"].pop(rng.randrange(len(c["no_effect"]))))
+        if c["no_effect"]
+        else no_effect_that_has_one(c, rng)
+    )
 
 
 def another_rank(c: Claim, rng: random.Random) -> str:

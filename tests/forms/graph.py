@@ -24,6 +24,7 @@ from symgen.symbols.symbolic_model import SymbolicModel
 Values = Mapping[str, Any]
 DRAWS = 4
 
+
 @cache
 def number(name: str) -> Any:
     """Random numbers of a name, complex so that every root has a value; pi is pi."""
@@ -32,6 +33,7 @@ def number(name: str) -> Any:
     rng = random.Random(name)
     signs = (1, -1, *(rng.choice((1, -1)) for _ in range(DRAWS - 2)))
     return np.array([rng.uniform(0.5, 2.0) * sign for sign in signs]) + 0j
+
 
 class Numbers:
     """The domain of these numbers, for nodes of the graph."""
@@ -51,6 +53,7 @@ class Numbers:
             return FUNCTIONS["max"](x[0], 0)
         return x[0] ** x[1] if node.op == "pow" else FUNCTIONS[node.op](*x)
 
+
 def expression(e: Expression, known: Values) -> Any:
     """Value of an expression of the robot file."""
 
@@ -62,16 +65,16 @@ def expression(e: Expression, known: Values) -> Any:
 
     return e.evaluate(lambda a: known[a], function, complex)
 
+
 def of_recursion(model: SymbolicModel) -> tuple[dict[str, Any], dict[str, Any]]:
     """Names that may be read, with their numbers; and the right value of each equation."""
     listing = model.listing
     steps, outputs = listing.steps(Numbers(), number)
     labels = [model.label(place) for place in listing.places]
     known = {name: number(name) for name in (*listing.text.called.values(), *steps)}
-    right = steps | {
-        label: x for label, x in zip(labels, outputs, strict=True) if not _is_zero(x)
-    }
+    right = steps | {label: x for label, x in zip(labels, outputs, strict=True) if not _is_zero(x)}
     return known | {"pi": number("pi")}, right
+
 
 def of_closed(model: SymbolicModel) -> tuple[dict[str, Any], dict[str, Any]]:
     """The same of the closed form: names of its angles are cosines and sines of the positions."""
@@ -90,6 +93,7 @@ def of_closed(model: SymbolicModel) -> tuple[dict[str, Any], dict[str, Any]]:
     }
     return known | angles, angles | entries
 
+
 def _entries(model: SymbolicModel) -> tuple[dict[str, Any], set[str]]:
     """Right values of the entries, and the names of the graph."""
     source, request = model.source, model.request
@@ -101,7 +105,11 @@ def _entries(model: SymbolicModel) -> tuple[dict[str, Any], set[str]]:
             }, set()
         case "determinant":
             J, names = _matrix(model, "jacobian", request)
-            rows = [k - 1 for k in model.rows] if model.rows else [k for k in range(6) if not all(map(_is_zero, J[k]))]
+            rows = (
+                [k - 1 for k in model.rows]
+                if model.rows
+                else [k for k in range(6) if not all(map(_is_zero, J[k]))]
+            )
             return {model.label(()): _det([J[k] for k in rows])}, names
         case "quotient":
             A, names = _matrix(model, "inertia_matrix", request)
@@ -110,9 +118,7 @@ def _entries(model: SymbolicModel) -> tuple[dict[str, Any], set[str]]:
             A = [[A[min(i, k)][max(i, k)] for k in n] for i in n]
             rest = [number(f"GAM{j}") - h[0] for j, h in zip(source.robot.joints, H, strict=True)]
             found = {
-                model.label((i,)): _det(
-                    [[rest[k] if m == i else A[k][m] for m in n] for k in n]
-                )
+                model.label((i,)): _det([[rest[k] if m == i else A[k][m] for m in n] for k in n])
                 for i in n
             }
             return found | {model.model.denominator: _det(A)}, names | more
@@ -126,6 +132,7 @@ def _entries(model: SymbolicModel) -> tuple[dict[str, Any], set[str]]:
         if entry.place in kept and not _is_zero(x)
     }, names
 
+
 def _matrix(model: SymbolicModel, name: str, request: Request) -> tuple[list[list[Any]], set[str]]:
     values = MODELS[name].values(model.source.derivation, request)
     rows, columns = (1 + max((*e.place, 0)[k] for e in values.entries) for k in (0, 1))
@@ -135,16 +142,22 @@ def _matrix(model: SymbolicModel, name: str, request: Request) -> tuple[list[lis
         matrix[i][k] = x
     return matrix, {str(node.value) for node in reachable(values.outputs) if node.op == SYM}
 
+
 def _det(rows: list[list[Any]]) -> Any:
     full = np.array([[np.broadcast_to(x, DRAWS) for x in row] for row in rows], dtype=complex)
     return np.linalg.det(np.moveaxis(full, -1, 0))
 
+
 def _is_zero(x: Any) -> bool:
     return isinstance(x, int) and x == 0
 
+
 def formula(combination: Mapping[str, Expression], known: Values) -> Any:
     """Value of a base parameter, sum_k c_k chi_k."""
-    return sum(expression(c, {**known, "pi": number("pi")}) * known[p] for p, c in combination.items())
+    return sum(
+        expression(c, {**known, "pi": number("pi")}) * known[p] for p, c in combination.items()
+    )
+
 
 def of_formulas(regrouping: Regrouping) -> tuple[dict[str, Any], dict[str, Any]]:
     """Names of the formulas of base parameters with their numbers, and the right values."""
@@ -152,10 +165,12 @@ def of_formulas(regrouping: Regrouping) -> tuple[dict[str, Any], dict[str, Any]]
     known = {name: number(name) for name in (*robot.constants, *robot.parameters, "pi")}
     return known, {b.name: formula(b.combination, known) for b in regrouping.base}
 
+
 def differs(found: Any, right: Any) -> bool:
     """Whether a value is not that of the graph, up to rounding."""
     found, right = (np.asarray(x, dtype=complex) for x in (found, right))
     size = 1 + np.abs(right)
     return not bool(np.all(np.abs(found - right) < 1e-9 * size))
+
 
 __all__ = ["Scalar"]

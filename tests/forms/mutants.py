@@ -64,7 +64,7 @@ LATEX = {
     "quotient turned": replaced(r"\\frac\{(\w+)\}\{(\w+)\}", r"\\frac{\2}{\1}"),
     "separator dropped": replaced(r"\\,", " "),
 }  # fmt: skip
-GAP = "<mo>\u2062</mo><mspace width=\"0.14em\"/>"
+GAP = '<mo>\u2062</mo><mspace width="0.14em"/>'
 ATOM = r"<msub>(?:(?!<msub|</msub).)*</msub>"
 MATHML = {
     "factor dropped": replaced(rf"{ATOM}{GAP}|{GAP}{ATOM}", ""),
@@ -112,7 +112,9 @@ def of_forms(forms: Sequence[Form], count: int, seed: int) -> Iterator[Mutant]:
 
 # --- emitted files ---
 
-LINE = re.compile(r"^(\s+[^=#]*? = )([-\w\s+*/().]*\b[A-Z]\w*[-\w\s+*/().]*?)(;?(?:\s+(?:#|/[*/]).*)?)$")
+LINE = re.compile(
+    r"^(\s+[^=#]*? = )([-\w\s+*/().]*\b[A-Z]\w*[-\w\s+*/().]*?)(;?(?:\s+(?:#|/[*/]).*)?)$"
+)
 EMITTED = ("planar_2r", "scara", "two_branch", "four_bar", "haptic")
 
 
@@ -161,4 +163,8 @@ def target_of(file: str) -> str:
 def _computes(line: str) -> bool:
     """Whether a line is an assignment of arithmetic to be mutated."""
     match = LINE.match(line)
-    return bool(match and re.search(r"\*| [+-] ", match[2]) and not re.search(r"\b(if|else|int\d*_t|size_t|for)\b", line))
+    return bool(
+        match
+        and re.search(r"\*| [+-] ", match[2])
+        and not re.search(r"\b(if|else|int\d*_t|size_t|for)\b", line)
+    )

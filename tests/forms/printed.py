@@ -18,7 +18,6 @@ from forms.reader import (
     Item,
     ReadError,
     evaluated,
-    left,
     meant,
     of_latex,
     of_mathml,
@@ -26,7 +25,6 @@ from forms.reader import (
     values_of,
 )
 
-from symgen.derive.models import SYMBOLIC
 from symgen.description.grammar import LAWS, parse
 from symgen.emit.generate import generate_files
 from symgen.errors import ExpressionError, SymgenError
@@ -73,9 +71,7 @@ class Form:
         ]
 
     def is_wrong(self, label: str, value: Any) -> bool:
-        return (
-            value is None or label not in self.right or graph.differs(value, self.right[label])
-        )
+        return value is None or label not in self.right or graph.differs(value, self.right[label])
 
     def refuses(self, k: int, text: str) -> bool:
         """Whether another text of one equation is seen to be wrong."""
@@ -224,9 +220,7 @@ def model_text(model: SymbolicModel, shape: str, format: str) -> str:
 def latex_equations(document: str) -> Equations:
     """Equations of all environments of a document, continued lines joined."""
     found = []
-    for body in re.findall(
-        r"\\begin\{align(?:\*|ed)\}\n(.*?)\n\\end\{align", document, re.DOTALL
-    ):
+    for body in re.findall(r"\\begin\{align(?:\*|ed)\}\n(.*?)\n\\end\{align", document, re.DOTALL):
         for row in body.replace("\\\\\n&\\quad", " ").split(" \\\\\n"):
             label, equals, e = row.partition(" &= ")
             if not equals or "&" in e or r"\quad" in e:
@@ -280,7 +274,9 @@ def sympy_objects(model: SymbolicModel, shape: str) -> list[tuple[str, Any]]:
     steps, value = of_listing(model) if shape == "recursive" else ([], of_model(model))
     rows = value.tolist() if isinstance(value, sympy.MatrixBase) else [[value]]
     entries = ((i, k, e) for i, row in enumerate(rows) for k, e in enumerate(row))
-    return [(str(x), e) for x, e in steps] + [(_place(model, i, k), e) for i, k, e in entries if e != 0]
+    return [(str(x), e) for x, e in steps] + [
+        (_place(model, i, k), e) for i, k, e in entries if e != 0
+    ]
 
 
 def _place(model: SymbolicModel, *place: int) -> str:
@@ -315,7 +311,9 @@ def formula_forms(regrouping: Regrouping) -> Iterator[Form]:
     known, right = graph.of_formulas(regrouping)
     absorbing = {b.name for b in regrouping.base if b.name != b.own}
 
-    def form(name: str, equations: Equations, read: Callable[..., Any], every: bool = False) -> Form:
+    def form(
+        name: str, equations: Equations, read: Callable[..., Any], every: bool = False
+    ) -> Form:
         kept = right if every else {label: right[label] for label in absorbing}
         own = [(label, e) for label, e in equations if label in right]
         return Form(name, own, known, kept, one_by_one(read))
@@ -333,7 +331,9 @@ def formula_forms(regrouping: Regrouping) -> Iterator[Form]:
     latex = latex_equations(printed_formulas(regrouping, "latex")) if absorbing else []
     yield form("LaTeX", [(_name(of_latex(label)[0], names), e) for label, e in latex], by_latex)
     page = re.findall(
-        r'<li data-p="(\w+)">.*?<span class="formula">= (.*?) </span>', robot_page(regrouping), re.DOTALL
+        r'<li data-p="(\w+)">.*?<span class="formula">= (.*?) </span>',
+        robot_page(regrouping),
+        re.DOTALL,
     )
     yield form("MathML", page, by_mathml)
     files = generate_files(regrouping.robot, targets=("numpy", "c"), regrouping=regrouping)
@@ -347,9 +347,7 @@ def formula_forms(regrouping: Regrouping) -> Iterator[Form]:
 def constant(text: str, name: str) -> Any:
     """A constant of a module, from its text."""
     assigned = [s for s in ast.parse(text).body if isinstance(s, ast.Assign)]
-    return next(
-        ast.literal_eval(s.value) for s in assigned if ast.unparse(s.targets[0]) == name
-    )
+    return next(ast.literal_eval(s.value) for s in assigned if ast.unparse(s.targets[0]) == name)
 
 
 def recursive_form(regrouping: Regrouping, known: Mapping[str, Any]) -> Form:

@@ -72,7 +72,9 @@ def meant(letter: str, subscript: str, known: Collection[str]) -> str:
     candidates = {f"{s}{gap}{i}{marks}" for (s, i), gap in product(stems, ("", "_"))}
     found = candidates & {*known}
     if len(found) != 1:
-        raise ReadError(f"{letter} with the subscript {subscript!r} is {sorted(found) or 'no name'}")
+        raise ReadError(
+            f"{letter} with the subscript {subscript!r} is {sorted(found) or 'no name'}"
+        )
     return found.pop()
 
 

@@ -1,6 +1,6 @@
 """Every printed equation has the value of the graph, in every form; wrong ones are refused.
 
-`benchmarks/forms.py` runs every robot, model and form, and 200 mutants of each printer.
+`benchmarks/printed_forms.py` runs every robot, model and form, and 200 mutants of each printer.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import sympy
 from campaign import FULL, campaign, sampled
 from forms import graph
 from forms.mutants import of_files, of_forms
-from forms.printed import Form, by_latex, by_mathml, formula_forms, forms
+from forms.printed import Form, by_latex, by_mathml, forms, formula_forms
 from forms.reader import ReadError, of_latex, of_mathml, of_text
 
 import symgen
@@ -145,7 +145,7 @@ def test_a_tree_is_typeset_with_its_value(x: expressions.Tree) -> None:
     for markup in (printers.math(x), "".join(printers.math_terms(x))):
         assert not graph.differs(by_mathml(markup, known), right)
     assert not graph.differs(by_latex(printers.latex(x), known), right)
-    numbers = {s: 1.5 for s in x.free_symbols}
+    numbers = dict.fromkeys(x.free_symbols, 1.5)
     assert expressions.negative(x).subs(numbers).evalf() == pytest.approx(-x.subs(numbers).evalf())
 
 
