@@ -61,7 +61,7 @@ def row(what: str, claims: list[tuple[str, str, set[int]]], folder: Path) -> str
 
 def main() -> None:
     judged = {name: {0} for name in packaged_robots()}
-    judged |= dict.fromkeys(("four_bar", "five_bar"), {2})  # joints that closure equations tie
+    judged |= {name: {2} for name in ("four_bar", "five_bar")}  # joints that closure equations tie
     groups = {
         "packaged robots": [(name, packaged(name), codes) for name, codes in judged.items()],
         "true, with columns that are judged": [

@@ -19,7 +19,7 @@ from certify.forgeries import (
     BESIDE,
     EDITS,
     LAWS,
-    NOT_JUDGED,
+    OTHER_LAWS,
     PAIRS,
     TRIPLES,
     edited,
@@ -442,7 +442,7 @@ def test_angles_that_are_numbers_have_one_unit(tmp_path: Path) -> None:
     assert verdict(claim, tmp_path)[0] == 1
 
 
-TRUE = [(columns, 0) for columns in LAWS] + [(columns, 2) for columns in NOT_JUDGED]
+TRUE = [(columns, 0) for columns in LAWS] + [(columns, 2) for columns in OTHER_LAWS]
 
 
 @pytest.mark.parametrize("case", sampled(TRUE, 2, more=3), ids=lambda case: told(case[0]))

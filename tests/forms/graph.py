@@ -171,6 +171,3 @@ def differs(found: Any, right: Any) -> bool:
     found, right = (np.asarray(x, dtype=complex) for x in (found, right))
     size = 1 + np.abs(right)
     return not bool(np.all(np.abs(found - right) < 1e-9 * size))
-
-
-__all__ = ["Scalar"]
