@@ -114,7 +114,7 @@ def mutants(count: int, printers: list[str]) -> list[str]:
 
 def mutants_of(printer: str, count: int) -> Iterator[Mutant]:
     if printer.startswith("lines of"):
-        return of_files({"Python": ".py", "C": ".c"}[printer.split()[-1]], count, 1)
+        return of_files({"Python": ".py", "C": ".c"}[printer.rsplit(maxsplit=1)[-1]], count, 1)
     if printer == FORMULAS:
         robots = map(regrouping_of, ("scara", "two_branch", "words"))
         found = [form for robot in robots for form in formula_forms(robot)]
