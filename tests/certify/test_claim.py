@@ -461,6 +461,12 @@ def test_dependent_laws_are_not_verified(laws, tmp_path: Path) -> None:
     assert verdict(with_laws(laws, 2), tmp_path)[0] in (1, 2)
 
 
+def test_numeric_coefficients_are_not_judged(folder: Path) -> None:
+    claim = json.loads(claimed("planar_2r", folder)) | {"method": "numeric, for the constants"}
+    code, text = verdict(claim, folder)
+    assert code == 2 and text.startswith("not judged: coefficients that are numeric")
+
+
 @pytest.mark.parametrize("k", sampled(range(len(EDITS)), 2, more=4))
 def test_an_edited_claim_is_not_verified(k: int, tmp_path: Path) -> None:
     what, claim = [*edited(k + 1, 3)][k]
