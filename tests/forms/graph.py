@@ -22,7 +22,7 @@ from symgen.regroup.regrouping import Regrouping
 from symgen.symbols.symbolic_model import SymbolicModel
 
 Values = Mapping[str, Any]
-DRAWS = 4
+DRAWS, SMALL, LARGE = 6, (0.05, 0.25), (0.5, 2.0)  # small ones: a sign of q - 0.3
 
 
 @cache
@@ -31,8 +31,9 @@ def number(name: str) -> Any:
     if name == "pi":
         return np.full(DRAWS, np.pi + 0j)
     rng = random.Random(name)
-    signs = (1, -1, *(rng.choice((1, -1)) for _ in range(DRAWS - 2)))
-    return np.array([rng.uniform(0.5, 2.0) * sign for sign in signs]) + 0j
+    sizes = [rng.uniform(*(SMALL if k in (2, 3) else LARGE)) for k in range(DRAWS)]
+    signs = (1, -1, 1, -1, *(rng.choice((1, -1)) for _ in range(DRAWS - 4)))
+    return np.array(sizes) * signs + 0j
 
 
 class Numbers:
