@@ -51,12 +51,12 @@ def wrong(found: list[Form]) -> dict[str, list[str]]:
     return {form.name: labels for form in found if (labels := form.wrong())}
 
 
-@pytest.mark.parametrize("case", sampled(CASES, 5, more=20), ids="-".join)
+@pytest.mark.parametrize("case", sampled(CASES, 5, more=14), ids="-".join)
 def test_every_equation_of_a_model_has_its_value(case: tuple[str, str]) -> None:
     assert not wrong(forms_of(*case))
 
 
-@pytest.mark.parametrize("name", sampled(ROBOTS, 2, more=3))
+@pytest.mark.parametrize("name", sampled(ROBOTS, 1, more=2))
 def test_every_formula_of_base_parameters_has_its_value(name: str) -> None:
     assert not wrong([*formula_forms(regrouping_of(name))])
 
@@ -76,7 +76,7 @@ def test_wrong_equations_are_refused(language: str) -> None:
 @campaign
 @pytest.mark.parametrize("ending", [".py", ".c"])
 def test_wrong_lines_of_emitted_files_are_refused(ending: str) -> None:
-    missed = [m for m in of_files(ending, 40 if FULL else 4, 2) if not m.refused]
+    missed = [m for m in of_files(ending, 40 if FULL else 3, 2) if not m.refused]
     assert not missed
 
 
