@@ -3,15 +3,16 @@
 A controller or a logger without a new packet repeats the last one, and the next change makes up
 for it: after g rows it is
 
-    s = g v (1 +- LIMIT.CATCHES_UP)          v = speed around it, per row
+    s = g v (1 +- LIMIT.CATCHES_UP)          v = mean speed before and after, per row; both are alike
 
-A joint at rest, or between two steps of a coarse encoder, shows no such change; chance repeats a
+A joint at rest, one that starts, or between two steps of a coarse encoder, shows no such change; chance repeats a
 noisy value less often the larger the speed.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from runtime.ground.limits import limits
 
@@ -23,13 +24,14 @@ Array = np.ndarray
 def held_positions(q: Array) -> Array:
     """Find the positions that repeat the sample before although the joint moves, bool (N, n).
 
-    Where all positions repeat and one of them does so for certain, all are marked.
+    Where all positions repeat, the evidence of the joints is added, and all are marked.
 
     q : positions, shape (N, n).
     """
-    held = np.stack([_held(x) for x in q.T], axis=1)
+    evidence = np.stack([_evidence(x) for x in q.T], axis=1)
+    held = evidence > LIMIT.HELD_NOISE**2
     same = np.append(False, (q[1:] == q[:-1]).all(axis=1))
-    held[same & held.any(axis=1)] = True
+    held[same & (evidence.sum(axis=1) > LIMIT.HELD_NOISE**2)] = True
     return held
 
 
@@ -42,26 +44,33 @@ def repeated_mostly(x: Array) -> bool:
     return bool(np.median(np.diff(c)) >= 2 and np.median(steps) > LIMIT.HELD_STEPS * steps.min())
 
 
-def _held(x: Array) -> Array:
-    """Find the repeated samples of one moving position, bool (N,)."""
-    held = np.zeros(len(x), dtype=bool)
+def _evidence(x: Array) -> Array:
+    """Compute the evidence that samples of one position are held, shape (N,); 0 of other samples.
+
+    It is the square of v (g - 1) over twice the largest noise nearby: the exponent of the
+    probability that noise repeats a value.
+    """
+    evidence = np.zeros(len(x))
     c = np.append(0, np.flatnonzero(np.diff(x)) + 1)  # rows with a new value
     if len(c) < LIMIT.FEWEST_CHANGES:
-        return held
+        return evidence
     y, gap = x[c], np.diff(c)
     i = np.flatnonzero(gap >= 2)
     i = i[(i >= 2) & (i + 3 < len(c))]
     if not len(i):
-        return held
+        return evidence
     before = (y[i] - y[i - 2]) / (c[i] - c[i - 2])
     after = (y[i + 3] - y[i + 1]) / (c[i + 3] - c[i + 1])
     v, g, s = (before + after) / 2, gap[i], y[i + 1] - y[i]
-    middle = y[:-2] + (y[2:] - y[:-2]) * gap[:-1] / (c[2:] - c[:-2])
-    noise = 2 * float(np.median(np.abs(y[1:-1] - middle)))
+    off = np.abs(y[1:-1] - y[:-2] - (y[2:] - y[:-2]) * gap[:-1] / (c[2:] - c[:-2]))
+    noise = 2 * maximum_filter1d(off, 2 * LIMIT.BESIDE + 1)[i - 1]
+    often = uniform_filter1d(np.where(gap >= 2, 1.0, 0.0), 2 * LIMIT.BESIDE + 1)[i]
     count = float(np.abs(np.diff(y)).min())
-    least = np.maximum(LIMIT.HELD_STEPS * count, LIMIT.HELD_NOISE * noise / (g - 1))
+    certain = (np.abs(v) > LIMIT.HELD_STEPS * count) & (often < LIMIT.HELD_OFTEN)
     with np.errstate(divide="ignore", invalid="ignore"):
-        certain = (np.abs(v) > least) & (np.abs(s / (g * v) - 1) < LIMIT.CATCHES_UP)
-    for k in i[certain]:
-        held[c[k] + 1 : c[k + 1]] = True
-    return held
+        for speed in (before, after, s / g):
+            certain &= np.abs(speed / v - 1) < LIMIT.CATCHES_UP
+        strength = np.minimum((v * (g - 1) / noise) ** 2, LIMIT.CERTAINLY_HELD)
+    for k, of in zip(i[certain], strength[certain], strict=True):
+        evidence[c[k] + 1 : c[k + 1]] = of
+    return evidence
