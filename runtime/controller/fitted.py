@@ -91,7 +91,10 @@ def law_of_controller(problem: Problem) -> Problem:
     bound = np.where(np.isfinite(estimate.kd) | (law.kd != "fit"), saturation, np.inf)
 
     def with_torque(record: Record) -> Record:
-        channels = {key: x for key, x in record.channels.items() if key != "law_v"}
+        channels = dict(record.channels)
+        v = channels.pop("law_v")
+        if law.kd != "fit":
+            channels["law_v"] = late(record.t, v, np.nan_to_num(estimate.delay))
         tau = torque_of(record, np.nan_to_num(estimate.kd), estimate.delay, bound)
         return replace(record, tau=tau, channels=channels)
 
@@ -174,7 +177,7 @@ def gain_doubt(problem: Problem, error: float) -> str:
     if error < LIMIT.LAW_DOUBT or not all(by_law) or not laws or laws[0].kd == "fit":
         return ""
     uncut = np.full(problem.records[0].n, np.inf)
-    estimate = law_estimate(problem, Law(kp=laws[0].kp, kd="fit"), uncut)
+    estimate = law_estimate(problem, Law(kp=laws[0].kp, kd="fit", delay=0.0), uncut)
     if not estimate.error < error / 2:
         return ""
     stated = laws[0].gains(problem.records[0].n)["Vm"]
