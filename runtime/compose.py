@@ -126,6 +126,10 @@ EXTRAS: list[Extra] = [
     ),
     PartWhen(Late("runtime.plausible.known:torque_unit"), lambda r: bool(r.model.VALUES)),
     PartWhen(
+        Late("runtime.controller.fitted:fitted_law"),
+        lambda r: any(record.origin.by_law for record in r.records),
+    ),
+    PartWhen(
         Late("runtime.controller.fitted:doubt_of_gains"),
         lambda r: any("law_v" in record.channels for record in r.records),
     ),

@@ -34,9 +34,10 @@ from runtime.core.record import Record
 from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared, stacked, with_torques
+from runtime.ground.check import Check
 from runtime.ground.documents import Result
 from runtime.ground.limits import limits
-from runtime.ground.part import Doubt
+from runtime.ground.part import Doubt, Part
 from runtime.loop.settings import Law
 
 LIMIT = limits(__package__)
@@ -107,11 +108,34 @@ def law_of_controller(problem: Problem) -> Problem:
     if sums := friction_and_gain(model, law, estimate):
         model = UnsignedModel(model, sums)
     return problem.changed(
-        Note(KIND, estimate.text, {KIND: estimate.summary()}, estimate),
+        Note(KIND, "", {KIND: estimate.summary()}, estimate),
         model=model,
         records=tuple(map(with_torque, problem.records)),
         unseen=tuple(map(with_torque, problem.unseen)),
     )
+
+
+class FittedLaw(Part):
+    """Part that tells what was fitted of the control law, ahead of the values of the parameters."""
+
+    name = "law_of_controller"
+    title = "Law of the controller"
+    about = "record"
+
+    def __init__(self, estimate: LawEstimate) -> None:
+        self.estimate = estimate
+
+    def checks(self) -> tuple[Check, ...]:
+        """Return one check, which is good: the fitted gains and the fitted delay."""
+        finding = self.estimate.text.rstrip(".")
+        question = "What was fitted of the law of the controller?"
+        return (Check(question, "good", finding, ahead=True),)
+
+
+def fitted_law(result: Identification) -> FittedLaw | None:
+    """Return the part on the fitted control law; None if nothing of it was fitted."""
+    note = result.problem.noted(KIND)
+    return FittedLaw(note.result) if note is not None and note.result.text.strip(".") else None
 
 
 def friction_and_gain(model: GeneratedModel, law: Law, estimate: LawEstimate) -> tuple[str, ...]:
