@@ -108,10 +108,11 @@ def kinks_at_zero(x: Array, rate: float) -> int:
     kinks, touches, last = 0, 0, -reach
     for a, b in ends:
         k = a + int(np.argmin(x[a:b]))
-        if k - last < 2 * reach or k < 2 * reach or k + 2 * reach >= len(x):
+        if k - last < 2 * reach or k < 3 * reach or k + 3 * reach >= len(x):
             continue
         last, touches = k, touches + 1
-        before = x[k - 2 * reach : k - reach].mean() - x[k - reach : k].mean()
-        after = x[k + reach : k + 2 * reach].mean() - x[k : k + reach].mean()
-        kinks += min(before, after) > LIMIT.KINK * usual
+        sides = np.stack([x[k : k + 3 * reach], x[k - 3 * reach : k][::-1]])
+        slopes = np.diff(sides.reshape(2, 3, reach).mean(axis=2), axis=1)  # near zero, then farther
+        steep = (slopes > LIMIT.KINK * usual).all()
+        kinks += bool(steep and slopes[:, 0].sum() > LIMIT.STRAIGHT * slopes[:, 1].sum())
     return kinks if kinks > LIMIT.MOST_TOUCHES * touches else 0

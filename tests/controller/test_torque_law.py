@@ -320,3 +320,17 @@ def test_friction_below_zero_is_told_as_a_gain(tmp_path):
     assert all_of_them["FV1"] == pytest.approx(model.VALUES["FV1"] - 5, abs=0.2)
     told = replace(result, sets=Sets(all_of_them)).own_warnings
     assert any("kd of the law is larger than that of the drive" in text for text in told)
+
+
+def test_the_delay_is_fitted_by_default_and_told_first(tmp_path):
+    """A law whose torque acts 4.2 ms later, and a right one whose interval contains 0."""
+    late = identified(logged_early(tmp_path, kd=GAIN.tolist()))
+    law = late.estimate.provenance["law"]
+    assert abs(law["delay"] - LATE) < 3 * law["sigma_delay"] < 1e-3
+    assert str(late).startswith("The torque of the law comes 4.")
+    right = identified(logged_early(tmp_path, kd=GAIN.tolist(), late=0.0))
+    law = right.estimate.provenance["law"]
+    assert abs(law["delay"]) < 1.96 * law["sigma_delay"]
+    given = identified(logged_early(tmp_path, kd=GAIN.tolist(), delay=0.0))
+    assert "law" not in given.estimate.provenance
+    assert late.estimate.relative_error < 0.5 * given.estimate.relative_error
