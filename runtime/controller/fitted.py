@@ -240,9 +240,7 @@ def law_estimate(problem: Problem, law: Law, saturation: Array) -> LawEstimate:
         rows = away_from_reversals(stacked(model, slow), slow)
         late_by = _delay(TorquesOfLaw(model, slow, rows, saturation), asked, starts, cuts)
     delay = float(np.nan_to_num(late_by[0]))
-    torques = TorquesOfLaw(
-        model, problem.prepared, stacked(model, problem.prepared), saturation
-    )
+    torques = TorquesOfLaw(model, problem.prepared, stacked(model, problem.prepared), saturation)
     kd = _best(torques, asked, False, starts, delay, cuts)[0]
     fit = torques.fit(asked, False, kd, delay)
     gains = [name for name in asked if name in fit.names and _apart(fit, name)]
@@ -302,7 +300,9 @@ def away_from_reversals(rows: Observation, records: Sequence[Prepared]) -> Obser
     kept = np.zeros(len(rows.Y), dtype=bool)
     for number, own in enumerate(records):
         qd, low = own.states.qd, own.study.signals.lowpass
-        reach = round(LIMIT.REVERSAL * own.record.rate / (own.record.rate if low is None else low.hertz))
+        reach = round(
+            LIMIT.REVERSAL * own.record.rate / (own.record.rate if low is None else low.hertz)
+        )
         slow = np.abs(qd) < LIMIT.STANDING * np.abs(qd).max(axis=0)
         slow[1:] |= np.sign(qd[1:]) != np.sign(qd[:-1])
         near = maximum_filter1d(slow.astype(np.int8), 2 * reach + 1, axis=0) > 0
@@ -342,7 +342,9 @@ def _search_kd(
     """
     labels = [f"KD{j}" for j in joint_labels(torques.model)]
     misfit = torques.misfit(kd, delay) if cuts else np.nan
-    for _ in range((LIMIT.LAW_CUT_PASSES if cuts else LIMIT.LAW_PASSES) if gains or late_too else 0):
+    for _ in range(
+        (LIMIT.LAW_CUT_PASSES if cuts else LIMIT.LAW_PASSES) if gains or late_too else 0
+    ):
         fit = torques.fit(gains, late_too, kd, delay)
         step = {name: x for name, x in zip(fit.names, fit.X, strict=True) if np.isfinite(x)}
         by_kd = np.array([step.get(name, 0.0) for name in labels])

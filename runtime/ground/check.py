@@ -125,7 +125,9 @@ def worst_of(checks: Sequence[Check]) -> Check | None:
     worst = next((c for state in WORST[:2] for c in checks if c.state == state), None)
     if worst is None:
         return None
-    rivals = [c for c in checks if c.state == worst.state or (worst.outcome and c.state in WORST[:2])]
+    rivals = [
+        c for c in checks if c.state == worst.state or (worst.outcome and c.state in WORST[:2])
+    ]
     strongest = max(rivals, key=lambda check: check.explains)
     return strongest if strongest.explains > worst.explains else worst
 

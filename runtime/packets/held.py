@@ -32,7 +32,7 @@ def held_positions(q: Array) -> Array:
     held = evidence > LIMIT.HELD_NOISE**2
     same = np.append(False, (q[1:] == q[:-1]).all(axis=1))
     held[same & (evidence.sum(axis=1) > LIMIT.HELD_NOISE**2)] = True
-    return held
+    return np.asarray(held)
 
 
 def repeated_mostly(x: Array) -> bool:

@@ -195,7 +195,7 @@ def _sampled(problem: Problem, record: Record, ticks: Ticks) -> bool:
         except (InputError, np.linalg.LinAlgError):
             return False
         errors.append(percent(*system.norms(system.solve().X)))
-    return errors[0] < LIMIT.SAMPLED_TORQUE * errors[1]
+    return bool(errors[0] < LIMIT.SAMPLED_TORQUE * errors[1])
 
 
 def _alone(problem: Problem, record: Record) -> Problem:
@@ -208,7 +208,7 @@ def _alone(problem: Problem, record: Record) -> Problem:
 def _without_held(problem: Problem, record: Record, told: list[str]) -> Record:
     """Replace single samples that repeat the one before; add a sentence on them to `told`."""
     held = held_positions(record.q)
-    held[_long(held.any(axis=1), LIMIT.BRIDGED * record.rate)] = False
+    held[_long(np.asarray(held.any(axis=1)), LIMIT.BRIDGED * record.rate)] = False
     rows = held.any(axis=1)
     if not rows.any():
         return record
@@ -223,7 +223,9 @@ def _without_held(problem: Problem, record: Record, told: list[str]) -> Record:
     if accepted:
         q = np.where(held, np.nan, record.q)
         before = record.missing
-        missing = Missing(held) if before is None else replace(before, samples=before.samples | held)
+        missing = (
+            Missing(held) if before is None else replace(before, samples=before.samples | held)
+        )
         return replace(record, q=q, missing=missing)
     channels = {
         name: bridged(x, _repeats(x) & whole) if name in JOINT_CHANNELS else x

@@ -38,7 +38,7 @@ def signed(case: Case) -> Answer | None:
         tau = record.tau if drives is None else drives.motor_command(record.tau)
         bits = [register_bit(x) for x in tau.T]
         if found := [(j, bit) for j, bit in enumerate(bits) if bit is not None]:
-            j, (k, complement) = found[0]
+            _, (k, complement) = found[0]
             joints = ", ".join(case.labels[j] for j, _ in found)
             meaning = (
                 f"raw values from {2**k} on are negative, raw - {2 ** (k + 1)} (two's complement)"
