@@ -197,7 +197,7 @@ def test_a_stated_delay_and_gain_serve_as_the_found_ones(tmp_path):
     study = logged_early(tmp_path, kd=GAIN.tolist(), delay=LATE, noise=0.0)
     result = identified(study)
     np.testing.assert_allclose(result.estimate.X, TRUE, rtol=0.02, atol=0.02)
-    wrong = identified(logged_early(tmp_path, kd=GAIN.tolist(), noise=0.0))
+    wrong = identified(logged_early(tmp_path, kd=GAIN.tolist(), delay=0.0, noise=0.0))
     assert result.estimate.relative_error < 0.2 * wrong.estimate.relative_error
 
 
@@ -205,7 +205,7 @@ def test_kd_beside_a_reference_at_rest_is_told(tmp_path):
     """Its column is that of FV: a sentence, FV the sum of both."""
     result = identified(logged_early(tmp_path, kd="fit", moving=False, late=0.0))
     law = result.estimate.provenance["law"]
-    assert np.isnan(law["kd"]).all() and np.isnan(law["delay"])
+    assert np.isnan(law["kd"]).all() and abs(law["delay"]) < 3 * law["sigma_delay"]
     assert "kd and FV of joint 1, 2 cannot be separated" in result.brief()
     viscous = [result.estimate["FV1"], result.estimate["FV2"]]
     np.testing.assert_allclose(viscous, GAIN + TRUE[[3, 8]], rtol=0.02)
