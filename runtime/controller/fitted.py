@@ -236,8 +236,9 @@ def law_estimate(problem: Problem, law: Law, saturation: Array) -> LawEstimate:
     starts = [s * law.gains(n)["P"] for s in (LIMIT.LAW_STARTS if cuts else (0.0,))]
     late_by = (np.nan, np.nan)
     if law.delay == "fit":
-        slow = slow_records(problem)
-        rows = away_from_reversals(stacked(model, slow), slow)
+        slow = problem.prepared if asked else slow_records(problem)  # kd needs all frequencies
+        rows = stacked(model, slow)
+        rows = rows if asked else away_from_reversals(rows, slow)
         late_by = _delay(TorquesOfLaw(model, slow, rows, saturation), asked, starts, cuts)
     delay = float(np.nan_to_num(late_by[0]))
     torques = TorquesOfLaw(model, problem.prepared, stacked(model, problem.prepared), saturation)
