@@ -1,9 +1,10 @@
-"""Public functions of identification, and lists of preparation steps, readers, methods, analyses.
+"""Public functions of identification, and lists of preparation steps, readers, methods, analyses, questions.
 
     STEPS      Problem -> Problem: changes of a problem before its rows are made, in this order
     READERS    Record, Signals -> States: signals.reader of a study (`runtime.core.signals.reader`)
     METHODS    Observation -> rows of a least squares -> their fit: estimate.method of a study
     EXTRAS     Identification -> Part: further analyses of the records
+    QUESTIONS  Identification -> Check: what the verdict asks, before the questions of the parts
 
 Each call builds a Problem from model, records and study, prepares it by STEPS and passes it to one
 function of the package. A feature is one file and one line of a list.
@@ -12,7 +13,7 @@ function of the package. A feature is one file and one line of a list.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -46,10 +47,13 @@ from runtime.counts.encoder_advice import EncoderSteps
 from runtime.expected import ExpectedError
 from runtime.ground.arrays import kind_of, require_kind
 from runtime.ground.errors import InputError, SettingsError
+from runtime.ground.part import About
 from runtime.ground.settings_errors import gone
 from runtime.late import Late, Listed, PartWhen, When
 from runtime.link_side import stated_sides, torques_of_links
 from runtime.median import pulses_in_torques
+from runtime.packets.packets import KIND as PACKETS
+from runtime.packets.packets import packets_once
 from runtime.payload.settings import LOADED
 from runtime.reading.formats import is_measured
 from runtime.reading.records import read_records
@@ -58,6 +62,8 @@ from runtime.rest import STATIC, poses_at_rest
 from runtime.speeds import recorded_speeds
 from runtime.study import Study, study_of, study_schema
 from runtime.threads import alone_each, single_threaded
+from runtime.verdict import questions
+from runtime.verdict.verdict import Ask, verdict
 
 if TYPE_CHECKING:
     from runtime.advisor.advice import Advice
@@ -84,6 +90,7 @@ STEPS: list[Step] = [
         lambda p: any(c.startswith(WRENCH) for r in (*p.records, *p.unseen) for c in r.channels),
     ),
     torques_of_links,
+    packets_once,
     pulses_in_torques,
     recorded_speeds,
     automatic_cutoff,
@@ -93,6 +100,10 @@ STEPS: list[Step] = [
     When(
         Late("runtime.controller.fitted:law_of_controller"),
         lambda p: any("law_v" in r.channels for r in p.records),
+    ),
+    When(
+        Late("runtime.plausible.rests:rows_at_rest"),
+        lambda p: p.settings.rows.low_speed == "auto" and bool(p.records),
     ),
 ]
 READERS: Listed[Reader] = Listed(
@@ -115,7 +126,15 @@ METHODS: Listed[Method] = Listed(
     }
 )
 EXTRAS: list[Extra] = [
+    PartWhen(
+        Late("runtime.packets.packets:packets_told"),
+        lambda r: r.problem.noted(PACKETS) is not None,
+    ),
     PartWhen(Late("runtime.plausible.known:torque_unit"), lambda r: bool(r.model.VALUES)),
+    PartWhen(
+        Late("runtime.controller.fitted:fitted_law"),
+        lambda r: any(record.origin.by_law for record in r.records),
+    ),
     PartWhen(
         Late("runtime.controller.fitted:doubt_of_gains"),
         lambda r: any("law_v" in record.channels for record in r.records),
@@ -160,6 +179,18 @@ EXTRAS: list[Extra] = [
     ),
 ]
 
+QUESTIONS: Mapping[About, list[Ask]] = {
+    "record": [questions.determined],
+    "prediction": [questions.total_error, questions.explained_by_joint, questions.predicted],
+    "values": [
+        questions.signs,
+        questions.certain,
+        questions.separate,
+        questions.conditioned,
+    ],
+}
+judged = partial(verdict, questions=QUESTIONS)
+
 Records = Record | Sequence[Record]
 T = TypeVar("T")
 
@@ -190,10 +221,20 @@ def list_records(records: Records) -> tuple[Record, ...]:
 def complete_study(study: Study) -> Study:
     """Check that method and reader of a study exist; complete the settings of the reader.
 
-    SettingsError if the method or the reader is unknown.
+    SettingsError if the method or the reader is unknown, or for a setting of another reader.
     """
     _named(METHODS, study.estimate.method, ("estimate", "method"))
-    return reader_of(study.signals).settled(study)
+    reader, signals = reader_of(study.signals), study.signals
+    known = {f.name for f in fields(reader.settings)}
+    for f in fields(signals):
+        if f.name not in known and getattr(signals, f.name) != f.default:
+            users = [name for name, one in READERS.items() if f.name in one.own_settings]
+            raise SettingsError(
+                f"given, but reader is {signals.reader}; set reader: {' or '.join(users)}, or "
+                "remove this key",
+                path=("signals", f.name),
+            )
+    return reader.settled(study)
 
 
 def reader_of(signals: Signals) -> Reader:
@@ -483,7 +524,7 @@ def identify(
     if plausible or (plausible is None and variants is not None):
         asked["plausible"] = {"variants": variants}
     whole = _with_loaded(model, records, study, further, loaded, simulator)
-    return identification.identify(whole, extras(asked), provenance=provenance)
+    return identification.identify(whole, extras(asked), judged, provenance=provenance)
 
 
 @single_threaded
@@ -512,7 +553,7 @@ def assess(
     whole = _with_loaded(model, records, study, None, None, None)
     progress("identification")
     return identification.identify(
-        whole, extras(asked, attempted=True), provenance=provenance, progress=progress
+        whole, extras(asked, attempted=True), judged, provenance=provenance, progress=progress
     )
 
 
@@ -548,7 +589,7 @@ def compare(
     if variants is not None:
         plausible = Late("runtime.plausible.plausibility:plausibility_of")
         of_the_best.append(partial(plausible, variants=variants))
-    return comparing.compare(problems, extras({}), of_the_best)
+    return comparing.compare(problems, extras({}), judged, of_the_best)
 
 
 @single_threaded
@@ -806,6 +847,7 @@ def _candidate(model: GeneratedModel, candidate: Study | tuple[Study, Records, R
 __all__ = [
     "EXTRAS",
     "METHODS",
+    "QUESTIONS",
     "READERS",
     "STEPS",
     "InputError",

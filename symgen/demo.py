@@ -33,12 +33,11 @@ import symgen
 from runtime import Cestac, Estimate, Identification, Record, Study
 from runtime.core.cestac.result import LevelResult
 from runtime.core.drives import Drives
-from runtime.core.study import CestacSettings
 from runtime.files import Files, identification_files, part_files
 from runtime.ground.errors import DataUnavailableError
 from runtime.ground.table import Table, number, percentage
 from runtime.loop.reference import Reference, point_to_point
-from runtime.loop.settings import Points
+from runtime.loop.settings import CestacSettings, Points
 from runtime.reading.datasets import dataset_study
 from runtime.reading.settings import Columns, RecordSettings
 from runtime.reporting.page import Section
@@ -275,29 +274,20 @@ class Demonstration:
     def verdict(self) -> str:
         """Sentences on the fit, its prediction error, and the effect of each encoder step."""
         result, names = self.result, self.result.essential.names
-        words = {
-            "unbiased": "do not bias the parameters",
-            "doubtful": "make the parameters doubtful",
-            "biased": "bias the parameters",
-        }
-        levels = {
+        of = {
             verdict: [
                 r.level.label for r in self.resolution.levels if r.residual_verdict == verdict
             ]
-            for verdict in words
+            for verdict in ("unbiased", "doubtful", "biased")
         }
-        steps = ", ".join(
-            f"encoder steps of {' and '.join(labels)} {words[verdict]}"
-            for verdict, labels in levels.items()
-            if labels
-        )
+        residual = "; ".join(f"{verdict} at {', '.join(at)}" for verdict, at in of.items() if at)
         return (
             f"{'SIMULATED record: ' if self.prepared.note else ''}{len(names)} of "
             f"{len(result.estimate.names)} parameters leave "
             f"{result.essential.estimate.relative_error:.1f} % of the torques of "
             f"{result.model.NAME} unexplained, {result.prediction_error:.1f} % on a half of the "
-            "record that the fit has not seen. Judged by the residual of least squares, "
-            f"{steps}.{self.resolution.finer_for_values}"
+            "record that the fit has not seen. Judged by the parameters, eq. (21): "
+            f"{self.resolution.message} Judged by the residual alone, eq. (22): {residual}."
         )
 
     def files(self, folder: Path) -> Files:

@@ -1,6 +1,7 @@
 """Settings of measured records: their files, their columns, and treatment of their time stamps.
 
-They are a part of a Study.
+They are a part of a Study, and what reading of files adds to the sections of the chapter: units of
+speeds, and records that are predicted.
 """
 
 from __future__ import annotations
@@ -9,8 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, field_validator
 
+from runtime.core import study as chapter
 from runtime.core.record import WRENCH
 from runtime.core.signals.base import MOTION, POSITION, QUATERNION
 from runtime.ground.settings import (
@@ -25,7 +27,7 @@ from runtime.ground.settings import (
     require,
 )
 from runtime.loop.settings import Controller
-from runtime.reading.units import COMMANDS, position_unit, time_unit, torque_unit
+from runtime.reading.units import COMMANDS, position_unit, speed, time_unit, torque_unit
 
 
 def _one_by_one(names: Any) -> Any:
@@ -420,9 +422,61 @@ def each_record(settings: Sequence[RecordSettings]) -> tuple[RecordSettings, ...
     )
 
 
+INHERITED = (  # keys that belong together: all are those of another record, or none
+    ("columns",),
+    ("side", "torque_side", "coupling"),
+    ("units", "scale", "counts_per_revolution", "torque_constant"),
+    ("rate", "jitter", "resample"),
+    ("unwrap",),
+    ("topic",),
+    ("decimal",),
+)
+"""Keys of a record with a load that are those of the records without it, if left out."""
+
+
+def inherited(record: Any, others: Any) -> Any:
+    """Add to the mapping of a record the settings of the first of `others` that it leaves out.
+
+    Both are settings as in a file, or RecordSettings; anything else is returned as it is, and
+    refused later.
+    """
+    first = others[0] if isinstance(others, list | tuple) and others else others
+    if not (isinstance(record, Mapping) and isinstance(first, Mapping | RecordSettings)):
+        return record
+    like = first if isinstance(first, Mapping) else {k: getattr(first, k) for k in vars(first)}
+    free = [keys for keys in INHERITED if not any(key in record for key in keys)]
+    return {**{key: like[key] for keys in free for key in keys if key in like}, **record}
+
+
 Records = Annotated[Many[RecordSettings], AfterValidator(each_record)]
 """Settings of one record or of several, one entry each."""
 
 
 def _each(units: str | tuple[str, ...]) -> tuple[str, ...]:
     return units if isinstance(units, tuple) else (units,)
+
+
+class Rows(chapter.Rows):
+    """Settings that select the rows of W and Y that are used.
+
+    Attributes
+    ----------
+    low_speed : float or tuple of float or str, rad/s or m/s
+        Rows of joint j with |qd_j| below this speed are left out, because sign(qd) is noise in
+        them. A text may have another unit: 2 rpm. auto: found from the record for joints whose
+        torques at rest are not those of the model; zero for other joints.
+    """
+
+    _with_unit = field_validator("low_speed", mode="before")(speed)
+
+
+class ValidateSettings(chapter.ValidateSettings):
+    """Settings for validation: data to which parameters are fitted, and data that they predict.
+
+    Attributes
+    ----------
+    record : tuple of RecordSettings
+        Further records, predicted with the parameters of the study.
+    """
+
+    record: Records = ()

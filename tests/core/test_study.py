@@ -9,13 +9,22 @@ import numpy as np
 import pytest
 
 from runtime.compose import METHODS, complete_study
-from runtime.core.study import CestacSettings, Lowpass, Signals
+from runtime.core.study import Lowpass
 from runtime.ground import settings_errors
 from runtime.ground.errors import InputError, SettingsError
 from runtime.ground.settings import number, to_mapping
 from runtime.ground.settings_errors import WENT
 from runtime.reading.datasets import DATASETS, dataset_study
-from runtime.study import Rows, Study, load_study, study_from_mapping, study_from_text, study_of
+from runtime.study import (
+    CestacSettings,
+    Rows,
+    Signals,
+    Study,
+    load_study,
+    study_from_mapping,
+    study_from_text,
+    study_of,
+)
 
 DESIGN = """
 symgen: 1
@@ -325,7 +334,7 @@ def test_settings_made_in_python_are_checked():
         (lambda: Lowpass(cutoff=-1), "cutoff: -1; expected more than 0"),
         (lambda: Lowpass(50, 4, ("q", "qdd")), r"on[1]: 'qdd'; expected q or qd"),
         (lambda: Lowpass(frequency=50), "unknown key frequency; known: cutoff, order, on, padding"),
-        (lambda: Rows((0, 1), 3, 0.0, 5), "Unexpected positional argument"),
+        (lambda: Rows((0, 1), 3, 0.0, 0.0, 5), "Unexpected positional argument"),
         (lambda: Signals(lowpass=3), "lowpass: 3; expected a mapping with some of cutoff"),
     ):
         with pytest.raises(SettingsError) as e:
@@ -345,7 +354,9 @@ def test_settings_are_values():
     study = study_from_text(DESIGN)
     assert hash(study.rows) == hash(study_from_text(DESIGN).rows)
     assert study == pickle.loads(pickle.dumps(study))  # noqa: S301
-    assert replace(study, rows=replace(study.rows, trim=0)).rows == Rows(window=(0, 7.5), trim=0)
+    assert replace(study, rows=replace(study.rows, trim=0)).rows == Rows(
+        window=(0, 7.5), trim=0, low_speed=0
+    )
     with pytest.raises(FrozenInstanceError):
         study.rows = Rows()
 

@@ -13,12 +13,12 @@ from test_closed_loop import ARM, arm, away  # noqa: F401  (arm is a fixture)
 from runtime.compose import METHODS, cestac, estimate_of, observe, problem
 from runtime.core.cestac.rounding import rounded, stream
 from runtime.core.cestac.runs import Level
-from runtime.core.study import CestacSettings, EstimateSettings
+from runtime.core.study import EstimateSettings
 from runtime.ground.errors import InputError, SettingsError
 from runtime.loop.cestac import loop_of
 from runtime.loop.simulation import Simulator
 from runtime.parallel.processes import processes
-from runtime.study import study_from_mapping
+from runtime.study import CestacSettings, study_from_mapping
 
 STEP = 2e-4
 TORQUE = {"saturation": None, "noise": 0.05}
@@ -125,9 +125,8 @@ def test_the_encoder_in_the_loop_has_a_random_phase(arm, study, simulator):  # n
 @campaign
 def test_didim_sees_the_encoder_in_the_loop(arm, study, simulator):  # noqa: F811
     model, *_, truth, _ = arm
-    asked = in_loop(
-        method(study, "didim", start=away(truth, model.BASE_PARAMETERS), gains="one", around=0.05)
-    )
+    asked = in_loop(method(study, "didim", start=away(truth, model.BASE_PARAMETERS), gains="one"))
+    asked = replace(asked, rows=replace(asked.rows, around=0.05))
     found = cestac(model, (), asked, simulator=simulator)
     assert found.levels[0].e[found.names.index("ZZ1R")] > 0.2
 
