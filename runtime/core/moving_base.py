@@ -19,7 +19,7 @@ import numpy as np
 from runtime.core.model import GeneratedModel
 from runtime.core.problem import Problem
 from runtime.core.record import WRENCH, Record
-from runtime.core.signals.base import GRAVITY, INPUTS, MOTION, POSITION, QUATERNION
+from runtime.core.signals.base import GRAVITY, IMU, INPUTS, MOTION, POSITION, QUATERNION
 from runtime.ground.errors import InputError
 
 Array = np.ndarray
@@ -82,9 +82,9 @@ def moved_base(problem: Problem) -> Problem:
     moves = getattr(model, "BASE", "fixed") == "moving"
     for record in records:
         _require_motion(model, record, moves)
-        if problem.reader.at_rest and POSITION in record.channels:
+        if problem.reader.at_rest and {POSITION, IMU} & {*record.channels}:
             raise InputError(
-                "poses at rest have no accelerations of the base; give record.base: {motion: [...]}",
+                "poses at rest have no rates of the base; give record.base: {motion: [...]}",
                 file=record.file,
             )
         if moves and any(c.startswith(WRENCH) for c in record.channels):
@@ -103,12 +103,12 @@ def moved_base(problem: Problem) -> Problem:
 
 
 def _require_motion(model: GeneratedModel, record: Record, moves: bool) -> None:
-    given = {MOTION, POSITION} & {*record.channels}
+    given = {MOTION, POSITION, IMU} & {*record.channels}
     if moves and not given:
         raise InputError(
             f"the base of {model.NAME} moves, but the record does not say how; give record.base: "
-            "{motion: [nine columns]} or {position: [...], quaternion: [...]} in the study, or use "
-            "a model with base: fixed",
+            "{motion: [nine columns]}, {position: [...], quaternion: [...]} or {gyroscope: [...], "
+            "accelerometer: [...]} in the study, or use a model with base: fixed",
             file=record.file,
         )
     if given and not moves:
@@ -117,7 +117,7 @@ def _require_motion(model: GeneratedModel, record: Record, moves: bool) -> None:
             "--base moving (symgen.model(ROBOT, base='moving')), or remove record.base",
             file=record.file,
         )
-    widths = {MOTION: 9, POSITION: 3, QUATERNION: 4}
+    widths = {MOTION: 9, POSITION: 3, QUATERNION: 4, IMU: 9}
     for name, width in widths.items():
         if name in record.channels and record.channels[name].shape[1] != width:
             raise InputError(

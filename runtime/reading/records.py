@@ -21,7 +21,7 @@ from runtime.controller.law import torque_law
 from runtime.core.missing import COUNTS, Missing, bridged
 from runtime.core.model import GeneratedModel, drives_of, joint_labels
 from runtime.core.record import JOINT_CHANNELS, WRENCH, Origin, Record, require_finite
-from runtime.core.signals.base import QUATERNION, continued
+from runtime.core.signals.base import IMU, QUATERNION, continued
 from runtime.ground.clock import Stamps, rate_of, time_stamps
 from runtime.ground.errors import InputError, ModelError
 from runtime.ground.limits import LIMIT
@@ -254,6 +254,8 @@ def _joint_side(
             values = side.torque(values)
         elif key == "tau_known":
             values = _spread(values, columns.tau_known)
+        elif key == IMU:
+            values = settings.base.of_sensor(values)
         elif key == QUATERNION:
             values = continued(values)  # before it is resampled
         elif key.startswith(WRENCH) and key not in columns.channels:

@@ -110,19 +110,31 @@ def test_the_rates_of_a_quaternion_do_not_feel_its_length():
     np.testing.assert_allclose(unit[0, 6:], R.T @ a[0], atol=1e-12)
 
 
-@pytest.mark.parametrize("form", ["motion", "pose"])
+@pytest.mark.parametrize("form", ["motion", "pose", "sensor"])
 def test_parameters_lie_within_their_intervals(case, form):
     """Noise of torques, encoders and of the motion of the base; least squares in all parameters."""
     _, module, truth, (t, q, tau, base, pose) = case
     rng = np.random.default_rng(11)
-    channels = (
-        {"base_motion": base + 0.01 * rng.normal(size=base.shape)}
-        if form == "motion"
-        else {
+    w, wd, a0 = np.hsplit(base, 3)
+    r = np.array([0.1, -0.2, 0.3])
+    f = a0 + np.cross(wd, r) + np.cross(w, np.cross(w, r))
+    forms = {
+        "motion": {"base_motion": base + 0.01 * rng.normal(size=base.shape)},
+        "pose": {
             "base_position": pose[:, :3] + 2e-5 * rng.normal(size=(len(t), 3)),
             "base_quaternion": pose[:, 3:] + 2e-5 * rng.normal(size=(len(t), 4)),
-        }
-    )
+        },
+        "sensor": {
+            "base_imu": np.hstack(
+                [
+                    w + 0.001 * rng.normal(size=w.shape),
+                    f + 0.01 * rng.normal(size=f.shape),
+                    np.broadcast_to(r, f.shape),
+                ]
+            )
+        },
+    }
+    channels = forms[form]
     record = runtime.Record(
         t,
         q + 1e-6 * rng.normal(size=q.shape),
@@ -135,6 +147,31 @@ def test_parameters_lie_within_their_intervals(case, form):
     assert len(z) == len(module.BASE_PARAMETERS)
     assert np.abs(z).max() < 4.5
     assert np.mean(np.abs(z) < 2) > 0.85
+
+
+def test_a_sensor_on_the_base_is_read_at_its_place_and_in_its_axes(case, tmp_path: Path):
+    """Gyroscope in deg/s, accelerometer in g with the other sign, turned and away from frame 0."""
+    _, module, _, (t, q, tau, base, _) = case
+    w, wd, a0 = np.hsplit(base, 3)
+    r, rpy = np.array([0.1, -0.2, 0.3]), np.array([0.4, -0.7, 1.1])
+    R = pin.rpy.rpyToMatrix(*rpy)
+    f = a0 + np.cross(wd, r) + np.cross(w, np.cross(w, r))
+    sensor = np.hstack([np.rad2deg(w) @ R, -f @ R / 9.80665])
+    head = ["t", *(f"q{j}" for j in range(1, 7)), *(f"tau{j}" for j in range(1, 7))]
+    six = [f"s{k}" for k in range(6)]
+    table, names = np.column_stack([t, q, tau, sensor]), ",".join([*head, *six])
+    np.savetxt(tmp_path / "arm.csv", table, delimiter=",", header=names, comments="", fmt="%.12g")
+    form = (
+        "{gyroscope: [s0, s1, s2], accelerometer: [s3, s4, s5], gyroscope_unit: deg/s, "
+        "accelerometer_unit: g, specific_force: false, "
+        f"mounting: {{position: {r.tolist()}, rotation: {rpy.tolist()}}}}}"
+    )
+    (tmp_path / "study.yaml").write_text(study_text(form), encoding="utf-8")
+    record = runtime.read_record(tmp_path / "study.yaml", module)
+    signals = Signals(lowpass=None, median=1)
+    found = np.stack([*base_motion(record.channels, RATE, signals).values()], axis=1)
+    error = np.abs(found - base)[20:-20].max(axis=0)
+    assert (error < 2e-4 * np.abs(base).max(axis=0)).all()
 
 
 def test_a_base_that_moves_needs_its_motion_and_a_fixed_one_has_none(case):
@@ -187,7 +224,8 @@ def test_a_study_names_the_columns_of_the_base(case, tmp_path: Path):
     for wrong, message in (
         ("{motion: [b0, b1]}", "2 columns; expected 9 columns"),
         ("{position: [x, y, z]}", "position and quaternion belong together"),
-        (f"{{motion: [{', '.join(nine)}], position: [x, y, z]}}", "give the motion or the pose"),
+        (f"{{motion: [{', '.join(nine)}], position: [x, y, z]}}", "more than one form is given"),
+        ("{gyroscope: [b0, b1, b2]}", "gyroscope and accelerometer belong together"),
     ):
         (tmp_path / "study.yaml").write_text(study_text(wrong), encoding="utf-8")
         with pytest.raises(SettingsError, match=message):

@@ -8,7 +8,12 @@ world, position p and unit quaternion Q = (w, x, y, z), with R the rotation matr
 
     w0 = 2 vec(Q* Qd),   wd0 = 2 vec(Q* Qdd),   a0 = R' (pdd - g)
 
-The filters are those of the joints: p and Q pass them like positions, the nine like velocities.
+or an inertial measurement unit at r in frame 0, whose gyroscope reads w0 and whose accelerometer
+reads f, the acceleration there minus gravity:
+
+    wd0 = dw0/dt,   a0 = f - wd0 x r - w0 x (w0 x r)
+
+The filters are those of the joints: p and Q pass them like positions, the others like velocities.
 The filtered Q = r u has a length r near 1, which vec(Q* Qd)/r**2 = vec(u* ud) takes out.
 """
 
@@ -18,13 +23,20 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from runtime.core.signals.filters import filtered_states, lowpass_filtered, median_filtered
+from runtime.core.signals.filters import (
+    derivative,
+    filtered_states,
+    lowpass_filtered,
+    median_filtered,
+)
 from runtime.core.study import Signals
 
 Array = np.ndarray
 
 MOTION, POSITION, QUATERNION = "base_motion", "base_position", "base_quaternion"
 """Channels of a record: w0, wd0, a0 (N, 9); p (N, 3), m; Q (N, 4), scalar first."""
+IMU = "base_imu"
+"""Channel with w0 (rad/s), f (m/s**2) and r (m) in the axes of frame 0, (N, 9)."""
 GRAVITY = "base_gravity"
 """Channel with the acceleration of gravity in the axes of the world, (N, 3), m/s**2."""
 INPUTS = tuple(f"{family}{k}0" for family in ("W", "WP", "VP") for k in (1, 2, 3))
@@ -37,10 +49,11 @@ def base_motion(channels: Mapping[str, Array], rate: float, signals: Signals) ->
     channels : signals of the record.   rate : Hz.   signals : filters.
     """
     if MOTION in channels:
-        x, low = median_filtered(channels[MOTION], signals.median), signals.lowpass
-        for state in ("q", "qd"):
-            if low is not None and state in low.on:
-                x = lowpass_filtered(x, rate, low)
+        x = _filtered(channels[MOTION], rate, signals)
+    elif IMU in channels:
+        w, f = np.hsplit(_filtered(channels[IMU][:, :6], rate, signals), 2)
+        wd, r = derivative(w, rate, signals.ends), channels[IMU][:, 6:]
+        x = np.hstack([w, wd, f - np.cross(wd, r) - np.cross(w, np.cross(w, r))])
     elif POSITION in channels:
         p = filtered_states(channels[POSITION], rate, signals)
         unit = channels[QUATERNION] / np.linalg.norm(channels[QUATERNION], axis=1, keepdims=True)
@@ -49,6 +62,15 @@ def base_motion(channels: Mapping[str, Array], rate: float, signals: Signals) ->
     else:
         return {}
     return dict(zip(INPUTS, x.T, strict=True))
+
+
+def _filtered(x: Array, rate: float, signals: Signals) -> Array:
+    """Return x, shape (N, k), after the filters of a velocity."""
+    x, low = median_filtered(x, signals.median), signals.lowpass
+    for state in ("q", "qd"):
+        if low is not None and state in low.on:
+            x = lowpass_filtered(x, rate, low)
+    return x
 
 
 def continued(Q: Array) -> Array:
