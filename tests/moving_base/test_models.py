@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from certify.text_faults import code_lines, turned_sign
+from typer.testing import CliRunner
 
 import symgen
 from oracles.urdf_robots import NAMED, panda, random_tree, ur5
@@ -21,6 +22,7 @@ from symgen.certify.claim import claim
 from symgen.certify.modules import certify
 from symgen.certify.texts import text_check
 from symgen.certify.witness import Witness
+from symgen.cli.main import app
 from symgen.derive.regressor import inertial_names
 from symgen.description import load_robot, parse_robot
 from symgen.description.tree import TreePart
@@ -282,3 +284,20 @@ def test_the_inertial_parameters_of_a_moving_base_are_never_fewer():
             for base in ("fixed", "moving")
         ]
         assert counts[0] < counts[1]
+
+
+def test_commands_take_the_base(tmp_path):
+    """The header of a generated module names --base, by which it is generated anew."""
+    run = CliRunner().invoke(
+        app, ["generate", "planar_2r", "--base", "moving", "-o", str(tmp_path)]
+    )
+    assert run.exit_code == 0, run.output
+    text = (tmp_path / "planar_2r.py").read_text(encoding="utf-8")
+    assert "symgen generate planar_2r --base moving" in text
+    assert "def regressor(\n    base:" in text or "def regressor(base:" in text
+    assert CliRunner().invoke(app, ["check", "planar_2r", "--base", "moving"]).exit_code == 0
+    module = CliRunner().invoke(
+        app, ["identify", str(tmp_path / "planar_2r.py"), "x.csv", "--base", "fixed"]
+    )
+    assert module.exit_code == 2
+    assert "leave out --base" in module.output
