@@ -14,13 +14,17 @@ torque errors of motions within the range of the robot.
     a       share of the accelerations that is an error of the encoder's steps
     D_0     D without accelerations
 
+    F a     torques of the laws that the model lacks, dX the change of X beside them
+            (`runtime.unmodelled`)
+
     expected^2 = tr(D K V K'D')/||D X||^2 + ||D (X - K chi_V)||^2/||D X||^2
-                 + (a/(1 + a))^2 ||(D - D_0) X||^2/||D X||^2
+                 + (a/(1 + a))^2 ||(D - D_0) X||^2/||D X||^2 + ||D dX + F a||^2/||D X||^2
 
 The first term is what the record leaves undetermined. The second is the difference between the fit
 and the joint estimate of record and values. The third is the amount by which the encoder steps make
-inertias too small (the encoder resolution of the record: `runtime.counts.encoder_advice`). Effects
-that the model lacks are included only as far as they are in the residuals of C.
+inertias too small (the encoder resolution of the record: `runtime.counts.encoder_advice`). The
+fourth is what the model lacks; other effects that it lacks are included only as far as they are in
+the residuals of C.
 
 The squared error of one record is a sum of b squares, a few of which are large: with
 M = K'D'D K V it is distributed as chi^2/nu with nu = tr(M)^2/tr(M^2) degrees of freedom. The
@@ -52,6 +56,7 @@ from runtime.ground.check import Answer, Check, Question
 from runtime.ground.limits import LIMIT
 from runtime.ground.part import Part
 from runtime.physical.inertia import INERTIAL, PhysicalModel, physical_model
+from runtime.unmodelled import Lacking, depends, friction_columns, lacking_of
 
 EXPECTED_INTERVAL = (0.05, 0.95)
 """Probabilities of the ends of that interval. Measured: benchmarks/truth.md."""
@@ -139,12 +144,18 @@ class ExpectedError(Part):
             result.model_estimate,
             result.prepared,
             max(steps, default=0.0),
+            self.lacking,
         )
 
+    @cached_property
+    def lacking(self) -> Lacking | None:
+        """Laws of load, position or time that the model lacks; None if nothing can be said."""
+        return lacking_of(self.result)
+
     def checks(self) -> tuple[Check, ...]:
-        """Return the check of the expected error of predicted torques, if this error is known."""
-        check = expected_off(self.expected)
-        return () if check is None else (check,)
+        """Return the questions on what the model lacks, and on the expected error if it is known."""
+        lacks = self.lacking and depends(self.lacking, self.result.model)
+        return tuple(check for check in (lacks, expected_off(self.expected)) if check)
 
 
 def expected_error(
@@ -153,6 +164,7 @@ def expected_error(
     fit: Estimate,
     records: Sequence[Prepared],
     steps: float = 0.0,
+    lacking: Lacking | None = None,
 ) -> Expected:
     """Compute the expected error of torques predicted for other motions, with its interval, %.
 
@@ -170,6 +182,8 @@ def expected_error(
     records : sequence of Prepared
     steps : float
         Share of the accelerations that is an error of the encoder's steps.
+    lacking : Lacking or None
+        Laws that the model lacks.
     """
     states = reference_states(model, records)
     if states is None or not has_channels(model, records):
@@ -184,6 +198,7 @@ def expected_error(
     X = np.array(
         [dict(zip(fit.names, fit.X, strict=True)).get(name, 0.0) for name in least_squares.names]
     )
+    lacks = 0.0 if lacking is None else lost(lacking, states, D, X, model, least_squares.names)
     ratio = least_squares.sigma_corrected / least_squares.sigma
     wider = np.fmax(ratio, 1.0) * np.sqrt(unseen_by_blocks(system.observation, least_squares))
     V = np.outer(wider, wider) * least_squares.covariance
@@ -203,7 +218,7 @@ def expected_error(
     open_part = (spread + np.sum((A @ (X - near)) ** 2)) / size**2
     times = np.array([1.0, *(chi2.ppf(p, nu) / nu for p in EXPECTED_INTERVAL)])
     part = np.array([1.0, *STEPS_MOVE]) * inertial * steps / (1 + steps)
-    errors = 100 * np.sqrt(open_part * times + part**2)
+    errors = 100 * np.sqrt(open_part * times + part**2 + (lacks / size) ** 2)
     motions = (
         "motions over limits.q of the robot file at up to half of limits.qd"
         if limits_of(model)
@@ -211,6 +226,25 @@ def expected_error(
     )
     error, low, high = np.minimum(errors, LIMIT.LARGEST_EXPECTED).tolist()
     return Expected(error, low, high, motions)
+
+
+def lost(
+    lacking: Lacking,
+    states: tuple[Array, Array, Array],
+    D: Array,
+    X: Array,
+    model: GeneratedModel,
+    names: Sequence[str],
+) -> float:
+    """Compute ||D dX + F a|| in the states, with the laws that the model lacks.
+
+    D : shape (K, n, b), columns of the parameters X of the record.
+    """
+    q, qd, _ = states
+    left, load = D @ lacking.dX, D @ np.where(friction_columns(model, names), 0.0, X)
+    for law in lacking.laws:
+        left[:, law.j] += law.torque(q[:, law.j], qd[:, law.j], load[:, law.j])
+    return float(np.linalg.norm(left))
 
 
 def has_channels(model: GeneratedModel, records: Sequence[Prepared]) -> bool:
