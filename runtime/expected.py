@@ -148,6 +148,11 @@ class ExpectedError(Part):
         )
 
     @cached_property
+    def unseen_error(self) -> float:
+        """Error on a part of the record that its other parts explain, %; nan if not computed."""
+        return unseen_error(self.result) if self.result.held_out_rows else float("nan")
+
+    @cached_property
     def lacking(self) -> Lacking | None:
         """Laws of load, position or time that the model lacks; None if nothing can be said."""
         return lacking_of(self.result)
@@ -199,22 +204,14 @@ def expected_error(
         [dict(zip(fit.names, fit.X, strict=True)).get(name, 0.0) for name in least_squares.names]
     )
     lacks = 0.0 if lacking is None else lost(lacking, states, D, X, model, least_squares.names)
-    ratio = least_squares.sigma_corrected / least_squares.sigma
-    wider = np.fmax(ratio, 1.0) * np.sqrt(unseen_by_blocks(system.observation, least_squares))
-    V = np.outer(wider, wider) * least_squares.covariance
-    near = least_squares.X
-    if dict(fit.details.get("options", {})).get("prior", "none") != "none":
-        physical = physical_model(model)
-        K, rows = physical.rows(least_squares.names), system.weighted
-        R = rows.R11 / (wider * (1.0 if system.known_variance else least_squares.sigma_rho))
-        near, V = with_values(physical, K, R, R @ least_squares.X)
-        D, still, X = D @ K, still @ K, np.linalg.lstsq(K, X, rcond=None)[0]
+    K, near, V = determined_by(model, system, least_squares, has_prior(fit))
+    D, still = D @ K, still @ K
+    if has_prior(fit):
+        X = np.linalg.lstsq(K, X, rcond=None)[0]
     A = D.reshape(-1, len(X))
     size = np.linalg.norm(A @ X)
     inertial = np.linalg.norm(A @ X - still.reshape(-1, len(X)) @ X) / size
-    M = A.T @ A @ V
-    spread = max(np.trace(M), 0.0)
-    nu = max(np.trace(M) ** 2 / np.sum(M * M.T), 1.0)
+    spread, nu = undetermined(A, V)
     open_part = (spread + np.sum((A @ (X - near)) ** 2)) / size**2
     times = np.array([1.0, *(chi2.ppf(p, nu) / nu for p in EXPECTED_INTERVAL)])
     part = np.array([1.0, *STEPS_MOVE]) * inertial * steps / (1 + steps)
@@ -226,6 +223,66 @@ def expected_error(
     )
     error, low, high = np.minimum(errors, LIMIT.LARGEST_EXPECTED).tolist()
     return Expected(error, low, high, motions)
+
+
+def has_prior(fit: Estimate) -> bool:
+    """Whether a fit uses the values of the robot file."""
+    return bool(dict(fit.details.get("options", {})).get("prior", "none") != "none")
+
+
+def determined_by(
+    model: GeneratedModel, system: System, least_squares: Estimate, prior: bool
+) -> tuple[Array, Array, Array]:
+    """Compute K, the parameters and their covariance V that rows determine, with or without values.
+
+    Without the values of the robot file (`prior`), K is the identity and the parameters are X, else
+    X = K chi and they are chi_V.
+    """
+    ratio = least_squares.sigma_corrected / least_squares.sigma
+    wider = np.fmax(ratio, 1.0) * np.sqrt(unseen_by_blocks(system.observation, least_squares))
+    if not prior:
+        V = np.outer(wider, wider) * least_squares.covariance
+        return np.eye(len(wider)), least_squares.X, V
+    physical = physical_model(model)
+    K, rows = physical.rows(least_squares.names), system.weighted
+    R = rows.R11 / (wider * (1.0 if system.known_variance else least_squares.sigma_rho))
+    return K, *with_values(physical, K, R, R @ least_squares.X)
+
+
+def undetermined(A: Array, V: Array) -> tuple[float, float]:
+    """Compute tr(A V A') and its degrees of freedom nu, for rows A of a regressor."""
+    M = A.T @ A @ V
+    trace = float(np.trace(M))
+    return max(trace, 0.0), max(trace**2 / float(np.sum(M * M.T)), 1.0)
+
+
+def unseen_error(result: Identification) -> float:
+    """Compute how far a part of the record may be off because the other parts do not tell, %.
+
+    The largest error that parameters from the other parts explain, in % of the torques of the part:
+    the upper limit of tr(W V W'), with W the rows of the part and V of the other parts, and the
+    error of the fit. It is inf if the other parts do not determine V.
+    """
+    observation, problem = result.observation, result.problem
+    most = 0.0
+    for rest, part in result.held_out_rows:
+        system = weighted_system(
+            observation.where(rest), "joint", problem.settings.estimate.columns
+        )
+        solution = system.solve()
+        if solution.rank < len(system.names):
+            return float("inf")
+        least_squares = assemble(system, solution)
+        K, _, V = determined_by(
+            result.model, system, least_squares, has_prior(result.model_estimate)
+        )
+        if not np.isfinite(V).all():
+            return float("inf")
+        at = [observation.names.index(name) for name in system.names]
+        spread, nu = undetermined(observation.W[np.ix_(part, at)] @ K, V)
+        upper = spread * chi2.ppf(EXPECTED_INTERVAL[1], nu) / nu
+        most = max(most, 100 * float(np.sqrt(upper) / np.linalg.norm(observation.Y[part])))
+    return float(np.hypot(most, result.model_estimate.relative_error))
 
 
 def lost(

@@ -17,7 +17,7 @@ from runtime.core.parameter_sets import SetDocument, SetName, Sets, ranking_text
 from runtime.core.problem import SIGNALS, Problem
 from runtime.core.provenance import record_names
 from runtime.core.record import UNNAMED, Record
-from runtime.core.rows.observation import Observation
+from runtime.core.rows.observation import Observation, halves
 from runtime.core.rows.prepared import Prepared
 from runtime.core.rows.selection import unused_joints
 from runtime.core.study import Study
@@ -250,6 +250,31 @@ class Identification:
         These data are the validation records, or else parts of the records; nan without such data.
         """
         return self.set_errors.get(self.model_columns, float("nan"))
+
+    @cached_property
+    def held_out_rows(self) -> tuple[tuple[Any, Any], ...]:
+        """Parts of the records that fits of other parts predict: rows of the fit and of the part.
+
+        Pairs of bool arrays of shape (r,); empty if separate records are predicted, or nothing is.
+        """
+        if not self.validation or self.by_records:
+            return ()
+        t, (first, *_) = self.observation.t, self.validation
+        if first.folds:
+            number = self.observation.equal_parts(first.folds)
+            return tuple((number != p, number == p) for p in np.unique(number))
+        windows = self.study.validate.split or halves(*self.observation.span)
+        inside = [
+            (t >= (-np.inf if a is None else a)) & (t <= (np.inf if b is None else b))
+            for a, b in windows
+        ]
+        return tuple((inside[0], part) for part in inside[1:])
+
+    @property
+    def unseen_error(self) -> float:
+        """Error on a part of the record that fits of other parts explain, %; nan if unknown."""
+        told = (part.unseen_error for part in self.parts)
+        return next((error for error in told if not np.isnan(error)), float("nan"))
 
     @property
     def negative(self) -> tuple[str, ...]:
