@@ -447,7 +447,7 @@ def try_causes(
     trials = [*_of_causes(baseline, causes(robot)), *_of_numbers(baseline, robot)]
     priced = [
         replace(trial, gain=trial.gain - LIMIT.RATE_GAIN)
-        if trial.cause.kind in ("rate", "coupling", "offset", "scale")
+        if trial.cause.kind in ("rate", "coupling", "offset", "scale", "ratio")
         else trial
         for trial in trials
     ]
