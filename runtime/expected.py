@@ -219,7 +219,8 @@ def expected_error(
     motions = (
         "motions over limits.q of the robot file at up to half of limits.qd"
         if limits_of(model)
-        else "motions over the range of this record at its speeds (the robot file has no limits)"
+        else "motions over the range of this record at its speeds (the robot file has no "
+        f"{missing_limits(model)})"
     )
     error, low, high = np.minimum(errors, LIMIT.LARGEST_EXPECTED).tolist()
     return Expected(error, low, high, motions)
@@ -386,6 +387,13 @@ def limits_of(model: GeneratedModel) -> tuple[Array, Array] | None:
     span, speed = (np.asarray(limits.get(key, ()), dtype=float) for key in ("q", "qd"))
     known = span.shape == (n, 2) and speed.shape == (n,) and np.isfinite([*span.T, speed]).all()
     return (span, speed) if known else None
+
+
+def missing_limits(model: GeneratedModel) -> str:
+    """Name the limits that the robot file lacks: "limits", "limits.q" or "limits.qd"."""
+    limits = dict(getattr(model, "LIMITS", {}) or {})
+    lacking = [f"limits.{key}" for key in ("q", "qd") if not len(np.ravel(limits.get(key, ())))]
+    return lacking[0] if len(lacking) == 1 else "limits" if lacking else "finite limits"
 
 
 def reference_states(

@@ -280,8 +280,11 @@ class Identification:
     def negative(self) -> tuple[str, ...]:
         """Motor inertias and friction parameters that are certainly below zero.
 
-        They are taken from `model_estimate`.
+        They are taken from `model_estimate`. Sensors behind the gears measure neither, and are not
+        judged.
         """
+        if any(record.sides[1] == "link" for record in self.records):
+            return ()
         return negative_elements(self.model, self.model_estimate)
 
     @property
