@@ -269,7 +269,7 @@ def search(own: Rows, candidates: Sequence[Candidate], size: Array, measured: Ar
             break
         found.append(candidates[best])
         system = system.with_columns(candidates[best].rows, candidates[best].F)
-    whole = Projector(system)
+    whole, without = Projector(system), Projector(own)
     laws, column = [], b
     for one in found:
         at = slice(column, column + one.F.shape[1])
@@ -284,7 +284,7 @@ def search(own: Rows, candidates: Sequence[Candidate], size: Array, measured: Ar
         for x in np.split(whole.left, np.cumsum(own.count)[:-1])
     ]
     scale = 100 * size / np.where(measured > 0, measured, np.inf)
-    return Lacking(tuple(laws), whole.X[:b], scale, scale * np.array(left))
+    return Lacking(tuple(laws), whole.X[:b] - without.X, scale, scale * np.array(left))
 
 
 class Projector:
