@@ -23,13 +23,14 @@ torque errors of motions within the range of the robot.
 The first term is what the record leaves undetermined. The second is the difference between the fit
 and the joint estimate of record and values. The third is the amount by which the encoder steps make
 inertias too small (the encoder resolution of the record: `runtime.counts.encoder_advice`). The
-fourth is what the model lacks; other effects that it lacks are included only as far as they are in
-the residuals of C.
+fourth is what the model lacks; the first two are then multiplied by the share of the squared error
+that the laws leave. Other effects that the model lacks are included only as far as they are in the
+residuals of C.
 
 The squared error of one record is a sum of b squares, a few of which are large: with
 M = K'D'D K V it is distributed as chi^2/nu with nu = tr(M)^2/tr(M^2) degrees of freedom. The
 interval of the expected error has the first two terms times quantiles of this distribution, and the
-third times STEPS_MOVE. If one direction is undetermined, nu is 1: 30 % expected may be 2 %.
+third times STEPS_MOVE, the fourth times LAWS_MOVE. If one direction is undetermined, nu is 1: 30 % expected may be 2 %.
 
 Reference: Satterthwaite (1946) for nu.
 """
@@ -62,6 +63,8 @@ EXPECTED_INTERVAL = (0.05, 0.95)
 """Probabilities of the ends of that interval. Measured: benchmarks/truth.md."""
 RANGE_ROUNDING = 1e-13
 """Eigenvalues of a scaled matrix that are rounding."""
+LAWS_MOVE = (0.6, 1.5)
+"""What the laws that the model lacks may do to predictions, over what they are expected to do: ends of the interval. Measured: benchmarks/verdicts.md."""
 REFERENCE_RANGE = (0.2, 0.8)
 """Amplitudes of the reference motion over half of the range of a joint. Measured: benchmarks/truth.md."""
 REFERENCE_SPEED = (0.1, 0.5)
@@ -213,9 +216,12 @@ def expected_error(
     inertial = np.linalg.norm(A @ X - still.reshape(-1, len(X)) @ X) / size
     spread, nu = undetermined(A, V)
     open_part = (spread + np.sum((A @ (X - near)) ** 2)) / size**2
+    if lacking is not None:  # the laws no longer make the deviations larger
+        open_part *= lacking.left
     times = np.array([1.0, *(chi2.ppf(p, nu) / nu for p in EXPECTED_INTERVAL)])
+    lacks = np.array([1.0, *LAWS_MOVE]) * lacks / size
     part = np.array([1.0, *STEPS_MOVE]) * inertial * steps / (1 + steps)
-    errors = 100 * np.sqrt(open_part * times + part**2 + (lacks / size) ** 2)
+    errors = 100 * np.sqrt(open_part * times + part**2 + lacks**2)
     motions = (
         "motions over limits.q of the robot file at up to half of limits.qd"
         if limits_of(model)

@@ -100,6 +100,12 @@ class Lacking:
     before: Array
     after: Array
 
+    @property
+    def left(self) -> float:
+        """Share of the squared error that the laws leave, on average over the joints, 0 to 1."""
+        shown = self.before > 0
+        return float(np.mean((self.after[shown] / self.before[shown]) ** 2)) if self.laws else 1.0
+
 
 @Question(
     "Does the error depend on load, position or time?",
@@ -111,7 +117,10 @@ def depends(lacking: Lacking, model: GeneratedModel) -> Answer:
     large = [law for law in lacking.laws if law.percent >= LIMIT.LAW_SHARE]
     if not large:
         return Answer("good", "No clear dependence is found")
-    law = max(large, key=lambda law: law.percent)
+    gain = lacking.before - lacking.after
+    law = max(large, key=lambda law: gain[law.j])
+    alike = [names[one.j] for one in (law, *lacking.laws) if one.kind == law.kind]
+    unit = "N*m" if joint_units(model)[law.j] == "rad" else "N"
     others = "" if len(large) == 1 else f" ({len(large)} such laws are found)"
     what = {
         "load": f"friction of joint {labels[law.j]} that grows with its load",
@@ -122,19 +131,32 @@ def depends(lacking: Lacking, model: GeneratedModel) -> Answer:
         "doubtful",
         f"The model lacks {what}, {law.percent:.1f} % of its torque{others}; with it, the error of the "
         f"joint goes from {lacking.before[law.j]:.1f} to {lacking.after[law.j]:.1f} %",
-        remedy_of(law, names[law.j]),
+        remedy_of(law, [*dict.fromkeys(alike)], unit),
     )
 
 
-def remedy_of(law: Law, number: int) -> str:
-    """Sentence that offers the law in the form of the robot file."""
+def remedy_of(law: Law, joints: Sequence[int], unit: str) -> str:
+    """Sentence that offers the law in the form of the robot file.
+
+    joints : numbers of the joints with such a law, the joint of the law first. unit : of its torque.
+    """
+    along = joints[0] if len(joints) == 1 else sorted(joints)
     if law.kind == "load":
-        value = f"{law.a[0]:.2g} +- {1.96 * law.sigma[0]:.1g}"
-        return f"write in the robot file, elements: {{FL: {{kind: load_dependent, along: {number}}}}} (FL{number} is about {value}); then identify again"
+        return (
+            f"write in the robot file, elements: {{FL: {{kind: load_dependent, along: {along}}}}} "
+            f"(FL{joints[0]} is about {law.a[0]:.2g} +- {1.96 * law.sigma[0]:.1g}); then identify again"
+        )
     if law.kind == "position":
-        k = f"{law.order:.3g}*" if law.order != 1 else ""
-        return f'write in the robot file, columns: {{PS: {{along: {number}, torque: "sin({k}q)", unit: N*m}}, PC: {{along: {number}, torque: "cos({k}q)", unit: N*m}}}}; then identify again'
-    return "warm the robot up, look for a drift of the torque or of its offset, or identify parts of the record alone (rows.window)"
+        angle = "q" if law.order == 1 else f"{law.order:.4g}*q"
+        columns = ", ".join(
+            f'{name}: {{along: {joints[0]}, torque: "{function}({angle})", unit: {unit}}}'
+            for name, function in (("PS", "sin"), ("PC", "cos"))
+        )
+        return f"write in the robot file, columns: {{{columns}}}; then identify again"
+    return (
+        "warm the robot up, look for a drift of its torque or offset, or identify parts of the "
+        "record alone (rows.window)"
+    )
 
 
 def columns_of(kind: Kind, order: float, q: Array, qd: Array, load: Array) -> Array:
