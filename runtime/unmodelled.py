@@ -119,7 +119,7 @@ def depends(lacking: Lacking, model: GeneratedModel) -> Answer:
         return Answer("good", "No clear dependence is found")
     gain = lacking.before - lacking.after
     law = max(large, key=lambda law: gain[law.j])
-    alike = [names[one.j] for one in (law, *lacking.laws) if one.kind == law.kind]
+    alike = [names[one.j] for one in (law, *large) if one.kind == law.kind]
     unit = "N*m" if joint_units(model)[law.j] == "rad" else "N"
     others = "" if len(large) == 1 else f" ({len(large)} such laws are found)"
     what = {
@@ -164,6 +164,12 @@ def columns_of(kind: Kind, order: float, q: Array, qd: Array, load: Array) -> Ar
     if kind == "load":
         return (np.abs(load) * np.sign(qd))[:, None]
     return np.column_stack([np.sin(order * q), np.cos(order * q)])
+
+
+def loaded_joints(model: GeneratedModel) -> set[int]:
+    """Numbers of the joints whose friction grows with their load in the model already."""
+    laws = [acts for kind, _, acts in elements_of(model).values() if kind == "load_dependent"]
+    return {joint for acts in laws for joint in acts if isinstance(joint, int)}
 
 
 def friction_columns(model: GeneratedModel, names: Sequence[str]) -> Array:
@@ -236,7 +242,8 @@ def lacking_of(result: Identification) -> Lacking | None:
     for j in usable:
         rows = np.flatnonzero(joint == j)
         unit = 1.0 if joint_units(model)[j] == "rad" else 2 * np.pi / max(np.ptp(q[rows]), 1e-9)
-        kinds: list[tuple[Kind, float]] = [("load", 0.0), ("time", 0.0)]
+        kinds: list[tuple[Kind, float]] = [("time", 0.0)]
+        kinds += [("load", 0.0)] if model.JOINTS[j] not in loaded_joints(model) else []
         kinds += [("position", k * unit) for k in range(1, ORDERS + 1)]
         for kind, order in kinds:
             if kind == "load":
