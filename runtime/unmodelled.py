@@ -28,7 +28,15 @@ from typing import Any, Literal, cast
 import numpy as np
 from scipy.stats import f as fisher
 
-from runtime.core.model import GeneratedModel, elements_of, is_axis, joint_labels, joint_units
+from runtime.core.model import (
+    TRANSMITTED,
+    GeneratedModel,
+    channels_of,
+    elements_of,
+    is_axis,
+    joint_labels,
+    joint_units,
+)
 from runtime.core.residuals import block_correlation, correlation_time, residual_correlation
 from runtime.core.result import Identification
 from runtime.core.rows.regressor import in_time
@@ -168,8 +176,9 @@ def columns_of(kind: Kind, order: float, q: Array, qd: Array, load: Array) -> Ar
 
 def loaded_joints(model: GeneratedModel) -> set[int]:
     """Numbers of the joints whose friction grows with their load in the model already."""
-    laws = [acts for kind, _, acts in elements_of(model).values() if kind == "load_dependent"]
-    return {joint for acts in laws for joint in acts if isinstance(joint, int)}
+    return {
+        int(c.removeprefix(TRANSMITTED)) for c in channels_of(model) if c.startswith(TRANSMITTED)
+    }
 
 
 def friction_columns(model: GeneratedModel, names: Sequence[str]) -> Array:
