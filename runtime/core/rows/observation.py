@@ -289,7 +289,9 @@ class Observation:
         One iterator for each kind of band (`bands`); the load is W X. The other parameters are
         those of `block_rows`.
         """
-        load = self.W[:, column_numbers(names, self.names)] @ X
+        whole = np.zeros(len(self.names))
+        whole[column_numbers(names, self.names)] = X
+        load = self.W @ whole
         for groups in self.bands(load):
             yield self._weighted_rows(names, weights, groups, whitener)
 
