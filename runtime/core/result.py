@@ -423,11 +423,19 @@ class Identification:
         )
         head = (
             f"{len(names)} of {len(self.estimate.names)} parameters ({self.model_columns}) by "
-            f"{fit.method}, +- 95 %"
+            f"{fit.method}, +- 95 %{self.of_intervals}"
         )
         head += f"; {more} more by --verbose" if more else ""
         head += f"; {unknown} smaller than their intervals by --verbose" if unknown else ""
         return "\n".join([head, *lines[:room], f"Unexplained by joint: {by_joint}"])
+
+    @property
+    def of_intervals(self) -> str:
+        """Words after "95 %": the condition of the intervals of an essential set, or their measure."""
+        known = self.problem.method.intervals
+        if self.model_columns == "essential":
+            return " if the others are zero"
+        return f", {known}" if known else ""
 
     def _lines(self, names: Sequence[str]) -> list[str]:
         """Write parameters with 95 % intervals and units, several parameters per line."""
