@@ -2,14 +2,21 @@
 inertia, half the force of a slide told as right. Torques are pinocchio's.
 """
 
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
+
 import truth_simulator as world
 from truth_shared import emitted, record_of
 from truth_simulator import Encoder, Truth, encoded, fourier, noise, slow
 
 import runtime
-from runtime.core.model import load_model
+from runtime.core.result import Identification
 
 
 def simulated(name, seed, motion=fourier, seconds=6.0):
@@ -57,10 +64,5 @@ def test_half_the_force_of_a_slide_is_a_doubt(factor, doubt):
 
 def test_sensors_behind_the_gears_judge_no_rotor():
     """They see neither friction nor rotors: a negative Ia names no sign or ratio."""
-    from runtime.core.result import Identification
-
-    record = type("Sided", (), {"sides": ("joint", "link")})()
-    result = Identification.__new__(Identification)
-    object.__setattr__(result, "problem", type("P", (), {"records": (record,)})())
-    assert result.negative == ()
-    assert load_model is not None
+    behind = SimpleNamespace(sides=("joint", "link"))
+    assert Identification.negative.fget(SimpleNamespace(records=(behind,))) == ()
