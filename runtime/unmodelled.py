@@ -170,7 +170,7 @@ def remedy_of(law: Law, joints: Sequence[int], unit: str) -> str:
 def columns_of(kind: Kind, order: float, q: Array, qd: Array, load: Array) -> Array:
     """Compute the columns of a law in states of its joint, shape (K, q)."""
     if kind == "load":
-        return (np.abs(load) * np.sign(qd))[:, None]
+        return np.asarray((np.abs(load) * np.sign(qd))[:, None])
     return np.column_stack([np.sin(order * q), np.cos(order * q)])
 
 
@@ -226,7 +226,7 @@ def lacking_of(result: Identification) -> Lacking | None:
         [np.arange(s.start, s.stop)[::step] for s in map(observation.joint, range(observation.n))]
     )
     joint = observation.joints[chosen]
-    at = [observation.names.index(name) for name in fit.names]
+    at = np.array([observation.names.index(name) for name in fit.names])
     W, Y = observation.W[np.ix_(chosen, at)], observation.Y[chosen]
     e, n = Y - W @ fit.X, observation.n
     size = np.array(

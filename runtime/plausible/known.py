@@ -97,7 +97,9 @@ class KnownValues(Result):
     def other_weights(self) -> Array:
         """Whether the weight on each slide is far from that of the values, bool (n,)."""
         low, high = LIMIT.WEIGHT_RATIOS
-        return np.isfinite(self.weight) & ~((low <= self.weight) & (self.weight <= high))
+        return np.asarray(
+            np.isfinite(self.weight) & ~((low <= self.weight) & (self.weight <= high))
+        )
 
     @property
     def heavy(self) -> bool:
