@@ -646,7 +646,7 @@ def decisive(
         for trial in alike[: LIMIT.ALTERNATIVES_NAMED]
         if before - baseline.unseen(trial.cause) > np.log(len(trials))
         and (other is None or helps(trial, baseline, other))
-        and (id(trial) in closer or falls(baseline, trial.cause))
+        and (id(trial) in closer or falls(baseline, trial, alone))
     ]
     if named:  # of those that gain the same, a sign changes least
         same = LIMIT.GAIN_SAME * named[0].gain
@@ -670,9 +670,15 @@ def clearly_smaller(before: Array, after: Array) -> Array:
     return np.asarray((before / after.clip(0.1) > LIMIT.VISIBLE) & (before - after > 0.2))
 
 
-def falls(baseline: Baseline, cause: Cause) -> bool:
-    """Whether a correction clearly lowers the error of a joint in a half that it was not fitted to."""
-    before, after = (baseline.held_out(one) for one in (unchanged_study(baseline.samples.n), cause))
+def falls(baseline: Baseline, trial: Trial, alone: Baseline | None) -> bool:
+    """Whether a correction clearly lowers the error of a joint in a half that it was not fitted to.
+
+    Bodies that differ from those of the file must do so without its values (`alone`).
+    """
+    assert trial.fit is not None
+    judge = alone if alone is not None and leaves_values(trial.fit, baseline) else baseline
+    causes = (unchanged_study(judge.samples.n), trial.cause)
+    before, after = (judge.held_out(cause) for cause in causes)
     return bool(clearly_smaller(before, after).any())
 
 
