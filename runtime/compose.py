@@ -50,6 +50,8 @@ from runtime.ground.settings_errors import gone
 from runtime.late import Late, Listed, PartWhen, When
 from runtime.link_side import stated_sides, torques_of_links
 from runtime.median import pulses_in_torques
+from runtime.packets.packets import KIND as PACKETS
+from runtime.packets.packets import packets_once
 from runtime.payload.settings import LOADED
 from runtime.reading.formats import is_measured
 from runtime.reading.records import read_records
@@ -85,6 +87,7 @@ STEPS: list[Step] = [
         lambda p: any(c.startswith(WRENCH) for r in (*p.records, *p.unseen) for c in r.channels),
     ),
     torques_of_links,
+    packets_once,
     pulses_in_torques,
     recorded_speeds,
     automatic_cutoff,
@@ -94,6 +97,10 @@ STEPS: list[Step] = [
     When(
         Late("runtime.controller.fitted:law_of_controller"),
         lambda p: any("law_v" in r.channels for r in p.records),
+    ),
+    When(
+        Late("runtime.plausible.rests:rows_at_rest"),
+        lambda p: p.settings.rows.low_speed == "auto" and bool(p.records),
     ),
 ]
 READERS: Listed[Reader] = Listed(
@@ -116,7 +123,15 @@ METHODS: Listed[Method] = Listed(
     }
 )
 EXTRAS: list[Extra] = [
+    PartWhen(
+        Late("runtime.packets.packets:packets_told"),
+        lambda r: r.problem.noted(PACKETS) is not None,
+    ),
     PartWhen(Late("runtime.plausible.known:torque_unit"), lambda r: bool(r.model.VALUES)),
+    PartWhen(
+        Late("runtime.controller.fitted:fitted_law"),
+        lambda r: any(record.origin.by_law for record in r.records),
+    ),
     PartWhen(
         Late("runtime.controller.fitted:doubt_of_gains"),
         lambda r: any("law_v" in record.channels for record in r.records),

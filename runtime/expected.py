@@ -94,6 +94,7 @@ class Expected(NamedTuple):
     f"{LIMIT.EXPECTED_ERROR:g} % (usable where it may be less)",
     "record a motion over the range and speeds for which you need the model, for a longer time, "
     "or with finer positions (symgen excite; signals: {reader: counts})",
+    outcome=True,
 )
 def expected_off(likely: Expected) -> Answer | None:
     """Judge whether the expected error of predicted torques is small enough; None if unknown."""

@@ -380,7 +380,8 @@ class Identification:
         Values have 95 % intervals. The text is kept to about LIMIT.LINES_PRINTED lines; `to_text`
         has everything. others : number of lines that are printed in addition to this text.
         """
-        first = [f"{check.finding}." for check in self.checklist.checks if check.ahead]
+        ahead = [check for check in self.checklist.checks if check.ahead]
+        first = [f"{check.finding}." for check in ahead]
         notes = [*self.observation.findings, *self.own_warnings, *self.missing]
         if len(notes) > LIMIT.NOTES_PRINTED:
             more = len(notes) - LIMIT.NOTES_PRINTED + 1
@@ -393,7 +394,7 @@ class Identification:
         if self.determined and self.usable:
             taken = sum(len(text.splitlines()) + 1 for text in (head, *rest) if text)
             room = max(LIMIT.LINES_PRINTED - others - taken - 2, LIMIT.LINES_OF_VALUES)
-            rest = [self._values(room, known=bool(first)), *rest]
+            rest = [self._values(room, known=any(check.state != "good" for check in ahead)), *rest]
         return "\n\n".join(text for text in (head, *rest) if text)
 
     def _values(self, room: int, *, known: bool) -> str:

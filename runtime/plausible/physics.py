@@ -229,7 +229,13 @@ def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
         if case.sides[1] == "law"
         else f"shift the torques by {', '.join(f'{-1e3 * x:+.1f}' for x in shift)} ms against the "
         "positions before reading the record, or repair the logger",
+        explains=explained(late.before[j], late.after[j]),
     )
+
+
+def explained(before: float, after: float) -> float:
+    """Compute the share of an error, %, that a correction takes away: 1 - after/before, or 0."""
+    return max(0.0, 1.0 - float(after) / float(before)) if before > 0 else 0.0
 
 
 def _from_to(text: str, before: float, after: float) -> str:
@@ -322,4 +328,6 @@ def better(case: Case, named: Sequence[Trial]) -> Answer:
         "; the errors do not change, but the parameters are nearer to the values of the robot file"
     )
     first = named[0].cause
-    return Answer("good" if friction else "no", text, first.remedy, change=first.change)
+    state: State = "good" if friction else "no"
+    gain = explained(before[j], after[j])
+    return Answer(state, text, first.remedy, change=first.change, explains=gain)

@@ -80,6 +80,7 @@ def rank_and_condition(result: Identification) -> Answer:
     f"{LIMIT.TOTAL_ERROR[0]:g} % (usable to {LIMIT.TOTAL_ERROR[1]:g} %)",
     "check the joints named below: first units, signs and ratios of the drives, "
     "then friction (--friction)",
+    outcome=True,
 )
 def total_error(result: Identification) -> Answer:
     """Check the relative error 100 ||Y - W X|| / ||Y|| of the fit over all joints, in %."""
@@ -88,7 +89,11 @@ def total_error(result: Identification) -> Answer:
     return Answer(state_of(fit.relative_error, *LIMIT.TOTAL_ERROR), text)
 
 
-@Question("On every joint?", f"{LIMIT.JOINT_ERROR[0]:g} % (usable to {LIMIT.JOINT_ERROR[1]:g} %)")
+@Question(
+    "On every joint?",
+    f"{LIMIT.JOINT_ERROR[0]:g} % (usable to {LIMIT.JOINT_ERROR[1]:g} %)",
+    outcome=True,
+)
 def explained_by_joint(result: Identification) -> Answer | None:
     """Check the largest relative error of the fit on a single joint; the total error may hide it.
 
@@ -109,7 +114,7 @@ def explained_by_joint(result: Identification) -> Answer | None:
     )
 
 
-@Question("Does it predict data it has not seen?")
+@Question("Does it predict data it has not seen?", outcome=True)
 def predicted(result: Identification) -> Answer:
     """Check the relative error, %, of torques that the model predicts for data not fitted.
 

@@ -281,8 +281,30 @@ class Observation:
                 band[own][order] = np.arange(len(order)) * BANDS // len(order)
         return band
 
+    @cached_property
+    def instants(self) -> Array:
+        """Number of the row of each joint at each instant, shape (instants, n); -1 if it has none."""
+        _, instant = np.unique(np.stack([self.record, self.t]), axis=1, return_inverse=True)
+        place = np.full((instant.max(initial=-1) + 1, self.n), -1)
+        place[instant.reshape(-1), self.joints] = np.arange(len(self.Y))
+        return place
+
+    def whitened(self, A: Array, covariance: Array) -> Array:
+        """Multiply the rows of each instant in A, shape (r, c), by L^-1, so that they are independent.
+
+        L L' is the covariance of the torques of the joints that have rows at this instant, a part
+        of `covariance`, shape (n, n). LinAlgError if it is singular.
+        """
+        white = np.empty_like(A)
+        patterns, pattern = np.unique(self.instants >= 0, axis=0, return_inverse=True)
+        for k, joints in enumerate(patterns):
+            rows = self.instants[pattern.reshape(-1) == k][:, joints]
+            L = np.linalg.cholesky(covariance[np.ix_(joints, joints)])
+            white[rows] = np.linalg.solve(L, A[rows])
+        return white
+
     def band_rows(
-        self, names: Sequence[str], weights: Array, X: Array, whitener: Array | None = None
+        self, names: Sequence[str], weights: Array, X: Array, covariance: Array | None = None
     ) -> Iterator[Iterator[Array]]:
         """Yield the weighted rows of [W Y], shape (rows, b + 1), one band after another.
 
@@ -293,16 +315,16 @@ class Observation:
         whole[column_numbers(names, self.names)] = X
         load = self.W @ whole
         for groups in self.bands(load):
-            yield self._weighted_rows(names, weights, groups, whitener)
+            yield self._weighted_rows(names, weights, groups, covariance)
 
     def _weighted_rows(
-        self, names: Sequence[str], weights: Array, groups: Array, whitener: Array | None
+        self, names: Sequence[str], weights: Array, groups: Array, covariance: Array | None
     ) -> Iterator[Array]:
         """Yield the weighted rows of [W Y] of each group; `groups` has the group of each row."""
         kept = column_numbers(names, self.names)
-        if whitener is not None:
+        if covariance is not None:
             A = np.column_stack([self.W[:, kept], self.Y])
-            yield from split_rows(whitened(A, whitener), groups)
+            yield from split_rows(self.whitened(A, covariance), groups)
             return
         row_weights = np.repeat(weights, self.rows)
         for rows in rows_by_block(groups):
@@ -310,7 +332,7 @@ class Observation:
             yield A * row_weights[rows, None]
 
     def block_rows(
-        self, names: Sequence[str], weights: Array, length: float, whitener: Array | None = None
+        self, names: Sequence[str], weights: Array, length: float, covariance: Array | None = None
     ) -> Iterator[Array]:
         """Yield the weighted rows of [W Y], shape (rows, b + 1), block of time by block of time.
 
@@ -325,11 +347,12 @@ class Observation:
             Factors by which the rows of each joint are multiplied.
         length : float, s
             Length of a block.
-        whitener : ndarray, shape (n, n), optional
-            Multiplies the n rows of one instant, in place of the weights.
+        covariance : ndarray, shape (n, n), optional
+            Covariance of the torques of one instant, by which rows are whitened in place of the
+            weights.
         """
-        if whitener is not None or self.block_factors is None or length != self.residual_block:
-            yield from self._weighted_rows(names, weights, self.blocks(length), whitener)
+        if covariance is not None or self.block_factors is None or length != self.residual_block:
+            yield from self._weighted_rows(names, weights, self.blocks(length), covariance)
         else:
             kept = column_numbers(names, self.names)
             for joints in self.block_factors:
@@ -357,17 +380,6 @@ def rows_by_block(blocks: Array) -> list[Array]:
     """
     order = np.argsort(blocks, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(blocks[order])) + 1)
-
-
-def whitened(A: Array, whitener: Array) -> Array:
-    """Multiply the n rows (one per joint) of each instant in A by the (n, n) matrix `whitener`.
-
-    A : shape (n*N, c), joint-major.
-    """
-    n = len(whitener)
-    return np.asarray(
-        np.einsum("ij,jNc->iNc", whitener, A.reshape(n, -1, A.shape[1])).reshape(A.shape)
-    )
 
 
 def halves(t0: float, t1: float) -> tuple[Window, Window]:
