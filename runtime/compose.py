@@ -4,7 +4,7 @@
     READERS    Record, Signals -> States: signals.reader of a study (`runtime.core.signals.reader`)
     METHODS    Observation -> rows of a least squares -> their fit: estimate.method of a study
     EXTRAS     Identification -> Part: further analyses of the records
-    QUESTIONS  Identification -> Check: what the verdict asks, before the questions of the parts
+    QUESTIONS  Identification -> Check: what the verdict asks; a part asks its own
 
 Each call builds a Problem from model, records and study, prepares it by STEPS and passes it to one
 function of the package. A feature is one file and one line of a list.
@@ -46,7 +46,6 @@ from runtime.counts.encoder_advice import EncoderSteps
 from runtime.expected import ExpectedError
 from runtime.ground.arrays import kind_of, require_kind
 from runtime.ground.errors import InputError, SettingsError
-from runtime.ground.part import About
 from runtime.ground.settings_errors import gone
 from runtime.late import Late, Listed, PartWhen, When
 from runtime.link_side import stated_sides, torques_of_links
@@ -62,7 +61,7 @@ from runtime.speeds import recorded_speeds
 from runtime.study import Study, study_of, study_schema
 from runtime.threads import alone_each, single_threaded
 from runtime.verdict import questions
-from runtime.verdict.verdict import Ask, verdict
+from runtime.verdict.verdict import Ask, of_parts, verdict
 
 if TYPE_CHECKING:
     from runtime.advisor.advice import Advice
@@ -177,17 +176,19 @@ EXTRAS: list[Extra] = [
     ),
 ]
 
-QUESTIONS: Mapping[About, list[Ask]] = {
-    "record": [questions.determined],
-    "prediction": [questions.total_error, questions.explained_by_joint, questions.predicted],
-    "values": [
-        questions.signs,
-        questions.certain,
-        questions.separate,
-        questions.conditioned,
-    ],
-}
-judged = partial(verdict, questions=QUESTIONS)
+RECORD_QUESTIONS: list[Ask] = [questions.determined, of_parts("record")]
+QUESTIONS: list[Ask] = [
+    questions.total_error,
+    questions.explained_by_joint,
+    of_parts("prediction"),
+    questions.predicted,
+    questions.signs,
+    questions.certain,
+    questions.separate,
+    questions.conditioned,
+    of_parts("values"),
+]
+judged = partial(verdict, on_record=RECORD_QUESTIONS, on_parameters=QUESTIONS)
 
 Records = Record | Sequence[Record]
 T = TypeVar("T")
@@ -847,6 +848,7 @@ __all__ = [
     "METHODS",
     "QUESTIONS",
     "READERS",
+    "RECORD_QUESTIONS",
     "STEPS",
     "InputError",
     "advise",
