@@ -207,7 +207,7 @@ def expected_error(
     X = np.array(
         [dict(zip(fit.names, fit.X, strict=True)).get(name, 0.0) for name in least_squares.names]
     )
-    lacks = 0.0 if lacking is None else lost(lacking, states, D, X, model, least_squares.names)
+    lost_part = 0.0 if lacking is None else lost(lacking, states, D, X, model, least_squares.names)
     K, near, V = determined_by(model, system, least_squares, has_prior(fit))
     D, still = D @ K, still @ K
     if has_prior(fit):
@@ -220,7 +220,7 @@ def expected_error(
     if lacking is not None:  # the laws no longer make the deviations larger
         open_part *= lacking.left
     times = np.array([1.0, *(chi2.ppf(p, nu) / nu for p in EXPECTED_INTERVAL)])
-    lacks = np.array([1.0, *LAWS_MOVE]) * lacks / size
+    lacks = np.array([1.0, *LAWS_MOVE]) * lost_part / size
     part = np.array([1.0, *STEPS_MOVE]) * inertial * steps / (1 + steps)
     errors = 100 * np.sqrt(open_part * times + part**2 + lacks**2)
     motions = (

@@ -254,7 +254,7 @@ class Case:
     @property
     def coarse(self) -> bool:
         """Whether noise of the positions hides the accelerations, as steps of coarse encoders do."""
-        return self.noise_floor > LIMIT.COARSE
+        return bool(self.noise_floor > LIMIT.COARSE)
 
     @cached_property
     def noise_floor(self) -> float:
