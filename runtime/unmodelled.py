@@ -372,7 +372,7 @@ class Projector:
         g = F.T @ self.left[rows]
         statistic = float(g @ np.linalg.pinv(C, hermitian=True) @ g) / q * (K - q) / (K - 1)
         p = float(fisher.sf(statistic, q, K - q))
-        return p if self.helps(MF) else 1.0
+        return p if p > LIMIT.LAW_CERTAIN or self.helps(MF) else 1.0
 
     def helps(self, MF: Array) -> bool:
         """Whether the law from the even blocks takes away error in the odd ones, and vice versa."""
