@@ -35,6 +35,7 @@ from runtime.reading.likely_columns import candidates, known_columns
 from runtime.reading.records import read_records
 from runtime.reading.settings import Records, RecordSettings, with_law
 from runtime.reading.units import speed
+from runtime.mending.corrections import Corrections
 
 RARE_WRAPS = 0.05
 """Share of the steps between two samples that may be jumps of an angle by a full turn."""
@@ -91,6 +92,8 @@ class Study(chapter.Study, Recorded):
         Closed loop for simulation, IV and DIDIM.
     excitation : ExcitationSettings or None
         Search for an exciting motion.
+    robot : Corrections or None
+        Entries that replace those of the robot file.
     """
 
     rows: Rows = field(default_factory=Rows)
@@ -98,6 +101,7 @@ class Study(chapter.Study, Recorded):
     payload: PayloadSettings | None = None
     controller: Controller | None = None
     excitation: ExcitationSettings | None = None
+    robot: Corrections | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "record", with_law(self.record, self.controller))
