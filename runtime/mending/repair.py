@@ -371,22 +371,23 @@ def _candidate(reading: Reading, start: Reading) -> Candidate:
 
 
 def _changes(best: Reading, start: Reading) -> list[Change]:
-    """Write each changed line, with the steps that change it."""
+    """Write each changed line, with the steps that change it.
+
+    A line belongs to the steps without which it would be another one.
+    """
     after = best.unseen_error
     told: dict[tuple[str | int, ...], list[tuple[str, float]]] = {}
-    present = start
     for step in best.steps:
-        new = present.again([step])
         others = start.again([one for one in best.steps if one is not step])
-        without = np.inf if others is None else others.unseen_error
-        assert new is not None
-        for line in differences(present.study, new.study):
-            told.setdefault(line["path"], []).append((step.says, without))
-        present = new
+        if others is None:
+            continue
+        for line in differences(others.study, best.study):
+            told.setdefault(line["path"], []).append((step.says, others.unseen_error))
+    every = "; ".join(step.says for step in best.steps)
     changes = []
     for line in differences(start.study, best.study):
-        own = told.get(line["path"], [])
+        own = told.get(line["path"], [(every, start.unseen_error)])
         says = ", and ".join(dict.fromkeys(text for text, _ in own))
-        without = max((error for _, error in own), default=start.unseen_error)
+        without = max(error for _, error in own)
         changes.append(Change(**line, says=says, error_without=without, error_with=after))
     return changes
