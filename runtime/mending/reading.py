@@ -35,6 +35,8 @@ LIMIT = limits(__package__)
 
 Array = np.ndarray
 
+FITTED = {"gravity": 2, "factor": 1, "scale": 1, "ratio": 1, "zero": 1, "angle": 1, "length": 1}
+"""Numbers that a cause fits, by its kind."""
 NOT_WRITTEN = ("load", "friction", "offset", "known")
 """Causes that no line of a study corrects."""
 
@@ -54,6 +56,13 @@ class Step:
     says: str
     cause: Cause | None = None
     delay: Array | None = None
+
+    @property
+    def numbers(self) -> int:
+        """Numbers that were fitted: none of a sign or a unit, two of a direction of gravity."""
+        if self.cause is None:
+            return 0 if self.delay is None else len({*self.delay})
+        return FITTED.get(self.cause.kind, 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -390,31 +399,50 @@ class Reading:
         return float(
             N * np.log(errors[moving] / 100).sum()
             + fit.penalty
-            + LIMIT.CHANGE_PRICE * len(self.steps)
+            + self.price(N)
         )
 
-    @cached_property
-    def unseen_error(self) -> float:
-        """Error of the rows that are set aside, %, by the fit of the rows of the search.
+    def price(self, N: float) -> float:
+        """Price of the changes, nats: of each change, and half of log N of each fitted number."""
+        numbers = sum(step.numbers for step in self.steps)
+        return float(LIMIT.CHANGE_PRICE * len(self.steps) + numbers * np.log(max(N, 1.0)) / 2)
 
-        With validation records, it is the larger one of both errors.
+    @property
+    def unseen_error(self) -> float:
+        """Error of the rows that are set aside, %: root mean square over the joints."""
+        return self.unseen[0]
+
+    @property
+    def unseen_total(self) -> float:
+        """Error of the rows that are set aside, % of all torques."""
+        return self.unseen[1]
+
+    @cached_property
+    def unseen(self) -> tuple[float, float]:
+        """Errors of the rows that are set aside, %, by the fit of the rows of the search.
+
+        The root mean square over the joints, and the share of all torques, each the larger one
+        of the records and the validation records.
         """
         if self.baseline is None:
-            return np.inf
+            return np.inf, np.inf
         parts = [self.samples(self.data.aside)]
         if self.data.unseen is not None:
             parts.append(self.samples(raw=self.data.unseen))
-        return max(map(self._predicted, parts))
+        errors = [self._predicted(part) for part in parts]
+        return max(e for e, _ in errors), max(e for _, e in errors)
 
-    def _predicted(self, samples: Samples) -> float:
+    def _predicted(self, samples: Samples) -> tuple[float, float]:
         assert self.baseline is not None
         try:
             other = replace(self.baseline, samples=samples, D=self.regressor(samples))
         except ValueError:
-            return np.inf
+            return np.inf, np.inf
         grams = Grams.of(*other.as_given, other.tau)
         fit = fit_of(other.standard(grams), self.baseline.given.X, 1.0)
-        return over_joints(fit.errors[grams.rows > 0])
+        sizes = np.sqrt(grams.measured)
+        total = np.linalg.norm(fit.errors * sizes) / np.linalg.norm(sizes)
+        return over_joints(fit.errors[grams.rows > 0]), float(total)
 
 
 def over_joints(errors: Array) -> float:

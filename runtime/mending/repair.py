@@ -2,9 +2,10 @@
 
     blocks of the records set aside -> search on the others -> judge on those set aside -> lines
 
-A repair is kept if it leaves less than REMAINS of the unseen rows and less than SHARE of the error
-of the study as given, or if every change is a named cause (`runtime.plausible`) and it leaves less
-than REMAINS_NAMED. It is kept as a whole or not at all: half of a repair is another error.
+Errors are root mean squares over the joints. A repair is kept if it leaves less than REMAINS of all
+torques of the unseen rows, and less than SHARE of the error of the study as given, or if every change is a named cause (`runtime.plausible`) and it leaves less
+than REMAINS_NAMED; unless it is a unit or a side, the error must fall, since a number that only the
+values of the robot file speak for is a guess. It is kept as a whole or not at all: half of a repair is another error.
 """
 
 from __future__ import annotations
@@ -31,12 +32,14 @@ from runtime.plausible.jumps import cut_torques, jumps
 from runtime.plausible.plausibility import case_of
 from runtime.plausible.samples import excerpts, samples_of
 from runtime.mending.edits import Lines, Place, differences
-from runtime.mending.reading import Data, Reading, record_of, set_aside
+from runtime.mending.reading import Data, Reading, Step, record_of, set_aside
 from runtime.mending.search import Found, further, search
 
 LIMIT = limits(__package__)
 
 Array = np.ndarray
+BY_VALUES = ("unit", "side")
+"""Kinds of causes that the values of the robot file alone may show: they fit no number."""
 Columns = Callable[[Mapping[str, Any]], tuple[Sequence[str], Sequence[str]]]
 
 
@@ -325,15 +328,15 @@ def _simplest(best: Reading, start: Reading, found: Found) -> tuple[Reading, lis
     if not best.steps:
         return best, []
     weight = _weight(best, start)
-    price = LIMIT.CHANGE_PRICE
-    level = best.score(found.N) - price * len(best.steps)
+    N = found.N
+    level = best.score(N) - best.price(N)
     alike = {best.key: best}
     for cause in found.hidden[best.key]:
         one = best.changed(cause)
         if one is not None:
             alike[one.key] = replace(one, named=best.named)
     for one in found.readings.values():
-        if one.steps and one.score(found.N) - price * len(one.steps) < level + LIMIT.SAME:
+        if one.steps and one.score(N) - one.price(N) < level + LIMIT.SAME:
             alike.setdefault(one.key, one)
     simple = [one for one in alike.values() if _weight(one, start)[0] <= weight[0] and one.steps]
     chosen = min(simple, key=lambda one: (_weight(one, start), one is not best))
@@ -349,14 +352,20 @@ def _judged(best: Reading, start: Reading) -> tuple[bool, str]:
         )
     before, after = start.unseen_error, best.unseen_error
     told = f"rows that were not used: {before:.2g} % unexplained as given, {after:.2g} % with"
-    if after < LIMIT.REMAINS and after < LIMIT.SHARE * before:
+    if best.unseen_total < LIMIT.REMAINS and after < LIMIT.SHARE * before:
         return True, f"{len(best.steps)} changed; {told} all changes."
-    if best.named and after < LIMIT.REMAINS_NAMED:
+    shown = after < before / LIMIT.SHOWN or {*map(_kind, best.steps)} <= {*BY_VALUES}
+    if best.named and shown and best.unseen_total < LIMIT.REMAINS_NAMED:
         return True, f"{len(best.steps)} changed, each a decisive cause; {told} all changes."
     return False, (
-        f"Nothing changes: the best changes found are not certain enough; {told} them, and less "
-        f"than {LIMIT.REMAINS:g} % and than {LIMIT.SHARE:g} of the given error is asked."
+        f"Nothing changes: the best changes found are not certain enough; {told} them "
+        f"({best.unseen_total:.2g} % of all torques); less than {LIMIT.REMAINS:g} % of all torques, "
+        f"and less than {LIMIT.SHARE:g} of the given error, is asked."
     )
+
+
+def _kind(step: Step) -> str:
+    return "delay" if step.cause is None else step.cause.kind
 
 
 def _candidate(reading: Reading, start: Reading) -> Candidate:

@@ -9,7 +9,7 @@ wrong one may gain more. Where the error is small, only named causes are tried.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from runtime.ground.limits import limits
 from runtime.ground.progress import at
@@ -17,10 +17,11 @@ from runtime.plausible.causes import Cause
 from runtime.plausible.trials import decisive, try_causes
 from runtime.mending.gravity import tilted
 from runtime.mending.late import late_torques
+from runtime.mending.ratio import other_ratios
 from runtime.mending.reading import Reading, best_of
 from runtime.mending.reversed import reversed_torques
 
-LIMIT = limits(__package__)
+LIMIT, TRIED = limits(__package__), limits("runtime.plausible")
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +91,8 @@ def further(reading: Reading) -> tuple[list[Reading], tuple[Cause, ...]]:
     if baseline is None:
         return [], ()
     trials = try_causes(baseline, reading.sides, reading.units)
+    ratios = [replace(t, gain=t.gain - TRIED.RATE_GAIN) for t in other_ratios(reading)]
+    trials = sorted([*trials, *ratios], key=lambda trial: -trial.gain)
     if case.robot_values is not None and case.robot_values.heavy:
         trials = [t for t in trials if t.cause.kind != "rate"]
     named = decisive(trials, baseline, case.noise_floor, None, reading.alone)
