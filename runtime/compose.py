@@ -1,9 +1,10 @@
-"""Public functions of identification, and lists of preparation steps, readers, methods, analyses.
+"""Public functions of identification, and lists of preparation steps, readers, methods, analyses, questions.
 
     STEPS      Problem -> Problem: changes of a problem before its rows are made, in this order
     READERS    Record, Signals -> States: signals.reader of a study (`runtime.core.signals.reader`)
     METHODS    Observation -> rows of a least squares -> their fit: estimate.method of a study
     EXTRAS     Identification -> Part: further analyses of the records
+    QUESTIONS  Identification -> Check: what the verdict asks, before the questions of the parts
 
 Each call builds a Problem from model, records and study, prepares it by STEPS and passes it to one
 function of the package. A feature is one file and one line of a list.
@@ -45,6 +46,7 @@ from runtime.counts.encoder_advice import EncoderSteps
 from runtime.expected import ExpectedError
 from runtime.ground.arrays import kind_of, require_kind
 from runtime.ground.errors import InputError, SettingsError
+from runtime.ground.part import About
 from runtime.ground.settings import structure
 from runtime.ground.settings_errors import gone
 from runtime.late import Late, Listed, PartWhen, When
@@ -58,6 +60,8 @@ from runtime.rest import STATIC, poses_at_rest
 from runtime.speeds import recorded_speeds
 from runtime.study import Study, study_of, study_schema
 from runtime.threads import alone_each, single_threaded
+from runtime.verdict import questions
+from runtime.verdict.verdict import Ask, verdict
 
 if TYPE_CHECKING:
     from runtime.advisor.advice import Advice
@@ -163,6 +167,18 @@ EXTRAS: list[Extra] = [
         ),
     ),
 ]
+
+QUESTIONS: Mapping[About, list[Ask]] = {
+    "record": [questions.determined],
+    "prediction": [questions.total_error, questions.explained_by_joint, questions.predicted],
+    "values": [
+        questions.signs,
+        questions.certain,
+        questions.separate,
+        questions.conditioned,
+    ],
+}
+judged = partial(verdict, questions=QUESTIONS)
 
 Records = Record | Sequence[Record]
 T = TypeVar("T")
@@ -487,7 +503,7 @@ def identify(
     if plausible or (plausible is None and variants is not None):
         asked["plausible"] = {"variants": variants}
     whole = _with_loaded(model, records, study, further, loaded, simulator)
-    return identification.identify(whole, extras(asked), provenance=provenance)
+    return identification.identify(whole, extras(asked), judged, provenance=provenance)
 
 
 @single_threaded
@@ -516,7 +532,7 @@ def assess(
     whole = _with_loaded(model, records, study, None, None, None)
     progress("identification")
     return identification.identify(
-        whole, extras(asked, attempted=True), provenance=provenance, progress=progress
+        whole, extras(asked, attempted=True), judged, provenance=provenance, progress=progress
     )
 
 
@@ -552,7 +568,7 @@ def compare(
     if variants is not None:
         plausible = Late("runtime.plausible.plausibility:plausibility_of")
         of_the_best.append(partial(plausible, variants=variants))
-    return comparing.compare(problems, extras({}), of_the_best)
+    return comparing.compare(problems, extras({}), judged, of_the_best)
 
 
 @single_threaded
@@ -871,6 +887,7 @@ def _candidate(model: GeneratedModel, candidate: Study | tuple[Study, Records, R
 __all__ = [
     "EXTRAS",
     "METHODS",
+    "QUESTIONS",
     "READERS",
     "STEPS",
     "InputError",

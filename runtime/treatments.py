@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.identify import Extra, identify, with_parts
+from runtime.core.identify import Extra, Judge, identify, with_parts
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.parameter_sets import ORDER, SetName, best_set
 from runtime.core.problem import Problem, estimated
@@ -143,7 +143,10 @@ class Ranking:
 
 
 def compare(
-    problems: Mapping[str, Problem], extras: Sequence[Extra], of_the_best: Sequence[Extra] = ()
+    problems: Mapping[str, Problem],
+    extras: Sequence[Extra],
+    judge: Judge,
+    of_the_best: Sequence[Extra] = (),
 ) -> Ranking:
     """Identify a robot by each treatment of its records, and order these by prediction error.
 
@@ -153,6 +156,8 @@ def compare(
         Prepared, by name of the treatment; their unseen records are of the same instants.
     extras : sequence of Extra
         Further analyses of every treatment.
+    judge : function of Identification
+        Answers the questions of the verdict.
     of_the_best : sequence of Extra
         Additional analyses of the best treatment.
 
@@ -172,7 +177,7 @@ def compare(
     for name, problem in problems.items():
         at(f"treatment {name}")
         try:
-            results[name] = identify(problem, extras)
+            results[name] = identify(problem, extras, judge)
         except InputError as e:
             missing.append(f"{name}: {e}")
     if not results:

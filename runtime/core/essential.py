@@ -20,6 +20,7 @@ from runtime.core.least_squares.linear import System, assemble, standard_deviati
 from runtime.core.model import GeneratedModel
 from runtime.core.study import EssentialSettings
 from runtime.ground.documents import Result
+from runtime.ground.limits import LIMIT
 from runtime.ground.table import aligned, percentage
 
 THRESHOLDS = (1.02, 1.03, 1.04, 1.05, 1.06, 1.07, 1.08, 1.09, 1.10)
@@ -190,3 +191,36 @@ def _relative(C: np.ndarray, X: np.ndarray) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
         relative = 100 * np.sqrt(np.diag(C)) / np.abs(X)
     return np.where(np.isnan(relative), np.inf, relative)
+
+
+def lost_joints(estimate: Estimate, fit: Estimate) -> str:
+    """Name the joints whose torques fit badly because parameters were removed, and give a remedy.
+
+    Return "" if there are none.
+
+    Such joints occur because the threshold of the essential parameters uses ||Y - W X|| of all
+    joints. Without weights this norm mostly depends on the joint with the largest forces, such as a
+    lift in N next to a wrist in N m.
+    """
+    if len(fit.names) == len(estimate.names):
+        return ""
+    whole = {joint.joint: joint.relative_error for joint in estimate.per_joint}
+    lost = [
+        joint
+        for joint in fit.per_joint
+        if joint.relative_error > max(LIMIT.LOST_JOINT, 2 * whole.get(joint.joint, np.inf))
+    ]
+    if not lost:
+        return ""
+    weighted = any(joint.scale != 1.0 for joint in estimate.per_joint)
+    remedy = (
+        "lower essential.threshold"
+        if weighted
+        else "weigh the joints by their noise (estimate: {method: wls})"
+    )
+    by_all = " and ".join(f"{whole[joint.joint]:.1f} % of joint {joint.joint}" for joint in lost)
+    by_essential = " and ".join(f"{joint.relative_error:.1f} %" for joint in lost)
+    return (
+        f"all parameters leave {by_all} unexplained, the essential ones {by_essential}: "
+        f"parameters with small torques were removed because other joints have large forces; {remedy}"
+    )

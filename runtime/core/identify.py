@@ -17,9 +17,12 @@ from runtime.core.provenance import record_names
 from runtime.core.result import Identification
 from runtime.core.uncertainty import uncertainty
 from runtime.core.validation import direct_comparison, weak_directions
+from runtime.ground.checklist import Checklist
 from runtime.ground.errors import InputError, SettingsError
 from runtime.ground.part import Part
 
+Judge: TypeAlias = Callable[[Identification], Checklist]
+"""A function that answers the questions of the verdict (`runtime.verdict`)."""
 Extra: TypeAlias = Callable[[Identification], Part | None]
 """A function that makes a Part of an identification, or None if it has nothing to say."""
 
@@ -60,6 +63,7 @@ class OnRequest:
 def identify(
     problem: Problem,
     extras: Sequence[Extra],
+    judge: Judge,
     *,
     provenance: Mapping[str, Any] | None = None,
     progress: Callable[[str], None] = lambda label: None,
@@ -72,6 +76,8 @@ def identify(
         A prepared problem.
     extras : sequence of Extra
         Further analyses, made in this order.
+    judge : function of Identification
+        Answers the questions of the verdict.
     provenance : mapping, optional
         Further entries that help to reproduce the result; names of the records, hashes and versions
         are added.
@@ -113,6 +119,7 @@ def identify(
         comparison=comparison,
         correlations=weak_directions(system),
         uncertainty=uncertainty(system, essential, comparison),
+        judge=judge,
         missing=missing,
     )
     return with_parts(result, extras, progress)

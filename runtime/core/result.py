@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 
-from runtime.core.checklist import Checklist, checklist_of, lost_joints, negative_elements
-from runtime.core.essential import Essential
+from runtime.core.essential import Essential, lost_joints
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.model import GeneratedModel, joint_labels, joint_torque_units
 from runtime.core.parameter_sets import SetDocument, SetName, Sets, ranking_text, written_sets
@@ -22,7 +21,7 @@ from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared
 from runtime.core.rows.selection import unused_joints
 from runtime.core.study import Study
-from runtime.core.uncertainty import Uncertainty
+from runtime.core.uncertainty import Uncertainty, negative_elements
 from runtime.core.validation import (
     CrossValidation,
     JointComparison,
@@ -30,6 +29,7 @@ from runtime.core.validation import (
     WeakDirections,
     record_errors,
 )
+from runtime.ground.checklist import Checklist
 from runtime.ground.documents import json_text
 from runtime.ground.limits import LIMIT
 from runtime.ground.part import Part, printed
@@ -63,6 +63,8 @@ class Identification:
     uncertainty : Uncertainty
         Standard deviations without the assumption of independent residuals, whiteness of the
         residuals, F-tests, essential sets by threshold.
+    judge : function of Identification
+        Answers the questions of the verdict.
     unseen_rows : mapping of str to Observation
         Rows of the records that are predicted, not fitted, by name.
     parts : tuple of Part
@@ -79,6 +81,7 @@ class Identification:
     validation: tuple[CrossValidation, ...]
     correlations: WeakDirections
     uncertainty: Uncertainty
+    judge: Callable[[Identification], Checklist]
     unseen_rows: Mapping[str, Observation] = field(default_factory=dict)
     parts: tuple[Part, ...] = ()
     missing: tuple[str, ...] = ()
@@ -270,21 +273,7 @@ class Identification:
     @cached_property
     def checklist(self) -> Checklist:
         """The verdict on the identification, with all its checks."""
-        drawn = self.uncertainty.bootstrap
-        return checklist_of(
-            self.estimate,
-            self.model_estimate,
-            self.verdict,
-            bootstrap=dict(zip(drawn.names, drawn.drawn, strict=True))
-            if self.model_columns == "essential"
-            else {},
-            prediction_error=self.prediction_error,
-            expected_error=self.expected_error,
-            halves=bool(self.validation) and not self.by_records,
-            negative=self.negative if self.determined else (),
-            parts=self.parts,
-            single=self.study.validate.values,
-        )
+        return self.judge(self)
 
     @property
     def verdict(self) -> str:

@@ -18,7 +18,7 @@ References: Seber and Lee (2003), section 4.3, for F.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +29,7 @@ from runtime.core.essential import Essential
 from runtime.core.least_squares.block_covariance import gram_solution, scatter
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import System
+from runtime.core.model import SIGNED, GeneratedModel, is_form
 from runtime.core.residuals import Whiteness, effective_share, whiteness
 from runtime.core.validation import JointComparison
 from runtime.ground.documents import Result
@@ -355,3 +356,21 @@ def sets(essential: Essential) -> tuple[tuple[float, int, tuple[str, ...]], ...]
         ]
         by_threshold.append((threshold, count, tuple(differs)))
     return tuple(by_threshold)
+
+
+def negative_elements(model: GeneratedModel, fit: Estimate) -> tuple[str, ...]:
+    """Return the friction parameters and motor inertias of a fit that are certainly below zero.
+
+    Certainly means by LIMIT.CERTAIN_SIGN standard deviations, of which the larger kind is used.
+    Parameters that are regrouped with others are not tested.
+    """
+    elements: Mapping[str, Any] = getattr(model, "ELEMENTS", {})
+    signed = {
+        name for name, (kind, _, acts) in elements.items() if kind in SIGNED and not is_form(acts)
+    }
+    sigma = np.fmax(fit.sigma, fit.sigma_corrected)
+    return tuple(
+        name
+        for i, name in enumerate(fit.names)
+        if name in signed and fit.X[i] < -LIMIT.CERTAIN_SIGN * sigma[i]
+    )

@@ -35,7 +35,8 @@ LIMIT = limits(__package__)
 
 Array = np.ndarray
 
-FITTED = {"gravity": 2, "factor": 1, "scale": 1, "ratio": 1, "zero": 1, "angle": 1, "length": 1}
+FITTED = {"gravity": 2, "factor": 1, "scale": 1, "ratio": 1, "zero": 1, "angle": 1, "length": 1,
+          "rate": 1}
 """Numbers that a cause fits, by its kind."""
 NOT_WRITTEN = ("load", "friction", "offset", "known")
 """Causes that no line of a study corrects."""

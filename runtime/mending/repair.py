@@ -210,11 +210,12 @@ def repair(problem: Problem, study: Any, *, variants: Any, columns: Columns) -> 
     best = _without_needless(found.best, start, found.N)
     if best.key not in found.hidden:
         found.hidden[best.key] = further(best)[1]
+    same = found.hidden[best.key]
     best, others = _simplest(best, start, found)
     at("repair: the rows that were set aside")
     kept, reason = _judged(best, start)
     again = tuple(record_of(best, one) for one in problem.records)
-    hidden = tuple(dict.fromkeys(cause.subject for cause in found.hidden[best.key]))
+    hidden = tuple(dict.fromkeys(cause.subject for cause in same))
     if not kept:
         ranked = sorted(found.readings.values(), key=lambda one: one.score(found.N))
         listed = [one for one in ranked if one.steps][: LIMIT.BEAM]

@@ -102,7 +102,9 @@ def further(reading: Reading) -> tuple[list[Reading], tuple[Cause, ...]]:
     if not good:
         chosen = {id(t.cause) for t in named}
         others = [t for t in trials if id(t.cause) not in chosen and t.gain > LIMIT.STEP_GAIN]
-        causes += [(t.cause, False) for t in others[: LIMIT.TRIALS_TAKEN] if t.cause.kind != "rate"]
+        if case.noise_floor > TRIED.NOISY:  # small accelerations undo what noise makes
+            others = [t for t in others if t.cause.kind != "rate"]
+        causes += [(t.cause, False) for t in others[: LIMIT.TRIALS_TAKEN]]
         causes += [(cause, False) for cause in reversed_torques(reading)]
     if (tilt := tilted(reading)) is not None:
         causes.append((tilt, True))

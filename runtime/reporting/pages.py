@@ -12,8 +12,8 @@ from math import log2, pi
 from typing import Any
 
 from runtime.core.cestac.result import Cestac, error_against_resolution
-from runtime.core.checklist import Checklist
 from runtime.core.result import Identification
+from runtime.ground.checklist import Checklist
 from runtime.ground.part import Part
 from runtime.ground.table import Table
 from runtime.reporting import figures as plots

@@ -18,11 +18,11 @@ import symgen
 from oracles.pinocchio_model import PinocchioModel
 from runtime import InputError, observe
 from runtime.compose import estimate_of, state_problem
-from runtime.core.checklist import negative_elements
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.model import load_model
 from runtime.core.rows.observation import Observation
 from runtime.core.study import EstimateSettings
+from runtime.core.uncertainty import negative_elements
 from runtime.core.validation import split_validation
 from runtime.ground.errors import SettingsError
 from runtime.physical.feasibility import (

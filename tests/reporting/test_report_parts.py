@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from runtime.advisor.advice import answer
-from runtime.core.checklist import certain, checklist_of, lost_joints, separate
+from runtime.compose import judged
+from runtime.core.essential import lost_joints
 from runtime.core.least_squares.estimate import Estimate, JointFit
 from runtime.core.model import load_model
 from runtime.core.study import Decimate, Signals
@@ -37,6 +38,7 @@ from runtime.reporting.sections import (
     torque_section,
 )
 from runtime.reporting.series import extremes, gaps, series
+from runtime.verdict.questions import certain, separate
 from symgen.symbols.printers import letter as other_symbol
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
@@ -159,17 +161,32 @@ class Asking(Part):
         return self.asked
 
 
-def checked(estimate, unseen=5.0, *, every=None, **asked):
-    asked = {"parts": [Consistency(estimate, estimate), Asking("values", answer(None))], **asked}
-    deviations = dict(zip(estimate.names, 2.5 * estimate.sigma, strict=True))
-    return checklist_of(
-        every or estimate,
-        estimate,
-        "2 of 2.",
-        bootstrap=deviations,
-        prediction_error=unseen,
-        **asked,
+def asked_about(estimate, unseen=5.0, *, every=None, halves=False, single=False, **known):
+    """An identification as far as the questions look at it."""
+    whole = every or estimate
+    drawn = SimpleNamespace(names=estimate.names, drawn=2.5 * estimate.sigma)
+    return SimpleNamespace(
+        **{
+            "estimate": whole,
+            "model_estimate": estimate,
+            "model_columns": "essential",
+            "determined": whole.status != "rank-deficient",
+            "uncertainty": SimpleNamespace(bootstrap=drawn),
+            "verdict": "2 of 2.",
+            "validation": (unseen,),
+            "by_records": not halves,
+            "prediction_error": unseen,
+            "expected_error": np.nan,
+            "negative": (),
+            "parts": [Consistency(estimate, estimate), Asking("values", answer(None))],
+            "study": SimpleNamespace(validate=SimpleNamespace(values=single)),
+            **known,
+        }
     )
+
+
+def checked(estimate, unseen=5.0, **known):
+    return judged(asked_about(estimate, unseen, **known))
 
 
 @pytest.mark.parametrize(("estimate", "unseen", "state", "question"), [
@@ -217,7 +234,7 @@ def test_verdict_is_the_worst_answer(estimate, unseen, state, question):
 def test_a_value_within_its_interval_of_zero_has_no_percentage(X, sigma, state, finding):
     """439 % (MY2), 2975630 % (MY1) were said of parameters that are zero."""
     estimate = fit(X, np.array(sigma) / 2)  # corrected: sigma
-    answer = certain(estimate, {})
+    answer = certain(asked_about(estimate, model_columns="all"))
     assert (answer.state, answer.finding) == (state, finding)
     percents = [row[3] for row in estimate.tables()[0].rows]
     told = np.abs(X) > 1.96 * np.array(sigma)
@@ -321,7 +338,7 @@ def test_correlations_by_name():
     matrix = correlation_matrix(fit(correlation=-0.95))
     assert matrix.cells == [[("+1.00", 4), ("−0.95", 4)], [("−0.95", 4), ("+1.00", 4)]]
     assert correlation_matrix(fit(sigma=(0.0, 0.1))) is None
-    assert separate(fit(correlation=0.89)).state == "good"
+    assert separate(asked_about(fit(correlation=0.89))).state == "good"
 
 
 def identified(robot_file=(1.0, 0.01)):
