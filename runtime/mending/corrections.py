@@ -16,12 +16,16 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import field
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
 
 from runtime.core.problem import Problem
 from runtime.ground.errors import InputError
 from runtime.ground.settings import Real, Settings, Text, to_mapping
 
+Entry = Annotated[Text | Real, Field(union_mode="left_to_right")]
+"""A number, or an expression as in a robot file."""
 Place = Literal["gamma", "b", "alpha", "d", "theta", "r"]
 
 
@@ -39,7 +43,7 @@ class Corrections(Settings):
     """
 
     gravity: tuple[Real, Real, Real] | None = None
-    frames: Mapping[int, Mapping[Place, Real | Text]] = field(default_factory=dict)
+    frames: Mapping[int, Mapping[Place, Entry]] = field(default_factory=dict)
     drives: Mapping[Literal["ratio", "offset", "torque_constant"], Any] = field(
         default_factory=dict
     )

@@ -99,7 +99,7 @@ def _in_table(
             continue
         name, frame = _entry(key)
         row = robot.setdefault("frames", {}).setdefault(str(frame), {})
-        row[name] = _with_variable(name, frame, value, place)
+        row[name] = with_variable(name, frame, value, place)
     return True
 
 
@@ -112,7 +112,7 @@ def _entry(key: str) -> tuple[str, int]:
     return name, int(key.removeprefix(f"free_{name}"))
 
 
-def _with_variable(name: str, frame: int, value: float, place: Place) -> float | str:
+def with_variable(name: str, frame: int, value: float, place: Place) -> float | str:
     """Write the entry of a frame; theta of a joint that turns and r of one that slides hold q."""
     text = angle_text(value) if name in ("alpha", "theta", "gamma") else f"{value:g}"
     own = place.joints.index(frame) if frame in place.joints else None

@@ -60,7 +60,7 @@ def tilted(reading: Reading) -> Cause | None:
     first, n = gravity_of(reading), len(reading.p)
     if reading.baseline is None or not first.any() or reading.data.case.variants is None:
         return None
-    g, present = first, reading
+    g, present = _start(reading, first)
     for _ in range(LIMIT.GRAVITY_PASSES):
         baseline = present.baseline
         assert baseline is not None
@@ -91,6 +91,22 @@ def tilted(reading: Reading) -> Cause | None:
     if np.degrees(np.arccos(np.clip(cos, -1.0, 1.0))) < LIMIT.LEAST_TILT:
         return None
     return along(g, n, first)
+
+
+def _start(reading: Reading, first: Array) -> tuple[Array, Reading]:
+    """Return the best of five directions: that of the reading, and four that are turned from it.
+
+    A turn about an axis in the plane of all motion has no effect of first order.
+    """
+    best = first, reading
+    for a, b in ((0.4, 0.0), (-0.4, 0.0), (0.0, 0.4), (0.0, -0.4)):
+        g = towards(first, a, b)
+        other = reading.changed(along(g, len(reading.p), first))
+        if other is None or other.baseline is None or best[1].baseline is None:
+            continue
+        if other.baseline.given.score < best[1].baseline.given.score:
+            best = g, other
+    return best
 
 
 def _turned(g: Array, n: int, k: int, xi: float) -> Cause:

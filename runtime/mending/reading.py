@@ -29,7 +29,7 @@ from runtime.plausible.causes import ENTRY, GRAVITY, Cause, Robot
 from runtime.plausible.samples import SIGNALS, Samples
 from runtime.plausible.trials import Baseline, baseline_of, regressor
 from runtime.mending.bound import Bound
-from runtime.mending.edits import Lines, Place, delayed, edited, monomial, of_files, rounded
+from runtime.mending.edits import Lines, Place, delayed, edited, monomial, of_files, rounded, with_variable
 
 LIMIT = limits(__package__)
 
@@ -57,6 +57,11 @@ class Step:
     says: str
     cause: Cause | None = None
     delay: Array | None = None
+
+    @property
+    def kind(self) -> str:
+        """Family of the cause, or delay."""
+        return "delay" if self.cause is None else self.cause.kind
 
     @property
     def numbers(self) -> int:
@@ -202,6 +207,8 @@ class Reading:
             if found is None:
                 return None
             cause = found
+        if ({*cause.constants} & {*self.constants}) - {*GRAVITY}:
+            return None  # one number is fitted once
         cause = self._rounded(cause)
         constants = {**self.constants, **cause.constants}
         delay = self._reordered(cause.T)
@@ -315,6 +322,17 @@ class Reading:
             return self.delay
         found = monomial(T)
         return None if found is None else self.delay[found[0]]
+
+    def of_robot(self, path: tuple[str | int, ...]) -> Any:
+        """Return an entry of the robot file as this reading has it; None if it has none."""
+        free = {**self._free, **self.constants}
+        if path == ("gravity",):
+            return [free.get(key, 0.0) for key in GRAVITY]
+        if path[0] == "frames" and (key := f"free_{path[2]}{path[1]}") in free:
+            return with_variable(str(path[2]), int(path[1]), free[key], self.data.place)
+        if path[0] == "drives" and self.drives is not None:
+            return plain(getattr(self.drives, str(path[1])))
+        return None
 
     # --- samples and fits ---
 

@@ -31,8 +31,9 @@ from runtime.plausible.friction import friction
 from runtime.plausible.jumps import cut_torques, jumps
 from runtime.plausible.plausibility import case_of
 from runtime.plausible.samples import excerpts, samples_of
+from runtime.reading.publishers import Sent, of_one_publisher
 from runtime.mending.edits import Lines, Place, differences
-from runtime.mending.reading import Data, Reading, Step, record_of, set_aside
+from runtime.mending.reading import Data, Reading, record_of, set_aside
 from runtime.mending.search import Found, further, search
 
 LIMIT = limits(__package__)
@@ -201,7 +202,7 @@ def repair(problem: Problem, study: Any, *, variants: Any, columns: Columns) -> 
     """
     case = _case(problem, variants)
     lines = to_mapping(study)
-    data = _data(case, problem, lines, columns)
+    data = data_of(case, problem, lines, columns)
     start = Reading.given(data, lines)
     if start.baseline is None:
         raise InputError("the rows of the study cannot be fitted; identify says why")
@@ -257,12 +258,7 @@ def _case(problem: Problem, variants: Any) -> Case:
                 "repaired on whole records only",
                 file=record.file,
             )
-        if "publisher" in record.origin.time:
-            raise InputError(
-                f"messages of a second publisher lie in the record {record.name}; record one "
-                "publisher alone, then repair",
-                file=record.file,
-            )
+        _require_one_publisher(record)
     case = case_of(problem, variants)
     if isinstance(case, Check):
         raise InputError(f"the study is not repaired: {case.finding}")
@@ -275,7 +271,22 @@ def _case(problem: Problem, variants: Any) -> Case:
     return case
 
 
-def _data(case: Case, problem: Problem, study: Lines, columns: Columns) -> Data:
+def _require_one_publisher(record: Record) -> None:
+    """Raise InputError if some samples of a record seem to be those of a second publisher."""
+    sent = Sent(
+        topic=record.name,
+        file=record.file,
+        senders=("",) * len(record),
+        stamps=np.round(1e9 * (record.t - record.t[0])).astype(np.int64),
+        values=np.hstack([record.q, record.tau]),
+        efforts=np.arange(2 * record.n) >= record.n,
+    )
+    kept, note = of_one_publisher(sent)
+    if note or not kept.all():
+        raise sent.refused(note)
+
+
+def data_of(case: Case, problem: Problem, study: Lines, columns: Columns) -> Data:
     """Set blocks of the records aside, before anything is searched."""
     samples = case.samples
     seen, aside = set_aside(samples, 1 / samples.cutoff)
@@ -296,11 +307,19 @@ def _data(case: Case, problem: Problem, study: Lines, columns: Columns) -> Data:
 
 
 def _without_needless(best: Reading, start: Reading, N: float) -> Reading:
-    """Leave out each change without which the rows of the search are explained as well."""
+    """Leave out each change without which the rows of the search are explained nearly as well.
+
+    A change must gain what names a cause (DECISIVE), and more than nearness to the values of the
+    robot file, unless it is a unit or a side.
+    """
+    least = LIMIT.DECISIVE - LIMIT.CHANGE_PRICE
     for step in best.steps:
         others = [one for one in best.steps if one is not step]
         fewer = start.again(others)
-        if fewer is not None and fewer.score(N) <= best.score(N):
+        if fewer is None:
+            continue
+        by_values = fewer.error < LIMIT.SHOWN * best.error and step.kind not in BY_VALUES
+        if by_values or fewer.score(N) <= best.score(N) + least:
             return _without_needless(replace(fewer, named=best.named), start, N)
     return best
 
@@ -353,9 +372,14 @@ def _judged(best: Reading, start: Reading) -> tuple[bool, str]:
         )
     before, after = start.unseen_error, best.unseen_error
     told = f"rows that were not used: {before:.2g} % unexplained as given, {after:.2g} % with"
+    fitted = sum(step.numbers for step in best.steps if step.kind not in ("gravity", "delay"))
+    if fitted > LIMIT.MOST_NUMBERS:
+        return False, (
+            f"Nothing changes: {told} changes that fit {fitted} numbers, which may hide another error."
+        )
     if best.unseen_total < LIMIT.REMAINS and after < LIMIT.SHARE * before:
         return True, f"{len(best.steps)} changed; {told} all changes."
-    shown = after < before / LIMIT.SHOWN or {*map(_kind, best.steps)} <= {*BY_VALUES}
+    shown = after < before / LIMIT.SHOWN or {step.kind for step in best.steps} <= {*BY_VALUES}
     if best.named and shown and best.unseen_total < LIMIT.REMAINS_NAMED:
         return True, f"{len(best.steps)} changed, each a decisive cause; {told} all changes."
     return False, (
@@ -365,15 +389,25 @@ def _judged(best: Reading, start: Reading) -> tuple[bool, str]:
     )
 
 
-def _kind(step: Step) -> str:
-    return "delay" if step.cause is None else step.cause.kind
+def lines_of(start: Reading, end: Reading) -> list[Lines]:
+    """List the lines that differ between two readings: path, value before, value after.
+
+    What the study does not give of the robot is that of its file.
+    """
+    told = []
+    for line in differences(start.study, end.study):
+        path = line["path"]
+        if line["before"] is None and path[0] == "robot":
+            line["before"] = start.of_robot(path[1:])
+        told.append(line)
+    return told
 
 
 def _candidate(reading: Reading, start: Reading) -> Candidate:
     """Write a reading as its lines."""
     lines = [
         Change(**line, says="", error_without=0.0, error_with=0.0)
-        for line in differences(start.study, reading.study)
+        for line in lines_of(start, reading)
     ]
     texts = dict.fromkeys(one.line for one in lines)
     says = tuple(step.says for step in reading.steps)
@@ -391,11 +425,11 @@ def _changes(best: Reading, start: Reading) -> list[Change]:
         others = start.again([one for one in best.steps if one is not step])
         if others is None:
             continue
-        for line in differences(others.study, best.study):
+        for line in lines_of(others, best):
             told.setdefault(line["path"], []).append((step.says, others.unseen_error))
     every = "; ".join(step.says for step in best.steps)
     changes = []
-    for line in differences(start.study, best.study):
+    for line in lines_of(start, best):
         own = told.get(line["path"], [(every, start.unseen_error)])
         says = ", and ".join(dict.fromkeys(text for text, _ in own))
         without = max(error for _, error in own)

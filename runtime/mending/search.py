@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 from runtime.ground.limits import limits
 from runtime.ground.progress import at
-from runtime.plausible.causes import Cause
-from runtime.plausible.trials import decisive, try_causes
+from runtime.plausible.causes import CAUSES, Cause
+from runtime.plausible.trials import decisive, leaves_values, try_causes
 from runtime.mending.gravity import tilted
 from runtime.mending.late import late_torques
 from runtime.mending.ratio import other_ratios
@@ -22,6 +22,10 @@ from runtime.mending.reading import Reading, best_of
 from runtime.mending.reversed import reversed_torques
 
 LIMIT, TRIED = limits(__package__), limits("runtime.plausible")
+
+
+DEAR = ("rate", "coupling", "offset", "scale", "ratio")
+"""Kinds whose gain `try_causes` lowers by RATE_GAIN; the score of a reading has its own price."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,9 +84,30 @@ def search(start: Reading, spent: Callable[[], float]) -> Found:
         every |= {one.key: one for one in gaining}
         if not gaining:
             break
-        gaining = sorted(gaining, key=lambda one: one.score(N))[: LIMIT.BEAM]
+        gaining = different(gaining, N)
         beam = gaining[:1] if gaining[0].error < LIMIT.GOOD_ENOUGH else gaining
     return Found(every, N, expanded, hidden)
+
+
+def different(readings: list[Reading], N: float) -> list[Reading]:
+    """Return the readings from which the search goes on: the best ones, of several kinds first."""
+    ranked = sorted(readings, key=lambda one: one.score(N))
+    kinds: set[str] = set()
+    first, rest = [], []
+    for one in ranked:
+        (rest if one.steps[-1].kind in kinds else first).append(one)
+        kinds.add(one.steps[-1].kind)
+    return sorted([*first, *rest][: LIMIT.BEAM], key=lambda one: one.score(N))
+
+
+def other_rates(reading: Reading) -> list[Cause]:
+    """Return the causes of another sampling rate, which a second error may hide from a trial."""
+    if reading.data.case.noise_floor > TRIED.NOISY:  # small accelerations undo what noise makes
+        return []
+    robot = reading.robot
+    return [
+        row.cause(robot, item) for row in CAUSES if row.kind == "rate" for item in row.of(robot)
+    ]
 
 
 def further(reading: Reading) -> tuple[list[Reading], tuple[Cause, ...]]:
@@ -101,11 +126,18 @@ def further(reading: Reading) -> tuple[list[Reading], tuple[Cause, ...]]:
     good = reading.error < LIMIT.GOOD_ENOUGH
     if not good:
         chosen = {id(t.cause) for t in named}
-        others = [t for t in trials if id(t.cause) not in chosen and t.gain > LIMIT.STEP_GAIN]
+        others = [
+            t
+            for t in trials
+            if id(t.cause) not in chosen
+            and t.fit is not None
+            and t.gain + TRIED.RATE_GAIN * (t.cause.kind in DEAR) > LIMIT.STEP_GAIN
+            and not leaves_values(t.fit, baseline)
+        ]
         if case.noise_floor > TRIED.NOISY:  # small accelerations undo what noise makes
             others = [t for t in others if t.cause.kind != "rate"]
         causes += [(t.cause, False) for t in others[: LIMIT.TRIALS_TAKEN]]
-        causes += [(cause, False) for cause in reversed_torques(reading)]
+        causes += [(cause, False) for cause in (*reversed_torques(reading), *other_rates(reading))]
     if (tilt := tilted(reading)) is not None:
         causes.append((tilt, True))
     made = [reading.changed(cause, named=sure) for cause, sure in causes]
