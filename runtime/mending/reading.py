@@ -261,6 +261,11 @@ class Reading:
             named=self.named and named,
         )
 
+    def short(self, delay: Array) -> bool:
+        """Whether delays, s, are below a twentieth of every record, as this reading times it."""
+        lasts = min(float(one.record.t[-1] - one.record.t[0]) for one in self.data.case.through)
+        return bool(np.abs(delay).max() < 0.05 * lasts / self.rate)
+
     def again(self, steps: Sequence[Step]) -> Reading | None:
         """Make the changes `steps` in this reading; None if one of them cannot be written."""
         reading: Reading | None = self

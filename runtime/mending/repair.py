@@ -215,7 +215,6 @@ def repair(problem: Problem, study: Any, *, variants: Any, columns: Columns) -> 
     best, others = _simplest(best, start, found)
     at("repair: the rows that were set aside")
     kept, reason = _judged(best, start)
-    again = tuple(record_of(best, one) for one in problem.records)
     hidden = tuple(dict.fromkeys(cause.subject for cause in same))
     if not kept:
         ranked = sorted(found.readings.values(), key=lambda one: one.score(found.N))
@@ -239,7 +238,7 @@ def repair(problem: Problem, study: Any, *, variants: Any, columns: Columns) -> 
         start.unseen_error,
         best.unseen_error,
         structure(type(study), best.study),
-        again,
+        tuple(record_of(best, one) for one in problem.records),
         equivalent=tuple(_candidate(one, start) for one in others),
         hidden=hidden,
         readings=found.expanded,
@@ -318,7 +317,7 @@ def _without_needless(best: Reading, start: Reading, N: float) -> Reading:
         fewer = start.again(others)
         if fewer is None:
             continue
-        by_values = fewer.error < LIMIT.SHOWN * best.error and step.kind not in BY_VALUES
+        by_values = fewer.error < LIMIT.LEAST_FALL * best.error and step.kind not in BY_VALUES
         if by_values or fewer.score(N) <= best.score(N) + least:
             return _without_needless(replace(fewer, named=best.named), start, N)
     return best

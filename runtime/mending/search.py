@@ -100,6 +100,14 @@ def different(readings: list[Reading], N: float) -> list[Reading]:
     return sorted([*first, *rest][: LIMIT.BEAM], key=lambda one: one.score(N))
 
 
+def simple_rate(factor: float) -> bool:
+    """Whether a factor on the sampling rate is one of those that a wrong rate has.
+
+    A fitted factor takes up what other errors leave.
+    """
+    return any(abs(factor / known - 1) < 1e-9 for known in TRIED.RATE_FACTORS)
+
+
 def other_rates(reading: Reading) -> list[Cause]:
     """Return the causes of another sampling rate, which a second error may hide from a trial."""
     if reading.data.case.noise_floor > TRIED.NOISY:  # small accelerations undo what noise makes
@@ -116,6 +124,7 @@ def further(reading: Reading) -> tuple[list[Reading], tuple[Cause, ...]]:
     if baseline is None:
         return [], ()
     trials = try_causes(baseline, reading.sides, reading.units)
+    trials = [t for t in trials if t.cause.rate == 1 or simple_rate(t.cause.rate)]
     ratios = [replace(t, gain=t.gain - TRIED.RATE_GAIN) for t in other_ratios(reading)]
     trials = sorted([*trials, *ratios], key=lambda trial: -trial.gain)
     if case.robot_values is not None and case.robot_values.heavy:
@@ -142,5 +151,5 @@ def further(reading: Reading) -> tuple[list[Reading], tuple[Cause, ...]]:
         causes.append((tilt, True))
     made = [reading.changed(cause, named=sure) for cause, sure in causes]
     if (late := late_torques(reading)) is not None:
-        made.append(reading.late(*late, named=True))
+        made.append(reading.late(*late, named=True) if reading.short(late[0]) else None)
     return [one for one in made if one is not None], hidden
