@@ -44,11 +44,11 @@ from runtime.compose import estimate_of, observe
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.model import GeneratedModel, load_model
 from runtime.core.rows.observation import Observation
-from runtime.core.study import Decimate, Lowpass, Signals
+from runtime.core.study import Decimate, Lowpass
 from runtime.reading.datasets import dataset_study, fetch
 from runtime.reading.files import read_bytes
 from runtime.reading.records import read_records
-from runtime.study import Rows, Study, study_from_mapping
+from runtime.study import Rows, Signals, Study, study_from_mapping
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files
 

@@ -39,9 +39,9 @@ from runtime.core.model import GeneratedModel, load_model
 from runtime.core.record import Record
 from runtime.core.rows.regressor import Columns
 from runtime.core.signals.filters import States, decimation_plan
-from runtime.core.study import CestacSettings, Decimate
+from runtime.core.study import Decimate
 from runtime.parallel.processes import processes
-from runtime.study import Study
+from runtime.study import CestacSettings, Study
 from symgen.description import load_robot, parse_robot
 from symgen.emit.generate import generate_files, generate_module
 

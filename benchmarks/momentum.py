@@ -34,8 +34,7 @@ import numpy as np
 
 from runtime import load_model
 from runtime.core.signals.filters import decimated, derivative
-from runtime.core.study import Signals
-from runtime.study import study_from_mapping
+from runtime.study import Signals, study_from_mapping
 from symgen import load_robot
 from symgen.certify.witness import bodies
 from symgen.emit.generate import generate_files

@@ -380,7 +380,9 @@ def left_of(robot: Any, study: Any, folder: Path, clean: World, g: Array) -> flo
         model = symgen.model(robot)
         record = reading(study, model, "clean.csv")
     part = runtime.plausibility(model, record, variants=symgen.variants(robot))
-    result = runtime.identify(model, record, study_from_mapping({"estimate": {"method": "feasible"}}))
+    result = runtime.identify(
+        model, record, study_from_mapping({"estimate": {"method": "feasible"}})
+    )
     del part
     return float(result.estimate.relative_error)
 
@@ -391,7 +393,9 @@ def told(w: World, share: float) -> bool:
     data, n = model.createData(), w.robot.n
     kept = slice(50, -50, max(1, len(w.t) // 300))
     q, qd, qdd, tau = (x[kept] for x in (w.q, w.qd, w.qdd, w.tau))
-    D = np.array([pin.computeJointTorqueRegressor(model, data, *x) for x in zip(q, qd, qdd, strict=True)])
+    D = np.array(
+        [pin.computeJointTorqueRegressor(model, data, *x) for x in zip(q, qd, qdd, strict=True)]
+    )
     K, b = len(q), D.shape[2]
     W = np.zeros((K, n, b + 2 * n))
     W[:, :, :b] = D
@@ -404,7 +408,10 @@ def told(w: World, share: float) -> bool:
     least = np.concatenate([np.full(b, -np.inf), np.zeros(2 * n)])
     R = np.linalg.qr(np.column_stack([A / scale, y]), mode="r")
     x = lsq_linear(
-        np.concatenate([R[:, :-1], 1e-6 * np.eye(len(scale))]), np.append(R[:, -1], 0 * scale), (least, np.inf), method="bvls"
+        np.concatenate([R[:, :-1], 1e-6 * np.eye(len(scale))]),
+        np.append(R[:, -1], 0 * scale),
+        (least, np.inf),
+        method="bvls",
     ).x
     left = np.sqrt((((y - A / scale @ x).reshape(K, n)) ** 2).mean(axis=0))
     return bool((left > 0.2 * share).any())

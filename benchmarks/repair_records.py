@@ -83,7 +83,9 @@ def studies(case: Any, count: int) -> list[dict[str, Any]]:
             rows.append(row | {"outcome": "refused", "lines": [str(e)], "before": 0.0, "after": 0.0, "s": process_time() - began})  # fmt: skip
             print(rows[-1], flush=True)
             continue
-        lines = [c.line for c in repair.changes] or [x for c in repair.candidates[:1] for x in c.lines]
+        lines = [c.line for c in repair.changes] or [
+            x for c in repair.candidates[:1] for x in c.lines
+        ]
         zero = any(x.startswith("zero") for x in joints)
         right = repair.kept and all(
             taken_back(w, one, zero) for w, one in zip(worlds, repair.records, strict=True)
@@ -110,7 +112,9 @@ def taken_back(w: simulated.World, record: Any, zero: bool) -> bool:
         off = off - off.mean(axis=0)
     still = np.sqrt((off**2).mean(axis=0)) < 0.05 * (np.ptp(q, axis=0) + 1e-9)
     size = np.sqrt((tau**2).mean(axis=0)) + 1e-12
-    return bool(still.all() and (np.sqrt(((record.tau - tau) ** 2).mean(axis=0)) < 0.1 * size).all())
+    return bool(
+        still.all() and (np.sqrt(((record.tau - tau) ** 2).mean(axis=0)) < 0.1 * size).all()
+    )
 
 
 def main() -> None:

@@ -13,7 +13,7 @@ function of the package. A feature is one file and one line of a list.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -79,7 +79,7 @@ if TYPE_CHECKING:
 
 STEPS: list[Step] = [
     When(
-        Late("runtime.mending.corrections:corrected_model"),
+        Late("runtime.mending.corrected:corrected_model"),
         lambda p: getattr(p.settings, "robot", None) is not None,
     ),
     stated_sides,
@@ -210,10 +210,20 @@ def list_records(records: Records) -> tuple[Record, ...]:
 def complete_study(study: Study) -> Study:
     """Check that method and reader of a study exist; complete the settings of the reader.
 
-    SettingsError if the method or the reader is unknown.
+    SettingsError if the method or the reader is unknown, or for a setting of another reader.
     """
     _named(METHODS, study.estimate.method, ("estimate", "method"))
-    return reader_of(study.signals).settled(study)
+    reader, signals = reader_of(study.signals), study.signals
+    known = {f.name for f in fields(reader.settings)}
+    for f in fields(signals):
+        if f.name not in known and getattr(signals, f.name) != f.default:
+            users = [name for name, one in READERS.items() if f.name in one.own_settings]
+            raise SettingsError(
+                f"given, but reader is {signals.reader}; set reader: {' or '.join(users)}, or "
+                "remove this key",
+                path=("signals", f.name),
+            )
+    return reader.settled(study)
 
 
 def reader_of(signals: Signals) -> Reader:

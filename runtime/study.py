@@ -4,8 +4,9 @@
     study = study_from_mapping({"signals": {"lowpass": {"cutoff": 100}}})
     study.signals.lowpass.order        # 4, the default
 
-A Study has the sections of the chapter (`runtime.core.study`) and a section for each further
-feature, such as `payload` or `excitation`.
+A Study has the sections of the chapter (`runtime.core.study`), to which features add settings, and
+a section for each further feature, such as `payload` or `excitation`. Sections and settings of a
+feature are in its folder: `settings.py`.
 """
 
 from __future__ import annotations
@@ -14,56 +15,31 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import field, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from pydantic import BeforeValidator, TypeAdapter
+from pydantic import TypeAdapter
 
 from runtime.core import study as chapter
 from runtime.core.model import GeneratedModel
+from runtime.counts.settings import Signals
 from runtime.documents.files import settings_from_text, text_of
 from runtime.documents.yaml_text import yaml_text
 from runtime.excitation.settings import ExcitationSettings
 from runtime.ground.arrays import require_kind
 from runtime.ground.errors import InputError
-from runtime.ground.settings import NotNegative, PerJoint, Settings, structure, to_mapping
-from runtime.loop.settings import Controller
+from runtime.ground.settings import Settings, structure, to_mapping
+from runtime.loop.settings import CestacSettings, Controller
+from runtime.mending.settings import Corrections
 from runtime.payload.settings import PayloadSettings
 from runtime.reading.datasets import DATASETS, dataset_study
 from runtime.reading.formats import endings, is_measured, read_table
 from runtime.reading.likely_columns import candidates, known_columns
 from runtime.reading.records import read_records
-from runtime.reading.settings import Records, RecordSettings, with_law
-from runtime.reading.units import speed
-from runtime.mending.corrections import Corrections
+from runtime.reading.settings import Records, RecordSettings, Rows, ValidateSettings, with_law
 
 RARE_WRAPS = 0.05
 """Share of the steps between two samples that may be jumps of an angle by a full turn."""
-
-
-class Rows(chapter.Rows):
-    """Settings that select the rows of W and Y that are used.
-
-    Attributes
-    ----------
-    low_speed : float or tuple of float, rad/s or m/s
-        Rows of joint j with |qd_j| below this speed are left out, because sign(qd) is noise in
-        them. A text may have another unit: 2 rpm.
-    """
-
-    low_speed: Annotated[PerJoint[NotNegative], BeforeValidator(speed)] = 0.0
-
-
-class ValidateSettings(chapter.ValidateSettings):
-    """Settings for validation: data to which parameters are fitted, and data that they predict.
-
-    Attributes
-    ----------
-    record : tuple of RecordSettings
-        Further records, predicted with the parameters of the study.
-    """
-
-    record: Records = ()
 
 
 class Recorded(Settings):
@@ -96,8 +72,10 @@ class Study(chapter.Study, Recorded):
         Entries that replace those of the robot file.
     """
 
+    signals: Signals = field(default_factory=Signals)
     rows: Rows = field(default_factory=Rows)
     validate: ValidateSettings = field(default_factory=ValidateSettings)
+    cestac: CestacSettings = field(default_factory=CestacSettings)
     payload: PayloadSettings | None = None
     controller: Controller | None = None
     excitation: ExcitationSettings | None = None

@@ -33,12 +33,11 @@ import symgen
 from runtime import Cestac, Estimate, Identification, Record, Study
 from runtime.core.cestac.result import LevelResult
 from runtime.core.drives import Drives
-from runtime.core.study import CestacSettings
 from runtime.files import Files, identification_files, part_files
 from runtime.ground.errors import DataUnavailableError
 from runtime.ground.table import Table, number, percentage
 from runtime.loop.reference import Reference, point_to_point
-from runtime.loop.settings import Points
+from runtime.loop.settings import CestacSettings, Points
 from runtime.reading.datasets import dataset_study
 from runtime.reading.settings import Columns, RecordSettings
 from runtime.reporting.page import Section

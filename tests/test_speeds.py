@@ -17,8 +17,8 @@ from runtime.compose import observe, plausibility
 from runtime.core.record import Record
 from runtime.core.signals.filters import filtered_states
 from runtime.core.signals.velocities import agreement
-from runtime.core.study import Lowpass, Signals
-from runtime.study import Study
+from runtime.core.study import Lowpass
+from runtime.study import Signals, Study
 
 RATE, N = 500.0, 8000
 STEP, NOISE = 2e-3, 4e-3  # rad, rad/s

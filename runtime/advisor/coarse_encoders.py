@@ -89,8 +89,8 @@ class CoarseEncoders:
         model, study = problem.model, problem.settings
         signals = study.signals
         if reader != problem.reader:
-            signals = replace(signals, options={}, step=None, side="joint")
-        settings = replace(study.cestac, rounding=law, delta=(), place="record")
+            signals = replace(signals, options={}, **problem.reader.own_settings)
+        settings = replace(study.cestac, rounding=law, delta=())
         study = reader.settled(replace(study, signals=signals, cestac=settings))
         side = encoder_drives(settings.side, drives, "cestac")
         self.reader, self.root, self.parts = reader, encoder_root(side, len(model.JOINTS)), []

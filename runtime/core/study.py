@@ -120,10 +120,6 @@ class Signals(Settings):
         positions are counts of an encoder, which bound the motion; no median is needed. static:
         each row is a pose at rest, with the mean of its torques; then there is no filter, no
         decimation and no trim, whatever their settings are.
-    step : float or tuple of float or None, rad or m
-        Step of the encoders, for counts; null: from the record.
-    side : str
-        Side of the encoders, for counts: joint, or motor by the drives of the robot.
     velocity : str or float or tuple of float, Hz
         Use of recorded velocities (record.columns.qd), for reader lowpass: the frequency from which
         they replace differences of q. auto: the frequency at which both have the same noise; they
@@ -141,8 +137,6 @@ class Signals(Settings):
     ends: Literal["one-sided", "second-order"] = "one-sided"
     decimate: Decimate | None = field(default_factory=Decimate)
     reader: Text = "lowpass"
-    step: PerJoint[Positive] | None = None
-    side: Literal["joint", "motor"] = "joint"
     velocity: Literal["auto", "differences"] | PerJoint[Positive] = "auto"
     torque_median: OddWindow = 1
     options: Mapping[str, Any] = field(default_factory=dict)
@@ -243,9 +237,6 @@ class CestacSettings(Settings):
         random by joint and run.
     uneven : float
         Standard deviation of the lines of law phase from even spacing, in steps.
-    place : str
-        Signal that is rounded. record: the positions of the record. loop: the encoder in the closed
-        loop of study.controller, which is simulated again in every run.
     delta : tuple of float, rad or m
         Steps of the perturbed position.
     runs : int
@@ -267,7 +258,6 @@ class CestacSettings(Settings):
     side: Literal["joint", "motor"] = "joint"
     rounding: Literal["two-point", "uniform", "gaussian", "quantise", "phase"] = "two-point"
     uneven: Annotated[Real, Field(ge=0, le=0.5)] = 0.0
-    place: Literal["record", "loop"] = "record"
     delta: Many[Step] = (2 * pi / 10000, 2 * pi / 5000, 2 * pi / 2000, 2 * pi / 1000)
     runs: Annotated[Whole, Field(ge=2, le=MOST)] = 5
     seed: Seed = 1
@@ -277,31 +267,16 @@ class CestacSettings(Settings):
     median: OddWindow = 1
 
     def __post_init__(self) -> None:
-        law, loop = self.rounding, self.place == "loop"
+        phase = self.rounding == "phase"
         require(
-            not self.uneven or law == "phase",
-            f"{self.uneven} with rounding: {law}; uneven lines need rounding: phase",
+            not self.uneven or phase,
+            f"{self.uneven} with rounding: {self.rounding}; uneven lines need rounding: phase",
             "uneven",
         )
         require(
-            not (self.common and law == "phase"),
+            not (self.common and phase),
             "rounding: phase draws a new phase for every step; set common: false",
             "common",
-        )
-        require(
-            not loop or law == "phase",
-            f"{law} with place: loop; expected phase, the only rounding of an encoder in the loop",
-            "rounding",
-        )
-        require(
-            not (loop and self.uneven),
-            f"{self.uneven} with place: loop; the encoder in the loop has even lines: remove uneven",
-            "uneven",
-        )
-        require(
-            not (loop and self.torque),
-            "given with place: loop; remove torque, and set torque steps in controller.torque.step",
-            "torque",
         )
 
 

@@ -72,10 +72,8 @@ class OwnEncoder:
 def own_encoder(record: Record, study: Study, drives: Drives | None) -> OwnEncoder | None:
     """Determine the encoder steps of a record, for a study that simulates coarser encoders.
 
-    The study needs the setting `rounding: phase`. None if the study simulates the closed loop
-    (`place: loop`).
-
-    None for other kinds of rounding, which take every position as exact.
+    The study needs the setting `rounding: phase`. None for other kinds of rounding, which take
+    every position as exact.
 
     Raises
     ------
@@ -84,8 +82,9 @@ def own_encoder(record: Record, study: Study, drives: Drives | None) -> OwnEncod
     InputError
         If a Delta is less than five own steps and no motion can be estimated from the counts.
     """
-    settings, signals = study.cestac, study.signals
-    if settings.rounding != "phase" or settings.place == "loop":
+    settings = study.cestac
+    signals: Any = study.signals
+    if settings.rounding != "phase":
         return None
     own_drives = drives if settings.side == "motor" else None
     q = record.q if own_drives is None else own_drives.motor_position(record.q)

@@ -16,9 +16,9 @@ from runtime.core.missing import Missing, held_samples
 from runtime.core.record import Record
 from runtime.core.signals.filters import SpeedErrors, States, filtered_states
 from runtime.core.signals.reader import Reader, Steps
-from runtime.core.study import Signals
 from runtime.counts.lattice import unwrapped_counts
 from runtime.counts.reading import read_counts
+from runtime.counts.settings import Signals
 
 Array = np.ndarray
 
@@ -94,6 +94,7 @@ def encoder_position(q: Array, drives: Drives | None, missing: Missing | None = 
 
 COUNTS = Reader(
     counted,
+    settings=Signals,
     missing=True,
     rounded=rounded,
     encoder=encoder,

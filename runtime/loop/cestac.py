@@ -75,6 +75,11 @@ class Loop:
         return _loop, (self.problem,)
 
     @property
+    def in_loop(self) -> bool:
+        """Whether the encoder of the study is the one in the loop (place: loop)."""
+        return bool(self.study.cestac.place == "loop")
+
+    @property
     def model(self) -> GeneratedModel:
         """Generated model of the robot."""
         return self.problem.model
@@ -112,9 +117,9 @@ class Loop:
 
         The simulated record is made with the encoder of the study.
         """
-        if self.study.cestac.place == "record":
-            return closed_loop(self.problem, self.problem.prepared, self.simulator, **self.options)
-        return self._of(self.simulator, self.simulator.controller.seed, 0.0)
+        if self.in_loop:
+            return self._of(self.simulator, self.simulator.controller.seed, 0.0)
+        return closed_loop(self.problem, self.problem.prepared, self.simulator, **self.options)
 
     @property
     def records(self) -> tuple[Prepared, ...]:
@@ -142,7 +147,7 @@ class Loop:
     def notes(self) -> tuple[str, ...]:
         """Remarks for the user of a study, such as an assumption on the reference motion."""
         notes = [self.closed.assumption] if self.closed.assumption else []
-        if self.study.cestac.place == "loop":
+        if self.in_loop:
             notes.append(
                 "The encoder rounds inside the simulated loop, whose parameters are the values of the robot file; every run is a record of its own, compared with the mean of as many records of the same seeds whose encoder is that of the study."
             )
@@ -221,20 +226,19 @@ def loop_of(problem: Problem, simulator: Simulator | None = None) -> Loop | None
     simulator : default: made from the section `controller`; SettingsError if that is missing.
     """
     study: Any = problem.settings
-    if study.cestac.place != "loop" and problem.method.observe is None:
+    in_loop = study.cestac.place == "loop"
+    if not in_loop and problem.method.observe is None:
         return None
     if study.controller is None:
-        asked = "place: loop" if study.cestac.place == "loop" else study.estimate.method
+        asked = "place: loop" if in_loop else study.estimate.method
         raise SettingsError(
             f"{asked} simulates the closed loop, but this study does not describe it; add a section "
             "`controller` with law, rate and reference, "
             "or use ols, wls or irls on recorded positions",
-            path=("cestac", "place") if study.cestac.place == "loop" else ("estimate", "method"),
+            path=("cestac", "place") if in_loop else ("estimate", "method"),
         )
     quiet = replace(study, signals=replace(study.signals, median=study.cestac.median))
-    if (
-        study.cestac.place == "loop"
-    ):  # the encoder on the side of the study, of any step: only then is it in the law
+    if in_loop:  # the encoder on the side of the study, of any step: only then is it in the law
         encoder = replace(study.controller.encoder, side=study.cestac.side)
         quiet = replace(quiet, controller=replace(study.controller, encoder=encoder))
     quiet_problem = problem.changed(settings=quiet)

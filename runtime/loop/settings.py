@@ -1,4 +1,4 @@
-"""The `controller` section of a study file: the closed loop that moves the arm.
+"""The `controller` section of a study file, the closed loop that moves the arm, and its encoders in CESTAC.
 
 The section describes the control law, the reference, the encoders and the drives:
 
@@ -18,6 +18,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, Field
 
+from runtime.core import study as chapter
 from runtime.ground.errors import SettingsError
 from runtime.ground.settings import (
     Count,
@@ -287,3 +288,36 @@ class Controller(Settings):
             object.__setattr__(self, "law", Law(**given))
         object.__setattr__(self, "kp", None)
         object.__setattr__(self, "kd", None)
+
+
+class CestacSettings(chapter.CestacSettings):
+    """Settings of the CESTAC study of encoder resolution, eqs. (15)-(22), (28) of the chapter.
+
+    Attributes
+    ----------
+    place : str
+        Signal that is rounded. record: the positions of the record. loop: the encoder in the closed
+        loop of study.controller, which is simulated again in every run.
+    """
+
+    place: Literal["record", "loop"] = "record"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.place == "record":
+            return
+        require(
+            self.rounding == "phase",
+            f"{self.rounding} with place: loop; expected phase, the only rounding of an encoder in the loop",
+            "rounding",
+        )
+        require(
+            not self.uneven,
+            f"{self.uneven} with place: loop; the encoder in the loop has even lines: remove uneven",
+            "uneven",
+        )
+        require(
+            not self.torque,
+            "given with place: loop; remove torque, and set torque steps in controller.torque.step",
+            "torque",
+        )

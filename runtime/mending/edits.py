@@ -292,5 +292,3 @@ def differences(before: Any, after: Any, path: tuple[str | int, ...] = ()) -> It
 
 def _tables(values: list[Any]) -> bool:
     return bool(values) and all(isinstance(x, Mapping) for x in values)
-
-

@@ -29,14 +29,31 @@ from runtime.plausible.causes import ENTRY, GRAVITY, Cause, Robot
 from runtime.plausible.samples import SIGNALS, Samples
 from runtime.plausible.trials import Baseline, baseline_of, regressor
 from runtime.mending.bound import Bound
-from runtime.mending.edits import Lines, Place, delayed, edited, monomial, of_files, rounded, with_variable
+from runtime.mending.edits import (
+    Lines,
+    Place,
+    delayed,
+    edited,
+    monomial,
+    of_files,
+    rounded,
+    with_variable,
+)
 
 LIMIT = limits(__package__)
 
 Array = np.ndarray
 
-FITTED = {"gravity": 2, "factor": 1, "scale": 1, "ratio": 1, "zero": 1, "angle": 1, "length": 1,
-          "rate": 1}
+FITTED = {
+    "gravity": 2,
+    "factor": 1,
+    "scale": 1,
+    "ratio": 1,
+    "zero": 1,
+    "angle": 1,
+    "length": 1,
+    "rate": 1,
+}
 """Numbers that a cause fits, by its kind."""
 NOT_WRITTEN = ("load", "friction", "offset", "known")
 """Causes that no line of a study corrects."""
@@ -98,9 +115,7 @@ class Data:
     @cached_property
     def torques(self) -> list[CubicSpline]:
         """Filtered torques of each record as functions of time, shape (n,) at an instant."""
-        return [
-            CubicSpline(one.record.t, one.torque(one.record.tau)) for one in self.case.through
-        ]
+        return [CubicSpline(one.record.t, one.torque(one.record.tau)) for one in self.case.through]
 
     def torque(self, t: Array, record: Array) -> Array:
         """Evaluate the filtered torques at instants t of the records of these numbers."""
@@ -228,9 +243,7 @@ class Reading:
             sides = (q, cause.change.get("record.torque_side", sides[1]) or q)
         if cause.kind == "coupling":
             sides, made = ("motor", "motor"), study["robot"]["drives"]
-            drives = Drives(
-                np.array(made["ratio"]), made.get("offset", 0.0), np.ones(len(self.p))
-            )
+            drives = Drives(np.array(made["ratio"]), made.get("offset", 0.0), np.ones(len(self.p)))
         order = monomial(of_files(cause, self.sides, self.drives)[0])
         if order is not None and "q" in units and order[0] != [*range(len(self.p))]:
             units["q"] = tuple(units["q"][k] for k in order[0])
@@ -301,7 +314,8 @@ class Reading:
             return replace(
                 cause,
                 constants={
-                    key: x if not (ENTRY.fullmatch(key) or key[:10] == "free_theta" or key in GRAVITY)
+                    key: x
+                    if not (ENTRY.fullmatch(key) or key[:10] == "free_theta" or key in GRAVITY)
                     else rounded(x)
                     for key, x in cause.constants.items()
                 },
@@ -420,11 +434,7 @@ class Reading:
         fit = self.baseline.given
         errors = np.maximum(fit.errors, 100 * LIMIT.RESIDUAL_LEAST)
         moving = self.baseline.as_given[2].any(axis=0)
-        return float(
-            N * np.log(errors[moving] / 100).sum()
-            + fit.penalty
-            + self.price(N)
-        )
+        return float(N * np.log(errors[moving] / 100).sum() + fit.penalty + self.price(N))
 
     def price(self, N: float) -> float:
         """Price of the changes, nats: of each change, and half of log N of each fitted number."""
@@ -491,9 +501,7 @@ def record_of(reading: Reading, record: Record) -> Record:
         last = len(t) - int(np.ceil(max(0.0, late.max()) / period - 1e-9))
         kept = slice(first, last)
         at = [np.clip(t + d * f, t[0], t[-1]) for d in late]
-        tau = np.stack(
-            [CubicSpline(t, x)(own) for x, own in zip(tau.T, at, strict=True)], axis=1
-        )
+        tau = np.stack([CubicSpline(t, x)(own) for x, own in zip(tau.T, at, strict=True)], axis=1)
     channels = dict(record.channels)
     for key in ("qd", "qd_ref"):
         if key in channels:

@@ -1,6 +1,7 @@
 """Settings of measured records: their files, their columns, and treatment of their time stamps.
 
-They are a part of a Study.
+They are a part of a Study, and what reading of files adds to the sections of the chapter: units of
+speeds, and records that are predicted.
 """
 
 from __future__ import annotations
@@ -9,8 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, field_validator
 
+from runtime.core import study as chapter
 from runtime.core.record import WRENCH
 from runtime.ground.settings import (
     Flag,
@@ -24,7 +26,7 @@ from runtime.ground.settings import (
     require,
 )
 from runtime.loop.settings import Controller
-from runtime.reading.units import COMMANDS, position_unit, time_unit, torque_unit
+from runtime.reading.units import COMMANDS, position_unit, speed, time_unit, torque_unit
 
 
 def _one_by_one(names: Any) -> Any:
@@ -372,3 +374,28 @@ Records = Annotated[Many[RecordSettings], AfterValidator(each_record)]
 
 def _each(units: str | tuple[str, ...]) -> tuple[str, ...]:
     return units if isinstance(units, tuple) else (units,)
+
+
+class Rows(chapter.Rows):
+    """Settings that select the rows of W and Y that are used.
+
+    Attributes
+    ----------
+    low_speed : float or tuple of float, rad/s or m/s
+        Rows of joint j with |qd_j| below this speed are left out, because sign(qd) is noise in
+        them. A text may have another unit: 2 rpm.
+    """
+
+    _with_unit = field_validator("low_speed", mode="before")(speed)
+
+
+class ValidateSettings(chapter.ValidateSettings):
+    """Settings for validation: data to which parameters are fitted, and data that they predict.
+
+    Attributes
+    ----------
+    record : tuple of RecordSettings
+        Further records, predicted with the parameters of the study.
+    """
+
+    record: Records = ()

@@ -34,8 +34,12 @@ def studio(
         ),
     ] = Path("symgen-studio"),
     port: Annotated[
-        int, typer.Option(min=0, max=65535, help="Port of this machine. Default: a free one.")
+        int, typer.Option(min=0, max=65535, help="Port of this machine. Default: as the last time.")
     ] = 0,
+    renew: Annotated[
+        bool,
+        typer.Option("--new-address", help="Take a new address; bookmarks of the old one end."),
+    ] = False,
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
     ] = True,
@@ -43,7 +47,8 @@ def studio(
     """Serve a local page to edit a robot, read a record, check it, identify and see the results.
     Other machines cannot reach it.
 
-    The server ends with Ctrl-C, with its terminal, or ten minutes after its last page was closed.
+    The server ends with Ctrl-C, with its terminal, or ten minutes after its last page was closed and
+    its last run has ended.
     """
     with reported_errors():
         try:
@@ -54,4 +59,13 @@ def studio(
             name: [sys.executable, "-P", "-c", WATCHED + text] for name, text in PROGRAMS.items()
         }
         say = partial(typer.echo, err=True)
-        serve(output, programs, say, robot=robot, record=record, port=port, browser=browser)
+        serve(
+            output,
+            programs,
+            say,
+            robot=robot,
+            record=record,
+            port=port,
+            browser=browser,
+            renew=renew,
+        )

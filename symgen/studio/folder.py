@@ -6,9 +6,10 @@
     record/run.csv, validation/other.csv    measured files, with the names that they came with
     study.yaml                meaning of the record, and settings of its evaluation
     proof.json, check.json    the certificate and the findings
-    study-NN-name.yaml, runs/NN-name/    settings and results of one command
-    history/robot/NNNN/, history/study/NNNN/    files that a change has replaced
+    robot-NN-name.urdf, study-NN-name.yaml, runs/NN-name/    robot, settings, results of one command
+    history/robot/NNNN/, history/study/NNNN/, history/record/NNNN/    what a change has replaced
     history/undone/NNNN/      robots that undo has replaced
+    .address.json             port and token of the server, which only the owner reads
 
 In a history, the newest folder has the largest number NNNN.
 """
@@ -39,6 +40,7 @@ ROBOT_ENDINGS = (".yaml", ".urdf", ".xml", ".par")  # the first one that is ther
 OTHER_ENDINGS = {".yml": ".yaml", ".mjcf": ".xml"}
 DRAFT = "robot.draft.yaml"
 MOST_KEPT = 300  # robots and studies before the present one
+RECORDS_KEPT = 3  # before the present one
 RESULT_FILES = ("estimate.json", "cestac.json", "advice.json")  # of a run that is complete
 
 
@@ -166,7 +168,8 @@ class WorkFolder:
     def take_measured(self, kind: str, name: str, part: Path) -> None:
         """Use an uploaded file, or the folder of a bag, as the record or the validation record.
 
-        It replaces the one before. A new record starts a new study.
+        It replaces the one before, which `exchange_record` brings back. A new record starts a new
+        study.
 
         name : original name of the file.
         part : the uploaded file.
@@ -174,12 +177,45 @@ class WorkFolder:
         name = measured_name(name)
         if not (part.is_dir() or name.lower().removesuffix(".gz").endswith(endings())):
             raise InputError(f"{name}: expected a measured file: {', '.join(endings())}, or .gz")
+        if kind == "record":
+            self.keep("study")
+            self._keep_record()
         remove(self.path / kind)
         (self.path / kind).mkdir()
         part.replace(self.path / kind / name)
-        if kind == "record":
-            self.keep("study")
+
+    def _keep_record(self) -> None:
+        """Move the record and its study into the history, if there is a record."""
+        if not self.measured("record"):
             (self.path / "study.yaml").unlink(missing_ok=True)
+            return
+        before = self.kept("record")
+        place = self.path / "history/record" / f"{int(before[-1].name) + 1 if before else 1:04d}"
+        place.mkdir(parents=True)
+        for own in ("record", "study.yaml"):
+            if (path := self.path / own).exists():
+                path.replace(place / own)
+        for old in before[: -RECORDS_KEPT + 1]:
+            remove(old)
+
+    @property
+    def record_before(self) -> str:
+        """Name of the record that the present one has replaced; "" if there is none."""
+        before = [path.name for old in self.kept("record")[-1:] for path in old.glob("record/*")]
+        return next(iter(before), "")
+
+    def exchange_record(self) -> None:
+        """Exchange the record and its study with those before; done twice, it changes nothing.
+
+        InputError if there is none before.
+        """
+        if not self.record_before:
+            raise InputError("there is no record before; reload the page")
+        earlier = self.kept("record")[-1]
+        self._keep_record()
+        for path in earlier.iterdir():
+            path.replace(self.path / path.name)
+        remove(earlier)
 
     def take_record_of(self, source: str) -> None:
         """Use a dataset, a study file or a measured file as the record.
@@ -242,6 +278,10 @@ class WorkFolder:
             raise InputError("no such run; reload the page")
         return found[name]
 
+    def robot_of(self, run: str) -> Path | None:
+        """Return the robot file that a run was made with; the present one if none was kept."""
+        return next(self.path.glob(f"robot-{run}.*"), self.robot)
+
     def about(self, run: Path) -> dict[str, Any]:
         """Summarise one run of an identification or resolution study for the pages."""
         kind = result_of(run)
@@ -251,6 +291,7 @@ class WorkFolder:
         return {
             "name": run.name,
             "kind": kind.removesuffix(".json"),
+            "robot": getattr(self.robot_of(run.name), "name", ""),
             "method": data.get("method", "resolution"),
             "error": data.get("relative_error"),
             "unseen": max(unseen, default=None),

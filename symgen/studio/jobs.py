@@ -53,6 +53,8 @@ class Job:
         Text of its error stream and of its standard output.
     started : float
         Time of its start, on the monotonic clock, s.
+    dismissed : bool
+        Whether the user has taken note of its failure.
     """
 
     number: int
@@ -65,12 +67,18 @@ class Job:
     progress: str = ""
     output: str = ""
     started: float = 0.0
+    dismissed: bool = False
     process: Any = None
 
     @property
     def command(self) -> str:
         """The command line, quoted for a terminal."""
         return shlex.join(self.words)
+
+    @property
+    def task(self) -> str:
+        """Its title without the number of its run, such as ols for 03-ols."""
+        return self.title.partition("-")[2] if self.run else self.title
 
     @property
     def open(self) -> bool:
@@ -135,6 +143,19 @@ class Jobs:
         self.all.append(Job(number, title, tuple(words), result, run))
         self.wake.set()
         self.changed()
+
+    @property
+    def shown(self) -> list[Job]:
+        """List the commands that are open, or that have failed and were neither dismissed nor followed
+        by one of the same task that is done.
+        """
+        done = {job.task: job.number for job in self.all if job.state == DONE}
+        return [
+            job
+            for job in self.all
+            if job.open
+            or (not job.dismissed and job.state != DONE and job.number > done.get(job.task, 0))
+        ]
 
     def last(self, title: str) -> Job | None:
         """Return the last command with the given title; None if there is none."""
@@ -225,5 +246,7 @@ class Jobs:
             shutil.rmtree(self.folder / ".tmp", ignore_errors=True)
         if job.run and job.state != DONE:
             shutil.rmtree(self.folder / "runs" / job.run, ignore_errors=True)
-            (self.folder / f"study-{job.run}.yaml").unlink(missing_ok=True)
+            for own in ("study", "robot"):
+                for path in self.folder.glob(f"{own}-{job.run}.*"):
+                    path.unlink()
         self.changed()

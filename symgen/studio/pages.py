@@ -21,6 +21,7 @@ from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, R
 from starlette.routing import Route
 
 from runtime.ground.errors import InputError
+from runtime.reading.formats import endings
 from symgen.derive.models import SYMBOLIC
 from symgen.description import packaged_robots
 from symgen.description.files import TREES, content_of
@@ -28,7 +29,7 @@ from symgen.description.yaml import skeleton
 from symgen.emit.targets import TARGETS
 from symgen.errors import SymgenError
 from symgen.studio import table, views
-from symgen.studio.folder import DRAFT, json_of, remove, robot_file
+from symgen.studio.folder import DRAFT, json_of, measured_name, remove, robot_file
 from symgen.studio.server import Server, page
 
 PAGE_STEPS = ("robot", "record", "check", "solve", "results")
@@ -74,7 +75,7 @@ class Pages:
         }
         acts: tuple[Handler, ...] = (
             *(self._packaged, self._edit, self._undo, self._prove, self._study, self._check),
-            *(self._solve, self._cancel, self._apply),
+            *(self._solve, self._cancel, self._dismiss, self._apply, self._earlier_record),
         )
         posts = {f"/do/{act.__name__[1:]}": self._posted(act) for act in acts}
         return [
@@ -118,6 +119,10 @@ class Pages:
         own = folder.first(TREES)
         run = next((r for r in runs if r["name"] == asked), runs[-1] if runs else None)
         cells, values, wrong = None, {}, ""
+        robot_of = folder.robot_of(run["name"]) if name == "results" and run else None
+        changed = robot_of is not None and folder.digest != views.digest_of(robot_of)
+        if changed:  # drawing and figures of the run
+            shown = await self.server.view(views.robot, str(robot_of), "")
         try:
             cells, values = table.cells_of(shown.get("text", "")), folder.study()
         except InputError as e:
@@ -150,11 +155,13 @@ class Pages:
             stale=not self._is_checked(),
             checked=self.jobs.last("check of the record"),
             methods=ESTIMATORS,
-            jobs=self.jobs.all,
+            jobs=self.jobs.shown,
             now=time.monotonic(),
             runs=runs,
             run=run,
             own=own.name if own else "",
+            changed=changed,
+            record_before=folder.record_before,
             applied=self.jobs.last(f"apply {run['name']}") if run else None,
         )
 
@@ -192,7 +199,10 @@ class Pages:
         record = self.folder.measured("record")
         if name not in VIEWS or (name == "preview" and not record):
             raise InputError("no such view")
-        path = self.folder.path / record if name == "preview" else self._source()
+        of_run = name in ("series", "changes")
+        path = (
+            self.folder.path / record if name == "preview" else Path() if of_run else self._source()
+        )
         given: Any = self.server.before if name == "formulas" else asked
         if name == "preview":
             shown = await self.server.robot()
@@ -200,8 +210,9 @@ class Pages:
             joints = tuple(filter(None, shown.get("labels", ())))
             given = asked | {"joints": joints, "topic": settings.get("topic")}
         if name in ("series", "changes"):
-            run = str(self.folder.run(asked.get("run", "")))
-            given = {"run": run, "record": asked.get("record", "")}
+            run = self.folder.run(asked.get("run", ""))
+            path = self.folder.robot_of(run.name) or path
+            given = {"run": str(run), "record": asked.get("record", "")}
         value = await self.server.view(getattr(views, name), str(path), given)
         if name in ("preview", "series", "changes"):
             return JSONResponse(value)
@@ -232,13 +243,14 @@ class Pages:
         if kind not in ("robot", "record", "validation"):
             raise InputError("expected a robot, a record or a validation record")
         folder = self.folder.path / f"{secrets.token_hex(8)}.part"
-        part = folder / (robot_file(name) if kind == "robot" else kind)
+        part = folder / (robot_file(name) if kind == "robot" else measured_name(name) or kind)
         folder.mkdir()
         try:
             with part.open("xb") as file:
                 async for piece in request.stream():
                     file.write(piece)
             if kind != "robot":
+                await self._readable(part)
                 self.folder.take_measured(kind, name, part)
             elif "error" in (shown := await self.server.view(views.robot, str(part), "")):
                 raise InputError(f"{name[:80]}: {shown['error']}")
@@ -250,6 +262,18 @@ class Pages:
             self.server.changed()
             return PlainTextResponse(self.folder.measured(kind))
         return await self._changed("")
+
+    async def _readable(self, part: Path) -> None:
+        """Refuse a file that is no table, before it replaces one; which topic of a bag counts is asked later."""
+        if not part.name.lower().removesuffix(".gz").endswith(endings(packed=True)):
+            return
+        value = await self.server.view(views.preview, str(part), {"topic": None, "joints": ()})
+        if "error" in value:
+            raise InputError(f"{part.name[:80]}: {value['error']}; the record before stays")
+
+    async def _earlier_record(self, form: dict[str, str]) -> str:
+        self.folder.exchange_record()
+        return ""
 
     async def _packaged(self, form: dict[str, str]) -> str:
         name = form.get("name", "")
@@ -275,7 +299,8 @@ class Pages:
         """Restore the robot before the last change; with `redo`, the robot before the last undo."""
         self._of_this_robot(form)
         self.folder.bring_back(*(("undone", "robot") if "redo" in form else ()))
-        return ""
+        self.server.before, self.server.left_out = "", []
+        return "table"
 
     def _of_this_robot(self, form: dict[str, str]) -> None:
         if form.get("digest") != self.folder.digest:
@@ -318,7 +343,7 @@ class Pages:
         The settings are those of the study, or values of a form in JSON. The command line is the
         first line of the settings file of the run.
         """
-        robot, _ = self._command()
+        self._command()
         if "anyway" not in form and not self._is_checked():
             raise InputError("check record, study and robot first, or solve anyway")
         kind = form.get("kind", "identify")
@@ -336,14 +361,21 @@ class Pages:
         number = max((int(run[:2]) for run in taken if run[:2].isdigit()), default=0) + 1
         run = f"{number:02d}-{safe(form.get('name', '') or kind)}"
         result, verb, *own = RUN_COMMANDS[kind]
+        robot = f"robot-{run}{self._source().suffix}"  # a run keeps its own
         words = ("symgen", verb, robot, f"study-{run}.yaml", *own, *options, "-o", f"runs/{run}")
         self.jobs.add(run, words, f"runs/{run}/{result}", run=run)
+        self.folder.write(robot, self._source().read_bytes())
         self.folder.write(f"study-{run}.yaml", f"# {shlex.join(words)}\n{text}")
         return "jobs"
 
     async def _cancel(self, form: dict[str, str]) -> str:
         for job in (job for job in self.jobs.all if str(job.number) == form.get("number")):
             self.jobs.cancel(job)
+        return "jobs"
+
+    async def _dismiss(self, form: dict[str, str]) -> str:
+        for job in (job for job in self.jobs.all if str(job.number) == form.get("number")):
+            job.dismissed = True
         return "jobs"
 
     async def _apply(self, form: dict[str, str]) -> str:

@@ -6,7 +6,6 @@ It needs pip install symgen[studio].
 from __future__ import annotations
 
 import asyncio
-import secrets
 from collections.abc import Callable
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
@@ -41,10 +40,12 @@ class Server:
     folder : WorkFolder
     programs : dict of str to list of str
         As for `Jobs`.
+    token : str
+        The secret at the start of every path.
     """
 
-    def __init__(self, folder: WorkFolder, programs: dict[str, list[str]]) -> None:
-        self.folder, self.token = folder, secrets.token_urlsafe(16)
+    def __init__(self, folder: WorkFolder, programs: dict[str, list[str]], token: str) -> None:
+        self.folder, self.token = folder, token
         self.jobs = Jobs(folder.path, programs, self.changed)
         self.version, self.pages = 0, 0
         self.before, self.left_out = "", list[str]()
@@ -94,6 +95,9 @@ class Server:
         if path is None and not draft:
             return {}
         shown = await self.view(views.robot, str(path), draft)
+        if draft and path is not None and "figure" not in shown:  # the last whole robot is drawn
+            last = await self.view(views.robot, str(path), "")
+            shown = shown | {key: last[key] for key in ("figure",) if key in last}
         own = "" if path is None or path.suffix != ".yaml" else self.folder.read(path.name)
         return {**shown, "text": draft or own or shown.get("text", "")}
 

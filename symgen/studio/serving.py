@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
+import re
+import secrets
 import socket
 import webbrowser
 from collections.abc import AsyncIterator, Callable
@@ -18,11 +21,12 @@ from starlette.responses import FileResponse, Response, StreamingResponse
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
-from symgen.studio.folder import WorkFolder
+from symgen.studio.folder import WorkFolder, json_of
 from symgen.studio.guard import Guard
 from symgen.studio.pages import Pages
 from symgen.studio.server import Server
 
+ADDRESS = ".address.json"  # port and token of the last server, which bookmarks name
 IDLE_TIME = 600.0  # s without a page after which the server ends
 PULSE = 0.25  # s between two events of one page
 
@@ -30,7 +34,7 @@ PULSE = 0.25  # s between two events of one page
 def application(server: Server, port: int, end: Callable[[], None]) -> Guard:
     """Build the web application of the studio, with a secret token at the start of every path.
 
-    `end` is called after no page has been open for IDLE_TIME seconds.
+    `end` is called after no page has been open, and no command has run, for IDLE_TIME seconds.
     """
 
     async def events(request: Request) -> Response:
@@ -86,12 +90,40 @@ async def told(server: Server) -> AsyncIterator[str]:
 
 
 async def idle(server: Server, end: Callable[[], None]) -> None:
-    """Call `end` when no page has been open for IDLE_TIME seconds."""
+    """Call `end` when no page has been open, and no command has run, for IDLE_TIME seconds."""
     quiet, pause = 0.0, IDLE_TIME / 200
     while quiet < IDLE_TIME:
         await asyncio.sleep(pause)
-        quiet = 0.0 if server.pages else quiet + pause
+        busy = server.pages or any(job.open for job in server.jobs.all)
+        quiet = 0.0 if busy else quiet + pause
     end()
+
+
+def listening_at(folder: Path, port: int, *, renew: bool) -> tuple[str, socket.socket]:
+    """Return the token and the open port of a server of a work folder: those of the server before.
+
+    They stand in a file that only its owner reads; a file that others can read is not used. Where
+    another server has the port, a free one is taken for now.
+    """
+    path = folder / ADDRESS
+    owned = path.is_file() and (os.name == "nt" or not path.stat().st_mode & 0o077)
+    kept = {} if renew or not owned else json_of(path)
+    token, last = str(kept.get("token", "")), kept.get("port")
+    if not re.fullmatch(r"[\w-]{22,}", token):
+        token, last = secrets.token_urlsafe(16), None
+    wanted = port or (last if isinstance(last, int) and 0 < last < 2**16 else 0)
+    try:
+        listening = socket.create_server(("127.0.0.1", wanted))
+    except OSError:
+        if port:
+            raise
+        listening = socket.create_server(("127.0.0.1", 0))
+    own = listening.getsockname()[1]
+    if not (last and own not in (last, port)):  # where the port is another server's, its file stays
+        path.unlink(missing_ok=True)
+        with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
+            json.dump({"port": own, "token": token}, file)
+    return token, listening
 
 
 def serve(
@@ -103,8 +135,12 @@ def serve(
     record: str | None = None,
     port: int = 0,
     browser: bool = True,
+    renew: bool = False,
 ) -> None:
-    """Serve the page of a work folder until Ctrl-C, or until no page is open for IDLE_TIME seconds.
+    """Serve the page of a work folder until Ctrl-C, or until `idle` ends it.
+
+    port : 0 for that of the last server of the folder, or for a free one.
+    renew : take another port and token than the last server, so that old bookmarks find nothing.
 
     Raises InputError or SymgenError if robot or record cannot be used.
     """
@@ -113,10 +149,10 @@ def serve(
         work.take_robot_of(robot)
     if record is not None:
         work.take_record_of(record)
-    server = Server(work, programs)
-    server.process.start()
-    listening = socket.create_server(("127.0.0.1", port))
+    token, listening = listening_at(work.path, port, renew=renew)
     port = listening.getsockname()[1]
+    server = Server(work, programs, token)
+    server.process.start()
     own: list[uvicorn.Server] = []
     app = application(server, port, lambda: setattr(own[0], "should_exit", True))
     config = uvicorn.Config(

@@ -23,13 +23,13 @@ from runtime.core.rows.prepared import decimated_torque
 from runtime.core.rows.switches import Switch, switches
 from runtime.core.signals.filters import decimated, filtered_states
 from runtime.core.signals.noise_gain import bandwidth
-from runtime.core.study import Decimate, Lowpass, Signals
+from runtime.core.study import Decimate, Lowpass
 from runtime.ground.errors import InputError, ModelError, SettingsError
 from runtime.ground.limits import limits
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.reporting.sections import part_section
-from runtime.study import study_from_mapping
+from runtime.study import Signals, study_from_mapping
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files
 

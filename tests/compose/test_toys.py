@@ -17,14 +17,13 @@ from runtime.core.problem import Note, Problem
 from runtime.core.record import Record
 from runtime.core.signals.filters import States
 from runtime.core.signals.reader import Reader, lowpassed
-from runtime.core.study import Signals
 from runtime.ground import settings_errors
 from runtime.ground.errors import SettingsError
 from runtime.ground.settings import Count, Positive, Settings
 from runtime.reading import formats
 from runtime.reading.formats import Format
 from runtime.reading.text import read_text
-from runtime.study import study_from_mapping
+from runtime.study import Signals, study_from_mapping
 from symgen.cli.main import app
 
 COLUMNS = "t,q1,q2,tau1,tau2"

@@ -127,3 +127,18 @@ def test_a_reader_that_reads_no_rounded_positions_says_so(monkeypatch):
         compose.cestac(model, [record(model, 0)], settings)
     torque = study(signals={"reader": "smooth"}, cestac={"delta": [], "torque": [0.1], "runs": 2})
     assert np.isfinite(compose.cestac(model, [record(model, 0)], torque).levels[0].mean).all()
+
+
+def test_a_setting_of_another_reader_is_refused_by_the_list_of_readers(monkeypatch):
+    """The keys `step` and `side` belong to counts, and to every reader with its class of settings."""
+    monkeypatch.setitem(compose.READERS, TWIN, replace(compose.READERS["counts"]))
+    model = arm()
+    for key, value in {"step": 1e-3, "side": "motor"}.items():
+        settings = study(signals={key: value})
+        said = (
+            f"signals.{key}: given, but reader is lowpass; set reader: counts or {TWIN}, or remove"
+        )
+        with pytest.raises(SettingsError, match=said):
+            compose.problem(model, [record(model, 0)], settings)
+    twin = study(signals={"reader": TWIN, "step": 1e-3})
+    assert compose.complete_study(twin).signals.step == 1e-3

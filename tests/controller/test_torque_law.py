@@ -263,7 +263,7 @@ def test_the_saturation_is_in_force_where_kd_is_found(tmp_path, moving):
 def test_every_entry_point_has_the_torque_of_the_found_law(tmp_path):
     """Estimate and cestac took the torque without kd, or refused."""
     from runtime import cestac, estimate
-    from runtime.core.study import CestacSettings
+    from runtime.study import CestacSettings
 
     settings = CestacSettings(delta=(1e-6,), runs=2, columns="all")
     study = replace(logged_early(tmp_path, kd="fit"), cestac=settings)

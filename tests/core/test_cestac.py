@@ -22,10 +22,10 @@ from runtime.core.rows.prepared import decimated_torque, observation_of
 from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import select_rows
 from runtime.core.signals.filters import filtered_states
-from runtime.core.study import CestacSettings, EstimateSettings, Lowpass, Signals
+from runtime.core.study import EstimateSettings, Lowpass
 from runtime.ground.errors import InputError, SettingsError
 from runtime.parallel.processes import processes
-from runtime.study import Rows, Study
+from runtime.study import CestacSettings, Rows, Signals, Study
 
 SIGNALS = Signals(median=1, lowpass=Lowpass(cutoff=20))
 RECORD = record()

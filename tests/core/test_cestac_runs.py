@@ -16,9 +16,9 @@ from runtime.core.cestac.perturbed import system_of
 from runtime.core.model import GeneratedModel
 from runtime.core.record import Origin, Record
 from runtime.core.rows.regressor import Columns
-from runtime.core.study import CestacSettings, EstimateSettings, Lowpass, Signals
+from runtime.core.study import EstimateSettings, Lowpass
 from runtime.ground.errors import InputError
-from runtime.study import Rows, Study
+from runtime.study import CestacSettings, Rows, Signals, Study
 
 
 @pytest.fixture(scope="module")

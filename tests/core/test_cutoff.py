@@ -8,9 +8,8 @@ import runtime
 import symgen
 from runtime.core.signals.cutoff import cutoff
 from runtime.core.signals.filters import median_filtered
-from runtime.core.study import Signals
 from runtime.median import pulses_in_torques, share_taken
-from runtime.study import Study
+from runtime.study import Signals, Study
 
 RATE = 1000.0
 T = np.arange(10_000) / RATE

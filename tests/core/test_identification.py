@@ -21,8 +21,8 @@ from runtime.compose import assess
 from runtime.core.provenance import origin, record_names
 from runtime.core.record import Origin
 from runtime.core.rows.tape import Tape
-from runtime.core.study import Lowpass, Signals
-from runtime.study import located, study_from_mapping, study_text
+from runtime.core.study import Lowpass
+from runtime.study import Signals, located, study_from_mapping, study_text
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 STUDY = study_from_mapping(

@@ -15,8 +15,9 @@ from runtime.core.signals.filters import (
     lowpass_filtered,
     median_filtered,
 )
-from runtime.core.study import Decimate, Lowpass, Signals
+from runtime.core.study import Decimate, Lowpass
 from runtime.ground.errors import InputError
+from runtime.study import Signals
 
 RATE = 1000.0
 T = np.arange(3000) / RATE

@@ -9,13 +9,22 @@ import numpy as np
 import pytest
 
 from runtime.compose import METHODS, complete_study
-from runtime.core.study import CestacSettings, Lowpass, Signals
+from runtime.core.study import Lowpass
 from runtime.ground import settings_errors
 from runtime.ground.errors import InputError, SettingsError
 from runtime.ground.settings import number, to_mapping
 from runtime.ground.settings_errors import WENT
 from runtime.reading.datasets import DATASETS, dataset_study
-from runtime.study import Rows, Study, load_study, study_from_mapping, study_from_text, study_of
+from runtime.study import (
+    CestacSettings,
+    Rows,
+    Signals,
+    Study,
+    load_study,
+    study_from_mapping,
+    study_from_text,
+    study_of,
+)
 
 DESIGN = """
 symgen: 1

@@ -15,11 +15,11 @@ from runtime.core.rows.prepared import decimated_torque, observation_of
 from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import select_rows
 from runtime.core.signals.filters import filtered_states
-from runtime.core.study import CestacSettings, Lowpass, Signals
+from runtime.core.study import Lowpass
 from runtime.counts.own_encoder import own_encoder
 from runtime.counts.reading import read_counts
 from runtime.ground.errors import InputError, SettingsError
-from runtime.study import Rows, Study
+from runtime.study import CestacSettings, Rows, Signals, Study
 
 SIGNALS = Signals(median=1, lowpass=Lowpass(cutoff=20), reader="counts")
 TIME = np.arange(6000) / 1000.0

@@ -23,7 +23,7 @@ from runtime.core.rows.prepared import decimated_torque, observation_of
 from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import UNCERTAIN, certain_rows, select_rows
 from runtime.core.signals.filters import filtered_states
-from runtime.core.study import CestacSettings, Lowpass, Signals
+from runtime.core.study import Lowpass
 from runtime.counts.boxes import box_moments
 from runtime.counts.encoder_advice import encoder_sentences
 from runtime.counts.lattice import lattice
@@ -32,7 +32,7 @@ from runtime.counts.spline import Basis, Factor, next_density
 from runtime.ground.errors import InputError, SettingsError
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
-from runtime.study import Rows, Study, study_from_mapping
+from runtime.study import CestacSettings, Rows, Signals, Study, study_from_mapping
 from symgen.demo import MAIN
 
 GENERATED = Path(__file__).parents[2] / "generated"

@@ -23,11 +23,11 @@ from runtime.core.missing import Missing, bridged
 from runtime.core.model import drives_of
 from runtime.core.record import Record
 from runtime.core.signals.filters import filtered_states
-from runtime.core.study import CestacSettings, Lowpass, Signals
+from runtime.core.study import Lowpass
 from runtime.counts.reader import encoder_position
 from runtime.ground.errors import InputError
 from runtime.reading.settings import RecordSettings
-from runtime.study import Rows, Study
+from runtime.study import CestacSettings, Rows, Signals, Study
 from symgen.cli.main import app
 
 GENERATED = Path(__file__).parents[2] / "generated"

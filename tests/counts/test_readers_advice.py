@@ -14,11 +14,10 @@ from runtime.advisor.readers import curves
 from runtime.compose import advise, cestac, problem
 from runtime.core.signals.filters import filtered_states
 from runtime.core.signals.reader import LOWPASS
-from runtime.core.study import CestacSettings
 from runtime.counts.reader import COUNTS
 from runtime.ground.limits import limits
 from runtime.reporting.sections import part_section
-from runtime.study import Rows, Study
+from runtime.study import CestacSettings, Rows, Study
 
 LIMIT = limits("runtime.advisor")
 

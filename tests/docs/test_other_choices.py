@@ -4,7 +4,7 @@ import other_choices
 from campaign import campaign
 
 import runtime
-from runtime.core.study import CestacSettings
+from runtime.study import CestacSettings
 from symgen import demo as tx40
 
 

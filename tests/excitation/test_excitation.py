@@ -14,7 +14,7 @@ from runtime.compose import estimate_of, excite, observe, problem
 from runtime.core.model import load_model
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
-from runtime.core.study import Decimate, Lowpass, Signals
+from runtime.core.study import Decimate, Lowpass
 from runtime.excitation.criteria import Weights, excesses, limits_of, plan_rows, usage, weights_of
 from runtime.excitation.optimiser import Search, improve, one_start, smoothed
 from runtime.excitation.settings import ExcitationSettings, Sphere
@@ -22,7 +22,7 @@ from runtime.ground.errors import InputError, SettingsError
 from runtime.ground.settings import structure
 from runtime.loop.dry_friction import dry_friction
 from runtime.loop.trajectories import Motion, Part, motion_from_mapping
-from runtime.study import Study
+from runtime.study import Signals, Study
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files
 

@@ -13,12 +13,12 @@ from test_closed_loop import ARM, arm, away  # noqa: F401  (arm is a fixture)
 from runtime.compose import METHODS, cestac, estimate_of, observe, problem
 from runtime.core.cestac.rounding import rounded, stream
 from runtime.core.cestac.runs import Level
-from runtime.core.study import CestacSettings, EstimateSettings
+from runtime.core.study import EstimateSettings
 from runtime.ground.errors import InputError, SettingsError
 from runtime.loop.cestac import loop_of
 from runtime.loop.simulation import Simulator
 from runtime.parallel.processes import processes
-from runtime.study import study_from_mapping
+from runtime.study import CestacSettings, study_from_mapping
 
 STEP = 2e-4
 TORQUE = {"saturation": None, "noise": 0.05}

@@ -19,10 +19,10 @@ from planar_data import record
 
 from runtime.compose import cestac
 from runtime.core.cestac.runs import Run, Runs
-from runtime.core.study import CestacSettings, Lowpass, Signals
+from runtime.core.study import Lowpass
 from runtime.ground.errors import InputError
 from runtime.parallel.checkpoint import Checkpoint
-from runtime.study import Study
+from runtime.study import CestacSettings, Signals, Study
 
 RECORD = record(N=3000)
 HERE = Path(__file__).parent

@@ -14,8 +14,8 @@ from distributed import Client, LocalCluster
 from planar_data import record
 
 from runtime.compose import cestac
-from runtime.core.study import CestacSettings, Lowpass, Signals
-from runtime.study import Study
+from runtime.core.study import Lowpass
+from runtime.study import CestacSettings, Signals, Study
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "docs" / "examples" / "dask_many_robots.py"
 RECORD = record(N=3000)

@@ -9,8 +9,7 @@ from campaign import campaign
 import runtime
 import symgen
 from runtime.core.signals.cutoff import cutoff, stands
-from runtime.core.study import Signals
-from runtime.study import study_from_mapping
+from runtime.study import Signals, study_from_mapping
 
 T = np.arange(0, 20, 0.002)
 

@@ -155,10 +155,14 @@ def test_the_command_offers_a_repair(tmp_path: Path) -> None:
 
 def test_no_file_is_written_where_nothing_changes(tmp_path: Path) -> None:
     log, mended = written(tmp_path, *recorded(9)), tmp_path / "repaired.yaml"
-    run = CliRunner().invoke(app, ["identify", str(arm(tmp_path)), str(log), "--repair", str(mended)])
+    run = CliRunner().invoke(
+        app, ["identify", str(arm(tmp_path)), str(log), "--repair", str(mended)]
+    )
     assert run.exit_code == 0 and "Nothing changes" in run.output and not mended.exists()
     mended.write_text("mine", encoding="utf-8")
-    run = CliRunner().invoke(app, ["identify", str(arm(tmp_path)), str(log), "--repair", str(mended)])
+    run = CliRunner().invoke(
+        app, ["identify", str(arm(tmp_path)), str(log), "--repair", str(mended)]
+    )
     assert run.exit_code == 2 and mended.read_text(encoding="utf-8") == "mine"
 
 
@@ -178,9 +182,7 @@ def test_pieces_between_gaps_are_refused(made: Any, tmp_path: Path) -> None:
     t, q, tau = recorded(11)
     kept = np.r_[0:700, 800:1600]
     log = written(tmp_path, t[kept], q[kept], tau[kept])
-    study = study_from_mapping(
-        {"record": {"files": [str(log)], "resample": {"gaps": "split"}}}
-    )
+    study = study_from_mapping({"record": {"files": [str(log)], "resample": {"gaps": "split"}}})
     records = records_of(study.record, made[0], study)
     assert len(records) == 2
     with pytest.raises(runtime.InputError, match="gaps"):

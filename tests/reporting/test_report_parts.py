@@ -16,7 +16,7 @@ from runtime.compose import judged
 from runtime.core.essential import lost_joints
 from runtime.core.least_squares.estimate import Estimate, JointFit
 from runtime.core.model import load_model
-from runtime.core.study import Decimate, Signals
+from runtime.core.study import Decimate
 from runtime.core.validation import JointComparison
 from runtime.expected import Expected, expected_off
 from runtime.ground.check import Check, state_of
@@ -38,6 +38,7 @@ from runtime.reporting.sections import (
     torque_section,
 )
 from runtime.reporting.series import extremes, gaps, series
+from runtime.study import Signals
 from runtime.verdict.questions import certain, separate
 from symgen.symbols.printers import letter as other_symbol
 

@@ -33,7 +33,7 @@ class Studio:
     """A client that asks as the pages do: own Host, own Origin, the token."""
 
     def __init__(self, path: Path) -> None:
-        self.server = server.Server(folder.WorkFolder(path), PROGRAMS)
+        self.server = server.Server(folder.WorkFolder(path), PROGRAMS, "a" * 22)
         self.app = serving.application(self.server, PORT, lambda: None)
         self.client = TestClient(self.app, base_url=OWN, raise_server_exceptions=False)
         self.path = path

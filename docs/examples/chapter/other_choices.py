@@ -28,8 +28,9 @@ from couplings import recoupled
 import runtime
 from runtime import Cestac, Record, Study
 from runtime.core.drives import Drives
-from runtime.core.study import CestacSettings, Lowpass, Signals
+from runtime.core.study import Lowpass
 from runtime.ground.table import Table, number
+from runtime.study import CestacSettings, Signals
 from symgen.demo import DELTA, TABLE_2, TABLE_3, changed, prepare
 
 FASTER = 100.0  # Hz, the other cut-off

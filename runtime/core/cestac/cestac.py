@@ -144,17 +144,17 @@ def cestac(
     if loop is not None:
         as_measured = list(loop.records)
         study = replace(study, estimate=loop.estimate)
-    rounded = () if settings.place == "loop" else as_measured
+    in_loop = loop is not None and loop.in_loop
     task = Task(
         records=tuple(
             prepared_record(own, study, own_encoder, drives, exact=bool(settings.delta))
-            for own in rounded
+            for own in (() if in_loop else as_measured)
         ),
         model=model,
         names=study_columns(problem, as_measured, columns, loop),
         estimate=replace(study.estimate, columns="all"),
         settings=settings,
-        levels=levels_of(settings),
+        levels=levels_of(settings, in_loop),
         drives=drives,
         reader=problem.reader,
         methods=problem.methods,
@@ -184,10 +184,10 @@ def cestac(
     by_level = [runs.where(runs.level == k) for k in range(len(task.levels))]
     levels = list(zip(task.levels, by_level, strict=True))
     linear = method_of(task.estimate, task.methods).linear
-    if settings.place == "loop":
+    if in_loop:
         (_, exact), *levels = levels
         reference = replace(reference, X=np.nanmean(exact.X, axis=0))
-    if settings.place == "loop" or not linear:  # their residuals are not those of `measured`
+    if in_loop or not linear:  # their residuals are not those of `measured`
         norm = float(np.linalg.norm(measured.Y - measured.W @ reference.X))
         reference = replace(reference, residual_norm=norm)
     return Cestac(
@@ -216,13 +216,13 @@ def _refuse(reference: Estimate) -> None:
         )
 
 
-def levels_of(settings: CestacSettings) -> tuple[Level, ...]:
+def levels_of(settings: CestacSettings, in_loop: bool = False) -> tuple[Level, ...]:
     """List the levels of a study: each level is a position step Delta with a torque step Phi.
 
     The order is: each Delta alone, each Phi alone, each Phi with the first Delta. If the encoder of
-    a simulated loop is studied: a level without steps, then each Delta.
+    a simulated loop is studied (in_loop): a level without steps, then each Delta.
     """
-    if settings.place == "loop":
+    if in_loop:
         return (Level(0.0), *map(Level, settings.delta))
     steps = settings.torque or ()
     with_position = [Level(settings.delta[0], phi) for phi in steps] if settings.delta else []

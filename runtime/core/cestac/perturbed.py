@@ -286,7 +286,7 @@ def perturbed(columns: Columns, task: Task, level: Level, draw: tuple[int, ...])
     draw : numbers that identify the random draw.
     """
     loop = task.loop
-    if loop is not None and task.settings.place == "loop":
+    if loop is not None and loop.in_loop:
         rows = loop.rows(level, draw) if draw else loop.measured()
         return rows.columns(task.names)
     keys = [stream_keys(draw, k) for k in range(len(task.records))]

@@ -44,9 +44,14 @@ class RecordEncoder(Protocol):
 class Loop(Protocol):
     """Control loop of robot and controller that a study of encoders simulates again in each run.
 
+    in_loop : whether the encoder of the study is the one in the loop: each run is a record of its
+        own, simulated with this encoder. Otherwise the positions of the records are rounded.
     estimate : settings of the estimate without those of the loop.
     described : description for JSON.   notes : sentences for the user.
     """
+
+    @property
+    def in_loop(self) -> bool: ...
 
     @property
     def records(self) -> Sequence[Prepared]: ...

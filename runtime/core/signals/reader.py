@@ -10,7 +10,7 @@ name. The names are in the list READERS of `runtime/compose.py`; signals.reader 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Any, TypeAlias, TypeVar
 
@@ -44,6 +44,8 @@ class Reader:
         Joint states, shape (N, n) each.
     options : type or None
         Settings class of signals.options; None: the reader has no options.
+    settings : type
+        Class of its section `signals`: that of the chapter, or a subclass with settings of its own.
     linear : bool
         Whether each position is used as it is, and the states are linear in the positions of the
         same joint: a joint that stands is read as standing, and rounded positions are read like
@@ -71,16 +73,23 @@ class Reader:
         motion.
     """
 
-    states: Callable[[Record, Signals], States]
+    states: Callable[[Record, Any], States]
     options: type[Settings] | None = None
+    settings: type[Signals] = Signals
     linear: bool = False
     velocities: bool = False
     at_rest: bool = False
     missing: bool = False
-    rounded: Callable[[Record, Signals, Any, str], States] | None = None
-    encoder: Callable[[Signals], tuple[Steps, str]] | None = None
-    unwrapped: Callable[[Record, Signals, Drives | None], Record] | None = None
+    rounded: Callable[[Record, Any, Any, str], States] | None = None
+    encoder: Callable[[Any], tuple[Steps, str]] | None = None
+    unwrapped: Callable[[Record, Any, Drives | None], Record] | None = None
     motion: Callable[[Array, float, float, Any], tuple[Array, Array, Any]] | None = None
+
+    @property
+    def own_settings(self) -> dict[str, Any]:
+        """Keys of its section `signals` that the chapter does not have, with their defaults."""
+        known = {f.name for f in fields(Signals)}
+        return {f.name: f.default for f in fields(self.settings) if f.name not in known}
 
     @property
     def filters_positions(self) -> bool:
@@ -114,15 +123,9 @@ class Reader:
         Raises
         ------
         SettingsError
-            Options that do not suit, or a step or side of encoders for a reader without encoders.
+            Options that do not suit.
         """
         signals, rows = study.signals, study.rows
-        for key, given in (("step", signals.step is not None), ("side", signals.side != "joint")):
-            if given and self.encoder is None:
-                raise SettingsError(
-                    f"given, but reader is {signals.reader}; set reader: counts, or remove this key",
-                    path=("signals", key),
-                )
         changed: dict[str, Any] = {
             "options": self._checked(signals),
             **(UNFILTERED if self.at_rest else {}),

@@ -172,7 +172,7 @@ const one = (selector, of = document) => of.querySelector(selector), all = (sele
   function changed(table, act, j) {
     const rows = Object.values(table.frames);
     const gone = (text) => text.replace(/\bq(\d+)\b/g, (all, i) => `q${i - (i > j)}`);
-    if (act === "add") rows.push({ ant: String(j), sigma: "0", alpha: "0", d: "0", theta: `q${rows.length + 1}`, r: "0" });
+    if (act === "add") rows.push({ ant: String(j || rows.length), sigma: "0", alpha: "0", d: "0", theta: `q${rows.length + 1}`, r: "0" });
     if (act === "loop") table.loops.push({ cut: String(rows.length), twin: "" });
     if (act === "unloop") table.loops.splice(j, 1);
     if (act === "remove") {
@@ -185,17 +185,22 @@ const one = (selector, of = document) => of.querySelector(selector), all = (sele
     return { ...table, frames: Object.fromEntries(rows.map((row, k) => [k + 1, row])) };
   }
 
-  /** Send the cells as they are when the edits before are done; `act` adds or removes row j of frames or loops. */
-  async function edit(act = "", j = 0) {
+  /** Send the cells as they are when the edits before are done; `act` adds row j (0: on the last) or removes it, of frames or loops; or it is undo, redo, or text, the whole file. */
+  async function edit(act = "", j = 0, text = "") {
+    if (resting && ["undo", "redo", "text"].includes(act)) waiting.push(["", 0, ""]); // what was typed before
     clearTimeout(resting);
-    if (act || !waiting.length) waiting.push([act, j]);
+    resting = null;
+    if (act || !waiting.length) waiting.push([act, j, text]);
+    if (act !== "undo") one("#undo").disabled = false;
     if (busy) return;
     busy = true;
     while (waiting.length) {
-      const [act, j] = waiting.shift(), table = act ? changed(cells(), act, j) : cells();
-      const values = { digest: one("#cells").dataset.digest, cells: JSON.stringify(table), ...(act && !act.endsWith("loop") ? { resized: "1" } : {}) };
+      const [act, j, text] = waiting.shift(), { digest } = one("#figure").dataset;
+      const back = { undo: {}, redo: { redo: "1" } }[act], table = () => (act ? changed(cells(), act, j) : cells());
+      const resized = act && !act.endsWith("loop") ? { resized: "1" } : {};
+      const values = back || (act === "text" ? { text } : { cells: JSON.stringify(table()), ...resized });
       sent = act === "remove" ? {} : Object.fromEntries(all("#cells [data-cell]").map((input) => [input.id, input.value]));
-      await htmx.ajax("POST", "do/edit", { target: "#table", swap: "outerHTML", values }).catch(() => {}); // told by htmx:sendError
+      await htmx.ajax("POST", back ? "do/undo" : "do/edit", { target: "#table", swap: "outerHTML", values: { digest, ...values } }).catch(() => {}); // told by htmx:sendError
     }
     busy = moving = false;
   }
@@ -205,14 +210,16 @@ const one = (selector, of = document) => of.querySelector(selector), all = (sele
     resting = setTimeout(() => edit(), 250);
   });
   document.addEventListener("submit", (event) => {
-    if (event.target.id !== "cells") return;
+    const { id } = event.target;
+    if (id !== "cells" && id !== "whole") return;
     event.preventDefault();
-    edit();
+    if (id === "cells") edit();
+    else edit("text", 0, one("#robot-text").value);
   });
   document.addEventListener("click", (event) => {
-    const [act, j] = event.target.closest("[data-act]")?.dataset.act.split(" ") || [];
-    if (!act || moving) return; // the rows that were clicked on move when one goes
-    moving = act === "remove" || act === "unloop";
+    const [act, j = 0] = event.target.closest("[data-act]")?.dataset.act.split(" ") || [];
+    if (!act || (moving && j)) return; // the rows that were clicked on move when one goes or another robot comes
+    moving ||= !["add", "loop"].includes(act);
     edit(act, Number(j));
   });
   // --- forms that derive: a sign of work in the place of what an earlier choice gave ---
@@ -278,8 +285,12 @@ const one = (selector, of = document) => of.querySelector(selector), all = (sele
     }, 1500);
   });
   document.addEventListener("htmx:afterSettle", () => {
-    const { figure, digest } = one("#figure")?.dataset || {}, robot = figure ? digest : ""; // "" for a draft
-    if (robot !== shownRobot) { shownRobot = robot; if (robot) htmx.trigger(document.body, "robot"); }
+    const { figure, digest } = one("#figure")?.dataset || {}, robot = figure ? digest : "";
+    if (robot !== shownRobot) {
+      shownRobot = robot;
+      for (const place of all("#model, #module")) place.replaceChildren(); // of the robot before
+      if (robot) htmx.trigger(document.body, "robot");
+    }
   });
   read();
   all("[data-series]").forEach(replay);

@@ -20,8 +20,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from runtime.core.problem import Problem
-from runtime.ground.errors import InputError
 from runtime.ground.settings import Real, Settings, Text, to_mapping
 
 Entry = Annotated[Text | Real, Field(union_mode="left_to_right")]
@@ -59,23 +57,3 @@ def digest(corrections: Any) -> str:
         return ""
     text = json.dumps(given, sort_keys=True)
     return f"+{hashlib.sha256(text.encode()).hexdigest()[:12]}"
-
-
-def corrected_model(problem: Problem) -> Problem:
-    """Check that the model is that of the robot which the study corrects; change nothing.
-
-    This is a step of the preparation of a problem.
-
-    Raises
-    ------
-    InputError
-        The model is that of the robot file, or of other corrections.
-    """
-    settings: Any = problem.settings
-    wanted = digest(settings.robot)
-    if not problem.model.SOURCE_SHA256.endswith(wanted):
-        raise InputError(
-            f"the study corrects the robot (section `robot`), but {problem.model.NAME} is not the "
-            "model of the corrected robot; make it by symgen.model(symgen.corrected(robot, study))"
-        )
-    return problem
