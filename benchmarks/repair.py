@@ -44,7 +44,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import lsq_linear
 from truth_classes import stribeck
 from truth_shared import among, markdown, middle
-from truth_simulator import Encoder, Motion, Robot, Truth, encoded, noise
+from truth_simulator import Encoder, Robot, Truth, encoded, noise
 
 import runtime
 import symgen
@@ -109,6 +109,10 @@ def scaled(w: World, j: int, q: float, tau: float) -> World:
     return replace(w, q=w.q * a, qd=w.qd * a, qdd=w.qdd * a, tau=w.tau * b)
 
 
+def geared(w: World, j: int, x: float) -> World:
+    return scaled(w, j, x, 1 / x)
+
+
 def moved(w: World, j: int, by: float) -> World:
     return replace(w, q=w.q + by * (np.arange(w.robot.n) == j))
 
@@ -154,7 +158,7 @@ ERRORS = (
     Error("positions exchanged", lambda w, j, r: exchanged(w, j, "q")),
     Error("degrees", lambda w, j, r: scaled(w, j, 180 / pi, 1), suits=turns),
     Error("torque factor", lambda w, j, r: scaled(w, j, 1, r.choice([0.5, 2**-0.5, 1.6, 2.0]))),
-    Error("gear ratio", lambda w, j, r: (lambda x: scaled(w, j, x, 1 / x))(r.choice([0.8, 1.25, 1.5]))),
+    Error("gear ratio", lambda w, j, r: geared(w, j, r.choice([0.8, 1.25, 1.5]))),
     Error("zero", lambda w, j, r: moved(w, j, r.choice([-1, 1]) * r.uniform(0.3, 1.3)), suits=turns),
     Error("length", lambda w, j, r: longer(w, j, r.choice([0.75, 1.3])), suits=has_length),
     Error("gravity angle", lambda w, j, r: w, gravity=True),
@@ -475,7 +479,7 @@ def main() -> None:
     parser.add_argument("--seeds", choices=[*BASE], default="first")
     parser.add_argument("--seconds", type=float, default=1e9, help="of processor time, then stop")
     parser.add_argument("--more", action="store_true")
-    parser.add_argument("-o", type=Path, default=Path("."))
+    parser.add_argument("-o", type=Path, default=Path())
     parser.add_argument("-v", action="store_true")
     asked = parser.parse_args()
     file = asked.o / f"repair_{asked.set}_{asked.seeds}.json"
@@ -488,7 +492,7 @@ def main() -> None:
         file.write_text(json.dumps(rows, indent=1))
         if asked.v:
             r = rows[-1]
-            print(k, r["robot"], r["class"], list(zip(r["errors"], r["joints"])), "told", r["told"], r["outcome"], f"{r['error given']:.1f} -> {r['error']:.1f}", f"unseen {r.get('before', 0):.1f} {r.get('after', 0):.1f}", r.get("lines"), r.get("refused", ""), f"{r['repair s']:.1f}s {r['repair s'] / r['identify s']:.1f}", flush=True)  # fmt: skip
+            print(k, r["robot"], r["class"], list(zip(r["errors"], r["joints"], strict=True)), "told", r["told"], r["outcome"], f"{r['error given']:.1f} -> {r['error']:.1f}", f"unseen {r.get('before', 0):.1f} {r.get('after', 0):.1f}", r.get("lines"), r.get("refused", ""), f"{r['repair s']:.1f}s {r['repair s'] / r['identify s']:.1f}", flush=True)  # fmt: skip
     print(table(rows))
 
 

@@ -71,10 +71,10 @@ if TYPE_CHECKING:
     from runtime.excitation.result import Excitation
     from runtime.loop.result import Simulation
     from runtime.loop.simulation import Simulator
+    from runtime.mending.repair import Repair
     from runtime.payload.study import PayloadStudy
     from runtime.plausible.delay import Delay
     from runtime.plausible.plausibility import Plausibility
-    from runtime.mending.repair import Repair
     from runtime.treatments import Ranking
 
 STEPS: list[Step] = [

@@ -14,8 +14,8 @@ from functools import partial
 import numpy as np
 
 from runtime.ground.limits import limits
-from runtime.plausible.causes import GRAVITY, Cause, unchanged_study
 from runtime.mending.reading import Reading
+from runtime.plausible.causes import GRAVITY, Cause, unchanged_study
 
 LIMIT = limits(__package__)
 

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from runtime.ground.limits import limits
-from runtime.plausible.bodies import Grams, least_squares
 from runtime.mending.reading import Reading
+from runtime.plausible.bodies import Grams, least_squares
 
 LIMIT = limits("runtime.plausible")
 OWN = limits(__package__)

@@ -12,9 +12,9 @@ from functools import partial
 import numpy as np
 
 from runtime.ground.limits import limits
+from runtime.mending.reading import Reading
 from runtime.plausible.causes import Item, Maps, Robot, Row, factor_words, joints
 from runtime.plausible.trials import search_number
-from runtime.mending.reading import Reading
 
 LIMIT = limits("runtime.plausible")
 

@@ -23,11 +23,6 @@ from runtime.core.drives import Drives
 from runtime.core.record import Record
 from runtime.ground.documents import plain
 from runtime.ground.limits import limits
-from runtime.plausible.bodies import Grams, fit_of
-from runtime.plausible.case import Case
-from runtime.plausible.causes import ENTRY, GRAVITY, Cause, Robot
-from runtime.plausible.samples import SIGNALS, Samples
-from runtime.plausible.trials import Baseline, baseline_of, regressor
 from runtime.mending.bound import Bound
 from runtime.mending.edits import (
     Lines,
@@ -39,6 +34,11 @@ from runtime.mending.edits import (
     rounded,
     with_variable,
 )
+from runtime.plausible.bodies import Grams, fit_of
+from runtime.plausible.case import Case
+from runtime.plausible.causes import ENTRY, GRAVITY, Cause, Robot
+from runtime.plausible.samples import SIGNALS, Samples
+from runtime.plausible.trials import Baseline, baseline_of, regressor
 
 LIMIT = limits(__package__)
 

@@ -26,15 +26,15 @@ from runtime.ground.errors import InputError
 from runtime.ground.limits import limits
 from runtime.ground.progress import at
 from runtime.ground.settings import structure, to_mapping
+from runtime.mending.edits import Lines, Place, differences
+from runtime.mending.reading import Data, Reading, record_of, set_aside
+from runtime.mending.search import Found, further, search
 from runtime.plausible.case import Case
 from runtime.plausible.friction import friction
 from runtime.plausible.jumps import cut_torques, jumps
 from runtime.plausible.plausibility import case_of
 from runtime.plausible.samples import excerpts, samples_of
 from runtime.reading.publishers import Sent, of_one_publisher
-from runtime.mending.edits import Lines, Place, differences
-from runtime.mending.reading import Data, Reading, record_of, set_aside
-from runtime.mending.search import Found, further, search
 
 LIMIT = limits(__package__)
 

@@ -15,9 +15,9 @@ from itertools import combinations
 import numpy as np
 
 from runtime.ground.limits import limits
+from runtime.mending.reading import Reading
 from runtime.plausible.bodies import Grams, physical_fit
 from runtime.plausible.causes import SCALE, Cause, unchanged_study
-from runtime.mending.reading import Reading
 
 LIMIT = limits(__package__)
 

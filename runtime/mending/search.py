@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 
 from runtime.ground.limits import limits
 from runtime.ground.progress import at
-from runtime.plausible.causes import CAUSES, Cause
-from runtime.plausible.trials import decisive, leaves_values, try_causes
 from runtime.mending.gravity import tilted
 from runtime.mending.late import late_torques
 from runtime.mending.ratio import other_ratios
 from runtime.mending.reading import Reading, best_of
 from runtime.mending.reversed import reversed_torques
+from runtime.plausible.causes import CAUSES, Cause
+from runtime.plausible.trials import decisive, leaves_values, try_causes
 
 LIMIT, TRIED = limits(__package__), limits("runtime.plausible")
 

@@ -17,9 +17,9 @@ from runtime.compose import problem, records_of
 from runtime.ground.errors import InputError, SettingsError
 from runtime.ground.settings import structure, to_mapping
 from runtime.mending import repair as mending
-from runtime.mending.settings import digest
 from runtime.mending.edits import angle_text
 from runtime.mending.reading import Reading, record_of
+from runtime.mending.settings import digest
 from runtime.plausible.causes import CAUSES, NUMBERS, Cause, Robot
 from runtime.plausible.plausibility import case_of
 from runtime.study import Study, located, study_from_mapping, study_from_text, study_text

@@ -192,11 +192,11 @@ def test_pieces_between_gaps_are_refused(made: Any, tmp_path: Path) -> None:
 def test_blocks_set_aside_do_not_matter_to_the_search(made: Any) -> None:
     """Another torque in the blocks set aside changes what is judged, and nothing that is found."""
     from runtime.compose import problem
+    from runtime.ground.settings import to_mapping
     from runtime.mending import repair as mending
     from runtime.mending.reading import Reading
     from runtime.mending.search import search
     from runtime.plausible.plausibility import case_of
-    from runtime.ground.settings import to_mapping
     from runtime.reading.settings import RecordSettings
 
     t, q, tau = recorded(12)
