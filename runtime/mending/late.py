@@ -8,6 +8,7 @@ one of each joint from there. The score is that of least squares with weights by
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -73,7 +74,7 @@ def late_torques(reading: Reading) -> tuple[Array, str] | None:
     return delay, f"torques are late by {text} ms (early if below zero)"
 
 
-def _least(f: object, bounds: tuple[float, float]) -> float:
+def _least(f: Callable[[float], float], bounds: tuple[float, float]) -> float:
     options = {"maxiter": 10, "xatol": 1e-4}
     found = minimize_scalar(f, bounds=bounds, method="bounded", options=options)
     return float(found.x)

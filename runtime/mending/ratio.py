@@ -14,7 +14,7 @@ import numpy as np
 from runtime.ground.limits import limits
 from runtime.mending.reading import Reading
 from runtime.plausible.causes import Item, Maps, Robot, Row, factor_words, joints
-from runtime.plausible.trials import search_number
+from runtime.plausible.trials import Trial, search_number
 
 LIMIT = limits("runtime.plausible")
 
@@ -37,7 +37,7 @@ RATIO = Row(
 )
 
 
-def other_ratios(reading: Reading) -> list:
+def other_ratios(reading: Reading) -> list[Trial]:
     """Return the trials of another gear ratio of one joint, at the best ratio each."""
     baseline = reading.baseline
     if baseline is None:

@@ -58,7 +58,7 @@ class Found:
 def search(start: Reading, spent: Callable[[], float]) -> Found:
     """Search the readings that explain the rows of the search better than the study as given.
 
-    spent : function that returns the processor time so far, in identifications.
+    spent : function that returns the processor time so far, s.
     """
     every = {start.key: start}
     hidden: dict[str, tuple[Cause, ...]] = {}
@@ -70,7 +70,7 @@ def search(start: Reading, spent: Callable[[], float]) -> Found:
                 break
             at(
                 f"repair: change {step}, reading {expanded + 1} of at most "
-                f"{LIMIT.READINGS_EXPANDED}, {spent():.1f} of at most 10 identifications"
+                f"{LIMIT.READINGS_EXPANDED}, {spent():.0f} s of processor time"
             )
             expanded += 1
             candidates, hidden[reading.key] = further(reading)

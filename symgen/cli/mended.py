@@ -7,8 +7,6 @@ from pathlib import Path
 from shlex import join
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 if TYPE_CHECKING:
     from runtime.core.model import GeneratedModel
     from runtime.core.record import Record
@@ -65,6 +63,8 @@ def mended_study(
 
 def same(a: Any, b: Any) -> bool:
     """Whether two signals agree, up to rounding."""
+    import numpy as np
+
     return a.shape == b.shape and bool(np.abs(a - b).max() <= AGREE * max(np.abs(b).max(), 1e-300))
 
 
@@ -91,11 +91,8 @@ def with_repair(
 
 def offered(result: Identification, arguments: Sequence[str]) -> str:
     """Write the line that offers to repair the first cause; "" if no cause is named."""
-    try:
-        part: Any = result.part("plausibility")
-    except KeyError:
-        return ""
-    first = next(iter(part.named), None)
+    part: Any = result.part("plausibility")
+    first = None if part is None else next(iter(part.named), None)
     if first is None or first.fit is None:
         return ""
     command = join(["symgen", "identify", *arguments, "--repair", "repaired.yaml"])

@@ -137,6 +137,8 @@ def test_gravity_of_a_tilted_base(tmp_path: Path) -> None:
     model = symgen.model(corrected)
     records = records_of(located(new, tmp_path).record, model, new)
     assert runtime.identify(model, records, new).estimate.relative_error < 1
+    with pytest.raises(symgen.SymgenError, match="corrected the robot"):
+        symgen.apply(runtime.identify(model, records, new), robot)
     with pytest.raises(runtime.InputError, match="corrects the robot"):
         runtime.identify(symgen.model(robot), records, new)
 
