@@ -19,6 +19,7 @@ import numpy as np
 
 from runtime.core.drives import Drives
 from runtime.plausible.causes import ENTRY, GRAVITY, Cause
+from runtime.reading.units import position_unit, torque_unit
 
 Array = np.ndarray
 Lines = dict[str, Any]
@@ -171,12 +172,11 @@ def sides_of(record: Lines) -> tuple[str, str]:
 
 def _in_columns(record: Lines, cause: Cause, place: Place) -> bool:
     """Write another order, other units, or factors of the columns of a record."""
-    units = {key: x for key, x in cause.change.items() if key.startswith("record.units.")}
-    for key, unit in units.items():
-        record["units"][key.rpartition(".")[2]] = unit
-    if units:
-        return True
     for key, E in zip(("q", "tau"), of_files(cause, sides_of(record), place.drives), strict=True):
+        unit = cause.change.get(f"record.units.{key}")
+        if unit is not None and _converts(key, record["units"][key], unit, E):
+            record["units"][key] = unit
+            continue
         found = monomial(E)
         if found is None:
             return False
@@ -186,6 +186,16 @@ def _in_columns(record: Lines, cause: Cause, place: Place) -> bool:
         if not np.allclose(factors, 1.0, atol=1e-12) and not _scaled(record, key, factors, place.n):
             return False
     return True
+
+
+def _converts(key: str, old: Any, new: Any, E: Array) -> bool:
+    """Whether other units of the columns are the factors on the diagonal of E."""
+    factor = position_unit if key == "q" else torque_unit
+    n = len(E)
+    before, after = ([x] * n if isinstance(x, str) else list(x) for x in (old, new))
+    factors = [factor(b)[1] / factor(a)[1] for a, b in zip(before, after, strict=True)]
+    # rad of a joint that slides are m
+    return bool(np.allclose(np.diag(factors), E, rtol=1e-6, atol=0))
 
 
 def _ordered(record: Lines, key: str, order: list[int], place: Place) -> bool:

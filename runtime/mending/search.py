@@ -93,7 +93,8 @@ def different(readings: list[Reading], N: float) -> list[Reading]:
     """Return the readings from which the search goes on: the best ones, of several kinds first."""
     ranked = sorted(readings, key=lambda one: one.score(N))
     kinds: set[str] = set()
-    first, rest = [], []
+    first: list[Reading] = []
+    rest: list[Reading] = []
     for one in ranked:
         (rest if one.steps[-1].kind in kinds else first).append(one)
         kinds.add(one.steps[-1].kind)
