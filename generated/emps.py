@@ -11,19 +11,20 @@ Torques     delivered by the actuators, so friction enters with a plus: Gamma = 
             FS*sign(qd) + OFFSET
 Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY
             MZ first moments
-Element     Ia      inertia: along q1
-Element     FV      viscous: along q1
-Element     FS      coulomb: along q1
-Element     OFFSET  offset: along q1
+Elements    along s = G q: Gamma gets G' times the force along s
+    Ia      inertia: along q1
+    FV      viscous: along q1
+    FS      coulomb: along q1
+    OFFSET  offset: along q1
 
 Base parameters, 4 of 14; Gautier and Khalil (1990)
     exact, proved modulo primes
-    FORMULAS says what they are made of; what it leaves out is as it is
+    FORMULAS has those that combine several; the others are standard parameters
     No effect: XX1 XY1 XZ1 YY1 YZ1 ZZ1 MX1 MY1 MZ1
 
 Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3
-            column 1, Z132 component 1 in frame 3 of the axis of joint 2; a letter at the end is a
-            part that several share, N16a of N16
+            column 1, Z132 component 1 in frame 3 of the axis of joint 2; what several share is
+            named by its factors, C4DV134, by its function, signQP1, or by a letter, N16a in N16
     QP   joint velocity; with the name of an element, QPFSM6, the velocity that it acts along
     QDP  joint acceleration
     F    force that moves a link
@@ -51,7 +52,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 15a0f1d957513a70f4283bd4be31c7ae10389c3c93a1a78375f857a5806fcf01
+sha256 of all but these lines: 9a1526060374714a58dcfc04138f3a8953f0b5009b6de98f371a78ef2849fbb5
 """
 
 import numpy as np
@@ -183,7 +184,8 @@ def _package(*arrays):
     if any(type(x).__module__.startswith("casadi") for x in arrays):
         return _Symbols()
     others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
-    if all(isinstance(x, np.ndarray | np.generic) for x in others):
+    others = [x for x in others if not isinstance(x, np.ndarray | np.generic)]
+    if not others:
         return np if _IN_PLACE else _Arrays(np, arrays)
     try:
         from array_api_compat import array_namespace
@@ -192,7 +194,13 @@ def _package(*arrays):
             f"arrays of {type(others[0]).__module__} need array_api_compat: "
             "pip install array-api-compat"
         ) from error
-    return _Arrays(array_namespace(*arrays), arrays)
+    try:
+        return _Arrays(array_namespace(*others), others)
+    except TypeError as error:
+        packages = " and ".join(sorted({type(x).__module__.partition(".")[0] for x in others}))
+        if " and " not in packages:
+            raise
+        raise TypeError(f"arrays of {packages}; expected states and X of one package") from error
 
 
 class _Arrays:
@@ -231,11 +239,19 @@ class _Arrays:
 
     def rows(self, x):
         """x[..., k], one by one."""
+        if self.package is not np and isinstance(x, np.ndarray | list | tuple):
+            raise TypeError(
+                f"states of {type(x).__name__} beside states or X of {self.package.__name__}; "
+                "make the states arrays of that package (X may be NumPy's)"
+            )
         if x.shape[-1:] != (1,):
             raise ValueError(f"state of shape {x.shape}; expected (..., 1)")
         return [x[..., k] for k in range(1)]
 
     def parameters(self, X):
+        """X[k], one by one; NumPy's as plain numbers."""
+        if self.package is not np and isinstance(X, np.ndarray | list | tuple):
+            return _parameters(_real(X, "X")).tolist()
         _parameters(X)
         return [X[k] for k in range(4)]
 
@@ -276,9 +292,9 @@ class _Symbols:
         if len(shape) == 3:
             first = [{k[1:]: x for k, x in table.items() if k[0] == i} for i in range(shape[0])]
             return [self.gathered(entries, shape[1:], like) for entries in first]
-        matrix = self.package.SX(*(*shape, 1)[:2])
+        matrix = self.package.SX(*(*shape, 1, 1)[:2])
         for place, x in table.items():
-            matrix[place] = x
+            matrix[place or 0] = x
         return matrix
 
     def solve(self, A, b):
@@ -359,9 +375,18 @@ def base_parameters(standard: "Array", *, g: float = 9.81) -> "Array":
     order of STANDARD_PARAMETERS.
     """
     if hasattr(standard, "keys"):
-        standard = [standard[name] for name in STANDARD_PARAMETERS]
+        rest = [x for x in STANDARD_PARAMETERS if x not in standard and x not in NO_EFFECT]
+        if rest:
+            raise ValueError(f"standard: no value of {', '.join(rest)}")
+        standard = [standard.get(name) for name in STANDARD_PARAMETERS]
         xp = _package(*standard)
     else:
+        shape = tuple(standard.shape if hasattr(standard, "shape") else np.shape(standard))
+        if shape[:1] != (14,):
+            raise ValueError(
+                f"standard of shape {shape}; expected (14,) in the order of "
+                "STANDARD_PARAMETERS, or a mapping by name"
+            )
         xp = _package(standard)
         standard = standard if xp is np else [standard[k] for k in range(14)]
     _, _, _, _, _, _, _, _, _, M1, Ia1, FV1, FS1, OFFSET1 = standard
@@ -517,7 +542,7 @@ def _moving(xp):
 
 
 def _regressor_block(xp, q, qd, qdd, D):
-    """Fill D, shape (4, 1, N), where it is not constant, from q (1, N); qd (1, N); qdd (1, N)."""
+    """Fill D, shape (4, 1, N), where it is not constant, from q, qd, qdd (1, N)."""
     # Inputs
     QP1 = qd[0]
     QDP1 = qdd[0]
@@ -528,7 +553,7 @@ def _regressor_block(xp, q, qd, qdd, D):
 
 
 def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X):
-    """Fill GAM, shape (1, N), from q (1, N); qd (1, N); qdd (1, N)."""
+    """Fill GAM, shape (1, N), from q, qd, qdd (1, N)."""
     # Inputs
     QP1 = qd[0]
     QDP1 = qdd[0]
@@ -542,19 +567,25 @@ def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X):
 def _inertia_matrix_block(xp, q, A, X):
     """Fill A, shape (1, 1, N), from q (1, N)."""
     # Inputs
-    A[0, 0] = X[0]
+    M1R = X[0]
+    # Inertia matrix
+    A[0, 0] = M1R
 
 
 def _gravity_block(xp, q, GAM, X):
     """Fill GAM, shape (1, N), from q (1, N)."""
     # Inputs
-    GAM[0] = X[3]
+    OFFSET1 = X[3]
+    # Torques
+    GAM[0] = OFFSET1
 
 
 def _frame_poses_block(xp, q, T):
     """Fill T, shape (1, 4, 4, N), from q (1, N)."""
     # Inputs
-    T[0, 2, 3] = q[0]
+    q1 = q[0]
+    # Poses
+    T[0, 2, 3] = q1
     # Constants
     T[0, 0, 0] = T[0, 1, 1] = T[0, 2, 2] = T[0, 3, 3] = 1.0
 
@@ -574,3 +605,4 @@ VALUES = {
     'MY1': 0.0, 'MZ1': 0.0, 'M1': 95.1089, 'Ia1': 0.0, 'FV1': 203.5034, 'FS1': 20.3935,
     'OFFSET1': -3.1648,
 }
+BASE_VALUES = base_parameters(VALUES)  # X of the robot file

@@ -11,20 +11,21 @@ Torques     delivered by the actuators, so friction enters with a plus: Gamma = 
             FS*sign(qd) + OFFSET
 Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY
             MZ first moments
-Element     Ia      inertia: along q1
-Element     FVP     viscous, positive motion only: along q1
-Element     FSP     coulomb, positive motion only: along q1
-Element     FVN     viscous, negative motion only: along q1
-Element     FSN     coulomb, negative motion only: along q1
+Elements    along s = G q: Gamma gets G' times the force along s
+    Ia      inertia: along q1
+    FVP     viscous, positive motion only: along q1
+    FSP     coulomb, positive motion only: along q1
+    FVN     viscous, negative motion only: along q1
+    FSN     coulomb, negative motion only: along q1
 
 Base parameters, 5 of 15; Gautier and Khalil (1990)
     exact, proved modulo primes
-    FORMULAS says what they are made of; what it leaves out is as it is
+    FORMULAS has those that combine several; the others are standard parameters
     No effect: XX1 XY1 XZ1 YY1 YZ1 ZZ1 MX1 MY1 MZ1
 
 Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3
-            column 1, Z132 component 1 in frame 3 of the axis of joint 2; a letter at the end is a
-            part that several share, N16a of N16
+            column 1, Z132 component 1 in frame 3 of the axis of joint 2; what several share is
+            named by its factors, C4DV134, by its function, signQP1, or by a letter, N16a in N16
     QP   joint velocity; with the name of an element, QPFSM6, the velocity that it acts along
     QDP  joint acceleration
     F    force that moves a link
@@ -52,7 +53,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 24349d5c473eaf51b5ec2a3c28c94afc4242474af569597403a8c3397b806cdc
+sha256 of all but these lines: 71d9047b1f8f99fd7c299bbe375b17f94047fc48eb4d026fbeb643ea010e8420
 """
 
 import numpy as np
@@ -183,7 +184,8 @@ def _package(*arrays):
     if any(type(x).__module__.startswith("casadi") for x in arrays):
         return _Symbols()
     others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
-    if all(isinstance(x, np.ndarray | np.generic) for x in others):
+    others = [x for x in others if not isinstance(x, np.ndarray | np.generic)]
+    if not others:
         return np if _IN_PLACE else _Arrays(np, arrays)
     try:
         from array_api_compat import array_namespace
@@ -192,7 +194,13 @@ def _package(*arrays):
             f"arrays of {type(others[0]).__module__} need array_api_compat: "
             "pip install array-api-compat"
         ) from error
-    return _Arrays(array_namespace(*arrays), arrays)
+    try:
+        return _Arrays(array_namespace(*others), others)
+    except TypeError as error:
+        packages = " and ".join(sorted({type(x).__module__.partition(".")[0] for x in others}))
+        if " and " not in packages:
+            raise
+        raise TypeError(f"arrays of {packages}; expected states and X of one package") from error
 
 
 class _Arrays:
@@ -231,11 +239,19 @@ class _Arrays:
 
     def rows(self, x):
         """x[..., k], one by one."""
+        if self.package is not np and isinstance(x, np.ndarray | list | tuple):
+            raise TypeError(
+                f"states of {type(x).__name__} beside states or X of {self.package.__name__}; "
+                "make the states arrays of that package (X may be NumPy's)"
+            )
         if x.shape[-1:] != (1,):
             raise ValueError(f"state of shape {x.shape}; expected (..., 1)")
         return [x[..., k] for k in range(1)]
 
     def parameters(self, X):
+        """X[k], one by one; NumPy's as plain numbers."""
+        if self.package is not np and isinstance(X, np.ndarray | list | tuple):
+            return _parameters(_real(X, "X")).tolist()
         _parameters(X)
         return [X[k] for k in range(5)]
 
@@ -276,9 +292,9 @@ class _Symbols:
         if len(shape) == 3:
             first = [{k[1:]: x for k, x in table.items() if k[0] == i} for i in range(shape[0])]
             return [self.gathered(entries, shape[1:], like) for entries in first]
-        matrix = self.package.SX(*(*shape, 1)[:2])
+        matrix = self.package.SX(*(*shape, 1, 1)[:2])
         for place, x in table.items():
-            matrix[place] = x
+            matrix[place or 0] = x
         return matrix
 
     def solve(self, A, b):
@@ -360,9 +376,18 @@ def base_parameters(standard: "Array", *, g: float = 9.81) -> "Array":
     order of STANDARD_PARAMETERS.
     """
     if hasattr(standard, "keys"):
-        standard = [standard[name] for name in STANDARD_PARAMETERS]
+        rest = [x for x in STANDARD_PARAMETERS if x not in standard and x not in NO_EFFECT]
+        if rest:
+            raise ValueError(f"standard: no value of {', '.join(rest)}")
+        standard = [standard.get(name) for name in STANDARD_PARAMETERS]
         xp = _package(*standard)
     else:
+        shape = tuple(standard.shape if hasattr(standard, "shape") else np.shape(standard))
+        if shape[:1] != (15,):
+            raise ValueError(
+                f"standard of shape {shape}; expected (15,) in the order of "
+                "STANDARD_PARAMETERS, or a mapping by name"
+            )
         xp = _package(standard)
         standard = standard if xp is np else [standard[k] for k in range(15)]
     _, _, _, _, _, _, _, _, _, M1, Ia1, FVP1, FSP1, FVN1, FSN1 = standard
@@ -518,39 +543,41 @@ def _moving(xp):
 
 
 def _regressor_block(xp, q, qd, qdd, D):
-    """Fill D, shape (5, 1, N), where it is not constant, from q (1, N); qd (1, N); qdd (1, N)."""
+    """Fill D, shape (5, 1, N), where it is not constant, from q, qd, qdd (1, N)."""
     # Inputs
     QP1 = qd[0]
     QDP1 = qdd[0]
     # Friction, actuators
-    DG1FSP1a = xp.sign(QP1)
+    signQP1 = xp.sign(QP1)
     # Joint 1
-    D[0, 0] = QDP1                       # DG1M1
-    D[1, 0] = xp.maximum(QP1, 0.0)       # DG1FVP1
-    D[2, 0] = xp.maximum(DG1FSP1a, 0.0)  # DG1FSP1
-    D[3, 0] = xp.minimum(QP1, 0.0)       # DG1FVN1
-    D[4, 0] = xp.minimum(DG1FSP1a, 0.0)  # DG1FSN1
+    D[0, 0] = QDP1                      # DG1M1
+    D[1, 0] = xp.maximum(QP1, 0.0)      # DG1FVP1
+    D[2, 0] = xp.maximum(signQP1, 0.0)  # DG1FSP1
+    D[3, 0] = xp.minimum(QP1, 0.0)      # DG1FVN1
+    D[4, 0] = xp.minimum(signQP1, 0.0)  # DG1FSN1
 
 
 def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X):
-    """Fill GAM, shape (1, N), from q (1, N); qd (1, N); qdd (1, N)."""
+    """Fill GAM, shape (1, N), from q, qd, qdd (1, N)."""
     # Inputs
     QP1 = qd[0]
     QDP1 = qdd[0]
     M1R, FVP1, FSP1, FVN1, FSN1 = X
     # Friction, actuators
-    GAM1a = xp.sign(QP1)
+    signQP1 = xp.sign(QP1)
     # Joint 1
     F31 = M1R*QDP1
     # Torques
-    GAM[0] = (F31 + FVP1*xp.maximum(QP1, 0.0) + FSP1*xp.maximum(GAM1a, 0.0) - FVN1*(-xp.minimum(QP1,
-        0.0)) - FSN1*(-xp.minimum(GAM1a, 0.0)))
+    GAM[0] = (F31 + FVP1*xp.maximum(QP1, 0.0) + FSP1*xp.maximum(signQP1, 0.0) +
+        FVN1*xp.minimum(QP1, 0.0) + FSN1*xp.minimum(signQP1, 0.0))
 
 
 def _inertia_matrix_block(xp, q, A, X):
     """Fill A, shape (1, 1, N), from q (1, N)."""
     # Inputs
-    A[0, 0] = X[0]
+    M1R = X[0]
+    # Inertia matrix
+    A[0, 0] = M1R
 
 
 def _gravity_block(xp, q, GAM, X):
@@ -560,7 +587,9 @@ def _gravity_block(xp, q, GAM, X):
 def _frame_poses_block(xp, q, T):
     """Fill T, shape (1, 4, 4, N), from q (1, N)."""
     # Inputs
-    T[0, 2, 3] = q[0]
+    q1 = q[0]
+    # Poses
+    T[0, 2, 3] = q1
     # Constants
     T[0, 0, 0] = T[0, 1, 1] = T[0, 2, 2] = T[0, 3, 3] = 1.0
 
@@ -580,3 +609,4 @@ VALUES = {
     'MY1': 0.0, 'MZ1': 0.0, 'M1': 95.154, 'Ia1': 0.0, 'FVP1': 166.7061, 'FSP1': 20.144,
     'FVN1': 240.4236, 'FSN1': 20.6277,
 }
+BASE_VALUES = base_parameters(VALUES)  # X of the robot file

@@ -17,10 +17,11 @@ Torques     delivered by the actuators, so friction enters with a plus: Gamma = 
             FS*sign(qd) + OFFSET
 Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY
             MZ first moments
-Element     Ia      inertia: along q1, q3
-Element     FV      viscous: along q1, q3
-Element     FS      coulomb: along q1, q3
-Element     OFFSET  offset: along q1, q3
+Elements    along s = G q: Gamma gets G' times the force along s
+    Ia      inertia: along q1, q3
+    FV      viscous: along q1, q3
+    FS      coulomb: along q1, q3
+    OFFSET  offset: along q1, q3
 Loop        frame 6 coincides with cut frame 5
 Loop        q5 = -q1 - q2 + q3 + q4
 Loop        q2, q4 from the closure equations by Newton; assembly mode of q1 = 2.2, q3 = 0.9, q2 =
@@ -28,13 +29,13 @@ Loop        q2, q4 from the closure equations by Newton; assembly mode of q1 = 2
 
 Base parameters, 17 of 48; Gautier and Khalil (1990)
     exact, proved modulo primes
-    FORMULAS says what they are made of; what it leaves out is as it is
+    FORMULAS has those that combine several; the others are standard parameters
     No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1 XX2 XY2 XZ2 YY2 YZ2 MZ2 XX3 XY3 XZ3 YY3 YZ3 MZ3 M3 XX4 XY4
         XZ4 YY4 YZ4 MZ4
 
 Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3
-            column 1, Z132 component 1 in frame 3 of the axis of joint 2; a letter at the end is a
-            part that several share, N16a of N16
+            column 1, Z132 component 1 in frame 3 of the axis of joint 2; what several share is
+            named by its factors, C4DV134, by its function, signQP1, or by a letter, N16a in N16
     th   joint angle with its constant, rad
     C    cosine of a joint angle or of a sum of angles
     S    sine of a joint angle or of a sum of angles
@@ -76,7 +77,7 @@ with probability below 8e-15; base_parameters, regressor, observation_matrix, in
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints, elements
 at random states, parameters and random constants agree with Lagrange's equations and products of
 frames to 1e-09, on NumPy's arrays.
-sha256 of all but these lines: c70f14d76c6a23302e8d23a63ea9d8e9d5940864333be250afb001b21335c446
+sha256 of all but these lines: 25d204f8f16411658d342fab3e5ac446890e62f5c4b4a60604b8ad0153fa63ff
 """
 
 import numpy as np
@@ -232,7 +233,17 @@ def base_parameters(
     order of STANDARD_PARAMETERS.
     """
     if hasattr(standard, "keys"):
-        standard = [standard[name] for name in STANDARD_PARAMETERS]
+        rest = [x for x in STANDARD_PARAMETERS if x not in standard and x not in NO_EFFECT]
+        if rest:
+            raise ValueError(f"standard: no value of {', '.join(rest)}")
+        standard = [standard.get(name) for name in STANDARD_PARAMETERS]
+    else:
+        shape = tuple(standard.shape if hasattr(standard, "shape") else np.shape(standard))
+        if shape[:1] != (48,):
+            raise ValueError(
+                f"standard of shape {shape}; expected (48,) in the order of "
+                "STANDARD_PARAMETERS, or a mapping by name"
+            )
     (
         _, _, _, _, _, ZZ1, MX1, MY1, _, _, Ia1, FV1, FS1, OFFSET1, _, _, _, _, _, ZZ2, MX2,
         MY2, _, M2, _, _, _, _, _, ZZ3, MX3, MY3, _, _, Ia3, FV3, FS3, OFFSET3, _, _, _, _, _,
@@ -295,8 +306,8 @@ def inverse_dynamics(
 
     Shape (N, 2).
     """
-    return _evaluated(_inverse_dynamics_block, (2,), (q, qd, qdd), (X,), (L1, L3, g), closing=((L0,
-        L1, L2, L3, L4), (L1, L2, L3, L4)))
+    return _evaluated(_inverse_dynamics_block, (2,), (q, qd, qdd), (X,), (L1, L3, g),
+        closing=((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))
 
 
 def inertia_matrix(
@@ -307,8 +318,8 @@ def inertia_matrix(
 
     Shape (N, 2, 2).
     """
-    return _evaluated(_inertia_matrix_block, (2, 2), (q,), (X,), (L1, L3), closing=((L0, L1, L2, L3,
-        L4), (L1, L2, L3, L4)))
+    return _evaluated(_inertia_matrix_block, (2, 2), (q,), (X,), (L1, L3),
+        closing=((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))
 
 
 def bias(
@@ -331,8 +342,8 @@ def gravity(
 
     Shape (N, 2).
     """
-    return _evaluated(_gravity_block, (2,), (q,), (X,), (g,), closing=((L0, L1, L2, L3, L4), (L1,
-        L2, L3, L4)))
+    return _evaluated(_gravity_block, (2,), (q,), (X,), (g,),
+        closing=((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))
 
 
 def frame_poses(
@@ -343,8 +354,8 @@ def frame_poses(
 
     Shape (N, 6, 4, 4).
     """
-    return _evaluated(_frame_poses_block, (6, 4, 4), (q,), (), (L0, L1, L2, L3, L4), closing=((L0,
-        L1, L2, L3, L4), (L1, L2, L3, L4)))
+    return _evaluated(_frame_poses_block, (6, 4, 4), (q,), (), (L0, L1, L2, L3, L4),
+        closing=((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))
 
 
 def forward_dynamics(
@@ -554,12 +565,25 @@ def _solved(J, b):
     return np.stack([J22*b[0] - J12*b[1], J11*b[1] - J21*b[0]]) / _determinant(J)
 
 
+def _regressor_block(xp, q, qd, qdd, G, D, L1, L3, g):
+    """Fill D, shape (17, 2, N), where it is not constant, from q, qd, qdd (4, N) and G (4, N)."""
+    _regressor, _ = _motion(xp, q, qd, qdd, G, L1, L3, g)
+    _regressor(D)
+
+
+def _inverse_dynamics_block(xp, q, qd, qdd, G, GAM, X, L1, L3, g):
+    """Fill GAM, shape (2, N), from q, qd, qdd (4, N) and G (4, N)."""
+    _, _torques = _motion(xp, q, qd, qdd, G, L1, L3, g)
+    _torques(GAM, X)
+
+
 def _motion(xp, q, qd, qdd, G, L1, L3, g):
-    """Velocities and accelerations of the links, which regressor and inverse_dynamics share."""
+    """Motion of the links. Returns two functions that go on from it: to D, and with X to GAM."""
     # Inputs
     q1, q3, q2, q4 = q
     QP1, QP3, QP2, QP4 = qd
     QDP1, QDP3, QDP2, QDP4 = qdd
+    G21, G23, G41, G43 = G
     # Trigonometry
     C1 = xp.cos(q1)
     S1 = xp.sin(q1)
@@ -593,94 +617,70 @@ def _motion(xp, q, qd, qdd, G, L1, L3, g):
     VSP24 = VP23 + L3*QDP3
     VP14 = C4*VSP14 + S4*VSP24
     # Friction, actuators
-    GAM1a = xp.sign(QP1)
-    GAM2a = xp.sign(QP3)
-    return (
-        C2, S2, C4, S4, VP11, VP21, WP32, DV332, VP12, VP22, VP13, VP23, WP34, DV334, VP14,
-        GAM1a, GAM2a
-    )
+    signQP1 = xp.sign(QP1)
+    signQP3 = xp.sign(QP3)
 
+    def _regressor(D):
+        # Joint axes Z and velocities V seen from link 2
+        V121 = L1*S2
+        V221 = L1*C2
+        # Joint axes Z and velocities V seen from link 4
+        V143 = L3*S4
+        V243 = L3*C4
+        # Joint 1
+        D[0, 0] = QDP1                                       # DG1ZZ1
+        D[1, 0] = VP21                                       # DG1MX1
+        D[2, 0] = -VP11                                      # DG1MY1
+        D[3, 0] = QP1                                        # DG1FV1
+        D[4, 0] = signQP1                                    # DG1FS1
+        D[6, 0] = WP32 + WP32*G21                            # DG1ZZ2
+        D[7, 0] = VP22 + WP32*V221 + VP22*G21 - DV332*V121   # DG1MX2
+        D[8, 0] = -VP12 - WP32*V121 - DV332*V221 - VP12*G21  # DG1MY2
+        D[15, 0] = WP34*G41                                  # DG1ZZ4
+        D[16, 0] = -VP14*G41                                 # DG1MY4
+        # Joint 3
+        D[6, 1] = WP32*G23                                    # DG3ZZ2
+        D[7, 1] = VP22*G23                                    # DG3MX2
+        D[8, 1] = -VP12*G23                                   # DG3MY2
+        D[9, 1] = QDP3                                        # DG3ZZ3
+        D[10, 1] = VP23                                       # DG3MX3
+        D[11, 1] = -VP13                                      # DG3MY3
+        D[12, 1] = QP3                                        # DG3FV3
+        D[13, 1] = signQP3                                    # DG3FS3
+        D[15, 1] = WP34 + WP34*G43                            # DG3ZZ4
+        D[16, 1] = -VP14 - WP34*V143 - DV334*V243 - VP14*G43  # DG3MY4
 
-def _regressor_block(xp, q, qd, qdd, G, D, L1, L3, g):
-    """Fill D, shape (17, 2, N), where it is not constant, from q (4, N); qd (4, N); qdd (4, N); G
-    (4, N)."""
-    # Inputs
-    QP1, QP3 = qd[:2]
-    QDP1, QDP3 = qdd[:2]
-    G21, G23, G41, G43 = G
-    # Motion of the links
-    (
-        C2, S2, C4, S4, VP11, VP21, WP32, DV332, VP12, VP22, VP13, VP23, WP34, DV334, VP14,
-        GAM1a, GAM2a
-    ) = _motion(xp, q, qd, qdd, G, L1, L3, g)
-    # Joint axes Z and velocities V seen from link 2
-    V121 = L1*S2
-    V221 = L1*C2
-    # Joint axes Z and velocities V seen from link 4
-    V143 = L3*S4
-    V243 = L3*C4
-    # Joint 1
-    D[0, 0] = QDP1                                       # DG1ZZ1
-    D[1, 0] = VP21                                       # DG1MX1
-    D[2, 0] = -VP11                                      # DG1MY1
-    D[3, 0] = QP1                                        # DG1FV1
-    D[4, 0] = GAM1a                                      # DG1FS1
-    D[6, 0] = WP32 + WP32*G21                            # DG1ZZ2
-    D[7, 0] = VP22 + WP32*V221 + VP22*G21 - DV332*V121   # DG1MX2
-    D[8, 0] = -VP12 - WP32*V121 - DV332*V221 - VP12*G21  # DG1MY2
-    D[15, 0] = WP34*G41                                  # DG1ZZ4
-    D[16, 0] = -VP14*G41                                 # DG1MY4
-    # Joint 3
-    D[6, 1] = WP32*G23                                    # DG3ZZ2
-    D[7, 1] = VP22*G23                                    # DG3MX2
-    D[8, 1] = -VP12*G23                                   # DG3MY2
-    D[9, 1] = QDP3                                        # DG3ZZ3
-    D[10, 1] = VP23                                       # DG3MX3
-    D[11, 1] = -VP13                                      # DG3MY3
-    D[12, 1] = QP3                                        # DG3FV3
-    D[13, 1] = GAM2a                                      # DG3FS3
-    D[15, 1] = WP34 + WP34*G43                            # DG3ZZ4
-    D[16, 1] = -VP14 - WP34*V143 - DV334*V243 - VP14*G43  # DG3MY4
+    def _torques(GAM, X):
+        # Inputs
+        (
+            ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MX3R, MY3, FV3, FS3, OFFSET3,
+            ZZ4R, MY4
+        ) = X
+        # Joint 4
+        F14 = -MY4*WP34
+        F24 = -MY4*DV334
+        N34 = ZZ4R*WP34 - MY4*VP14
+        FDI24 = S4*F14 + C4*F24
+        # Joint 3
+        N33 = ZZ3R*QDP3 + MX3R*VP23 - MY3*VP13
+        NE33 = N34 + L3*FDI24 + N33
+        # Joint 2
+        F12 = -MX2R*DV332 - MY2*WP32
+        F22 = MX2R*WP32 - MY2*DV332
+        N32 = ZZ2R*WP32 + MX2R*VP22 - MY2*VP12
+        FDI22 = S2*F12 + C2*F22
+        # Joint 1
+        N31 = ZZ1R*QDP1 + MX1R*VP21 - MY1*VP11
+        NE31 = N32 + L1*FDI22 + N31
+        # Torques
+        GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*signQP1 + G21*N32 + G41*N34
+        GAM[1] = OFFSET3 + NE33 + FV3*QP3 + FS3*signQP3 + G23*N32 + G43*N34
 
-
-def _inverse_dynamics_block(xp, q, qd, qdd, G, GAM, X, L1, L3, g):
-    """Fill GAM, shape (2, N), from q (4, N); qd (4, N); qdd (4, N); G (4, N)."""
-    # Inputs
-    QP1, QP3 = qd[:2]
-    QDP1, QDP3 = qdd[:2]
-    G21, G23, G41, G43 = G
-    (
-        ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MX3R, MY3, FV3, FS3, OFFSET3,
-        ZZ4R, MY4
-    ) = X
-    # Motion of the links
-    (
-        C2, S2, C4, S4, VP11, VP21, WP32, DV332, VP12, VP22, VP13, VP23, WP34, DV334, VP14,
-        GAM1a, GAM2a
-    ) = _motion(xp, q, qd, qdd, G, L1, L3, g)
-    # Joint 4
-    F14 = -MY4*WP34
-    F24 = -MY4*DV334
-    N34 = ZZ4R*WP34 - MY4*VP14
-    FDI24 = S4*F14 + C4*F24
-    # Joint 3
-    N33 = ZZ3R*QDP3 + MX3R*VP23 - MY3*VP13
-    NE33 = N34 + L3*FDI24 + N33
-    # Joint 2
-    F12 = -MX2R*DV332 - MY2*WP32
-    F22 = MX2R*WP32 - MY2*DV332
-    N32 = ZZ2R*WP32 + MX2R*VP22 - MY2*VP12
-    FDI22 = S2*F12 + C2*F22
-    # Joint 1
-    N31 = ZZ1R*QDP1 + MX1R*VP21 - MY1*VP11
-    NE31 = N32 + L1*FDI22 + N31
-    # Torques
-    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*GAM1a + G21*N32 + G41*N34
-    GAM[1] = OFFSET3 + NE33 + FV3*QP3 + FS3*GAM2a + G23*N32 + G43*N34
+    return _regressor, _torques
 
 
 def _inertia_matrix_block(xp, q, qd, qdd, G, A, X, L1, L3):
-    """Fill A, shape (2, 2, N), from q (4, N); qd (4, N); qdd (4, N); G (4, N)."""
+    """Fill A, shape (2, 2, N), from q, qd, qdd (4, N) and G (4, N)."""
     # Inputs
     q2, q4 = q[2:]
     G21, G23, G41, G43 = G
@@ -717,7 +717,7 @@ def _inertia_matrix_block(xp, q, qd, qdd, G, A, X, L1, L3):
 
 
 def _gravity_block(xp, q, qd, qdd, G, GAM, X, g):
-    """Fill GAM, shape (2, N), from q (4, N); qd (4, N); qdd (4, N); G (4, N)."""
+    """Fill GAM, shape (2, N), from q, qd, qdd (4, N) and G (4, N)."""
     # Inputs
     q1, q3, q2, q4 = q
     G21, G23, G41, G43 = G
@@ -758,38 +758,66 @@ def _gravity_block(xp, q, qd, qdd, G, GAM, X, g):
 
 
 def _frame_poses_block(xp, q, qd, qdd, G, T, L0, L1, L2, L3, L4):
-    """Fill T, shape (6, 4, 4, N), from q (4, N); qd (4, N); qdd (4, N); G (4, N)."""
+    """Fill T, shape (6, 4, 4, N), from q, qd, qdd (4, N) and G (4, N)."""
     # Inputs
     q1, q3, q2, q4 = q
     # Trigonometry
-    C1 = T[0, 0, 0] = T[0, 1, 1] = xp.cos(q1)
-    S1 = T[0, 1, 0] = xp.sin(q1)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
     th12 = q1 + q2
-    C12 = T[1, 0, 0] = T[1, 1, 1] = xp.cos(th12)
-    S12 = T[1, 1, 0] = xp.sin(th12)
-    C3 = T[2, 0, 0] = T[2, 1, 1] = xp.cos(q3)
-    S3 = T[2, 1, 0] = xp.sin(q3)
+    C12 = xp.cos(th12)
+    S12 = xp.sin(th12)
+    C3 = xp.cos(q3)
+    S3 = xp.sin(q3)
     th34 = q3 + q4
-    C34 = T[3, 0, 0] = T[3, 1, 1] = T[4, 0, 0] = T[4, 1, 1] = T[5, 0, 0] = T[5, 1, 1] = xp.cos(th34)
-    S34 = T[3, 1, 0] = T[4, 1, 0] = T[5, 1, 0] = xp.sin(th34)
+    C34 = xp.cos(th34)
+    S34 = xp.sin(th34)
     # Frame 2
-    P12 = T[1, 0, 3] = L1*C1
-    P22 = T[1, 1, 3] = L1*S1
+    P12 = L1*C1
+    P22 = L1*S1
     # Frame 4
-    P14 = T[3, 0, 3] = L0 + L3*C3
-    P24 = T[3, 1, 3] = L3*S3
+    P14 = L0 + L3*C3
+    P24 = L3*S3
     # Frame 5
-    T[4, 0, 3] = P12 + L2*C12
-    T[4, 1, 3] = P22 + L2*S12
+    P15 = P12 + L2*C12
+    P25 = P22 + L2*S12
     # Frame 6
-    T[5, 0, 3] = P14 + L4*C34
-    T[5, 1, 3] = P24 + L4*S34
+    P16 = P14 + L4*C34
+    P26 = P24 + L4*S34
     # Poses
+    T[0, 0, 0] = C1
     T[0, 0, 1] = -S1
+    T[0, 1, 0] = S1
+    T[0, 1, 1] = C1
+    T[1, 0, 0] = C12
     T[1, 0, 1] = -S12
+    T[1, 0, 3] = P12
+    T[1, 1, 0] = S12
+    T[1, 1, 1] = C12
+    T[1, 1, 3] = P22
+    T[2, 0, 0] = C3
     T[2, 0, 1] = -S3
     T[2, 0, 3] = L0
-    T[3, 0, 1] = T[4, 0, 1] = T[5, 0, 1] = -S34
+    T[2, 1, 0] = S3
+    T[2, 1, 1] = C3
+    T[3, 0, 0] = C34
+    T[3, 0, 1] = -S34
+    T[3, 0, 3] = P14
+    T[3, 1, 0] = S34
+    T[3, 1, 1] = C34
+    T[3, 1, 3] = P24
+    T[4, 0, 0] = C34
+    T[4, 0, 1] = -S34
+    T[4, 0, 3] = P15
+    T[4, 1, 0] = S34
+    T[4, 1, 1] = C34
+    T[4, 1, 3] = P25
+    T[5, 0, 0] = C34
+    T[5, 0, 1] = -S34
+    T[5, 0, 3] = P16
+    T[5, 1, 0] = S34
+    T[5, 1, 1] = C34
+    T[5, 1, 3] = P26
     # Constants
     T[0, 2, 2] = T[0, 3, 3] = T[1, 2, 2] = T[1, 3, 3] = T[2, 2, 2] = T[2, 3, 3] = T[3, 2, 2] = 1.0
     T[3, 3, 3] = T[4, 2, 2] = T[4, 3, 3] = T[5, 2, 2] = T[5, 3, 3] = 1.0
@@ -818,26 +846,30 @@ def _linearised_closure_block(xp, q, R, L0, L1, L2, L3, L4):
     P14 = L0 + C3L3
     P24 = L3*S3
     # Frame 5
-    C12L2 = R[1, 3] = L2*C12
-    P15 = R[1, 1] = P12 + C12L2
+    C12L2 = L2*C12
+    P15 = P12 + C12L2
     S12L2 = L2*S12
     P25 = P22 + S12L2
     # Frame 6
     C34L4 = L4*C34
     P16 = P14 + C34L4
-    S34L4 = R[0, 4] = L4*S34
-    P26 = R[0, 2] = P24 + S34L4
+    S34L4 = L4*S34
+    P26 = P24 + S34L4
     # Residuals and their derivatives by the joints
     R[0, 0] = P15 - P16
     R[0, 1] = -P25
+    R[0, 2] = P26
     R[0, 3] = -S12L2
+    R[0, 4] = S34L4
     R[1, 0] = P25 - P26
+    R[1, 1] = P15
     R[1, 2] = -C3L3 - C34L4
+    R[1, 3] = C12L2
     R[1, 4] = -C34L4
 
 
 def _curvature_block(xp, q, qd, B, L1, L2, L3, L4):
-    """Fill B, shape (2, N), from q (4, N); qd (4, N)."""
+    """Fill B, shape (2, N), from q, qd (4, N)."""
     # Inputs
     q1, q3, q2, q4 = q
     QP1, QP3, QP2, QP4 = qd

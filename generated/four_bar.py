@@ -16,10 +16,11 @@ Torques     delivered by the actuators, so friction enters with a plus: Gamma = 
             FS*sign(qd) + OFFSET
 Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY
             MZ first moments
-Element     Ia      inertia: along q1
-Element     FV      viscous: along q1
-Element     FS      coulomb: along q1
-Element     OFFSET  offset: along q1
+Elements    along s = G q: Gamma gets G' times the force along s
+    Ia      inertia: along q1
+    FV      viscous: along q1
+    FS      coulomb: along q1
+    OFFSET  offset: along q1
 Loop        frame 5 coincides with cut frame 4
 Loop        q4 = -q1 - q2 + q3
 Loop        q2, q3 from the closure equations by Newton; assembly mode of q1 = 1, q2 = -0.5518, q3 =
@@ -27,12 +28,12 @@ Loop        q2, q3 from the closure equations by Newton; assembly mode of q1 = 1
 
 Base parameters, 11 of 34; Gautier and Khalil (1990)
     exact, proved modulo primes
-    FORMULAS says what they are made of; what it leaves out is as it is
+    FORMULAS has those that combine several; the others are standard parameters
     No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1 XX2 XY2 XZ2 YY2 YZ2 MZ2 XX3 XY3 XZ3 YY3 YZ3 MZ3 M3
 
 Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3
-            column 1, Z132 component 1 in frame 3 of the axis of joint 2; a letter at the end is a
-            part that several share, N16a of N16
+            column 1, Z132 component 1 in frame 3 of the axis of joint 2; what several share is
+            named by its factors, C4DV134, by its function, signQP1, or by a letter, N16a in N16
     th   joint angle with its constant, rad
     C    cosine of a joint angle or of a sum of angles
     S    sine of a joint angle or of a sum of angles
@@ -74,7 +75,7 @@ with probability below 6e-15; base_parameters, regressor, observation_matrix, in
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints, elements
 at random states, parameters and random constants agree with Lagrange's equations and products of
 frames to 1e-09, on NumPy's arrays.
-sha256 of all but these lines: 7c7dc55776c486316dc4ce021a2a90506464c1774f2c35a4368689c14a91efe5
+sha256 of all but these lines: f9c8c7155b6b5b020c74b8f14c3d80ee21f26a08990496eabf6b7556ee84dbda
 """
 
 import numpy as np
@@ -222,7 +223,17 @@ def base_parameters(
     order of STANDARD_PARAMETERS.
     """
     if hasattr(standard, "keys"):
-        standard = [standard[name] for name in STANDARD_PARAMETERS]
+        rest = [x for x in STANDARD_PARAMETERS if x not in standard and x not in NO_EFFECT]
+        if rest:
+            raise ValueError(f"standard: no value of {', '.join(rest)}")
+        standard = [standard.get(name) for name in STANDARD_PARAMETERS]
+    else:
+        shape = tuple(standard.shape if hasattr(standard, "shape") else np.shape(standard))
+        if shape[:1] != (34,):
+            raise ValueError(
+                f"standard of shape {shape}; expected (34,) in the order of "
+                "STANDARD_PARAMETERS, or a mapping by name"
+            )
     (
         _, _, _, _, _, ZZ1, MX1, MY1, _, _, Ia1, FV1, FS1, OFFSET1, _, _, _, _, _, ZZ2, MX2,
         MY2, _, M2, _, _, _, _, _, ZZ3, MX3, MY3, _, _
@@ -281,8 +292,8 @@ def inverse_dynamics(
 
     Shape (N, 1).
     """
-    return _evaluated(_inverse_dynamics_block, (1,), (q, qd, qdd), (X,), (L1, g), closing=((L0, L1,
-        L2, L3), (L1, L2, L3)))
+    return _evaluated(_inverse_dynamics_block, (1,), (q, qd, qdd), (X,), (L1, g),
+        closing=((L0, L1, L2, L3), (L1, L2, L3)))
 
 
 def inertia_matrix(
@@ -293,8 +304,8 @@ def inertia_matrix(
 
     Shape (N, 1, 1).
     """
-    return _evaluated(_inertia_matrix_block, (1, 1), (q,), (X,), (L1,), closing=((L0, L1, L2, L3),
-        (L1, L2, L3)))
+    return _evaluated(_inertia_matrix_block, (1, 1), (q,), (X,), (L1,),
+        closing=((L0, L1, L2, L3), (L1, L2, L3)))
 
 
 def bias(
@@ -317,8 +328,8 @@ def gravity(
 
     Shape (N, 1).
     """
-    return _evaluated(_gravity_block, (1,), (q,), (X,), (g,), closing=((L0, L1, L2, L3), (L1, L2,
-        L3)))
+    return _evaluated(_gravity_block, (1,), (q,), (X,), (g,),
+        closing=((L0, L1, L2, L3), (L1, L2, L3)))
 
 
 def frame_poses(
@@ -329,8 +340,8 @@ def frame_poses(
 
     Shape (N, 5, 4, 4).
     """
-    return _evaluated(_frame_poses_block, (5, 4, 4), (q,), (), (L0, L1, L2, L3), closing=((L0, L1,
-        L2, L3), (L1, L2, L3)))
+    return _evaluated(_frame_poses_block, (5, 4, 4), (q,), (), (L0, L1, L2, L3),
+        closing=((L0, L1, L2, L3), (L1, L2, L3)))
 
 
 def forward_dynamics(
@@ -541,12 +552,25 @@ def _solved(J, b):
     return np.stack([J22*b[0] - J12*b[1], J11*b[1] - J21*b[0]]) / _determinant(J)
 
 
+def _regressor_block(xp, q, qd, qdd, G, D, L1, g):
+    """Fill D, shape (11, 1, N), where it is not constant, from q, qd, qdd (3, N) and G (2, N)."""
+    _regressor, _ = _motion(xp, q, qd, qdd, G, L1, g)
+    _regressor(D)
+
+
+def _inverse_dynamics_block(xp, q, qd, qdd, G, GAM, X, L1, g):
+    """Fill GAM, shape (1, N), from q, qd, qdd (3, N) and G (2, N)."""
+    _, _torques = _motion(xp, q, qd, qdd, G, L1, g)
+    _torques(GAM, X)
+
+
 def _motion(xp, q, qd, qdd, G, L1, g):
-    """Velocities and accelerations of the links, which regressor and inverse_dynamics share."""
+    """Motion of the links. Returns two functions that go on from it: to D, and with X to GAM."""
     # Inputs
     q1, q2, q3 = q
     QP1, QP2 = qd[:2]
-    QDP1, QDP2 = qdd[:2]
+    QDP1, QDP2, QDP3 = qdd
+    G21, G31 = G
     # Trigonometry
     C1 = xp.cos(q1)
     S1 = xp.sin(q1)
@@ -568,64 +592,45 @@ def _motion(xp, q, qd, qdd, G, L1, g):
     # Link 3
     VP13 = g*S3
     # Friction, actuators
-    GAM1a = xp.sign(QP1)
-    return (
-        C2, S2, VP11, VP21, WP32, DV332, VP12, VP22, VP13, GAM1a
-    )
+    signQP1 = xp.sign(QP1)
 
+    def _regressor(D):
+        # Joint axes Z and velocities V seen from link 2
+        V121 = L1*S2
+        V221 = L1*C2
+        # Joint 1
+        D[0, 0] = QDP1                                       # DG1ZZ1
+        D[1, 0] = VP21                                       # DG1MX1
+        D[2, 0] = -VP11                                      # DG1MY1
+        D[3, 0] = QP1                                        # DG1FV1
+        D[4, 0] = signQP1                                    # DG1FS1
+        D[6, 0] = WP32 + WP32*G21                            # DG1ZZ2
+        D[7, 0] = VP22 + WP32*V221 + VP22*G21 - DV332*V121   # DG1MX2
+        D[8, 0] = -VP12 - WP32*V121 - DV332*V221 - VP12*G21  # DG1MY2
+        D[9, 0] = QDP3*G31                                   # DG1ZZ3
+        D[10, 0] = -VP13*G31                                 # DG1MY3
 
-def _regressor_block(xp, q, qd, qdd, G, D, L1, g):
-    """Fill D, shape (11, 1, N), where it is not constant, from q (3, N); qd (3, N); qdd (3, N); G
-    (2, N)."""
-    # Inputs
-    QP1 = qd[0]
-    QDP1 = qdd[0]
-    QDP3 = qdd[2]
-    G21, G31 = G
-    # Motion of the links
-    C2, S2, VP11, VP21, WP32, DV332, VP12, VP22, VP13, GAM1a = _motion(xp, q, qd, qdd, G, L1, g)
-    # Joint axes Z and velocities V seen from link 2
-    V121 = L1*S2
-    V221 = L1*C2
-    # Joint 1
-    D[0, 0] = QDP1                                       # DG1ZZ1
-    D[1, 0] = VP21                                       # DG1MX1
-    D[2, 0] = -VP11                                      # DG1MY1
-    D[3, 0] = QP1                                        # DG1FV1
-    D[4, 0] = GAM1a                                      # DG1FS1
-    D[6, 0] = WP32 + WP32*G21                            # DG1ZZ2
-    D[7, 0] = VP22 + WP32*V221 + VP22*G21 - DV332*V121   # DG1MX2
-    D[8, 0] = -VP12 - WP32*V121 - DV332*V221 - VP12*G21  # DG1MY2
-    D[9, 0] = QDP3*G31                                   # DG1ZZ3
-    D[10, 0] = -VP13*G31                                 # DG1MY3
+    def _torques(GAM, X):
+        # Inputs
+        ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MY3 = X
+        # Joint 3
+        N33 = ZZ3R*QDP3 - MY3*VP13
+        # Joint 2
+        F12 = -MX2R*DV332 - MY2*WP32
+        F22 = MX2R*WP32 - MY2*DV332
+        N32 = ZZ2R*WP32 + MX2R*VP22 - MY2*VP12
+        FDI22 = S2*F12 + C2*F22
+        # Joint 1
+        N31 = ZZ1R*QDP1 + MX1R*VP21 - MY1*VP11
+        NE31 = N32 + L1*FDI22 + N31
+        # Torques
+        GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*signQP1 + G21*N32 + G31*N33
 
-
-def _inverse_dynamics_block(xp, q, qd, qdd, G, GAM, X, L1, g):
-    """Fill GAM, shape (1, N), from q (3, N); qd (3, N); qdd (3, N); G (2, N)."""
-    # Inputs
-    QP1 = qd[0]
-    QDP1 = qdd[0]
-    QDP3 = qdd[2]
-    G21, G31 = G
-    ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MY3 = X
-    # Motion of the links
-    C2, S2, VP11, VP21, WP32, DV332, VP12, VP22, VP13, GAM1a = _motion(xp, q, qd, qdd, G, L1, g)
-    # Joint 3
-    N33 = ZZ3R*QDP3 - MY3*VP13
-    # Joint 2
-    F12 = -MX2R*DV332 - MY2*WP32
-    F22 = MX2R*WP32 - MY2*DV332
-    N32 = ZZ2R*WP32 + MX2R*VP22 - MY2*VP12
-    FDI22 = S2*F12 + C2*F22
-    # Joint 1
-    N31 = ZZ1R*QDP1 + MX1R*VP21 - MY1*VP11
-    NE31 = N32 + L1*FDI22 + N31
-    # Torques
-    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*GAM1a + G21*N32 + G31*N33
+    return _regressor, _torques
 
 
 def _inertia_matrix_block(xp, q, qd, qdd, G, A, X, L1):
-    """Fill A, shape (1, 1, N), from q (3, N); qd (3, N); qdd (3, N); G (2, N)."""
+    """Fill A, shape (1, 1, N), from q, qd, qdd (3, N) and G (2, N)."""
     # Inputs
     q2 = q[1]
     G21, G31 = G
@@ -648,7 +653,7 @@ def _inertia_matrix_block(xp, q, qd, qdd, G, A, X, L1):
 
 
 def _gravity_block(xp, q, qd, qdd, G, GAM, X, g):
-    """Fill GAM, shape (1, N), from q (3, N); qd (3, N); qdd (3, N); G (2, N)."""
+    """Fill GAM, shape (1, N), from q, qd, qdd (3, N) and G (2, N)."""
     # Inputs
     q1, q2, q3 = q
     G21, G31 = G
@@ -684,31 +689,54 @@ def _gravity_block(xp, q, qd, qdd, G, GAM, X, g):
 
 
 def _frame_poses_block(xp, q, qd, qdd, G, T, L0, L1, L2, L3):
-    """Fill T, shape (5, 4, 4, N), from q (3, N); qd (3, N); qdd (3, N); G (2, N)."""
+    """Fill T, shape (5, 4, 4, N), from q, qd, qdd (3, N) and G (2, N)."""
     # Inputs
     q1, q2, q3 = q
     # Trigonometry
-    C1 = T[0, 0, 0] = T[0, 1, 1] = xp.cos(q1)
-    S1 = T[0, 1, 0] = xp.sin(q1)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
     th12 = q1 + q2
-    C12 = T[1, 0, 0] = T[1, 1, 1] = xp.cos(th12)
-    S12 = T[1, 1, 0] = xp.sin(th12)
-    C3 = T[2, 0, 0] = T[2, 1, 1] = T[3, 0, 0] = T[3, 1, 1] = T[4, 0, 0] = T[4, 1, 1] = xp.cos(q3)
-    S3 = T[2, 1, 0] = T[3, 1, 0] = T[4, 1, 0] = xp.sin(q3)
+    C12 = xp.cos(th12)
+    S12 = xp.sin(th12)
+    C3 = xp.cos(q3)
+    S3 = xp.sin(q3)
     # Frame 2
-    P12 = T[1, 0, 3] = L1*C1
-    P22 = T[1, 1, 3] = L1*S1
+    P12 = L1*C1
+    P22 = L1*S1
     # Frame 4
-    T[3, 0, 3] = P12 + L2*C12
-    T[3, 1, 3] = P22 + L2*S12
+    P14 = P12 + L2*C12
+    P24 = P22 + L2*S12
     # Frame 5
-    T[4, 0, 3] = L0 + L3*C3
-    T[4, 1, 3] = L3*S3
+    P15 = L0 + L3*C3
+    P25 = L3*S3
     # Poses
+    T[0, 0, 0] = C1
     T[0, 0, 1] = -S1
+    T[0, 1, 0] = S1
+    T[0, 1, 1] = C1
+    T[1, 0, 0] = C12
     T[1, 0, 1] = -S12
-    T[2, 0, 1] = T[3, 0, 1] = T[4, 0, 1] = -S3
+    T[1, 0, 3] = P12
+    T[1, 1, 0] = S12
+    T[1, 1, 1] = C12
+    T[1, 1, 3] = P22
+    T[2, 0, 0] = C3
+    T[2, 0, 1] = -S3
     T[2, 0, 3] = L0
+    T[2, 1, 0] = S3
+    T[2, 1, 1] = C3
+    T[3, 0, 0] = C3
+    T[3, 0, 1] = -S3
+    T[3, 0, 3] = P14
+    T[3, 1, 0] = S3
+    T[3, 1, 1] = C3
+    T[3, 1, 3] = P24
+    T[4, 0, 0] = C3
+    T[4, 0, 1] = -S3
+    T[4, 0, 3] = P15
+    T[4, 1, 0] = S3
+    T[4, 1, 1] = C3
+    T[4, 1, 3] = P25
     # Constants
     T[0, 2, 2] = T[0, 3, 3] = T[1, 2, 2] = T[1, 3, 3] = T[2, 2, 2] = T[2, 3, 3] = T[3, 2, 2] = 1.0
     T[3, 3, 3] = T[4, 2, 2] = T[4, 3, 3] = 1.0
@@ -730,24 +758,27 @@ def _linearised_closure_block(xp, q, R, L0, L1, L2, L3):
     P12 = L1*C1
     P22 = L1*S1
     # Frame 4
-    C12L2 = R[1, 2] = L2*C12
-    P14 = R[1, 1] = P12 + C12L2
+    C12L2 = L2*C12
+    P14 = P12 + C12L2
     S12L2 = L2*S12
     P24 = P22 + S12L2
     # Frame 5
     C3L3 = L3*C3
     P15 = L0 + C3L3
-    P25 = R[0, 3] = L3*S3
+    P25 = L3*S3
     # Residuals and their derivatives by the joints
     R[0, 0] = P14 - P15
     R[0, 1] = -P24
     R[0, 2] = -S12L2
+    R[0, 3] = P25
     R[1, 0] = P24 - P25
+    R[1, 1] = P14
+    R[1, 2] = C12L2
     R[1, 3] = -C3L3
 
 
 def _curvature_block(xp, q, qd, B, L1, L2, L3):
-    """Fill B, shape (2, N), from q (3, N); qd (3, N)."""
+    """Fill B, shape (2, N), from q, qd (3, N)."""
     # Inputs
     q1, q2, q3 = q
     QP1, QP2, QP3 = qd

@@ -19,12 +19,13 @@ Torques     delivered by the actuators, so friction enters with a plus: Gamma = 
             FS*sign(qd) + OFFSET
 Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY
             MZ first moments
-Element     Ia      inertia: along q1, q2, q5
-Element     FV      viscous: along q1, q2, q4, q5
-Element     FS      coulomb: along q1, q2, q4, q5
-Element     OFFSET  offset: along q1, q2, q5
-Element     FVP     viscous: along q2, q5
-Element     FSP     coulomb: along q2, q5
+Elements    along s = G q: Gamma gets G' times the force along s
+    Ia      inertia: along q1, q2, q5
+    FV      viscous: along q1, q2, q4, q5
+    FS      coulomb: along q1, q2, q4, q5
+    OFFSET  offset: along q1, q2, q5
+    FVP     viscous: along q2, q5
+    FSP     coulomb: along q2, q5
 Loop        frame 8 coincides with cut frame 7
 Loop        q3 = pi - q2 + q5
 Loop        q4 = c - q5 (declared)
@@ -33,12 +34,12 @@ Loop        q7 = pi - q2 + q5
 
 Base parameters, 30 of 78; Gautier and Khalil (1990)
     exact, proved modulo primes
-    FORMULAS says what they are made of; what it leaves out is as it is
+    FORMULAS has those that combine several; the others are standard parameters
     No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1 M2 XZ4 YZ4 ZZ4 M5
 
 Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3
-            column 1, Z132 component 1 in frame 3 of the axis of joint 2; a letter at the end is a
-            part that several share, N16a of N16
+            column 1, Z132 component 1 in frame 3 of the axis of joint 2; what several share is
+            named by its factors, C4DV134, by its function, signQP1, or by a letter, N16a in N16
     th   joint angle with its constant, rad
     C    cosine of a joint angle or of a sum of angles
     S    sine of a joint angle or of a sum of angles
@@ -89,7 +90,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 70e28dcb0291a73d7d570b89c4e8613ef2c6b431fcc08cbaf04543aae694a9ee
+sha256 of all but these lines: 80ea1c5149fd3a65f784f79730ef76c0732f5b1204677789aec9f464448add41
 """
 
 import numpy as np
@@ -253,7 +254,8 @@ def _package(*arrays):
     if any(type(x).__module__.startswith("casadi") for x in arrays):
         return _Symbols()
     others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
-    if all(isinstance(x, np.ndarray | np.generic) for x in others):
+    others = [x for x in others if not isinstance(x, np.ndarray | np.generic)]
+    if not others:
         return np if _IN_PLACE else _Arrays(np, arrays)
     try:
         from array_api_compat import array_namespace
@@ -262,7 +264,13 @@ def _package(*arrays):
             f"arrays of {type(others[0]).__module__} need array_api_compat: "
             "pip install array-api-compat"
         ) from error
-    return _Arrays(array_namespace(*arrays), arrays)
+    try:
+        return _Arrays(array_namespace(*others), others)
+    except TypeError as error:
+        packages = " and ".join(sorted({type(x).__module__.partition(".")[0] for x in others}))
+        if " and " not in packages:
+            raise
+        raise TypeError(f"arrays of {packages}; expected states and X of one package") from error
 
 
 class _Arrays:
@@ -301,11 +309,19 @@ class _Arrays:
 
     def rows(self, x):
         """x[..., k], one by one."""
+        if self.package is not np and isinstance(x, np.ndarray | list | tuple):
+            raise TypeError(
+                f"states of {type(x).__name__} beside states or X of {self.package.__name__}; "
+                "make the states arrays of that package (X may be NumPy's)"
+            )
         if x.shape[-1:] != (3,):
             raise ValueError(f"state of shape {x.shape}; expected (..., 3)")
         return [x[..., k] for k in range(3)]
 
     def parameters(self, X):
+        """X[k], one by one; NumPy's as plain numbers."""
+        if self.package is not np and isinstance(X, np.ndarray | list | tuple):
+            return _parameters(_real(X, "X")).tolist()
         _parameters(X)
         return [X[k] for k in range(30)]
 
@@ -354,9 +370,9 @@ class _Symbols:
         if len(shape) == 3:
             first = [{k[1:]: x for k, x in table.items() if k[0] == i} for i in range(shape[0])]
             return [self.gathered(entries, shape[1:], like) for entries in first]
-        matrix = self.package.SX(*(*shape, 1)[:2])
+        matrix = self.package.SX(*(*shape, 1, 1)[:2])
         for place, x in table.items():
-            matrix[place] = x
+            matrix[place or 0] = x
         return matrix
 
     combined = _Arrays.combined
@@ -453,9 +469,18 @@ def base_parameters(
     order of STANDARD_PARAMETERS.
     """
     if hasattr(standard, "keys"):
-        standard = [standard[name] for name in STANDARD_PARAMETERS]
+        rest = [x for x in STANDARD_PARAMETERS if x not in standard and x not in NO_EFFECT]
+        if rest:
+            raise ValueError(f"standard: no value of {', '.join(rest)}")
+        standard = [standard.get(name) for name in STANDARD_PARAMETERS]
         xp = _package(*standard)
     else:
+        shape = tuple(standard.shape if hasattr(standard, "shape") else np.shape(standard))
+        if shape[:1] != (78,):
+            raise ValueError(
+                f"standard of shape {shape}; expected (78,) in the order of "
+                "STANDARD_PARAMETERS, or a mapping by name"
+            )
         xp = _package(standard)
         standard = standard if xp is np else [standard[k] for k in range(78)]
     (
@@ -690,8 +715,20 @@ def _passive(xp, c):
     )
 
 
+def _regressor_block(xp, q, qd, qdd, D, D3, D4, D6, c, gx, gy):
+    """Fill D, shape (30, 3, N), where it is not constant, from q, qd, qdd (3, N)."""
+    _regressor, _ = _motion(xp, q, qd, qdd, D3, D4, D6, c, gx, gy)
+    _regressor(D)
+
+
+def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X, D3, D4, D6, c, gx, gy):
+    """Fill GAM, shape (3, N), from q, qd, qdd (3, N)."""
+    _, _torques = _motion(xp, q, qd, qdd, D3, D4, D6, c, gx, gy)
+    _torques(GAM, X)
+
+
 def _motion(xp, q, qd, qdd, D3, D4, D6, c, gx, gy):
-    """Velocities and accelerations of the links, which regressor and inverse_dynamics share."""
+    """Motion of the links. Returns two functions that go on from it: to D, and with X to GAM."""
     # Inputs
     q1, q2, q5 = q
     QP1, QP2, QP5 = qd
@@ -782,171 +819,142 @@ def _motion(xp, q, qd, qdd, D3, D4, D6, c, gx, gy):
     VSP36 = VP21 - D6*U313
     VP16 = C2m5*VSP16 + S2m5*VSP26
     # Friction, actuators
-    GAM1a = xp.sign(QP1)
-    GAM2a = xp.sign(QP2)
-    GAM3a = xp.sign(QP5)
-    return (
-        C2, S2, C2m5, S2m5, C5, S5, C5b, S5b, Z241, VP11, VP21, S2QDP1, C2QDP1, DV232, WP12,
-        DV132, DV122, DW232, DW312, DW122, U122, U212, U222, U312, U322, VP12, VP22, S5QDP1,
-        C5QDP1, DV233, WP13, DV133, DV123, DW233, DW313, DW123, U113, U123, U213, U223, U313,
-        U323, VSP33, VP13, VP23, WP24, DV124, DV224, VSP34, VP15, VP25, VSP36, VP16, GAM1a,
-        GAM2a, GAM3a
-    )
+    signQP1 = xp.sign(QP1)
+    signQP2 = xp.sign(QP2)
+    signQP5 = xp.sign(QP5)
 
+    def _regressor(D):
+        # Joint axes Z and velocities V seen from link 3
+        V331 = D3*C2
+        V132 = D3*S2m5
+        V232 = -D3*C2m5
+        # Joint axes Z and velocities V seen from link 4
+        V341 = V331 - D4*C5
+        VS242 = D4 + V232
+        V142 = C5b*V132 - S5b*VS242
+        V242 = C5b*VS242 + S5b*V132
+        V143 = -D4*S5b
+        V243 = D4*C5b
+        # Joint axes Z and velocities V seen from link 6
+        V361 = D6*C5
+        V165 = D6*S2m5
+        V265 = D6*C2m5
+        # Contributions that several joints share
+        DF3MX4 = DV124*V243 - DV224*V143
+        # Joint 1
+        D[0, 0] = QDP1                      # DG1ZZ1
+        D[1, 0] = VP21                      # DG1MX1
+        D[2, 0] = -VP11                     # DG1MY1
+        D[3, 0] = QP1                       # DG1FV1
+        D[4, 0] = signQP1                   # DG1FS1
+        D[6, 0] = -S2*WP12 - C2*DV132       # DG1XX2
+        D[7, 0] = S2*U312 - C2*U322         # DG1XY2
+        D[8, 0] = -S2*U212 - C2*DW312       # DG1XZ2
+        D[9, 0] = C2*U122 - S2*DW232        # DG1YZ2
+        D[11, 0] = C2*VP21                  # DG1MX2
+        D[12, 0] = -S2*VP21                 # DG1MY2
+        D[16, 0] = S5*WP13 + C5*DV133       # DG1XX3
+        D[17, 0] = C5*U323 - S5*U313        # DG1XY3
+        D[18, 0] = S5*U213 + C5*DW313       # DG1XZ3
+        D[19, 0] = S5*DW233 - C5*U123       # DG1YZ3
+        D[21, 0] = U313*V331 - C5*VSP33     # DG1MX3
+        D[22, 0] = S5*VSP33 + U323*V331     # DG1MY3
+        D[23, 0] = -Z241*VSP34 - WP24*V341  # DG1MX4
+        D[24, 0] = C5*VP21                  # DG1MX5
+        D[25, 0] = -S5*VP21                 # DG1MY5
+        D[29, 0] = U322*V361 - S2*VSP36     # DG1MY6
+        # Joint 2
+        D[6, 1] = -DV122                             # DG2XX2
+        D[7, 1] = DW122                              # DG2XY2
+        D[8, 1] = -S2QDP1                            # DG2XZ2
+        D[9, 1] = -C2QDP1                            # DG2YZ2
+        D[10, 1] = QDP2                              # DG2ZZ2
+        D[11, 1] = VP22                              # DG2MX2
+        D[12, 1] = -VP12                             # DG2MY2
+        D[13, 1] = QP2                               # DG2FV2
+        D[14, 1] = signQP2                           # DG2FS2
+        D[21, 1] = U113*V132 + U213*V232             # DG2MX3
+        D[22, 1] = U123*V132 + U223*V232             # DG2MY3
+        D[23, 1] = DV124*V242 - DV224*V142 - DF3MX4  # DG2MX4
+        D[29, 1] = -VP16                             # DG2MY6
+        # Joint 5
+        D[16, 2] = -DV123                 # DG5XX3
+        D[17, 2] = DW123                  # DG5XY3
+        D[18, 2] = S5QDP1                 # DG5XZ3
+        D[19, 2] = C5QDP1                 # DG5YZ3
+        D[20, 2] = QDP5                   # DG5ZZ3
+        D[21, 2] = VP23                   # DG5MX3
+        D[22, 2] = -VP13                  # DG5MY3
+        D[23, 2] = DF3MX4                 # DG5MX4
+        D[24, 2] = VP25                   # DG5MX5
+        D[25, 2] = -VP15                  # DG5MY5
+        D[26, 2] = QP5                    # DG5FV5
+        D[27, 2] = signQP5                # DG5FS5
+        D[29, 2] = U122*V165 + U222*V265  # DG5MY6
 
-def _regressor_block(xp, q, qd, qdd, D, D3, D4, D6, c, gx, gy):
-    """Fill D, shape (30, 3, N), where it is not constant, from q (3, N); qd (3, N); qdd (3, N)."""
-    # Inputs
-    QP1, QP2, QP5 = qd
-    QDP1, QDP2, QDP5 = qdd
-    # Motion of the links
-    (
-        C2, S2, C2m5, S2m5, C5, S5, C5b, S5b, Z241, VP11, VP21, S2QDP1, C2QDP1, _, WP12, DV132,
-        DV122, DW232, DW312, DW122, U122, U212, U222, U312, U322, VP12, VP22, S5QDP1, C5QDP1, _,
-        WP13, DV133, DV123, DW233, DW313, DW123, U113, U123, U213, U223, U313, U323, VSP33,
-        VP13, VP23, WP24, DV124, DV224, VSP34, VP15, VP25, VSP36, VP16, GAM1a, GAM2a, GAM3a
-    ) = _motion(xp, q, qd, qdd, D3, D4, D6, c, gx, gy)
-    # Joint axes Z and velocities V seen from link 3
-    V331 = D3*C2
-    V132 = D3*S2m5
-    V232 = -D3*C2m5
-    # Joint axes Z and velocities V seen from link 4
-    V341 = V331 - D4*C5
-    VS242 = D4 + V232
-    V142 = C5b*V132 - S5b*VS242
-    V242 = C5b*VS242 + S5b*V132
-    V143 = -D4*S5b
-    V243 = D4*C5b
-    # Joint axes Z and velocities V seen from link 6
-    V361 = D6*C5
-    V165 = D6*S2m5
-    V265 = D6*C2m5
-    # Contributions that several joints share
-    DF3MX4 = DV124*V243 - DV224*V143
-    # Joint 1
-    D[0, 0] = QDP1                      # DG1ZZ1
-    D[1, 0] = VP21                      # DG1MX1
-    D[2, 0] = -VP11                     # DG1MY1
-    D[3, 0] = QP1                       # DG1FV1
-    D[4, 0] = GAM1a                     # DG1FS1
-    D[6, 0] = -S2*WP12 - C2*DV132       # DG1XX2
-    D[7, 0] = S2*U312 - C2*U322         # DG1XY2
-    D[8, 0] = -S2*U212 - C2*DW312       # DG1XZ2
-    D[9, 0] = C2*U122 - S2*DW232        # DG1YZ2
-    D[11, 0] = C2*VP21                  # DG1MX2
-    D[12, 0] = -S2*VP21                 # DG1MY2
-    D[16, 0] = S5*WP13 + C5*DV133       # DG1XX3
-    D[17, 0] = C5*U323 - S5*U313        # DG1XY3
-    D[18, 0] = S5*U213 + C5*DW313       # DG1XZ3
-    D[19, 0] = S5*DW233 - C5*U123       # DG1YZ3
-    D[21, 0] = U313*V331 - C5*VSP33     # DG1MX3
-    D[22, 0] = S5*VSP33 + U323*V331     # DG1MY3
-    D[23, 0] = -Z241*VSP34 - WP24*V341  # DG1MX4
-    D[24, 0] = C5*VP21                  # DG1MX5
-    D[25, 0] = -S5*VP21                 # DG1MY5
-    D[29, 0] = U322*V361 - S2*VSP36     # DG1MY6
-    # Joint 2
-    D[6, 1] = -DV122                             # DG2XX2
-    D[7, 1] = DW122                              # DG2XY2
-    D[8, 1] = -S2QDP1                            # DG2XZ2
-    D[9, 1] = -C2QDP1                            # DG2YZ2
-    D[10, 1] = QDP2                              # DG2ZZ2
-    D[11, 1] = VP22                              # DG2MX2
-    D[12, 1] = -VP12                             # DG2MY2
-    D[13, 1] = QP2                               # DG2FV2
-    D[14, 1] = GAM2a                             # DG2FS2
-    D[21, 1] = U113*V132 + U213*V232             # DG2MX3
-    D[22, 1] = U123*V132 + U223*V232             # DG2MY3
-    D[23, 1] = DV124*V242 - DV224*V142 - DF3MX4  # DG2MX4
-    D[29, 1] = -VP16                             # DG2MY6
-    # Joint 5
-    D[16, 2] = -DV123                 # DG5XX3
-    D[17, 2] = DW123                  # DG5XY3
-    D[18, 2] = S5QDP1                 # DG5XZ3
-    D[19, 2] = C5QDP1                 # DG5YZ3
-    D[20, 2] = QDP5                   # DG5ZZ3
-    D[21, 2] = VP23                   # DG5MX3
-    D[22, 2] = -VP13                  # DG5MY3
-    D[23, 2] = DF3MX4                 # DG5MX4
-    D[24, 2] = VP25                   # DG5MX5
-    D[25, 2] = -VP15                  # DG5MY5
-    D[26, 2] = QP5                    # DG5FV5
-    D[27, 2] = GAM3a                  # DG5FS5
-    D[29, 2] = U122*V165 + U222*V265  # DG5MY6
+    def _torques(GAM, X):
+        # Inputs
+        (
+            ZZ1R, MX1, MY1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2R, FS2R,
+            OFFSET2, XX3R, XY3R, XZ3R, YZ3R, ZZ3R, MX3R, MY3, MX4R, MX5R, MY5, FV5R, FS5R, OFFSET5,
+            MY6
+        ) = X
+        # Link 4
+        VSP14 = VP13 + D4*U113
+        VSP24 = VP23 + D4*U213
+        VP24 = C5b*VSP24 + S5b*VSP14
+        # Joint 6
+        F16 = MY6*U122
+        F26 = MY6*U222
+        F36 = MY6*U322
+        N16 = MY6*VSP36
+        N36 = -MY6*VP16
+        FDI26 = S2m5*F16 + C2m5*F26
+        # Joint 5
+        N15 = MY5*VP21
+        N25 = -MX5R*VP21
+        N35 = MX5R*VP25 - MY5*VP15
+        NE15 = C2m5*N16 + N15
+        NE25 = S2m5*N16 + N25 - D6*F36
+        NE35 = N36 + D6*FDI26 + N35
+        # Joint 4
+        F14 = -MX4R*DV224
+        F24 = MX4R*DV124
+        F34 = -MX4R*WP24
+        N24 = -MX4R*VSP34
+        N34 = MX4R*VP24
+        FDI14 = C5b*F14 + S5b*F24
+        FDI24 = C5b*F24 - S5b*F14
+        # Joint 3
+        F13 = MX3R*U113 + MY3*U123
+        F23 = MX3R*U213 + MY3*U223
+        F33 = MX3R*U313 + MY3*U323
+        E13 = FDI14 + F13
+        E23 = FDI24 + F23
+        E33 = F34 + F33
+        N13 = XX3R*WP13 + ZZ3R*DV233 + YZ3R*DW233 + XZ3R*U213 + MY3*VSP33 - XY3R*U313
+        N23 = (XX3R - ZZ3R)*DV133 + XZ3R*DW313 + XY3R*U323 - YZ3R*U123 - MX3R*VSP33
+        N33 = ZZ3R*QDP5 + XY3R*DW123 + YZ3R*C5QDP1 + XZ3R*S5QDP1 + MX3R*VP23 - XX3R*DV123 - MY3*VP13
+        NE13 = S5b*N24 + N13
+        NE23 = C5b*N24 + N23 - D4*F34
+        NE33 = N34 + D4*FDI24 + N33
+        FDI23 = S2m5*E13 - C2m5*E23
+        # Joint 2
+        N12 = XX2R*WP12 + ZZ2R*DV232 + YZ2R*DW232 + XZ2R*U212 + MY2*VP21 - XY2R*U312
+        N22 = (XX2R - ZZ2R)*DV132 + XZ2R*DW312 + XY2R*U322 - YZ2R*U122 - MX2R*VP21
+        N32 = ZZ2R*QDP2 + XY2R*DW122 + MX2R*VP22 - XX2R*DV122 - YZ2R*C2QDP1 - XZ2R*S2QDP1 - MY2*VP12
+        NE12 = N12 - C2m5*NE13 - S2m5*NE23
+        NE22 = S2m5*NE13 + N22 - C2m5*NE23 - D3*E33
+        NE32 = NE33 + D3*FDI23 + N32
+        # Joint 1
+        N31 = ZZ1R*QDP1 + MX1*VP21 - MY1R*VP11
+        NE31 = N31 - S5*NE15 - C5*NE25 - S2*NE12 - C2*NE22
+        # Torques
+        GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*signQP1
+        GAM[1] = OFFSET2 + NE32 + FV2R*QP2 + FS2R*signQP2 + N36 - NE33
+        GAM[2] = NE33 + OFFSET5 + NE35 + FV5R*QP5 + FS5R*signQP5 - N34 - N36
 
-
-def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X, D3, D4, D6, c, gx, gy):
-    """Fill GAM, shape (3, N), from q (3, N); qd (3, N); qdd (3, N)."""
-    # Inputs
-    QP1, QP2, QP5 = qd
-    QDP1, QDP2, QDP5 = qdd
-    (
-        ZZ1R, MX1, MY1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2R, FS2R,
-        OFFSET2, XX3R, XY3R, XZ3R, YZ3R, ZZ3R, MX3R, MY3, MX4R, MX5R, MY5, FV5R, FS5R, OFFSET5,
-        MY6
-    ) = X
-    # Motion of the links
-    (
-        C2, S2, C2m5, S2m5, C5, S5, C5b, S5b, _, VP11, VP21, S2QDP1, C2QDP1, DV232, WP12, DV132,
-        DV122, DW232, DW312, DW122, U122, U212, U222, U312, U322, VP12, VP22, S5QDP1, C5QDP1,
-        DV233, WP13, DV133, DV123, DW233, DW313, DW123, U113, U123, U213, U223, U313, U323,
-        VSP33, VP13, VP23, WP24, DV124, DV224, VSP34, VP15, VP25, VSP36, VP16, GAM1a, GAM2a,
-        GAM3a
-    ) = _motion(xp, q, qd, qdd, D3, D4, D6, c, gx, gy)
-    # Link 4
-    VSP14 = VP13 + D4*U113
-    VSP24 = VP23 + D4*U213
-    VP24 = C5b*VSP24 + S5b*VSP14
-    # Joint 6
-    F16 = MY6*U122
-    F26 = MY6*U222
-    F36 = MY6*U322
-    N16 = MY6*VSP36
-    N36 = -MY6*VP16
-    FDI26 = S2m5*F16 + C2m5*F26
-    # Joint 5
-    N15 = MY5*VP21
-    N25 = -MX5R*VP21
-    N35 = MX5R*VP25 - MY5*VP15
-    NE15 = C2m5*N16 + N15
-    NE25 = S2m5*N16 + N25 - D6*F36
-    NE35 = N36 + D6*FDI26 + N35
-    # Joint 4
-    F14 = -MX4R*DV224
-    F24 = MX4R*DV124
-    F34 = -MX4R*WP24
-    N24 = -MX4R*VSP34
-    N34 = MX4R*VP24
-    FDI14 = C5b*F14 + S5b*F24
-    FDI24 = C5b*F24 - S5b*F14
-    # Joint 3
-    F13 = MX3R*U113 + MY3*U123
-    F23 = MX3R*U213 + MY3*U223
-    F33 = MX3R*U313 + MY3*U323
-    E13 = FDI14 + F13
-    E23 = FDI24 + F23
-    E33 = F34 + F33
-    N13 = XX3R*WP13 + ZZ3R*DV233 + YZ3R*DW233 + XZ3R*U213 + MY3*VSP33 - XY3R*U313
-    N23 = (XX3R - ZZ3R)*DV133 + XZ3R*DW313 + XY3R*U323 - YZ3R*U123 - MX3R*VSP33
-    N33 = ZZ3R*QDP5 + XY3R*DW123 + YZ3R*C5QDP1 + XZ3R*S5QDP1 + MX3R*VP23 - XX3R*DV123 - MY3*VP13
-    NE13 = S5b*N24 + N13
-    NE23 = C5b*N24 + N23 - D4*F34
-    NE33 = N34 + D4*FDI24 + N33
-    FDI23 = S2m5*E13 - C2m5*E23
-    # Joint 2
-    N12 = XX2R*WP12 + ZZ2R*DV232 + YZ2R*DW232 + XZ2R*U212 + MY2*VP21 - XY2R*U312
-    N22 = (XX2R - ZZ2R)*DV132 + XZ2R*DW312 + XY2R*U322 - YZ2R*U122 - MX2R*VP21
-    N32 = ZZ2R*QDP2 + XY2R*DW122 + MX2R*VP22 - XX2R*DV122 - YZ2R*C2QDP1 - XZ2R*S2QDP1 - MY2*VP12
-    NE12 = N12 - C2m5*NE13 - S2m5*NE23
-    NE22 = S2m5*NE13 + N22 - C2m5*NE23 - D3*E33
-    NE32 = NE33 + D3*FDI23 + N32
-    # Joint 1
-    N31 = ZZ1R*QDP1 + MX1*VP21 - MY1R*VP11
-    NE31 = N31 - S5*NE15 - C5*NE25 - S2*NE12 - C2*NE22
-    # Torques
-    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*GAM1a
-    GAM[1] = OFFSET2 + NE32 + FV2R*QP2 + FS2R*GAM2a + N36 - NE33
-    GAM[2] = NE33 + OFFSET5 + NE35 + FV5R*QP5 + FS5R*GAM3a - N34 - N36
+    return _regressor, _torques
 
 
 def _inertia_matrix_block(xp, q, A, X, D3, D4, D6, c):
@@ -1000,14 +1008,16 @@ def _inertia_matrix_block(xp, q, A, X, D3, D4, D6, c):
     JP232 = YZ2R + NE223
     # Composite link 2
     NE312 = -S2*JP132 - C2*JP232
-    A[0, 0] = ZZ1R + JP225*C5**2 + JP125*2*C5*S5 + JP112 + JP122*2*C2*S2 - C2**2*(JP112 - JP222)
+    JP331 = ZZ1R + JP225*C5**2 + JP125*2*C5*S5 + JP112 + JP122*2*C2*S2 - C2**2*(JP112 - JP222)
     # Unit acceleration of joint 3
-    NE313 = A[0, 2] = A[2, 0] = -S2*NE123 - C2*NE223
+    NE313 = -S2*NE123 - C2*NE223
     # Unit acceleration of joint 4
     E224 = -S2m5*AS24 - C2m5*AS14
     # Inertia matrix
+    A[0, 0] = JP331
     A[0, 1] = A[1, 0] = NE312 - NE313
     A[1, 1] = ZZ2R
+    A[0, 2] = A[2, 0] = NE313
     A[1, 2] = A[2, 1] = NE356 + D3AS13 - D3*E224
     A[2, 2] = ZZ3R
 
@@ -1085,56 +1095,120 @@ def _frame_poses_block(xp, q, T, D3, D4, D6, c):
     # Inputs
     q1, q2, q5 = q
     # Constants
-    Z241 = T[3, 2, 1] = xp.cos(c)
-    Z141 = T[3, 2, 0] = xp.sin(c)
+    Z241 = xp.cos(c)
+    Z141 = xp.sin(c)
     # Trigonometry
-    C1 = T[0, 0, 0] = T[0, 1, 1] = T[1, 1, 2] = T[2, 1, 2] = T[3, 1, 2] = T[4, 1, 2] = T[5, 1,
-        2] = T[6, 1, 2] = T[7, 1, 2] = (xp.cos(q1))
-    S1 = T[0, 1, 0] = xp.sin(q1)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
     C2 = xp.cos(q2)
     S2 = xp.sin(q2)
-    C5 = T[2, 2, 1] = T[6, 2, 1] = T[7, 2, 1] = xp.cos(q5)
-    S5 = T[2, 2, 0] = T[6, 2, 0] = T[7, 2, 0] = xp.sin(q5)
+    C5 = xp.cos(q5)
+    S5 = xp.sin(q5)
     # Frame 2
-    R112 = T[1, 0, 0] = T[5, 0, 0] = C1*C2
-    T[1, 0, 1] = T[5, 0, 1] = -C1*S2
-    R212 = T[1, 1, 0] = T[5, 1, 0] = S1*C2
-    T[1, 1, 1] = T[5, 1, 1] = -S1*S2
+    R112 = C1*C2
+    R122 = -C1*S2
+    R212 = S1*C2
+    R222 = -S1*S2
     # Frame 3
-    R113 = T[2, 0, 0] = T[6, 0, 0] = T[7, 0, 0] = -C1*C5
-    R123 = T[2, 0, 1] = T[6, 0, 1] = T[7, 0, 1] = C1*S5
-    R213 = T[2, 1, 0] = T[6, 1, 0] = T[7, 1, 0] = -S1*C5
-    R223 = T[2, 1, 1] = T[6, 1, 1] = T[7, 1, 1] = S1*S5
-    P13 = T[2, 0, 3] = D3*R112
-    P23 = T[2, 1, 3] = D3*R212
-    P33 = T[2, 2, 3] = -D3*S2
+    R113 = -C1*C5
+    R123 = C1*S5
+    R213 = -S1*C5
+    R223 = S1*S5
+    P13 = D3*R112
+    P23 = D3*R212
+    P33 = -D3*S2
     # Frame 4
-    T[3, 0, 0] = -Z241*C1
-    T[3, 0, 1] = Z141*C1
-    T[3, 1, 0] = -Z241*S1
-    T[3, 1, 1] = Z141*S1
-    T[3, 0, 3] = P13 + D4*R113
-    T[3, 1, 3] = P23 + D4*R213
-    T[3, 2, 3] = P33 + D4*S5
+    R114 = -Z241*C1
+    R124 = Z141*C1
+    R214 = -Z241*S1
+    R224 = Z141*S1
+    P14 = P13 + D4*R113
+    P24 = P23 + D4*R213
+    P34 = P33 + D4*S5
     # Frame 6
-    P16 = T[5, 0, 3] = -D6*R113
-    P26 = T[5, 1, 3] = -D6*R213
-    P36 = T[5, 2, 3] = -D6*S5
+    P16 = -D6*R113
+    P26 = -D6*R213
+    P36 = -D6*S5
     # Frame 7
-    T[6, 0, 3] = T[7, 0, 3] = P13 + P16
-    T[6, 1, 3] = T[7, 1, 3] = P23 + P26
-    T[6, 2, 3] = T[7, 2, 3] = P33 + P36
+    P17 = P13 + P16
+    P27 = P23 + P26
+    P37 = P33 + P36
     # Poses
-    T[0, 0, 1] = T[1, 0, 2] = T[2, 0, 2] = T[3, 0, 2] = T[4, 0, 2] = T[5, 0, 2] = T[6, 0, 2] = T[7,
-        0, 2] = (-S1)
-    T[1, 2, 0] = T[5, 2, 0] = -S2
-    T[1, 2, 1] = T[5, 2, 1] = -C2
+    T[0, 0, 0] = C1
+    T[0, 0, 1] = -S1
+    T[0, 1, 0] = S1
+    T[0, 1, 1] = C1
+    T[1, 0, 0] = R112
+    T[1, 0, 1] = R122
+    T[1, 0, 2] = -S1
+    T[1, 1, 0] = R212
+    T[1, 1, 1] = R222
+    T[1, 1, 2] = C1
+    T[1, 2, 0] = -S2
+    T[1, 2, 1] = -C2
+    T[2, 0, 0] = R113
+    T[2, 0, 1] = R123
+    T[2, 0, 2] = -S1
+    T[2, 0, 3] = P13
+    T[2, 1, 0] = R213
+    T[2, 1, 1] = R223
+    T[2, 1, 2] = C1
+    T[2, 1, 3] = P23
+    T[2, 2, 0] = S5
+    T[2, 2, 1] = C5
+    T[2, 2, 3] = P33
+    T[3, 0, 0] = R114
+    T[3, 0, 1] = R124
+    T[3, 0, 2] = -S1
+    T[3, 0, 3] = P14
+    T[3, 1, 0] = R214
+    T[3, 1, 1] = R224
+    T[3, 1, 2] = C1
+    T[3, 1, 3] = P24
+    T[3, 2, 0] = Z141
+    T[3, 2, 1] = Z241
+    T[3, 2, 3] = P34
     T[4, 0, 0] = -R113
     T[4, 0, 1] = -R123
+    T[4, 0, 2] = -S1
     T[4, 1, 0] = -R213
     T[4, 1, 1] = -R223
+    T[4, 1, 2] = C1
     T[4, 2, 0] = -S5
     T[4, 2, 1] = -C5
+    T[5, 0, 0] = R112
+    T[5, 0, 1] = R122
+    T[5, 0, 2] = -S1
+    T[5, 0, 3] = P16
+    T[5, 1, 0] = R212
+    T[5, 1, 1] = R222
+    T[5, 1, 2] = C1
+    T[5, 1, 3] = P26
+    T[5, 2, 0] = -S2
+    T[5, 2, 1] = -C2
+    T[5, 2, 3] = P36
+    T[6, 0, 0] = R113
+    T[6, 0, 1] = R123
+    T[6, 0, 2] = -S1
+    T[6, 0, 3] = P17
+    T[6, 1, 0] = R213
+    T[6, 1, 1] = R223
+    T[6, 1, 2] = C1
+    T[6, 1, 3] = P27
+    T[6, 2, 0] = S5
+    T[6, 2, 1] = C5
+    T[6, 2, 3] = P37
+    T[7, 0, 0] = R113
+    T[7, 0, 1] = R123
+    T[7, 0, 2] = -S1
+    T[7, 0, 3] = P17
+    T[7, 1, 0] = R213
+    T[7, 1, 1] = R223
+    T[7, 1, 2] = C1
+    T[7, 1, 3] = P27
+    T[7, 2, 0] = S5
+    T[7, 2, 1] = C5
+    T[7, 2, 3] = P37
     # Constants
     T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = 1.0
     T[6, 3, 3] = T[7, 3, 3] = 1.0
@@ -1173,3 +1247,4 @@ VALUES = {
     'YY6': 0.0005366, 'YZ6': 0.0, 'ZZ6': 0.0005365, 'MX6': 0.0029582, 'MY6': 1e-05,
     'MZ6': -7.18e-05, 'M6': 0.0388, 'FVP2': 2e-05, 'FVP5': 2e-05, 'FSP2': 0.02, 'FSP5': 0.02,
 }
+BASE_VALUES = base_parameters(VALUES)  # X of the robot file

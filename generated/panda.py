@@ -17,19 +17,20 @@ Torques     delivered by the actuators, so friction enters with a plus: Gamma = 
             FS*sign(qd) + OFFSET
 Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY
             MZ first moments
-Element     Ia      inertia: along q1, q2, q3, q4, q5, q6, q7
-Element     FV      viscous: along q1, q2, q3, q4, q5, q6, q7
-Element     FS      coulomb: along q1, q2, q3, q4, q5, q6, q7
-Element     OFFSET  offset: along q1, q2, q3, q4, q5, q6, q7
+Elements    along s = G q: Gamma gets G' times the force along s
+    Ia      inertia: along q1, q2, q3, q4, q5, q6, q7
+    FV      viscous: along q1, q2, q3, q4, q5, q6, q7
+    FS      coulomb: along q1, q2, q3, q4, q5, q6, q7
+    OFFSET  offset: along q1, q2, q3, q4, q5, q6, q7
 
 Base parameters, 69 of 98; Gautier and Khalil (1990)
     exact, proved modulo primes
-    FORMULAS says what they are made of; what it leaves out is as it is
+    FORMULAS has those that combine several; the others are standard parameters
     No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 MZ2 M2
 
 Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3
-            column 1, Z132 component 1 in frame 3 of the axis of joint 2; a letter at the end is a
-            part that several share, N16a of N16
+            column 1, Z132 component 1 in frame 3 of the axis of joint 2; what several share is
+            named by its factors, C4DV134, by its function, signQP1, or by a letter, N16a in N16
     C    cosine of a joint angle or of a sum of angles
     S    sine of a joint angle or of a sum of angles
     QP   joint velocity; with the name of an element, QPFSM6, the velocity that it acts along
@@ -80,7 +81,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 90e9f6768d64d98ea4c87d7cfa8a9e6eb7dd6f38650f2ddbdceae46758bf3340
+sha256 of all but these lines: 4eae6f9626c35108eaa1b8e4b06a17817f0631731197617a1e4c3ec21bd6b67b
 """
 
 import numpy as np
@@ -257,7 +258,8 @@ def _package(*arrays):
     if any(type(x).__module__.startswith("casadi") for x in arrays):
         return _Symbols()
     others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
-    if all(isinstance(x, np.ndarray | np.generic) for x in others):
+    others = [x for x in others if not isinstance(x, np.ndarray | np.generic)]
+    if not others:
         return np if _IN_PLACE else _Arrays(np, arrays)
     try:
         from array_api_compat import array_namespace
@@ -266,7 +268,13 @@ def _package(*arrays):
             f"arrays of {type(others[0]).__module__} need array_api_compat: "
             "pip install array-api-compat"
         ) from error
-    return _Arrays(array_namespace(*arrays), arrays)
+    try:
+        return _Arrays(array_namespace(*others), others)
+    except TypeError as error:
+        packages = " and ".join(sorted({type(x).__module__.partition(".")[0] for x in others}))
+        if " and " not in packages:
+            raise
+        raise TypeError(f"arrays of {packages}; expected states and X of one package") from error
 
 
 class _Arrays:
@@ -305,11 +313,19 @@ class _Arrays:
 
     def rows(self, x):
         """x[..., k], one by one."""
+        if self.package is not np and isinstance(x, np.ndarray | list | tuple):
+            raise TypeError(
+                f"states of {type(x).__name__} beside states or X of {self.package.__name__}; "
+                "make the states arrays of that package (X may be NumPy's)"
+            )
         if x.shape[-1:] != (7,):
             raise ValueError(f"state of shape {x.shape}; expected (..., 7)")
         return [x[..., k] for k in range(7)]
 
     def parameters(self, X):
+        """X[k], one by one; NumPy's as plain numbers."""
+        if self.package is not np and isinstance(X, np.ndarray | list | tuple):
+            return _parameters(_real(X, "X")).tolist()
         _parameters(X)
         return [X[k] for k in range(69)]
 
@@ -350,9 +366,9 @@ class _Symbols:
         if len(shape) == 3:
             first = [{k[1:]: x for k, x in table.items() if k[0] == i} for i in range(shape[0])]
             return [self.gathered(entries, shape[1:], like) for entries in first]
-        matrix = self.package.SX(*(*shape, 1)[:2])
+        matrix = self.package.SX(*(*shape, 1, 1)[:2])
         for place, x in table.items():
-            matrix[place] = x
+            matrix[place or 0] = x
         return matrix
 
     def solve(self, A, b):
@@ -451,9 +467,18 @@ def base_parameters(
     order of STANDARD_PARAMETERS.
     """
     if hasattr(standard, "keys"):
-        standard = [standard[name] for name in STANDARD_PARAMETERS]
+        rest = [x for x in STANDARD_PARAMETERS if x not in standard and x not in NO_EFFECT]
+        if rest:
+            raise ValueError(f"standard: no value of {', '.join(rest)}")
+        standard = [standard.get(name) for name in STANDARD_PARAMETERS]
         xp = _package(*standard)
     else:
+        shape = tuple(standard.shape if hasattr(standard, "shape") else np.shape(standard))
+        if shape[:1] != (98,):
+            raise ValueError(
+                f"standard of shape {shape}; expected (98,) in the order of "
+                "STANDARD_PARAMETERS, or a mapping by name"
+            )
         xp = _package(standard)
         standard = standard if xp is np else [standard[k] for k in range(98)]
     (
@@ -667,8 +692,20 @@ def _moving(xp):
     }
 
 
+def _regressor_block(xp, q, qd, qdd, D, RL3, D4, RL5, D7, g):
+    """Fill D, shape (69, 7, N), where it is not constant, from q, qd, qdd (7, N)."""
+    _regressor, _ = _motion(xp, q, qd, qdd, RL3, D4, RL5, D7, g)
+    _regressor(D)
+
+
+def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X, RL3, D4, RL5, D7, g):
+    """Fill GAM, shape (7, N), from q, qd, qdd (7, N)."""
+    _, _torques = _motion(xp, q, qd, qdd, RL3, D4, RL5, D7, g)
+    _torques(GAM, X)
+
+
 def _motion(xp, q, qd, qdd, RL3, D4, RL5, D7, g):
-    """Velocities and accelerations of the links, which regressor and inverse_dynamics share."""
+    """Motion of the links. Returns two functions that go on from it: to D, and with X to GAM."""
     # Inputs
     q2, q3, q4, q5, q6, q7 = q[1:]
     QP1, QP2, QP3, QP4, QP5, QP6, QP7 = qd
@@ -853,480 +890,435 @@ def _motion(xp, q, qd, qdd, RL3, D4, RL5, D7, g):
     VP17 = C7*VSP17 + S7*VSP37
     VP27 = C7*VSP37 - S7*VSP17
     # Friction, actuators
-    GAM1a = xp.sign(QP1)
-    GAM2a = xp.sign(QP2)
-    GAM3a = xp.sign(QP3)
-    GAM4a = xp.sign(QP4)
-    GAM5a = xp.sign(QP5)
-    GAM6a = xp.sign(QP6)
-    GAM7a = xp.sign(QP7)
-    return (
-        C2, S2, C3, S3, C4, S4, C5, S5, C6, S6, C7, S7, S2QDP1, C2QDP1, DV232, WP12, DV132,
-        DV122, DW232, DW312, DW122, U122, U212, U312, U322, VP12, VP22, WP13, WP33, DV123,
-        DV133, DV233, DW233, DW313, DW123, U113, U123, U133, U213, U223, U233, U313, U323,
-        VSP23, VP13, VP23, WP14, WP34, DV124, DV134, DV234, DW234, DW314, DW124, U114, U124,
-        U134, U214, U224, U234, U314, U324, VSP24, VP14, VP24, WP15, WP35, DV125, DV135, DV235,
-        DW235, DW315, DW125, U115, U125, U135, U215, U225, U235, U315, U325, DF3MX4, VSP25,
-        VP15, VP25, WP16, WP36, DV126, DV136, DV236, DW236, DW316, DW126, U116, U126, U136,
-        U216, U226, U236, U316, U326, VP16, VP26, WP17, WP37, DV127, DV137, DV237, DW237, DW317,
-        DW127, U117, U127, U137, U217, U227, U237, U317, U327, VSP27, VP17, VP27, GAM1a, GAM2a,
-        GAM3a, GAM4a, GAM5a, GAM6a, GAM7a
-    )
+    signQP1 = xp.sign(QP1)
+    signQP2 = xp.sign(QP2)
+    signQP3 = xp.sign(QP3)
+    signQP4 = xp.sign(QP4)
+    signQP5 = xp.sign(QP5)
+    signQP6 = xp.sign(QP6)
+    signQP7 = xp.sign(QP7)
 
+    def _regressor(D):
+        # Joint axes Z and velocities V seen from link 3
+        Z131 = -S2*C3
+        Z231 = S2*S3
+        VS331 = RL3*S2
+        V131 = S3*VS331
+        V231 = C3*VS331
+        V132 = RL3*C3
+        V232 = -RL3*S3
+        # Joint axes Z and velocities V seen from link 4
+        Z141 = C4*Z131 + C2*S4
+        Z241 = C2*C4 - S4*Z131
+        VS341 = -D4*Z231
+        V341 = -V231 - D4*C2
+        V141 = C4*V131 + S4*VS341
+        V241 = C4*VS341 - S4*V131
+        Z142 = S3*C4
+        Z242 = -S3*S4
+        VS342 = -D4*C3
+        V142 = C4*V132 + S4*VS342
+        V242 = C4*VS342 - S4*V132
+        # Joint axes Z and velocities V seen from link 5
+        Z151 = C5*Z141 + S5*Z231
+        Z251 = C5*Z231 - S5*Z141
+        VS151 = V141 + RL5*Z231
+        V351 = V241 - VS341
+        VS351 = V341 + RL5*Z141 + D4*Z241
+        V151 = C5*VS151 - S5*VS351
+        V251 = -C5*VS351 - S5*VS151
+        Z152 = C5*Z142 + C3*S5
+        Z252 = C3*C5 - S5*Z142
+        VS152 = V142 + RL5*C3
+        V352 = V242 - VS342
+        VS352 = RL5*Z142 + D4*Z242 - V232
+        V152 = C5*VS152 - S5*VS352
+        V252 = -C5*VS352 - S5*VS152
+        Z153 = S4*C5
+        Z253 = -S4*S5
+        VS353 = RL5*S4 + D4*C4 - D4
+        V153 = -S5*VS353
+        V253 = -C5*VS353
+        V154 = -RL5*C5
+        V254 = RL5*S5
+        # Joint axes Z and velocities V seen from link 6
+        Z161 = C6*Z151 + S6*Z241
+        Z261 = C6*Z241 - S6*Z151
+        V161 = C6*V151 + S6*V351
+        V261 = C6*V351 - S6*V151
+        Z162 = C6*Z152 + S6*Z242
+        Z262 = C6*Z242 - S6*Z152
+        V162 = C6*V152 + S6*V352
+        V262 = C6*V352 - S6*V152
+        Z163 = C6*Z153 + C4*S6
+        Z263 = C4*C6 - S6*Z153
+        V163 = C6*V153
+        V263 = -S6*V153
+        Z164 = -S5*C6
+        Z264 = S5*S6
+        V164 = C6*V154 - D4*S6
+        V264 = -D4*C6 - S6*V154
+        # Joint axes Z and velocities V seen from link 7
+        Z171 = C7*Z161 - S7*Z251
+        Z271 = -C7*Z251 - S7*Z161
+        V371 = D7*Z251 - V261
+        VS371 = -V251 - D7*Z261
+        V171 = C7*V161 + S7*VS371
+        V271 = C7*VS371 - S7*V161
+        Z172 = C7*Z162 - S7*Z252
+        Z272 = -C7*Z252 - S7*Z162
+        V372 = D7*Z252 - V262
+        VS372 = -V252 - D7*Z262
+        V172 = C7*V162 + S7*VS372
+        V272 = C7*VS372 - S7*V162
+        Z173 = C7*Z163 - S7*Z253
+        Z273 = -C7*Z253 - S7*Z163
+        V373 = D7*Z253 - V263
+        VS373 = -V253 - D7*Z263
+        V173 = C7*V163 + S7*VS373
+        V273 = C7*VS373 - S7*V163
+        Z174 = C7*Z164 + C5*S7
+        Z274 = C5*C7 - S7*Z164
+        V374 = -V264 - D7*C5
+        VS374 = -V254 - D7*Z264
+        V174 = C7*V164 + S7*VS374
+        V274 = C7*VS374 - S7*V164
+        Z175 = S6*C7
+        Z275 = -S6*S7
+        VS375 = -D7*C6
+        V175 = S7*VS375
+        V275 = C7*VS375
+        # Contributions that several joints share
+        DV133Z231 = DV133*Z231
+        C3DV133 = C3*DV133
+        DV134Z241 = DV134*Z241
+        DV134Z242 = DV134*Z242
+        C4DV134 = C4*DV134
+        DV135Z251 = DV135*Z251
+        DV135Z252 = DV135*Z252
+        DV135Z253 = DV135*Z253
+        C5DV135 = C5*DV135
+        DV136Z261 = DV136*Z261
+        DV136Z262 = DV136*Z262
+        DV136Z263 = DV136*Z263
+        DV136Z264 = DV136*Z264
+        C6DV136 = C6*DV136
+        DV137Z271 = DV137*Z271
+        DV137Z272 = DV137*Z272
+        DV137Z273 = DV137*Z273
+        DV137Z274 = DV137*Z274
+        DV137Z275 = DV137*Z275
+        C7DV137 = C7*DV137
+        # Joint 1
+        D[0, 0] = QDP1                                                    # DG1ZZ1
+        D[1, 0] = QP1                                                     # DG1FV1
+        D[2, 0] = signQP1                                                 # DG1FS1
+        D[4, 0] = -S2*WP12 - C2*DV132                                     # DG1XX2
+        D[5, 0] = S2*U312 - C2*U322                                       # DG1XY2
+        D[6, 0] = -S2*U212 - C2*DW312                                     # DG1XZ2
+        D[7, 0] = C2*U122 - S2*DW232                                      # DG1YZ2
+        D[14, 0] = WP13*Z131 + DV133Z231 - C2*DV123                       # DG1XX3
+        D[15, 0] = U323*Z231 + C2*DW123 - U313*Z131                       # DG1XY3
+        D[16, 0] = U213*Z131 + DW313*Z231 - C2*U233                       # DG1XZ3
+        D[17, 0] = DW233*Z131 + C2*U133 - U123*Z231                       # DG1YZ3
+        D[18, 0] = DV233*Z131 + C2*WP33 - DV133Z231                       # DG1ZZ3
+        D[19, 0] = VSP23*Z231 + C2*VP23 + U113*V131 + U213*V231           # DG1MX3
+        D[20, 0] = U123*V131 + U223*V231 - VSP23*Z131 - C2*VP13           # DG1MY3
+        D[25, 0] = WP14*Z141 + DV134Z241 + DV124*Z231                     # DG1XX4
+        D[26, 0] = U324*Z241 - U314*Z141 - DW124*Z231                     # DG1XY4
+        D[27, 0] = U214*Z141 + DW314*Z241 + U234*Z231                     # DG1XZ4
+        D[28, 0] = DW234*Z141 - U124*Z241 - U134*Z231                     # DG1YZ4
+        D[29, 0] = DV234*Z141 - DV134Z241 - WP34*Z231                     # DG1ZZ4
+        D[30, 0] = VSP24*Z241 + U114*V141 + U214*V241 + U314*V341 - VP24*Z231  # DG1MX4
+        D[31, 0] = VP14*Z231 + U124*V141 + U224*V241 + U324*V341 - VSP24*Z141  # DG1MY4
+        D[36, 0] = WP15*Z151 + DV135Z251 - DV125*Z241                     # DG1XX5
+        D[37, 0] = U325*Z251 + DW125*Z241 - U315*Z151                     # DG1XY5
+        D[38, 0] = U215*Z151 + DW315*Z251 - U235*Z241                     # DG1XZ5
+        D[39, 0] = DW235*Z151 + U135*Z241 - U125*Z251                     # DG1YZ5
+        D[40, 0] = DV235*Z151 + WP35*Z241 - DV135Z251                     # DG1ZZ5
+        D[41, 0] = VP25*Z241 + U115*V151 + U215*V251 + U315*V351 - VSP25*Z251  # DG1MX5
+        D[42, 0] = VSP25*Z151 + U125*V151 + U225*V251 + U325*V351 - VP15*Z241  # DG1MY5
+        D[47, 0] = WP16*Z161 + DV136Z261 + DV126*Z251                     # DG1XX6
+        D[48, 0] = U326*Z261 - U316*Z161 - DW126*Z251                     # DG1XY6
+        D[49, 0] = U216*Z161 + DW316*Z261 + U236*Z251                     # DG1XZ6
+        D[50, 0] = DW236*Z161 - U126*Z261 - U136*Z251                     # DG1YZ6
+        D[51, 0] = DV236*Z161 - DV136Z261 - WP36*Z251                     # DG1ZZ6
+        D[52, 0] = VP25*Z261 + U116*V161 + U216*V261 - VP26*Z251 - U316*V251  # DG1MX6
+        D[53, 0] = VP16*Z251 + U126*V161 + U226*V261 - VP25*Z161 - U326*V251  # DG1MY6
+        D[58, 0] = WP17*Z171 + DV137Z271 + DV127*Z261                     # DG1XX7
+        D[59, 0] = U327*Z271 - U317*Z171 - DW127*Z261                     # DG1XY7
+        D[60, 0] = U217*Z171 + DW317*Z271 + U237*Z261                     # DG1XZ7
+        D[61, 0] = DW237*Z171 - U127*Z271 - U137*Z261                     # DG1YZ7
+        D[62, 0] = DV237*Z171 - DV137Z271 - WP37*Z261                     # DG1ZZ7
+        D[63, 0] = VSP27*Z271 + U117*V171 + U217*V271 + U317*V371 - VP27*Z261  # DG1MX7
+        D[64, 0] = VP17*Z261 + U127*V171 + U227*V271 + U327*V371 - VSP27*Z171  # DG1MY7
+        # Joint 2
+        D[4, 1] = -DV122                                                  # DG2XX2
+        D[5, 1] = DW122                                                   # DG2XY2
+        D[6, 1] = -S2QDP1                                                 # DG2XZ2
+        D[7, 1] = -C2QDP1                                                 # DG2YZ2
+        D[8, 1] = QDP2                                                    # DG2ZZ2
+        D[9, 1] = VP22                                                    # DG2MX2
+        D[10, 1] = -VP12                                                  # DG2MY2
+        D[11, 1] = QP2                                                    # DG2FV2
+        D[12, 1] = signQP2                                                # DG2FS2
+        D[14, 1] = S3*WP13 + C3DV133                                      # DG2XX3
+        D[15, 1] = C3*U323 - S3*U313                                      # DG2XY3
+        D[16, 1] = S3*U213 + C3*DW313                                     # DG2XZ3
+        D[17, 1] = S3*DW233 - C3*U123                                     # DG2YZ3
+        D[18, 1] = S3*DV233 - C3DV133                                     # DG2ZZ3
+        D[19, 1] = C3*VSP23 + U113*V132 + U213*V232                       # DG2MX3
+        D[20, 1] = U123*V132 + U223*V232 - S3*VSP23                       # DG2MY3
+        D[25, 1] = WP14*Z142 + DV134Z242 + C3*DV124                       # DG2XX4
+        D[26, 1] = U324*Z242 - U314*Z142 - C3*DW124                       # DG2XY4
+        D[27, 1] = U214*Z142 + DW314*Z242 + C3*U234                       # DG2XZ4
+        D[28, 1] = DW234*Z142 - U124*Z242 - C3*U134                       # DG2YZ4
+        D[29, 1] = DV234*Z142 - DV134Z242 - C3*WP34                       # DG2ZZ4
+        D[30, 1] = VSP24*Z242 + U114*V142 + U214*V242 - C3*VP24 - U314*V232  # DG2MX4
+        D[31, 1] = C3*VP14 + U124*V142 + U224*V242 - VSP24*Z142 - U324*V232  # DG2MY4
+        D[36, 1] = WP15*Z152 + DV135Z252 - DV125*Z242                     # DG2XX5
+        D[37, 1] = U325*Z252 + DW125*Z242 - U315*Z152                     # DG2XY5
+        D[38, 1] = U215*Z152 + DW315*Z252 - U235*Z242                     # DG2XZ5
+        D[39, 1] = DW235*Z152 + U135*Z242 - U125*Z252                     # DG2YZ5
+        D[40, 1] = DV235*Z152 + WP35*Z242 - DV135Z252                     # DG2ZZ5
+        D[41, 1] = VP25*Z242 + U115*V152 + U215*V252 + U315*V352 - VSP25*Z252  # DG2MX5
+        D[42, 1] = VSP25*Z152 + U125*V152 + U225*V252 + U325*V352 - VP15*Z242  # DG2MY5
+        D[47, 1] = WP16*Z162 + DV136Z262 + DV126*Z252                     # DG2XX6
+        D[48, 1] = U326*Z262 - U316*Z162 - DW126*Z252                     # DG2XY6
+        D[49, 1] = U216*Z162 + DW316*Z262 + U236*Z252                     # DG2XZ6
+        D[50, 1] = DW236*Z162 - U126*Z262 - U136*Z252                     # DG2YZ6
+        D[51, 1] = DV236*Z162 - DV136Z262 - WP36*Z252                     # DG2ZZ6
+        D[52, 1] = VP25*Z262 + U116*V162 + U216*V262 - VP26*Z252 - U316*V252  # DG2MX6
+        D[53, 1] = VP16*Z252 + U126*V162 + U226*V262 - VP25*Z162 - U326*V252  # DG2MY6
+        D[58, 1] = WP17*Z172 + DV137Z272 + DV127*Z262                     # DG2XX7
+        D[59, 1] = U327*Z272 - U317*Z172 - DW127*Z262                     # DG2XY7
+        D[60, 1] = U217*Z172 + DW317*Z272 + U237*Z262                     # DG2XZ7
+        D[61, 1] = DW237*Z172 - U127*Z272 - U137*Z262                     # DG2YZ7
+        D[62, 1] = DV237*Z172 - DV137Z272 - WP37*Z262                     # DG2ZZ7
+        D[63, 1] = VSP27*Z272 + U117*V172 + U217*V272 + U317*V372 - VP27*Z262  # DG2MX7
+        D[64, 1] = VP17*Z262 + U127*V172 + U227*V272 + U327*V372 - VSP27*Z172  # DG2MY7
+        # Joint 3
+        D[14, 2] = -DV123                                                 # DG3XX3
+        D[15, 2] = DW123                                                  # DG3XY3
+        D[16, 2] = -U233                                                  # DG3XZ3
+        D[17, 2] = U133                                                   # DG3YZ3
+        D[18, 2] = WP33                                                   # DG3ZZ3
+        D[19, 2] = VP23                                                   # DG3MX3
+        D[20, 2] = -VP13                                                  # DG3MY3
+        D[21, 2] = QDP3                                                   # DG3Ia3
+        D[22, 2] = QP3                                                    # DG3FV3
+        D[23, 2] = signQP3                                                # DG3FS3
+        D[25, 2] = S4*WP14 + C4DV134                                      # DG3XX4
+        D[26, 2] = C4*U324 - S4*U314                                      # DG3XY4
+        D[27, 2] = S4*U214 + C4*DW314                                     # DG3XZ4
+        D[28, 2] = S4*DW234 - C4*U124                                     # DG3YZ4
+        D[29, 2] = S4*DV234 - C4DV134                                     # DG3ZZ4
+        D[30, 2] = DF3MX4 + C4*VSP24                                      # DG3MX4
+        D[31, 2] = -S4*VSP24 - D4*U324                                    # DG3MY4
+        D[36, 2] = WP15*Z153 + DV135Z253 - C4*DV125                       # DG3XX5
+        D[37, 2] = U325*Z253 + C4*DW125 - U315*Z153                       # DG3XY5
+        D[38, 2] = U215*Z153 + DW315*Z253 - C4*U235                       # DG3XZ5
+        D[39, 2] = DW235*Z153 + C4*U135 - U125*Z253                       # DG3YZ5
+        D[40, 2] = DV235*Z153 + C4*WP35 - DV135Z253                       # DG3ZZ5
+        D[41, 2] = C4*VP25 + U115*V153 + U215*V253 - VSP25*Z253           # DG3MX5
+        D[42, 2] = VSP25*Z153 + U125*V153 + U225*V253 - C4*VP15           # DG3MY5
+        D[47, 2] = WP16*Z163 + DV136Z263 + DV126*Z253                     # DG3XX6
+        D[48, 2] = U326*Z263 - U316*Z163 - DW126*Z253                     # DG3XY6
+        D[49, 2] = U216*Z163 + DW316*Z263 + U236*Z253                     # DG3XZ6
+        D[50, 2] = DW236*Z163 - U126*Z263 - U136*Z253                     # DG3YZ6
+        D[51, 2] = DV236*Z163 - DV136Z263 - WP36*Z253                     # DG3ZZ6
+        D[52, 2] = VP25*Z263 + U116*V163 + U216*V263 - VP26*Z253 - U316*V253  # DG3MX6
+        D[53, 2] = VP16*Z253 + U126*V163 + U226*V263 - VP25*Z163 - U326*V253  # DG3MY6
+        D[58, 2] = WP17*Z173 + DV137Z273 + DV127*Z263                     # DG3XX7
+        D[59, 2] = U327*Z273 - U317*Z173 - DW127*Z263                     # DG3XY7
+        D[60, 2] = U217*Z173 + DW317*Z273 + U237*Z263                     # DG3XZ7
+        D[61, 2] = DW237*Z173 - U127*Z273 - U137*Z263                     # DG3YZ7
+        D[62, 2] = DV237*Z173 - DV137Z273 - WP37*Z263                     # DG3ZZ7
+        D[63, 2] = VSP27*Z273 + U117*V173 + U217*V273 + U317*V373 - VP27*Z263  # DG3MX7
+        D[64, 2] = VP17*Z263 + U127*V173 + U227*V273 + U327*V373 - VSP27*Z173  # DG3MY7
+        # Joint 4
+        D[25, 3] = -DV124                                                 # DG4XX4
+        D[26, 3] = DW124                                                  # DG4XY4
+        D[27, 3] = -U234                                                  # DG4XZ4
+        D[28, 3] = U134                                                   # DG4YZ4
+        D[29, 3] = WP34                                                   # DG4ZZ4
+        D[30, 3] = VP24                                                   # DG4MX4
+        D[31, 3] = -VP14                                                  # DG4MY4
+        D[32, 3] = QDP4                                                   # DG4Ia4
+        D[33, 3] = QP4                                                    # DG4FV4
+        D[34, 3] = signQP4                                                # DG4FS4
+        D[36, 3] = -S5*WP15 - C5DV135                                     # DG4XX5
+        D[37, 3] = S5*U315 - C5*U325                                      # DG4XY5
+        D[38, 3] = -S5*U215 - C5*DW315                                    # DG4XZ5
+        D[39, 3] = C5*U125 - S5*DW235                                     # DG4YZ5
+        D[40, 3] = C5DV135 - S5*DV235                                     # DG4ZZ5
+        D[41, 3] = C5*VSP25 + U115*V154 + U215*V254 - D4*U315             # DG4MX5
+        D[42, 3] = U125*V154 + U225*V254 - S5*VSP25 - D4*U325             # DG4MY5
+        D[47, 3] = WP16*Z164 + DV136Z264 - C5*DV126                       # DG4XX6
+        D[48, 3] = U326*Z264 + C5*DW126 - U316*Z164                       # DG4XY6
+        D[49, 3] = U216*Z164 + DW316*Z264 - C5*U236                       # DG4XZ6
+        D[50, 3] = DW236*Z164 + C5*U136 - U126*Z264                       # DG4YZ6
+        D[51, 3] = DV236*Z164 + C5*WP36 - DV136Z264                       # DG4ZZ6
+        D[52, 3] = VP25*Z264 + C5*VP26 + U116*V164 + U216*V264 - U316*V254  # DG4MX6
+        D[53, 3] = U126*V164 + U226*V264 - VP25*Z164 - C5*VP16 - U326*V254  # DG4MY6
+        D[58, 3] = WP17*Z174 + DV137Z274 + DV127*Z264                     # DG4XX7
+        D[59, 3] = U327*Z274 - U317*Z174 - DW127*Z264                     # DG4XY7
+        D[60, 3] = U217*Z174 + DW317*Z274 + U237*Z264                     # DG4XZ7
+        D[61, 3] = DW237*Z174 - U127*Z274 - U137*Z264                     # DG4YZ7
+        D[62, 3] = DV237*Z174 - DV137Z274 - WP37*Z264                     # DG4ZZ7
+        D[63, 3] = VSP27*Z274 + U117*V174 + U217*V274 + U317*V374 - VP27*Z264  # DG4MX7
+        D[64, 3] = VP17*Z264 + U127*V174 + U227*V274 + U327*V374 - VSP27*Z174  # DG4MY7
+        # Joint 5
+        D[36, 4] = -DV125                                        # DG5XX5
+        D[37, 4] = DW125                                         # DG5XY5
+        D[38, 4] = -U235                                         # DG5XZ5
+        D[39, 4] = U135                                          # DG5YZ5
+        D[40, 4] = WP35                                          # DG5ZZ5
+        D[41, 4] = VP25                                          # DG5MX5
+        D[42, 4] = -VP15                                         # DG5MY5
+        D[43, 4] = QDP5                                          # DG5Ia5
+        D[44, 4] = QP5                                           # DG5FV5
+        D[45, 4] = signQP5                                       # DG5FS5
+        D[47, 4] = S6*WP16 + C6DV136                             # DG5XX6
+        D[48, 4] = C6*U326 - S6*U316                             # DG5XY6
+        D[49, 4] = S6*U216 + C6*DW316                            # DG5XZ6
+        D[50, 4] = S6*DW236 - C6*U126                            # DG5YZ6
+        D[51, 4] = S6*DV236 - C6DV136                            # DG5ZZ6
+        D[52, 4] = C6*VP25                                       # DG5MX6
+        D[53, 4] = -S6*VP25                                      # DG5MY6
+        D[58, 4] = WP17*Z175 + DV137Z275 + C6*DV127              # DG5XX7
+        D[59, 4] = U327*Z275 - U317*Z175 - C6*DW127              # DG5XY7
+        D[60, 4] = U217*Z175 + DW317*Z275 + C6*U237              # DG5XZ7
+        D[61, 4] = DW237*Z175 - U127*Z275 - C6*U137              # DG5YZ7
+        D[62, 4] = DV237*Z175 - DV137Z275 - C6*WP37              # DG5ZZ7
+        D[63, 4] = VSP27*Z275 + U117*V175 + U217*V275 - C6*VP27  # DG5MX7
+        D[64, 4] = C6*VP17 + U127*V175 + U227*V275 - VSP27*Z175  # DG5MY7
+        # Joint 6
+        D[47, 5] = -DV126               # DG6XX6
+        D[48, 5] = DW126                # DG6XY6
+        D[49, 5] = -U236                # DG6XZ6
+        D[50, 5] = U136                 # DG6YZ6
+        D[51, 5] = WP36                 # DG6ZZ6
+        D[52, 5] = VP26                 # DG6MX6
+        D[53, 5] = -VP16                # DG6MY6
+        D[54, 5] = QDP6                 # DG6Ia6
+        D[55, 5] = QP6                  # DG6FV6
+        D[56, 5] = signQP6              # DG6FS6
+        D[58, 5] = S7*WP17 + C7DV137    # DG6XX7
+        D[59, 5] = C7*U327 - S7*U317    # DG6XY7
+        D[60, 5] = S7*U217 + C7*DW317   # DG6XZ7
+        D[61, 5] = S7*DW237 - C7*U127   # DG6YZ7
+        D[62, 5] = S7*DV237 - C7DV137   # DG6ZZ7
+        D[63, 5] = C7*VSP27 - D7*U317   # DG6MX7
+        D[64, 5] = -S7*VSP27 - D7*U327  # DG6MY7
+        # Joint 7
+        D[58, 6] = -DV127   # DG7XX7
+        D[59, 6] = DW127    # DG7XY7
+        D[60, 6] = -U237    # DG7XZ7
+        D[61, 6] = U137     # DG7YZ7
+        D[62, 6] = WP37     # DG7ZZ7
+        D[63, 6] = VP27     # DG7MX7
+        D[64, 6] = -VP17    # DG7MY7
+        D[65, 6] = QDP7     # DG7Ia7
+        D[66, 6] = QP7      # DG7FV7
+        D[67, 6] = signQP7  # DG7FS7
 
-def _regressor_block(xp, q, qd, qdd, D, RL3, D4, RL5, D7, g):
-    """Fill D, shape (69, 7, N), where it is not constant, from q (7, N); qd (7, N); qdd (7, N)."""
-    # Inputs
-    QP1, QP2, QP3, QP4, QP5, QP6, QP7 = qd
-    QDP1, QDP2, QDP3, QDP4, QDP5, QDP6, QDP7 = qdd
-    # Motion of the links
-    (
-        C2, S2, C3, S3, C4, S4, C5, S5, C6, S6, C7, S7, S2QDP1, C2QDP1, _, WP12, DV132, DV122,
-        DW232, DW312, DW122, U122, U212, U312, U322, VP12, VP22, WP13, WP33, DV123, DV133,
-        DV233, DW233, DW313, DW123, U113, U123, U133, U213, U223, U233, U313, U323, VSP23, VP13,
-        VP23, WP14, WP34, DV124, DV134, DV234, DW234, DW314, DW124, U114, U124, U134, U214,
-        U224, U234, U314, U324, VSP24, VP14, VP24, WP15, WP35, DV125, DV135, DV235, DW235,
-        DW315, DW125, U115, U125, U135, U215, U225, U235, U315, U325, DF3MX4, VSP25, VP15, VP25,
-        WP16, WP36, DV126, DV136, DV236, DW236, DW316, DW126, U116, U126, U136, U216, U226,
-        U236, U316, U326, VP16, VP26, WP17, WP37, DV127, DV137, DV237, DW237, DW317, DW127,
-        U117, U127, U137, U217, U227, U237, U317, U327, VSP27, VP17, VP27, GAM1a, GAM2a, GAM3a,
-        GAM4a, GAM5a, GAM6a, GAM7a
-    ) = _motion(xp, q, qd, qdd, RL3, D4, RL5, D7, g)
-    # Joint axes Z and velocities V seen from link 3
-    Z131 = -S2*C3
-    Z231 = S2*S3
-    VS331 = RL3*S2
-    V131 = S3*VS331
-    V231 = C3*VS331
-    V132 = RL3*C3
-    V232 = -RL3*S3
-    # Joint axes Z and velocities V seen from link 4
-    Z141 = C4*Z131 + C2*S4
-    Z241 = C2*C4 - S4*Z131
-    VS341 = -D4*Z231
-    V341 = -V231 - D4*C2
-    V141 = C4*V131 + S4*VS341
-    V241 = C4*VS341 - S4*V131
-    Z142 = S3*C4
-    Z242 = -S3*S4
-    VS342 = -D4*C3
-    V142 = C4*V132 + S4*VS342
-    V242 = C4*VS342 - S4*V132
-    # Joint axes Z and velocities V seen from link 5
-    Z151 = C5*Z141 + S5*Z231
-    Z251 = C5*Z231 - S5*Z141
-    VS151 = V141 + RL5*Z231
-    V351 = V241 - VS341
-    VS351 = V341 + RL5*Z141 + D4*Z241
-    V151 = C5*VS151 - S5*VS351
-    V251 = -C5*VS351 - S5*VS151
-    Z152 = C5*Z142 + C3*S5
-    Z252 = C3*C5 - S5*Z142
-    VS152 = V142 + RL5*C3
-    V352 = V242 - VS342
-    VS352 = RL5*Z142 + D4*Z242 - V232
-    V152 = C5*VS152 - S5*VS352
-    V252 = -C5*VS352 - S5*VS152
-    Z153 = S4*C5
-    Z253 = -S4*S5
-    VS353 = RL5*S4 + D4*C4 - D4
-    V153 = -S5*VS353
-    V253 = -C5*VS353
-    V154 = -RL5*C5
-    V254 = RL5*S5
-    # Joint axes Z and velocities V seen from link 6
-    Z161 = C6*Z151 + S6*Z241
-    Z261 = C6*Z241 - S6*Z151
-    V161 = C6*V151 + S6*V351
-    V261 = C6*V351 - S6*V151
-    Z162 = C6*Z152 + S6*Z242
-    Z262 = C6*Z242 - S6*Z152
-    V162 = C6*V152 + S6*V352
-    V262 = C6*V352 - S6*V152
-    Z163 = C6*Z153 + C4*S6
-    Z263 = C4*C6 - S6*Z153
-    V163 = C6*V153
-    V263 = -S6*V153
-    Z164 = -S5*C6
-    Z264 = S5*S6
-    V164 = C6*V154 - D4*S6
-    V264 = -D4*C6 - S6*V154
-    # Joint axes Z and velocities V seen from link 7
-    Z171 = C7*Z161 - S7*Z251
-    Z271 = -C7*Z251 - S7*Z161
-    V371 = D7*Z251 - V261
-    VS371 = -V251 - D7*Z261
-    V171 = C7*V161 + S7*VS371
-    V271 = C7*VS371 - S7*V161
-    Z172 = C7*Z162 - S7*Z252
-    Z272 = -C7*Z252 - S7*Z162
-    V372 = D7*Z252 - V262
-    VS372 = -V252 - D7*Z262
-    V172 = C7*V162 + S7*VS372
-    V272 = C7*VS372 - S7*V162
-    Z173 = C7*Z163 - S7*Z253
-    Z273 = -C7*Z253 - S7*Z163
-    V373 = D7*Z253 - V263
-    VS373 = -V253 - D7*Z263
-    V173 = C7*V163 + S7*VS373
-    V273 = C7*VS373 - S7*V163
-    Z174 = C7*Z164 + C5*S7
-    Z274 = C5*C7 - S7*Z164
-    V374 = -V264 - D7*C5
-    VS374 = -V254 - D7*Z264
-    V174 = C7*V164 + S7*VS374
-    V274 = C7*VS374 - S7*V164
-    Z175 = S6*C7
-    Z275 = -S6*S7
-    VS375 = -D7*C6
-    V175 = S7*VS375
-    V275 = C7*VS375
-    # Contributions that several joints share
-    DV133Z231 = DV133*Z231
-    C3DV133 = C3*DV133
-    DV134Z241 = DV134*Z241
-    DV134Z242 = DV134*Z242
-    C4DV134 = C4*DV134
-    DV135Z251 = DV135*Z251
-    DV135Z252 = DV135*Z252
-    DV135Z253 = DV135*Z253
-    C5DV135 = C5*DV135
-    DV136Z261 = DV136*Z261
-    DV136Z262 = DV136*Z262
-    DV136Z263 = DV136*Z263
-    DV136Z264 = DV136*Z264
-    C6DV136 = C6*DV136
-    DV137Z271 = DV137*Z271
-    DV137Z272 = DV137*Z272
-    DV137Z273 = DV137*Z273
-    DV137Z274 = DV137*Z274
-    DV137Z275 = DV137*Z275
-    C7DV137 = C7*DV137
-    # Joint 1
-    D[0, 0] = QDP1                                                    # DG1ZZ1
-    D[1, 0] = QP1                                                     # DG1FV1
-    D[2, 0] = GAM1a                                                   # DG1FS1
-    D[4, 0] = -S2*WP12 - C2*DV132                                     # DG1XX2
-    D[5, 0] = S2*U312 - C2*U322                                       # DG1XY2
-    D[6, 0] = -S2*U212 - C2*DW312                                     # DG1XZ2
-    D[7, 0] = C2*U122 - S2*DW232                                      # DG1YZ2
-    D[14, 0] = WP13*Z131 + DV133Z231 - C2*DV123                       # DG1XX3
-    D[15, 0] = U323*Z231 + C2*DW123 - U313*Z131                       # DG1XY3
-    D[16, 0] = U213*Z131 + DW313*Z231 - C2*U233                       # DG1XZ3
-    D[17, 0] = DW233*Z131 + C2*U133 - U123*Z231                       # DG1YZ3
-    D[18, 0] = DV233*Z131 + C2*WP33 - DV133Z231                       # DG1ZZ3
-    D[19, 0] = VSP23*Z231 + C2*VP23 + U113*V131 + U213*V231           # DG1MX3
-    D[20, 0] = U123*V131 + U223*V231 - VSP23*Z131 - C2*VP13           # DG1MY3
-    D[25, 0] = WP14*Z141 + DV134Z241 + DV124*Z231                     # DG1XX4
-    D[26, 0] = U324*Z241 - U314*Z141 - DW124*Z231                     # DG1XY4
-    D[27, 0] = U214*Z141 + DW314*Z241 + U234*Z231                     # DG1XZ4
-    D[28, 0] = DW234*Z141 - U124*Z241 - U134*Z231                     # DG1YZ4
-    D[29, 0] = DV234*Z141 - DV134Z241 - WP34*Z231                     # DG1ZZ4
-    D[30, 0] = VSP24*Z241 + U114*V141 + U214*V241 + U314*V341 - VP24*Z231  # DG1MX4
-    D[31, 0] = VP14*Z231 + U124*V141 + U224*V241 + U324*V341 - VSP24*Z141  # DG1MY4
-    D[36, 0] = WP15*Z151 + DV135Z251 - DV125*Z241                     # DG1XX5
-    D[37, 0] = U325*Z251 + DW125*Z241 - U315*Z151                     # DG1XY5
-    D[38, 0] = U215*Z151 + DW315*Z251 - U235*Z241                     # DG1XZ5
-    D[39, 0] = DW235*Z151 + U135*Z241 - U125*Z251                     # DG1YZ5
-    D[40, 0] = DV235*Z151 + WP35*Z241 - DV135Z251                     # DG1ZZ5
-    D[41, 0] = VP25*Z241 + U115*V151 + U215*V251 + U315*V351 - VSP25*Z251  # DG1MX5
-    D[42, 0] = VSP25*Z151 + U125*V151 + U225*V251 + U325*V351 - VP15*Z241  # DG1MY5
-    D[47, 0] = WP16*Z161 + DV136Z261 + DV126*Z251                     # DG1XX6
-    D[48, 0] = U326*Z261 - U316*Z161 - DW126*Z251                     # DG1XY6
-    D[49, 0] = U216*Z161 + DW316*Z261 + U236*Z251                     # DG1XZ6
-    D[50, 0] = DW236*Z161 - U126*Z261 - U136*Z251                     # DG1YZ6
-    D[51, 0] = DV236*Z161 - DV136Z261 - WP36*Z251                     # DG1ZZ6
-    D[52, 0] = VP25*Z261 + U116*V161 + U216*V261 - VP26*Z251 - U316*V251  # DG1MX6
-    D[53, 0] = VP16*Z251 + U126*V161 + U226*V261 - VP25*Z161 - U326*V251  # DG1MY6
-    D[58, 0] = WP17*Z171 + DV137Z271 + DV127*Z261                     # DG1XX7
-    D[59, 0] = U327*Z271 - U317*Z171 - DW127*Z261                     # DG1XY7
-    D[60, 0] = U217*Z171 + DW317*Z271 + U237*Z261                     # DG1XZ7
-    D[61, 0] = DW237*Z171 - U127*Z271 - U137*Z261                     # DG1YZ7
-    D[62, 0] = DV237*Z171 - DV137Z271 - WP37*Z261                     # DG1ZZ7
-    D[63, 0] = VSP27*Z271 + U117*V171 + U217*V271 + U317*V371 - VP27*Z261  # DG1MX7
-    D[64, 0] = VP17*Z261 + U127*V171 + U227*V271 + U327*V371 - VSP27*Z171  # DG1MY7
-    # Joint 2
-    D[4, 1] = -DV122                                                  # DG2XX2
-    D[5, 1] = DW122                                                   # DG2XY2
-    D[6, 1] = -S2QDP1                                                 # DG2XZ2
-    D[7, 1] = -C2QDP1                                                 # DG2YZ2
-    D[8, 1] = QDP2                                                    # DG2ZZ2
-    D[9, 1] = VP22                                                    # DG2MX2
-    D[10, 1] = -VP12                                                  # DG2MY2
-    D[11, 1] = QP2                                                    # DG2FV2
-    D[12, 1] = GAM2a                                                  # DG2FS2
-    D[14, 1] = S3*WP13 + C3DV133                                      # DG2XX3
-    D[15, 1] = C3*U323 - S3*U313                                      # DG2XY3
-    D[16, 1] = S3*U213 + C3*DW313                                     # DG2XZ3
-    D[17, 1] = S3*DW233 - C3*U123                                     # DG2YZ3
-    D[18, 1] = S3*DV233 - C3DV133                                     # DG2ZZ3
-    D[19, 1] = C3*VSP23 + U113*V132 + U213*V232                       # DG2MX3
-    D[20, 1] = U123*V132 + U223*V232 - S3*VSP23                       # DG2MY3
-    D[25, 1] = WP14*Z142 + DV134Z242 + C3*DV124                       # DG2XX4
-    D[26, 1] = U324*Z242 - U314*Z142 - C3*DW124                       # DG2XY4
-    D[27, 1] = U214*Z142 + DW314*Z242 + C3*U234                       # DG2XZ4
-    D[28, 1] = DW234*Z142 - U124*Z242 - C3*U134                       # DG2YZ4
-    D[29, 1] = DV234*Z142 - DV134Z242 - C3*WP34                       # DG2ZZ4
-    D[30, 1] = VSP24*Z242 + U114*V142 + U214*V242 - C3*VP24 - U314*V232  # DG2MX4
-    D[31, 1] = C3*VP14 + U124*V142 + U224*V242 - VSP24*Z142 - U324*V232  # DG2MY4
-    D[36, 1] = WP15*Z152 + DV135Z252 - DV125*Z242                     # DG2XX5
-    D[37, 1] = U325*Z252 + DW125*Z242 - U315*Z152                     # DG2XY5
-    D[38, 1] = U215*Z152 + DW315*Z252 - U235*Z242                     # DG2XZ5
-    D[39, 1] = DW235*Z152 + U135*Z242 - U125*Z252                     # DG2YZ5
-    D[40, 1] = DV235*Z152 + WP35*Z242 - DV135Z252                     # DG2ZZ5
-    D[41, 1] = VP25*Z242 + U115*V152 + U215*V252 + U315*V352 - VSP25*Z252  # DG2MX5
-    D[42, 1] = VSP25*Z152 + U125*V152 + U225*V252 + U325*V352 - VP15*Z242  # DG2MY5
-    D[47, 1] = WP16*Z162 + DV136Z262 + DV126*Z252                     # DG2XX6
-    D[48, 1] = U326*Z262 - U316*Z162 - DW126*Z252                     # DG2XY6
-    D[49, 1] = U216*Z162 + DW316*Z262 + U236*Z252                     # DG2XZ6
-    D[50, 1] = DW236*Z162 - U126*Z262 - U136*Z252                     # DG2YZ6
-    D[51, 1] = DV236*Z162 - DV136Z262 - WP36*Z252                     # DG2ZZ6
-    D[52, 1] = VP25*Z262 + U116*V162 + U216*V262 - VP26*Z252 - U316*V252  # DG2MX6
-    D[53, 1] = VP16*Z252 + U126*V162 + U226*V262 - VP25*Z162 - U326*V252  # DG2MY6
-    D[58, 1] = WP17*Z172 + DV137Z272 + DV127*Z262                     # DG2XX7
-    D[59, 1] = U327*Z272 - U317*Z172 - DW127*Z262                     # DG2XY7
-    D[60, 1] = U217*Z172 + DW317*Z272 + U237*Z262                     # DG2XZ7
-    D[61, 1] = DW237*Z172 - U127*Z272 - U137*Z262                     # DG2YZ7
-    D[62, 1] = DV237*Z172 - DV137Z272 - WP37*Z262                     # DG2ZZ7
-    D[63, 1] = VSP27*Z272 + U117*V172 + U217*V272 + U317*V372 - VP27*Z262  # DG2MX7
-    D[64, 1] = VP17*Z262 + U127*V172 + U227*V272 + U327*V372 - VSP27*Z172  # DG2MY7
-    # Joint 3
-    D[14, 2] = -DV123                                                 # DG3XX3
-    D[15, 2] = DW123                                                  # DG3XY3
-    D[16, 2] = -U233                                                  # DG3XZ3
-    D[17, 2] = U133                                                   # DG3YZ3
-    D[18, 2] = WP33                                                   # DG3ZZ3
-    D[19, 2] = VP23                                                   # DG3MX3
-    D[20, 2] = -VP13                                                  # DG3MY3
-    D[21, 2] = QDP3                                                   # DG3Ia3
-    D[22, 2] = QP3                                                    # DG3FV3
-    D[23, 2] = GAM3a                                                  # DG3FS3
-    D[25, 2] = S4*WP14 + C4DV134                                      # DG3XX4
-    D[26, 2] = C4*U324 - S4*U314                                      # DG3XY4
-    D[27, 2] = S4*U214 + C4*DW314                                     # DG3XZ4
-    D[28, 2] = S4*DW234 - C4*U124                                     # DG3YZ4
-    D[29, 2] = S4*DV234 - C4DV134                                     # DG3ZZ4
-    D[30, 2] = DF3MX4 + C4*VSP24                                      # DG3MX4
-    D[31, 2] = -S4*VSP24 - D4*U324                                    # DG3MY4
-    D[36, 2] = WP15*Z153 + DV135Z253 - C4*DV125                       # DG3XX5
-    D[37, 2] = U325*Z253 + C4*DW125 - U315*Z153                       # DG3XY5
-    D[38, 2] = U215*Z153 + DW315*Z253 - C4*U235                       # DG3XZ5
-    D[39, 2] = DW235*Z153 + C4*U135 - U125*Z253                       # DG3YZ5
-    D[40, 2] = DV235*Z153 + C4*WP35 - DV135Z253                       # DG3ZZ5
-    D[41, 2] = C4*VP25 + U115*V153 + U215*V253 - VSP25*Z253           # DG3MX5
-    D[42, 2] = VSP25*Z153 + U125*V153 + U225*V253 - C4*VP15           # DG3MY5
-    D[47, 2] = WP16*Z163 + DV136Z263 + DV126*Z253                     # DG3XX6
-    D[48, 2] = U326*Z263 - U316*Z163 - DW126*Z253                     # DG3XY6
-    D[49, 2] = U216*Z163 + DW316*Z263 + U236*Z253                     # DG3XZ6
-    D[50, 2] = DW236*Z163 - U126*Z263 - U136*Z253                     # DG3YZ6
-    D[51, 2] = DV236*Z163 - DV136Z263 - WP36*Z253                     # DG3ZZ6
-    D[52, 2] = VP25*Z263 + U116*V163 + U216*V263 - VP26*Z253 - U316*V253  # DG3MX6
-    D[53, 2] = VP16*Z253 + U126*V163 + U226*V263 - VP25*Z163 - U326*V253  # DG3MY6
-    D[58, 2] = WP17*Z173 + DV137Z273 + DV127*Z263                     # DG3XX7
-    D[59, 2] = U327*Z273 - U317*Z173 - DW127*Z263                     # DG3XY7
-    D[60, 2] = U217*Z173 + DW317*Z273 + U237*Z263                     # DG3XZ7
-    D[61, 2] = DW237*Z173 - U127*Z273 - U137*Z263                     # DG3YZ7
-    D[62, 2] = DV237*Z173 - DV137Z273 - WP37*Z263                     # DG3ZZ7
-    D[63, 2] = VSP27*Z273 + U117*V173 + U217*V273 + U317*V373 - VP27*Z263  # DG3MX7
-    D[64, 2] = VP17*Z263 + U127*V173 + U227*V273 + U327*V373 - VSP27*Z173  # DG3MY7
-    # Joint 4
-    D[25, 3] = -DV124                                                 # DG4XX4
-    D[26, 3] = DW124                                                  # DG4XY4
-    D[27, 3] = -U234                                                  # DG4XZ4
-    D[28, 3] = U134                                                   # DG4YZ4
-    D[29, 3] = WP34                                                   # DG4ZZ4
-    D[30, 3] = VP24                                                   # DG4MX4
-    D[31, 3] = -VP14                                                  # DG4MY4
-    D[32, 3] = QDP4                                                   # DG4Ia4
-    D[33, 3] = QP4                                                    # DG4FV4
-    D[34, 3] = GAM4a                                                  # DG4FS4
-    D[36, 3] = -S5*WP15 - C5DV135                                     # DG4XX5
-    D[37, 3] = S5*U315 - C5*U325                                      # DG4XY5
-    D[38, 3] = -S5*U215 - C5*DW315                                    # DG4XZ5
-    D[39, 3] = C5*U125 - S5*DW235                                     # DG4YZ5
-    D[40, 3] = C5DV135 - S5*DV235                                     # DG4ZZ5
-    D[41, 3] = C5*VSP25 + U115*V154 + U215*V254 - D4*U315             # DG4MX5
-    D[42, 3] = U125*V154 + U225*V254 - S5*VSP25 - D4*U325             # DG4MY5
-    D[47, 3] = WP16*Z164 + DV136Z264 - C5*DV126                       # DG4XX6
-    D[48, 3] = U326*Z264 + C5*DW126 - U316*Z164                       # DG4XY6
-    D[49, 3] = U216*Z164 + DW316*Z264 - C5*U236                       # DG4XZ6
-    D[50, 3] = DW236*Z164 + C5*U136 - U126*Z264                       # DG4YZ6
-    D[51, 3] = DV236*Z164 + C5*WP36 - DV136Z264                       # DG4ZZ6
-    D[52, 3] = VP25*Z264 + C5*VP26 + U116*V164 + U216*V264 - U316*V254  # DG4MX6
-    D[53, 3] = U126*V164 + U226*V264 - VP25*Z164 - C5*VP16 - U326*V254  # DG4MY6
-    D[58, 3] = WP17*Z174 + DV137Z274 + DV127*Z264                     # DG4XX7
-    D[59, 3] = U327*Z274 - U317*Z174 - DW127*Z264                     # DG4XY7
-    D[60, 3] = U217*Z174 + DW317*Z274 + U237*Z264                     # DG4XZ7
-    D[61, 3] = DW237*Z174 - U127*Z274 - U137*Z264                     # DG4YZ7
-    D[62, 3] = DV237*Z174 - DV137Z274 - WP37*Z264                     # DG4ZZ7
-    D[63, 3] = VSP27*Z274 + U117*V174 + U217*V274 + U317*V374 - VP27*Z264  # DG4MX7
-    D[64, 3] = VP17*Z264 + U127*V174 + U227*V274 + U327*V374 - VSP27*Z174  # DG4MY7
-    # Joint 5
-    D[36, 4] = -DV125                                        # DG5XX5
-    D[37, 4] = DW125                                         # DG5XY5
-    D[38, 4] = -U235                                         # DG5XZ5
-    D[39, 4] = U135                                          # DG5YZ5
-    D[40, 4] = WP35                                          # DG5ZZ5
-    D[41, 4] = VP25                                          # DG5MX5
-    D[42, 4] = -VP15                                         # DG5MY5
-    D[43, 4] = QDP5                                          # DG5Ia5
-    D[44, 4] = QP5                                           # DG5FV5
-    D[45, 4] = GAM5a                                         # DG5FS5
-    D[47, 4] = S6*WP16 + C6DV136                             # DG5XX6
-    D[48, 4] = C6*U326 - S6*U316                             # DG5XY6
-    D[49, 4] = S6*U216 + C6*DW316                            # DG5XZ6
-    D[50, 4] = S6*DW236 - C6*U126                            # DG5YZ6
-    D[51, 4] = S6*DV236 - C6DV136                            # DG5ZZ6
-    D[52, 4] = C6*VP25                                       # DG5MX6
-    D[53, 4] = -S6*VP25                                      # DG5MY6
-    D[58, 4] = WP17*Z175 + DV137Z275 + C6*DV127              # DG5XX7
-    D[59, 4] = U327*Z275 - U317*Z175 - C6*DW127              # DG5XY7
-    D[60, 4] = U217*Z175 + DW317*Z275 + C6*U237              # DG5XZ7
-    D[61, 4] = DW237*Z175 - U127*Z275 - C6*U137              # DG5YZ7
-    D[62, 4] = DV237*Z175 - DV137Z275 - C6*WP37              # DG5ZZ7
-    D[63, 4] = VSP27*Z275 + U117*V175 + U217*V275 - C6*VP27  # DG5MX7
-    D[64, 4] = C6*VP17 + U127*V175 + U227*V275 - VSP27*Z175  # DG5MY7
-    # Joint 6
-    D[47, 5] = -DV126               # DG6XX6
-    D[48, 5] = DW126                # DG6XY6
-    D[49, 5] = -U236                # DG6XZ6
-    D[50, 5] = U136                 # DG6YZ6
-    D[51, 5] = WP36                 # DG6ZZ6
-    D[52, 5] = VP26                 # DG6MX6
-    D[53, 5] = -VP16                # DG6MY6
-    D[54, 5] = QDP6                 # DG6Ia6
-    D[55, 5] = QP6                  # DG6FV6
-    D[56, 5] = GAM6a                # DG6FS6
-    D[58, 5] = S7*WP17 + C7DV137    # DG6XX7
-    D[59, 5] = C7*U327 - S7*U317    # DG6XY7
-    D[60, 5] = S7*U217 + C7*DW317   # DG6XZ7
-    D[61, 5] = S7*DW237 - C7*U127   # DG6YZ7
-    D[62, 5] = S7*DV237 - C7DV137   # DG6ZZ7
-    D[63, 5] = C7*VSP27 - D7*U317   # DG6MX7
-    D[64, 5] = -S7*VSP27 - D7*U327  # DG6MY7
-    # Joint 7
-    D[58, 6] = -DV127  # DG7XX7
-    D[59, 6] = DW127   # DG7XY7
-    D[60, 6] = -U237   # DG7XZ7
-    D[61, 6] = U137    # DG7YZ7
-    D[62, 6] = WP37    # DG7ZZ7
-    D[63, 6] = VP27    # DG7MX7
-    D[64, 6] = -VP17   # DG7MY7
-    D[65, 6] = QDP7    # DG7Ia7
-    D[66, 6] = QP7     # DG7FV7
-    D[67, 6] = GAM7a   # DG7FS7
+    def _torques(GAM, X):
+        # Inputs
+        (
+            ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2, XZ2, YZ2, ZZ2R, MX2, MY2R, FV2, FS2, OFFSET2, XX3R,
+            XY3R, XZ3, YZ3, ZZ3R, MX3R, MY3R, Ia3, FV3, FS3, OFFSET3, XX4R, XY4R, XZ4, YZ4, ZZ4R,
+            MX4R, MY4R, Ia4, FV4, FS4, OFFSET4, XX5R, XY5, XZ5, YZ5, ZZ5R, MX5, MY5R, Ia5, FV5, FS5,
+            OFFSET5, XX6R, XY6R, XZ6, YZ6, ZZ6R, MX6R, MY6R, Ia6, FV6, FS6, OFFSET6, XX7R, XY7, XZ7,
+            YZ7, ZZ7, MX7, MY7, Ia7, FV7, FS7, OFFSET7
+        ) = X
+        # Joint 7
+        F17 = MX7*U117 + MY7*U127
+        F27 = MX7*U217 + MY7*U227
+        F37 = MX7*U317 + MY7*U327
+        N17 = XX7R*WP17 + ZZ7*DV237 + YZ7*DW237 + XZ7*U217 - XY7*U317 - MY7*VSP27
+        N27 = (XX7R - ZZ7)*DV137 + XZ7*DW317 + XY7*U327 + MX7*VSP27 - YZ7*U127
+        N37 = ZZ7*WP37 + XY7*DW127 + YZ7*U137 + MX7*VP27 - XX7R*DV127 - XZ7*U237 - MY7*VP17
+        FDI17 = C7*F17 - S7*F27
+        FDI37 = S7*F17 + C7*F27
+        # Joint 6
+        F16 = MX6R*U116 + MY6R*U126
+        F26 = MX6R*U216 + MY6R*U226
+        F36 = MX6R*U316 + MY6R*U326
+        E16 = FDI17 + F16
+        E26 = F26 - F37
+        E36 = FDI37 + F36
+        N16 = XX6R*WP16 + ZZ6R*DV236 + YZ6*DW236 + XZ6*U216 - XY6R*U316 - MY6R*VP25
+        N26 = (XX6R - ZZ6R)*DV136 + XZ6*DW316 + XY6R*U326 + MX6R*VP25 - YZ6*U126
+        N36 = ZZ6R*WP36 + XY6R*DW126 + YZ6*U136 + MX6R*VP26 - XX6R*DV126 - XZ6*U236 - MY6R*VP16
+        NE16 = C7*N17 + N16 - S7*N27
+        NE26 = N26 - N37 - D7*FDI37
+        NE36 = S7*N17 + C7*N27 + N36 - D7*F37
+        FDI16 = C6*E16 - S6*E26
+        FDI36 = S6*E16 + C6*E26
+        # Joint 5
+        F15 = MX5*U115 + MY5R*U125
+        F25 = MX5*U215 + MY5R*U225
+        F35 = MX5*U315 + MY5R*U325
+        E15 = FDI16 + F15
+        E25 = F25 - E36
+        E35 = FDI36 + F35
+        N15 = XX5R*WP15 + ZZ5R*DV235 + YZ5*DW235 + XZ5*U215 + MY5R*VSP25 - XY5*U315
+        N25 = (XX5R - ZZ5R)*DV135 + XZ5*DW315 + XY5*U325 - YZ5*U125 - MX5*VSP25
+        N35 = ZZ5R*WP35 + XY5*DW125 + YZ5*U135 + MX5*VP25 - XX5R*DV125 - XZ5*U235 - MY5R*VP15
+        NE15 = C6*NE16 + N15 - S6*NE26
+        NE25 = N25 - NE36
+        NE35 = S6*NE16 + C6*NE26 + N35
+        FDI15 = C5*E15 - S5*E25
+        FDI35 = -S5*E15 - C5*E25
+        # Joint 4
+        F14 = MX4R*U114 + MY4R*U124
+        F24 = MX4R*U214 + MY4R*U224
+        F34 = MX4R*U314 + MY4R*U324
+        E14 = FDI15 + F14
+        E24 = E35 + F24
+        E34 = FDI35 + F34
+        N14 = XX4R*WP14 + ZZ4R*DV234 + YZ4*DW234 + XZ4*U214 - XY4R*U314 - MY4R*VSP24
+        N24 = (XX4R - ZZ4R)*DV134 + XZ4*DW314 + XY4R*U324 + MX4R*VSP24 - YZ4*U124
+        N34 = ZZ4R*WP34 + XY4R*DW124 + YZ4*U134 + MX4R*VP24 - XX4R*DV124 - XZ4*U234 - MY4R*VP14
+        NE14 = C5*NE15 + RL5*FDI35 + N14 - S5*NE25
+        NE24 = NE35 + D4*FDI35 + N24
+        NE34 = N34 - S5*NE15 - C5*NE25 - D4*E35 - RL5*FDI15
+        FDI14 = C4*E14 - S4*E24
+        FDI34 = S4*E14 + C4*E24
+        # Joint 3
+        F13 = MX3R*U113 + MY3R*U123
+        F23 = MX3R*U213 + MY3R*U223
+        E13 = FDI14 + F13
+        E23 = F23 - E34
+        N13 = XX3R*WP13 + ZZ3R*DV233 + YZ3*DW233 + XZ3*U213 - XY3R*U313 - MY3R*VSP23
+        N23 = (XX3R - ZZ3R)*DV133 + XZ3*DW313 + XY3R*U323 + MX3R*VSP23 - YZ3*U123
+        N33 = ZZ3R*WP33 + XY3R*DW123 + YZ3*U133 + MX3R*VP23 - XX3R*DV123 - XZ3*U233 - MY3R*VP13
+        NE13 = C4*NE14 + N13 - S4*NE24
+        NE23 = N23 - NE34 - D4*FDI34
+        NE33 = S4*NE14 + C4*NE24 + N33 - D4*E34
+        FDI13 = C3*E13 - S3*E23
+        FDI33 = S3*E13 + C3*E23
+        # Joint 2
+        N12 = XX2R*WP12 + ZZ2R*DV232 + YZ2*DW232 + XZ2*U212 - XY2*U312
+        N22 = (XX2R - ZZ2R)*DV132 + XZ2*DW312 + XY2*U322 - YZ2*U122
+        N32 = ZZ2R*QDP2 + XY2*DW122 + MX2*VP22 - XX2R*DV122 - YZ2*C2QDP1 - XZ2*S2QDP1 - MY2R*VP12
+        NE12 = C3*NE13 + N12 - S3*NE23 - RL3*FDI33
+        NE22 = N22 - NE33
+        NE32 = S3*NE13 + C3*NE23 + RL3*FDI13 + N32
+        # Joint 1
+        N31 = ZZ1R*QDP1
+        NE31 = N31 - S2*NE12 - C2*NE22
+        # Torques
+        GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*signQP1
+        GAM[1] = OFFSET2 + NE32 + FV2*QP2 + FS2*signQP2
+        GAM[2] = OFFSET3 + NE33 + Ia3*QDP3 + FV3*QP3 + FS3*signQP3
+        GAM[3] = OFFSET4 + NE34 + Ia4*QDP4 + FV4*QP4 + FS4*signQP4
+        GAM[4] = OFFSET5 + NE35 + Ia5*QDP5 + FV5*QP5 + FS5*signQP5
+        GAM[5] = OFFSET6 + NE36 + Ia6*QDP6 + FV6*QP6 + FS6*signQP6
+        GAM[6] = OFFSET7 + N37 + Ia7*QDP7 + FV7*QP7 + FS7*signQP7
 
-
-def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X, RL3, D4, RL5, D7, g):
-    """Fill GAM, shape (7, N), from q (7, N); qd (7, N); qdd (7, N)."""
-    # Inputs
-    QP1, QP2, QP3, QP4, QP5, QP6, QP7 = qd
-    QDP1, QDP2, QDP3, QDP4, QDP5, QDP6, QDP7 = qdd
-    (
-        ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2, XZ2, YZ2, ZZ2R, MX2, MY2R, FV2, FS2, OFFSET2, XX3R,
-        XY3R, XZ3, YZ3, ZZ3R, MX3R, MY3R, Ia3, FV3, FS3, OFFSET3, XX4R, XY4R, XZ4, YZ4, ZZ4R,
-        MX4R, MY4R, Ia4, FV4, FS4, OFFSET4, XX5R, XY5, XZ5, YZ5, ZZ5R, MX5, MY5R, Ia5, FV5, FS5,
-        OFFSET5, XX6R, XY6R, XZ6, YZ6, ZZ6R, MX6R, MY6R, Ia6, FV6, FS6, OFFSET6, XX7R, XY7, XZ7,
-        YZ7, ZZ7, MX7, MY7, Ia7, FV7, FS7, OFFSET7
-    ) = X
-    # Motion of the links
-    (
-        C2, S2, C3, S3, C4, S4, C5, S5, C6, S6, C7, S7, S2QDP1, C2QDP1, DV232, WP12, DV132,
-        DV122, DW232, DW312, DW122, U122, U212, U312, U322, VP12, VP22, WP13, WP33, DV123,
-        DV133, DV233, DW233, DW313, DW123, U113, U123, U133, U213, U223, U233, U313, U323,
-        VSP23, VP13, VP23, WP14, WP34, DV124, DV134, DV234, DW234, DW314, DW124, U114, U124,
-        U134, U214, U224, U234, U314, U324, VSP24, VP14, VP24, WP15, WP35, DV125, DV135, DV235,
-        DW235, DW315, DW125, U115, U125, U135, U215, U225, U235, U315, U325, _, VSP25, VP15,
-        VP25, WP16, WP36, DV126, DV136, DV236, DW236, DW316, DW126, U116, U126, U136, U216,
-        U226, U236, U316, U326, VP16, VP26, WP17, WP37, DV127, DV137, DV237, DW237, DW317,
-        DW127, U117, U127, U137, U217, U227, U237, U317, U327, VSP27, VP17, VP27, GAM1a, GAM2a,
-        GAM3a, GAM4a, GAM5a, GAM6a, GAM7a
-    ) = _motion(xp, q, qd, qdd, RL3, D4, RL5, D7, g)
-    # Joint 7
-    F17 = MX7*U117 + MY7*U127
-    F27 = MX7*U217 + MY7*U227
-    F37 = MX7*U317 + MY7*U327
-    N17 = XX7R*WP17 + ZZ7*DV237 + YZ7*DW237 + XZ7*U217 - XY7*U317 - MY7*VSP27
-    N27 = (XX7R - ZZ7)*DV137 + XZ7*DW317 + XY7*U327 + MX7*VSP27 - YZ7*U127
-    N37 = ZZ7*WP37 + XY7*DW127 + YZ7*U137 + MX7*VP27 - XX7R*DV127 - XZ7*U237 - MY7*VP17
-    FDI17 = C7*F17 - S7*F27
-    FDI37 = S7*F17 + C7*F27
-    # Joint 6
-    F16 = MX6R*U116 + MY6R*U126
-    F26 = MX6R*U216 + MY6R*U226
-    F36 = MX6R*U316 + MY6R*U326
-    E16 = FDI17 + F16
-    E26 = F26 - F37
-    E36 = FDI37 + F36
-    N16 = XX6R*WP16 + ZZ6R*DV236 + YZ6*DW236 + XZ6*U216 - XY6R*U316 - MY6R*VP25
-    N26 = (XX6R - ZZ6R)*DV136 + XZ6*DW316 + XY6R*U326 + MX6R*VP25 - YZ6*U126
-    N36 = ZZ6R*WP36 + XY6R*DW126 + YZ6*U136 + MX6R*VP26 - XX6R*DV126 - XZ6*U236 - MY6R*VP16
-    NE16 = C7*N17 + N16 - S7*N27
-    NE26 = N26 - N37 - D7*FDI37
-    NE36 = S7*N17 + C7*N27 + N36 - D7*F37
-    FDI16 = C6*E16 - S6*E26
-    FDI36 = S6*E16 + C6*E26
-    # Joint 5
-    F15 = MX5*U115 + MY5R*U125
-    F25 = MX5*U215 + MY5R*U225
-    F35 = MX5*U315 + MY5R*U325
-    E15 = FDI16 + F15
-    E25 = F25 - E36
-    E35 = FDI36 + F35
-    N15 = XX5R*WP15 + ZZ5R*DV235 + YZ5*DW235 + XZ5*U215 + MY5R*VSP25 - XY5*U315
-    N25 = (XX5R - ZZ5R)*DV135 + XZ5*DW315 + XY5*U325 - YZ5*U125 - MX5*VSP25
-    N35 = ZZ5R*WP35 + XY5*DW125 + YZ5*U135 + MX5*VP25 - XX5R*DV125 - XZ5*U235 - MY5R*VP15
-    NE15 = C6*NE16 + N15 - S6*NE26
-    NE25 = N25 - NE36
-    NE35 = S6*NE16 + C6*NE26 + N35
-    FDI15 = C5*E15 - S5*E25
-    FDI35 = -S5*E15 - C5*E25
-    # Joint 4
-    F14 = MX4R*U114 + MY4R*U124
-    F24 = MX4R*U214 + MY4R*U224
-    F34 = MX4R*U314 + MY4R*U324
-    E14 = FDI15 + F14
-    E24 = E35 + F24
-    E34 = FDI35 + F34
-    N14 = XX4R*WP14 + ZZ4R*DV234 + YZ4*DW234 + XZ4*U214 - XY4R*U314 - MY4R*VSP24
-    N24 = (XX4R - ZZ4R)*DV134 + XZ4*DW314 + XY4R*U324 + MX4R*VSP24 - YZ4*U124
-    N34 = ZZ4R*WP34 + XY4R*DW124 + YZ4*U134 + MX4R*VP24 - XX4R*DV124 - XZ4*U234 - MY4R*VP14
-    NE14 = C5*NE15 + RL5*FDI35 + N14 - S5*NE25
-    NE24 = NE35 + D4*FDI35 + N24
-    NE34 = N34 - S5*NE15 - C5*NE25 - D4*E35 - RL5*FDI15
-    FDI14 = C4*E14 - S4*E24
-    FDI34 = S4*E14 + C4*E24
-    # Joint 3
-    F13 = MX3R*U113 + MY3R*U123
-    F23 = MX3R*U213 + MY3R*U223
-    E13 = FDI14 + F13
-    E23 = F23 - E34
-    N13 = XX3R*WP13 + ZZ3R*DV233 + YZ3*DW233 + XZ3*U213 - XY3R*U313 - MY3R*VSP23
-    N23 = (XX3R - ZZ3R)*DV133 + XZ3*DW313 + XY3R*U323 + MX3R*VSP23 - YZ3*U123
-    N33 = ZZ3R*WP33 + XY3R*DW123 + YZ3*U133 + MX3R*VP23 - XX3R*DV123 - XZ3*U233 - MY3R*VP13
-    NE13 = C4*NE14 + N13 - S4*NE24
-    NE23 = N23 - NE34 - D4*FDI34
-    NE33 = S4*NE14 + C4*NE24 + N33 - D4*E34
-    FDI13 = C3*E13 - S3*E23
-    FDI33 = S3*E13 + C3*E23
-    # Joint 2
-    N12 = XX2R*WP12 + ZZ2R*DV232 + YZ2*DW232 + XZ2*U212 - XY2*U312
-    N22 = (XX2R - ZZ2R)*DV132 + XZ2*DW312 + XY2*U322 - YZ2*U122
-    N32 = ZZ2R*QDP2 + XY2*DW122 + MX2*VP22 - XX2R*DV122 - YZ2*C2QDP1 - XZ2*S2QDP1 - MY2R*VP12
-    NE12 = C3*NE13 + N12 - S3*NE23 - RL3*FDI33
-    NE22 = N22 - NE33
-    NE32 = S3*NE13 + C3*NE23 + RL3*FDI13 + N32
-    # Joint 1
-    N31 = ZZ1R*QDP1
-    NE31 = N31 - S2*NE12 - C2*NE22
-    # Torques
-    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*GAM1a
-    GAM[1] = OFFSET2 + NE32 + FV2*QP2 + FS2*GAM2a
-    GAM[2] = OFFSET3 + NE33 + Ia3*QDP3 + FV3*QP3 + FS3*GAM3a
-    GAM[3] = OFFSET4 + NE34 + Ia4*QDP4 + FV4*QP4 + FS4*GAM4a
-    GAM[4] = OFFSET5 + NE35 + Ia5*QDP5 + FV5*QP5 + FS5*GAM5a
-    GAM[5] = OFFSET6 + NE36 + Ia6*QDP6 + FV6*QP6 + FS6*GAM6a
-    GAM[6] = OFFSET7 + N37 + Ia7*QDP7 + FV7*QP7 + FS7*GAM7a
+    return _regressor, _torques
 
 
 def _inertia_matrix_block(xp, q, A, X, RL3, D4, RL5, D7):
@@ -1359,7 +1351,7 @@ def _inertia_matrix_block(xp, q, A, X, RL3, D4, RL5, D7):
     C7S7 = C7*S7
     AJA117 = XX7R*C7C7 - XY7*2*C7S7
     NE167 = XZ7*C7 - YZ7*S7
-    NE367 = A[5, 6] = A[6, 5] = XZ7*S7 + YZ7*C7
+    NE367 = XZ7*S7 + YZ7*C7
     D7AS17 = D7*AS17
     JP226a = 2*D7AS17
     JP116 = XX6R + AJA117
@@ -1377,7 +1369,7 @@ def _inertia_matrix_block(xp, q, A, X, RL3, D4, RL5, D7):
     JP115a = JP116 - JP226
     JP115b = C6C6*JP115a - JP126*2*C6S6
     NE156 = C6*JP136 - S6*JP236
-    NE356 = A[4, 5] = A[5, 4] = S6*JP136 + C6*JP236
+    NE356 = S6*JP136 + C6*JP236
     JP115 = XX5R + JP226 + JP115b
     JP125 = XY5 - NE156
     JP135 = XZ5 + C6S6*JP115a + JP126*2*C6C6 - JP126
@@ -1401,7 +1393,7 @@ def _inertia_matrix_block(xp, q, A, X, RL3, D4, RL5, D7):
     JP124 = XY4R + AJA125 + D4*AS36 - RL5AS15
     JP134 = XZ4 + C5S5*JP114a + JP125 + D4AS35 - JP125*2*C5C5
     JP224 = JP335 - 2*D4AS15
-    NE345 = A[3, 4] = A[4, 3] = -S5*JP135 - C5*JP235 - RL5*AS35
+    NE345 = -S5*JP135 - C5*JP235 - RL5*AS35
     JP234 = YZ4 + NE345
     JP334 = ZZ4R + JP115 + JP114b - 2*(D4AS15 - RL5AS36)
     MSP14 = MX4R + AS15
@@ -1414,7 +1406,7 @@ def _inertia_matrix_block(xp, q, A, X, RL3, D4, RL5, D7):
     JP113a = JP114 - JP224
     JP113b = C4C4*JP113a - JP124*2*C4S4
     NE134 = C4*JP134 - S4*JP234
-    NE334 = A[2, 3] = A[3, 2] = S4*JP134 + C4*JP234
+    NE334 = S4*JP134 + C4*JP234
     D4AS14 = D4*AS14
     JP223a = 2*D4AS14
     JP113 = XX3R + JP224 + JP113b
@@ -1437,21 +1429,21 @@ def _inertia_matrix_block(xp, q, A, X, RL3, D4, RL5, D7):
     NE123 = C3*JP133 - S3*JP233 - RL3*AS13
     JP122 = XY2 - NE123
     JP132 = XZ2 + C3S3*JP112a + JP123*2*C3C3 - JP123
-    NE323 = A[1, 2] = A[2, 1] = S3*JP133 + C3*JP233 - RL3*AS33
+    NE323 = S3*JP133 + C3*JP233 - RL3*AS33
     JP232 = YZ2 - NE323
-    A[1, 1] = ZZ2R + JP113 + JP112c - JP112b
+    JP332 = ZZ2R + JP113 + JP112c - JP112b
     # Composite link 2
-    A[0, 1] = A[1, 0] = -S2*JP132 - C2*JP232
-    A[0, 0] = ZZ1R + JP112 + C2**2*(JP333 - JP112) + JP122*2*C2*S2
+    NE312 = -S2*JP132 - C2*JP232
+    JP331 = ZZ1R + JP112 + C2**2*(JP333 - JP112) + JP122*2*C2*S2
     # Unit acceleration of joint 3
-    A[0, 2] = A[2, 0] = C2*JP333 - S2*NE123
+    NE313 = C2*JP333 - S2*NE123
     # Unit acceleration of joint 4
     NE234 = -JP334 - D4AS14
     E124 = -C3*AS34
     E324 = -S3*AS34
     NE124 = C3*NE134 - S3*NE234 - RL3*E324
-    A[1, 3] = A[3, 1] = S3*NE134 + C3*NE234 + RL3*E124
-    A[0, 3] = A[3, 0] = C2*NE334 - S2*NE124
+    NE324 = S3*NE134 + C3*NE234 + RL3*E124
+    NE314 = C2*NE334 - S2*NE124
     # Unit acceleration of joint 5
     NE145 = AJA125 - RL5AS15
     NE245 = JP335 - D4AS15
@@ -1459,56 +1451,79 @@ def _inertia_matrix_block(xp, q, A, X, RL3, D4, RL5, D7):
     E335 = S4*AS35
     NE135 = C4*NE145 - S4*NE245
     NE235 = -NE345 - D4*E335
-    NE335 = A[2, 4] = A[4, 2] = D4AS15 + S4*NE145 + C4*NE245
+    NE335 = D4AS15 + S4*NE145 + C4*NE245
     E125 = C3*E135 - S3*AS15
     E325 = S3*E135 + C3*AS15
     NE125 = C3*NE135 - S3*NE235 - RL3*E325
-    A[1, 4] = A[4, 1] = S3*NE135 + C3*NE235 + RL3*E125
-    A[0, 4] = A[4, 0] = C2*NE335 - S2*NE125
+    NE325 = S3*NE135 + C3*NE235 + RL3*E125
+    NE315 = C2*NE335 - S2*NE125
     # Unit acceleration of joint 6
     E146 = -C5*AS36
     E346 = S5*AS36
     D4E346 = D4*E346
     NE146 = C5*NE156 + S5*JP336 + RL5*E346
     NE246 = NE356 + D4E346
-    NE346 = A[3, 5] = A[5, 3] = C5*JP336 - S5*NE156 - D4*AS16 - RL5*E146
+    NE346 = C5*JP336 - S5*NE156 - D4*AS16 - RL5*E146
     E136 = C4*E146 - S4*AS16
     E336 = S4*E146 + C4*AS16
     NE136 = C4*NE146 - S4*NE246
     NE236 = -NE346 - D4*E336
-    NE336 = A[2, 5] = A[5, 2] = S4*NE146 + C4*NE246 - D4E346
+    NE336 = S4*NE146 + C4*NE246 - D4E346
     E126 = C3*E136 + S3*E346
     E326 = S3*E136 - C3*E346
     NE126 = C3*NE136 - S3*NE236 - RL3*E326
-    A[1, 5] = A[5, 1] = S3*NE136 + C3*NE236 + RL3*E126
-    A[0, 5] = A[5, 0] = C2*NE336 - S2*NE126
+    NE326 = S3*NE136 + C3*NE236 + RL3*E126
+    NE316 = C2*NE336 - S2*NE126
     # Unit acceleration of joint 7
     NE267 = -ZZ7 - D7AS17
     E157 = -C6*AS37
     E357 = -S6*AS37
     NE157 = C6*NE167 - S6*NE267
-    NE357 = A[4, 6] = A[6, 4] = S6*NE167 + C6*NE267
+    NE357 = S6*NE167 + C6*NE267
     E147 = C5*E157 + S5*AS17
     E347 = C5*AS17 - S5*E157
     D4E347 = D4*E347
     NE147 = C5*NE157 + S5*NE367 + RL5*E347
     NE247 = NE357 + D4E347
-    NE347 = A[3, 6] = A[6, 3] = C5*NE367 - S5*NE157 - D4*E357 - RL5*E147
+    NE347 = C5*NE367 - S5*NE157 - D4*E357 - RL5*E147
     E137 = C4*E147 - S4*E357
     E337 = S4*E147 + C4*E357
     NE137 = C4*NE147 - S4*NE247
     NE237 = -NE347 - D4*E337
-    NE337 = A[2, 6] = A[6, 2] = S4*NE147 + C4*NE247 - D4E347
+    NE337 = S4*NE147 + C4*NE247 - D4E347
     E127 = C3*E137 + S3*E347
     E327 = S3*E137 - C3*E347
     NE127 = C3*NE137 - S3*NE237 - RL3*E327
-    A[1, 6] = A[6, 1] = S3*NE137 + C3*NE237 + RL3*E127
-    A[0, 6] = A[6, 0] = C2*NE337 - S2*NE127
+    NE327 = S3*NE137 + C3*NE237 + RL3*E127
+    NE317 = C2*NE337 - S2*NE127
     # Inertia matrix
+    A[0, 0] = JP331
+    A[0, 1] = A[1, 0] = NE312
+    A[1, 1] = JP332
+    A[0, 2] = A[2, 0] = NE313
+    A[1, 2] = A[2, 1] = NE323
     A[2, 2] = Ia3 + JP333
+    A[0, 3] = A[3, 0] = NE314
+    A[1, 3] = A[3, 1] = NE324
+    A[2, 3] = A[3, 2] = NE334
     A[3, 3] = Ia4 + JP334
+    A[0, 4] = A[4, 0] = NE315
+    A[1, 4] = A[4, 1] = NE325
+    A[2, 4] = A[4, 2] = NE335
+    A[3, 4] = A[4, 3] = NE345
     A[4, 4] = Ia5 + JP335
+    A[0, 5] = A[5, 0] = NE316
+    A[1, 5] = A[5, 1] = NE326
+    A[2, 5] = A[5, 2] = NE336
+    A[3, 5] = A[5, 3] = NE346
+    A[4, 5] = A[5, 4] = NE356
     A[5, 5] = Ia6 + JP336
+    A[0, 6] = A[6, 0] = NE317
+    A[1, 6] = A[6, 1] = NE327
+    A[2, 6] = A[6, 2] = NE337
+    A[3, 6] = A[6, 3] = NE347
+    A[4, 6] = A[6, 4] = NE357
+    A[5, 6] = A[6, 5] = NE367
     A[6, 6] = ZZ7 + Ia7
 
 
@@ -1603,9 +1618,9 @@ def _frame_poses_block(xp, q, T, RL1, RL3, D4, RL5, D7):
     # Inputs
     q1, q2, q3, q4, q5, q6, q7 = q
     # Trigonometry
-    C1 = T[0, 0, 0] = T[0, 1, 1] = T[1, 1, 2] = xp.cos(q1)
-    S1 = T[0, 1, 0] = xp.sin(q1)
-    C2 = T[2, 2, 2] = xp.cos(q2)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
+    C2 = xp.cos(q2)
     S2 = xp.sin(q2)
     C3 = xp.cos(q3)
     S3 = xp.sin(q3)
@@ -1618,78 +1633,137 @@ def _frame_poses_block(xp, q, T, RL1, RL3, D4, RL5, D7):
     C7 = xp.cos(q7)
     S7 = xp.sin(q7)
     # Joint axes Z and velocities V seen from link 3
-    Z131 = T[2, 2, 0] = -S2*C3
-    Z231 = T[2, 2, 1] = S2*S3
+    Z131 = -S2*C3
+    Z231 = S2*S3
     # Joint axes Z and velocities V seen from link 4
-    Z141 = T[3, 2, 0] = C4*Z131 + C2*S4
-    Z241 = T[3, 2, 1] = T[4, 2, 2] = C2*C4 - S4*Z131
+    Z141 = C4*Z131 + C2*S4
+    Z241 = C2*C4 - S4*Z131
     # Joint axes Z and velocities V seen from link 5
-    Z151 = T[4, 2, 0] = C5*Z141 + S5*Z231
-    Z251 = T[4, 2, 1] = C5*Z231 - S5*Z141
+    Z151 = C5*Z141 + S5*Z231
+    Z251 = C5*Z231 - S5*Z141
     # Joint axes Z and velocities V seen from link 6
-    Z161 = T[5, 2, 0] = C6*Z151 + S6*Z241
-    Z261 = T[5, 2, 1] = C6*Z241 - S6*Z151
+    Z161 = C6*Z151 + S6*Z241
+    Z261 = C6*Z241 - S6*Z151
     # Joint axes Z and velocities V seen from link 7
-    T[6, 2, 0] = C7*Z161 - S7*Z251
-    T[6, 2, 1] = -C7*Z251 - S7*Z161
+    Z171 = C7*Z161 - S7*Z251
+    Z271 = -C7*Z251 - S7*Z161
     # Frame 2
-    R112 = T[1, 0, 0] = C1*C2
-    R122 = T[1, 0, 1] = -C1*S2
-    R212 = T[1, 1, 0] = S1*C2
-    R222 = T[1, 1, 1] = -S1*S2
+    R112 = C1*C2
+    R122 = -C1*S2
+    R212 = S1*C2
+    R222 = -S1*S2
     # Frame 3
-    R113 = T[2, 0, 0] = C3*R112 - S1*S3
-    R123 = T[2, 0, 1] = -S1*C3 - S3*R112
-    R213 = T[2, 1, 0] = C3*R212 + C1*S3
-    R223 = T[2, 1, 1] = C1*C3 - S3*R212
-    P13 = T[2, 0, 3] = -RL3*R122
-    P23 = T[2, 1, 3] = -RL3*R222
-    P33 = T[2, 2, 3] = RL1 + RL3*C2
+    R113 = C3*R112 - S1*S3
+    R123 = -S1*C3 - S3*R112
+    R213 = C3*R212 + C1*S3
+    R223 = C1*C3 - S3*R212
+    P13 = -RL3*R122
+    P23 = -RL3*R222
+    P33 = RL1 + RL3*C2
     # Frame 4
-    R114 = T[3, 0, 0] = C4*R113 - S4*R122
-    R124 = T[3, 0, 1] = T[4, 0, 2] = -C4*R122 - S4*R113
-    R214 = T[3, 1, 0] = C4*R213 - S4*R222
-    R224 = T[3, 1, 1] = T[4, 1, 2] = -C4*R222 - S4*R213
-    P14 = T[3, 0, 3] = P13 + D4*R113
-    P24 = T[3, 1, 3] = P23 + D4*R213
-    P34 = T[3, 2, 3] = P33 + D4*Z131
+    R114 = C4*R113 - S4*R122
+    R124 = -C4*R122 - S4*R113
+    R214 = C4*R213 - S4*R222
+    R224 = -C4*R222 - S4*R213
+    P14 = P13 + D4*R113
+    P24 = P23 + D4*R213
+    P34 = P33 + D4*Z131
     # Frame 5
-    R115 = T[4, 0, 0] = C5*R114 + S5*R123
-    R125 = T[4, 0, 1] = C5*R123 - S5*R114
-    R215 = T[4, 1, 0] = C5*R214 + S5*R223
-    R225 = T[4, 1, 1] = C5*R223 - S5*R214
-    P15 = T[4, 0, 3] = T[5, 0, 3] = P14 + RL5*R124 - D4*R114
-    P25 = T[4, 1, 3] = T[5, 1, 3] = P24 + RL5*R224 - D4*R214
-    P35 = T[4, 2, 3] = T[5, 2, 3] = P34 + RL5*Z241 - D4*Z141
+    R115 = C5*R114 + S5*R123
+    R125 = C5*R123 - S5*R114
+    R215 = C5*R214 + S5*R223
+    R225 = C5*R223 - S5*R214
+    P15 = P14 + RL5*R124 - D4*R114
+    P25 = P24 + RL5*R224 - D4*R214
+    P35 = P34 + RL5*Z241 - D4*Z141
     # Frame 6
-    R116 = T[5, 0, 0] = C6*R115 + S6*R124
-    R126 = T[5, 0, 1] = C6*R124 - S6*R115
-    R216 = T[5, 1, 0] = C6*R215 + S6*R224
-    R226 = T[5, 1, 1] = C6*R224 - S6*R215
+    R116 = C6*R115 + S6*R124
+    R126 = C6*R124 - S6*R115
+    R216 = C6*R215 + S6*R224
+    R226 = C6*R224 - S6*R215
     # Frame 7
-    T[6, 0, 0] = C7*R116 - S7*R125
-    T[6, 0, 1] = -C7*R125 - S7*R116
-    T[6, 1, 0] = C7*R216 - S7*R225
-    T[6, 1, 1] = -C7*R225 - S7*R216
-    T[6, 0, 3] = P15 + D7*R116
-    T[6, 1, 3] = P25 + D7*R216
-    T[6, 2, 3] = P35 + D7*Z161
+    R117 = C7*R116 - S7*R125
+    R127 = -C7*R125 - S7*R116
+    R217 = C7*R216 - S7*R225
+    R227 = -C7*R225 - S7*R216
+    P17 = P15 + D7*R116
+    P27 = P25 + D7*R216
+    P37 = P35 + D7*Z161
     # Poses
-    T[0, 0, 1] = T[1, 0, 2] = -S1
-    T[0, 2, 3] = T[1, 2, 3] = RL1
+    T[0, 0, 0] = C1
+    T[0, 0, 1] = -S1
+    T[0, 1, 0] = S1
+    T[0, 1, 1] = C1
+    T[0, 2, 3] = RL1
+    T[1, 0, 0] = R112
+    T[1, 0, 1] = R122
+    T[1, 0, 2] = -S1
+    T[1, 1, 0] = R212
+    T[1, 1, 1] = R222
+    T[1, 1, 2] = C1
     T[1, 2, 0] = -S2
     T[1, 2, 1] = -C2
+    T[1, 2, 3] = RL1
+    T[2, 0, 0] = R113
+    T[2, 0, 1] = R123
     T[2, 0, 2] = -R122
+    T[2, 0, 3] = P13
+    T[2, 1, 0] = R213
+    T[2, 1, 1] = R223
     T[2, 1, 2] = -R222
+    T[2, 1, 3] = P23
+    T[2, 2, 0] = Z131
+    T[2, 2, 1] = Z231
+    T[2, 2, 2] = C2
+    T[2, 2, 3] = P33
+    T[3, 0, 0] = R114
+    T[3, 0, 1] = R124
     T[3, 0, 2] = -R123
+    T[3, 0, 3] = P14
+    T[3, 1, 0] = R214
+    T[3, 1, 1] = R224
     T[3, 1, 2] = -R223
+    T[3, 1, 3] = P24
+    T[3, 2, 0] = Z141
+    T[3, 2, 1] = Z241
     T[3, 2, 2] = -Z231
+    T[3, 2, 3] = P34
+    T[4, 0, 0] = R115
+    T[4, 0, 1] = R125
+    T[4, 0, 2] = R124
+    T[4, 0, 3] = P15
+    T[4, 1, 0] = R215
+    T[4, 1, 1] = R225
+    T[4, 1, 2] = R224
+    T[4, 1, 3] = P25
+    T[4, 2, 0] = Z151
+    T[4, 2, 1] = Z251
+    T[4, 2, 2] = Z241
+    T[4, 2, 3] = P35
+    T[5, 0, 0] = R116
+    T[5, 0, 1] = R126
     T[5, 0, 2] = -R125
+    T[5, 0, 3] = P15
+    T[5, 1, 0] = R216
+    T[5, 1, 1] = R226
     T[5, 1, 2] = -R225
+    T[5, 1, 3] = P25
+    T[5, 2, 0] = Z161
+    T[5, 2, 1] = Z261
     T[5, 2, 2] = -Z251
+    T[5, 2, 3] = P35
+    T[6, 0, 0] = R117
+    T[6, 0, 1] = R127
     T[6, 0, 2] = -R126
+    T[6, 0, 3] = P17
+    T[6, 1, 0] = R217
+    T[6, 1, 1] = R227
     T[6, 1, 2] = -R226
+    T[6, 1, 3] = P27
+    T[6, 2, 0] = Z171
+    T[6, 2, 1] = Z271
     T[6, 2, 2] = -Z261
+    T[6, 2, 3] = P37
     # Constants
     T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = 1.0
     T[6, 3, 3] = 1.0

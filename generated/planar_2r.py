@@ -12,19 +12,20 @@ Torques     delivered by the actuators, so friction enters with a plus: Gamma = 
             FS*sign(qd) + OFFSET
 Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY
             MZ first moments
-Element     Ia      inertia: along q1, q2
-Element     FV      viscous: along q1, q2
-Element     FS      coulomb: along q1, q2
-Element     OFFSET  offset: along q1, q2
+Elements    along s = G q: Gamma gets G' times the force along s
+    Ia      inertia: along q1, q2
+    FV      viscous: along q1, q2
+    FS      coulomb: along q1, q2
+    OFFSET  offset: along q1, q2
 
 Base parameters, 13 of 28; Gautier and Khalil (1990)
     exact, proved modulo primes
-    FORMULAS says what they are made of; what it leaves out is as it is
+    FORMULAS has those that combine several; the others are standard parameters
     No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1 XX2 XY2 XZ2 YY2 YZ2 MZ2
 
 Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3
-            column 1, Z132 component 1 in frame 3 of the axis of joint 2; a letter at the end is a
-            part that several share, N16a of N16
+            column 1, Z132 component 1 in frame 3 of the axis of joint 2; what several share is
+            named by its factors, C4DV134, by its function, signQP1, or by a letter, N16a in N16
     th   joint angle with its constant, rad
     C    cosine of a joint angle or of a sum of angles
     S    sine of a joint angle or of a sum of angles
@@ -67,7 +68,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 4062dfe0124b6e1029572901e48facd32398503202db52ae8b5ed0a3743870b2
+sha256 of all but these lines: bc044b3aa6271763d1554d0af9a28588a6191ef9b3ff1ddfefe421fb48eb28ab
 """
 
 import numpy as np
@@ -207,7 +208,8 @@ def _package(*arrays):
     if any(type(x).__module__.startswith("casadi") for x in arrays):
         return _Symbols()
     others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
-    if all(isinstance(x, np.ndarray | np.generic) for x in others):
+    others = [x for x in others if not isinstance(x, np.ndarray | np.generic)]
+    if not others:
         return np if _IN_PLACE else _Arrays(np, arrays)
     try:
         from array_api_compat import array_namespace
@@ -216,7 +218,13 @@ def _package(*arrays):
             f"arrays of {type(others[0]).__module__} need array_api_compat: "
             "pip install array-api-compat"
         ) from error
-    return _Arrays(array_namespace(*arrays), arrays)
+    try:
+        return _Arrays(array_namespace(*others), others)
+    except TypeError as error:
+        packages = " and ".join(sorted({type(x).__module__.partition(".")[0] for x in others}))
+        if " and " not in packages:
+            raise
+        raise TypeError(f"arrays of {packages}; expected states and X of one package") from error
 
 
 class _Arrays:
@@ -255,11 +263,19 @@ class _Arrays:
 
     def rows(self, x):
         """x[..., k], one by one."""
+        if self.package is not np and isinstance(x, np.ndarray | list | tuple):
+            raise TypeError(
+                f"states of {type(x).__name__} beside states or X of {self.package.__name__}; "
+                "make the states arrays of that package (X may be NumPy's)"
+            )
         if x.shape[-1:] != (2,):
             raise ValueError(f"state of shape {x.shape}; expected (..., 2)")
         return [x[..., k] for k in range(2)]
 
     def parameters(self, X):
+        """X[k], one by one; NumPy's as plain numbers."""
+        if self.package is not np and isinstance(X, np.ndarray | list | tuple):
+            return _parameters(_real(X, "X")).tolist()
         _parameters(X)
         return [X[k] for k in range(13)]
 
@@ -300,9 +316,9 @@ class _Symbols:
         if len(shape) == 3:
             first = [{k[1:]: x for k, x in table.items() if k[0] == i} for i in range(shape[0])]
             return [self.gathered(entries, shape[1:], like) for entries in first]
-        matrix = self.package.SX(*(*shape, 1)[:2])
+        matrix = self.package.SX(*(*shape, 1, 1)[:2])
         for place, x in table.items():
-            matrix[place] = x
+            matrix[place or 0] = x
         return matrix
 
     def solve(self, A, b):
@@ -385,9 +401,18 @@ def base_parameters(standard: "Array", *, D2: float = 0.5, g: float = 9.81) -> "
     order of STANDARD_PARAMETERS.
     """
     if hasattr(standard, "keys"):
-        standard = [standard[name] for name in STANDARD_PARAMETERS]
+        rest = [x for x in STANDARD_PARAMETERS if x not in standard and x not in NO_EFFECT]
+        if rest:
+            raise ValueError(f"standard: no value of {', '.join(rest)}")
+        standard = [standard.get(name) for name in STANDARD_PARAMETERS]
         xp = _package(*standard)
     else:
+        shape = tuple(standard.shape if hasattr(standard, "shape") else np.shape(standard))
+        if shape[:1] != (28,):
+            raise ValueError(
+                f"standard of shape {shape}; expected (28,) in the order of "
+                "STANDARD_PARAMETERS, or a mapping by name"
+            )
         xp = _package(standard)
         standard = standard if xp is np else [standard[k] for k in range(28)]
     (
@@ -548,8 +573,20 @@ def _moving(xp):
     }
 
 
+def _regressor_block(xp, q, qd, qdd, D, D2, g):
+    """Fill D, shape (13, 2, N), where it is not constant, from q, qd, qdd (2, N)."""
+    _regressor, _ = _motion(xp, q, qd, qdd, D2, g)
+    _regressor(D)
+
+
+def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X, D2, g):
+    """Fill GAM, shape (2, N), from q, qd, qdd (2, N)."""
+    _, _torques = _motion(xp, q, qd, qdd, D2, g)
+    _torques(GAM, X)
+
+
 def _motion(xp, q, qd, qdd, D2, g):
-    """Velocities and accelerations of the links, which regressor and inverse_dynamics share."""
+    """Motion of the links. Returns two functions that go on from it: to D, and with X to GAM."""
     # Inputs
     q1, q2 = q
     QP1, QP2 = qd
@@ -572,60 +609,46 @@ def _motion(xp, q, qd, qdd, D2, g):
     VP12 = C2*VSP12 + S2*VSP22
     VP22 = C2*VSP22 - S2*VSP12
     # Friction, actuators
-    GAM1a = xp.sign(QP1)
-    GAM2a = xp.sign(QP2)
-    return (
-        C2, S2, VP11, VP21, WP32, DV332, VP12, VP22, GAM1a, GAM2a
-    )
+    signQP1 = xp.sign(QP1)
+    signQP2 = xp.sign(QP2)
 
+    def _regressor(D):
+        # Joint axes Z and velocities V seen from link 2
+        V121 = D2*S2
+        V221 = D2*C2
+        # Joint 1
+        D[0, 0] = QDP1                            # DG1ZZ1
+        D[1, 0] = VP21                            # DG1MX1
+        D[2, 0] = -VP11                           # DG1MY1
+        D[3, 0] = QP1                             # DG1FV1
+        D[4, 0] = signQP1                         # DG1FS1
+        D[6, 0] = WP32                            # DG1ZZ2
+        D[7, 0] = VP22 + WP32*V221 - DV332*V121   # DG1MX2
+        D[8, 0] = -VP12 - WP32*V121 - DV332*V221  # DG1MY2
+        # Joint 2
+        D[6, 1] = WP32      # DG2ZZ2
+        D[7, 1] = VP22      # DG2MX2
+        D[8, 1] = -VP12     # DG2MY2
+        D[9, 1] = QDP2      # DG2Ia2
+        D[10, 1] = QP2      # DG2FV2
+        D[11, 1] = signQP2  # DG2FS2
 
-def _regressor_block(xp, q, qd, qdd, D, D2, g):
-    """Fill D, shape (13, 2, N), where it is not constant, from q (2, N); qd (2, N); qdd (2, N)."""
-    # Inputs
-    QP1, QP2 = qd
-    QDP1, QDP2 = qdd
-    # Motion of the links
-    C2, S2, VP11, VP21, WP32, DV332, VP12, VP22, GAM1a, GAM2a = _motion(xp, q, qd, qdd, D2, g)
-    # Joint axes Z and velocities V seen from link 2
-    V121 = D2*S2
-    V221 = D2*C2
-    # Joint 1
-    D[0, 0] = QDP1                            # DG1ZZ1
-    D[1, 0] = VP21                            # DG1MX1
-    D[2, 0] = -VP11                           # DG1MY1
-    D[3, 0] = QP1                             # DG1FV1
-    D[4, 0] = GAM1a                           # DG1FS1
-    D[6, 0] = WP32                            # DG1ZZ2
-    D[7, 0] = VP22 + WP32*V221 - DV332*V121   # DG1MX2
-    D[8, 0] = -VP12 - WP32*V121 - DV332*V221  # DG1MY2
-    # Joint 2
-    D[6, 1] = WP32    # DG2ZZ2
-    D[7, 1] = VP22    # DG2MX2
-    D[8, 1] = -VP12   # DG2MY2
-    D[9, 1] = QDP2    # DG2Ia2
-    D[10, 1] = QP2    # DG2FV2
-    D[11, 1] = GAM2a  # DG2FS2
+    def _torques(GAM, X):
+        # Inputs
+        ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2, MX2, MY2, Ia2, FV2, FS2, OFFSET2 = X
+        # Joint 2
+        F12 = -MX2*DV332 - MY2*WP32
+        F22 = MX2*WP32 - MY2*DV332
+        N32 = ZZ2*WP32 + MX2*VP22 - MY2*VP12
+        FDI22 = S2*F12 + C2*F22
+        # Joint 1
+        N31 = ZZ1R*QDP1 + MX1R*VP21 - MY1*VP11
+        NE31 = N32 + D2*FDI22 + N31
+        # Torques
+        GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*signQP1
+        GAM[1] = OFFSET2 + N32 + Ia2*QDP2 + FV2*QP2 + FS2*signQP2
 
-
-def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X, D2, g):
-    """Fill GAM, shape (2, N), from q (2, N); qd (2, N); qdd (2, N)."""
-    # Inputs
-    QP1, QP2 = qd
-    QDP1, QDP2 = qdd
-    ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2, MX2, MY2, Ia2, FV2, FS2, OFFSET2 = X
-    # Motion of the links
-    C2, S2, VP11, VP21, WP32, DV332, VP12, VP22, GAM1a, GAM2a = _motion(xp, q, qd, qdd, D2, g)
-    # Joint 2
-    F12 = -MX2*DV332 - MY2*WP32
-    F22 = MX2*WP32 - MY2*DV332
-    N32 = ZZ2*WP32 + MX2*VP22 - MY2*VP12
-    FDI22 = S2*F12 + C2*F22
-    # Joint 1
-    N31 = ZZ1R*QDP1 + MX1R*VP21 - MY1*VP11
-    NE31 = N32 + D2*FDI22 + N31
-    # Torques
-    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*GAM1a
-    GAM[1] = OFFSET2 + N32 + Ia2*QDP2 + FV2*QP2 + FS2*GAM2a
+    return _regressor, _torques
 
 
 def _inertia_matrix_block(xp, q, A, X, D2):
@@ -643,10 +666,12 @@ def _inertia_matrix_block(xp, q, A, X, D2):
     # Composite link 2
     AS12 = MX2*C2 - MY2*S2
     D2AS12 = D2*AS12
-    A[0, 0] = ZZ1R + ZZ2 + 2*D2AS12
+    JP331 = ZZ1R + ZZ2 + 2*D2AS12
     # Unit acceleration of joint 2
-    A[0, 1] = A[1, 0] = ZZ2 + D2AS12
+    NE312 = ZZ2 + D2AS12
     # Inertia matrix
+    A[0, 0] = JP331
+    A[0, 1] = A[1, 0] = NE312
     A[1, 1] = ZZ2 + Ia2
 
 
@@ -686,17 +711,25 @@ def _frame_poses_block(xp, q, T, D2):
     # Inputs
     q1, q2 = q
     # Trigonometry
-    C1 = T[0, 0, 0] = T[0, 1, 1] = xp.cos(q1)
-    S1 = T[0, 1, 0] = xp.sin(q1)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
     th12 = q1 + q2
-    T[1, 0, 0] = T[1, 1, 1] = xp.cos(th12)
-    S12 = T[1, 1, 0] = xp.sin(th12)
+    C12 = xp.cos(th12)
+    S12 = xp.sin(th12)
     # Frame 2
-    T[1, 0, 3] = D2*C1
-    T[1, 1, 3] = D2*S1
+    P12 = D2*C1
+    P22 = D2*S1
     # Poses
+    T[0, 0, 0] = C1
     T[0, 0, 1] = -S1
+    T[0, 1, 0] = S1
+    T[0, 1, 1] = C1
+    T[1, 0, 0] = C12
     T[1, 0, 1] = -S12
+    T[1, 0, 3] = P12
+    T[1, 1, 0] = S12
+    T[1, 1, 1] = C12
+    T[1, 1, 3] = P22
     # Constants
     T[0, 2, 2] = T[0, 3, 3] = T[1, 2, 2] = T[1, 3, 3] = 1.0
 
@@ -716,3 +749,4 @@ VALUES = {
     'XX2': 0.0012, 'XY2': 0.0, 'XZ2': 0.0, 'YY2': 0.1673, 'YZ2': 0.0, 'ZZ2': 0.1673, 'MX2': 0.5,
     'MY2': 0.0, 'MZ2': 0.0, 'M2': 2.0, 'Ia2': 0.02, 'FV2': 0.3, 'FS2': 0.4, 'OFFSET2': -0.05,
 }
+BASE_VALUES = base_parameters(VALUES)  # X of the robot file

@@ -14,20 +14,21 @@ Torques     delivered by the actuators, so friction enters with a plus: Gamma = 
             FS*sign(qd) + OFFSET
 Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY
             MZ first moments
-Element     Ia      inertia: along q1, q2, q3, q4
-Element     FV      viscous: along q1, q2, q3, q4
-Element     FS      coulomb: along q1, q2, q3, q4
-Element     OFFSET  offset: along q1, q2, q3, q4
+Elements    along s = G q: Gamma gets G' times the force along s
+    Ia      inertia: along q1, q2, q3, q4
+    FV      viscous: along q1, q2, q3, q4
+    FS      coulomb: along q1, q2, q3, q4
+    OFFSET  offset: along q1, q2, q3, q4
 
 Base parameters, 22 of 56; Gautier and Khalil (1990)
     exact, proved modulo primes
-    FORMULAS says what they are made of; what it leaves out is as it is
+    FORMULAS has those that combine several; the others are standard parameters
     No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 XX2 XY2 XZ2 YY2 YZ2 MZ2 XX3 XY3 XZ3 YY3 YZ3 MZ3
         XX4 XY4 XZ4 YY4 YZ4 MZ4
 
 Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3
-            column 1, Z132 component 1 in frame 3 of the axis of joint 2; a letter at the end is a
-            part that several share, N16a of N16
+            column 1, Z132 component 1 in frame 3 of the axis of joint 2; what several share is
+            named by its factors, C4DV134, by its function, signQP1, or by a letter, N16a in N16
     th   joint angle with its constant, rad
     C    cosine of a joint angle or of a sum of angles
     S    sine of a joint angle or of a sum of angles
@@ -73,7 +74,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 7521c2a30384859d2c9d6787a755eaa5929f55608a1920d0e9a891ccd586fbc8
+sha256 of all but these lines: 982097e30a71b825e21ee40e9d78b45d48bfc149e9dc74f31eddafea169a4d7d
 """
 
 import numpy as np
@@ -224,7 +225,8 @@ def _package(*arrays):
     if any(type(x).__module__.startswith("casadi") for x in arrays):
         return _Symbols()
     others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
-    if all(isinstance(x, np.ndarray | np.generic) for x in others):
+    others = [x for x in others if not isinstance(x, np.ndarray | np.generic)]
+    if not others:
         return np if _IN_PLACE else _Arrays(np, arrays)
     try:
         from array_api_compat import array_namespace
@@ -233,7 +235,13 @@ def _package(*arrays):
             f"arrays of {type(others[0]).__module__} need array_api_compat: "
             "pip install array-api-compat"
         ) from error
-    return _Arrays(array_namespace(*arrays), arrays)
+    try:
+        return _Arrays(array_namespace(*others), others)
+    except TypeError as error:
+        packages = " and ".join(sorted({type(x).__module__.partition(".")[0] for x in others}))
+        if " and " not in packages:
+            raise
+        raise TypeError(f"arrays of {packages}; expected states and X of one package") from error
 
 
 class _Arrays:
@@ -272,11 +280,19 @@ class _Arrays:
 
     def rows(self, x):
         """x[..., k], one by one."""
+        if self.package is not np and isinstance(x, np.ndarray | list | tuple):
+            raise TypeError(
+                f"states of {type(x).__name__} beside states or X of {self.package.__name__}; "
+                "make the states arrays of that package (X may be NumPy's)"
+            )
         if x.shape[-1:] != (4,):
             raise ValueError(f"state of shape {x.shape}; expected (..., 4)")
         return [x[..., k] for k in range(4)]
 
     def parameters(self, X):
+        """X[k], one by one; NumPy's as plain numbers."""
+        if self.package is not np and isinstance(X, np.ndarray | list | tuple):
+            return _parameters(_real(X, "X")).tolist()
         _parameters(X)
         return [X[k] for k in range(22)]
 
@@ -317,9 +333,9 @@ class _Symbols:
         if len(shape) == 3:
             first = [{k[1:]: x for k, x in table.items() if k[0] == i} for i in range(shape[0])]
             return [self.gathered(entries, shape[1:], like) for entries in first]
-        matrix = self.package.SX(*(*shape, 1)[:2])
+        matrix = self.package.SX(*(*shape, 1, 1)[:2])
         for place, x in table.items():
-            matrix[place] = x
+            matrix[place or 0] = x
         return matrix
 
     def solve(self, A, b):
@@ -408,9 +424,18 @@ def base_parameters(
     order of STANDARD_PARAMETERS.
     """
     if hasattr(standard, "keys"):
-        standard = [standard[name] for name in STANDARD_PARAMETERS]
+        rest = [x for x in STANDARD_PARAMETERS if x not in standard and x not in NO_EFFECT]
+        if rest:
+            raise ValueError(f"standard: no value of {', '.join(rest)}")
+        standard = [standard.get(name) for name in STANDARD_PARAMETERS]
         xp = _package(*standard)
     else:
+        shape = tuple(standard.shape if hasattr(standard, "shape") else np.shape(standard))
+        if shape[:1] != (56,):
+            raise ValueError(
+                f"standard of shape {shape}; expected (56,) in the order of "
+                "STANDARD_PARAMETERS, or a mapping by name"
+            )
         xp = _package(standard)
         standard = standard if xp is np else [standard[k] for k in range(56)]
     (
@@ -592,8 +617,20 @@ def _moving(xp):
     }
 
 
+def _regressor_block(xp, q, qd, qdd, D, D2, D3, g):
+    """Fill D, shape (22, 4, N), where it is not constant, from q, qd, qdd (4, N)."""
+    _regressor, _ = _motion(xp, q, qd, qdd, D2, D3, g)
+    _regressor(D)
+
+
+def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X, D2, D3, g):
+    """Fill GAM, shape (4, N), from q, qd, qdd (4, N)."""
+    _, _torques = _motion(xp, q, qd, qdd, D2, D3, g)
+    _torques(GAM, X)
+
+
 def _motion(xp, q, qd, qdd, D2, D3, g):
-    """Velocities and accelerations of the links, which regressor and inverse_dynamics share."""
+    """Motion of the links. Returns two functions that go on from it: to D, and with X to GAM."""
     # Inputs
     q2, q3 = q[1:3]
     QP1, QP2, QP3, QP4 = qd
@@ -624,112 +661,91 @@ def _motion(xp, q, qd, qdd, D2, D3, g):
     # Link 4
     VP34 = QDP4 + g
     # Friction, actuators
-    GAM1a = xp.sign(QP1)
-    GAM2a = xp.sign(QP2)
-    GAM3a = xp.sign(QP3)
-    GAM4a = xp.sign(QP4)
-    return (
-        C2, S2, C3, S3, WP32, DV332, VP12, VP22, WP33, DV333, VP13, VP23, VP34, GAM1a, GAM2a,
-        GAM3a, GAM4a
-    )
+    signQP1 = xp.sign(QP1)
+    signQP2 = xp.sign(QP2)
+    signQP3 = xp.sign(QP3)
+    signQP4 = xp.sign(QP4)
 
+    def _regressor(D):
+        # Joint axes Z and velocities V seen from link 2
+        V121 = D2*S2
+        V221 = D2*C2
+        # Joint axes Z and velocities V seen from link 3
+        VS231 = D3 + V221
+        V131 = C3*V121 + S3*VS231
+        V231 = C3*VS231 - S3*V121
+        V132 = D3*S3
+        V232 = D3*C3
+        # Joint 1
+        D[0, 0] = QDP1                             # DG1ZZ1
+        D[1, 0] = QP1                              # DG1FV1
+        D[2, 0] = signQP1                          # DG1FS1
+        D[4, 0] = WP32                             # DG1ZZ2
+        D[5, 0] = VP22 + WP32*V221 - DV332*V121    # DG1MX2
+        D[6, 0] = -VP12 - WP32*V121 - DV332*V221   # DG1MY2
+        D[11, 0] = WP33                            # DG1ZZ3
+        D[12, 0] = VP23 + WP33*V231 - DV333*V131   # DG1MX3
+        D[13, 0] = -VP13 - WP33*V131 - DV333*V231  # DG1MY3
+        D[18, 0] = VP13*V131 + VP23*V231           # DG1M4
+        # Joint 2
+        D[4, 1] = WP32                             # DG2ZZ2
+        D[5, 1] = VP22                             # DG2MX2
+        D[6, 1] = -VP12                            # DG2MY2
+        D[7, 1] = QDP2                             # DG2Ia2
+        D[8, 1] = QP2                              # DG2FV2
+        D[9, 1] = signQP2                          # DG2FS2
+        D[11, 1] = WP33                            # DG2ZZ3
+        D[12, 1] = VP23 + WP33*V232 - DV333*V132   # DG2MX3
+        D[13, 1] = -VP13 - WP33*V132 - DV333*V232  # DG2MY3
+        D[18, 1] = VP13*V132 + VP23*V232           # DG2M4
+        # Joint 3
+        D[11, 2] = WP33     # DG3ZZ3
+        D[12, 2] = VP23     # DG3MX3
+        D[13, 2] = -VP13    # DG3MY3
+        D[14, 2] = QDP3     # DG3Ia3
+        D[15, 2] = QP3      # DG3FV3
+        D[16, 2] = signQP3  # DG3FS3
+        # Joint 4
+        D[18, 3] = VP34     # DG4M4
+        D[19, 3] = QP4      # DG4FV4
+        D[20, 3] = signQP4  # DG4FS4
 
-def _regressor_block(xp, q, qd, qdd, D, D2, D3, g):
-    """Fill D, shape (22, 4, N), where it is not constant, from q (4, N); qd (4, N); qdd (4, N)."""
-    # Inputs
-    QP1, QP2, QP3, QP4 = qd
-    QDP1, QDP2, QDP3 = qdd[:3]
-    # Motion of the links
-    (
-        C2, S2, C3, S3, WP32, DV332, VP12, VP22, WP33, DV333, VP13, VP23, VP34, GAM1a, GAM2a,
-        GAM3a, GAM4a
-    ) = _motion(xp, q, qd, qdd, D2, D3, g)
-    # Joint axes Z and velocities V seen from link 2
-    V121 = D2*S2
-    V221 = D2*C2
-    # Joint axes Z and velocities V seen from link 3
-    VS231 = D3 + V221
-    V131 = C3*V121 + S3*VS231
-    V231 = C3*VS231 - S3*V121
-    V132 = D3*S3
-    V232 = D3*C3
-    # Joint 1
-    D[0, 0] = QDP1                             # DG1ZZ1
-    D[1, 0] = QP1                              # DG1FV1
-    D[2, 0] = GAM1a                            # DG1FS1
-    D[4, 0] = WP32                             # DG1ZZ2
-    D[5, 0] = VP22 + WP32*V221 - DV332*V121    # DG1MX2
-    D[6, 0] = -VP12 - WP32*V121 - DV332*V221   # DG1MY2
-    D[11, 0] = WP33                            # DG1ZZ3
-    D[12, 0] = VP23 + WP33*V231 - DV333*V131   # DG1MX3
-    D[13, 0] = -VP13 - WP33*V131 - DV333*V231  # DG1MY3
-    D[18, 0] = VP13*V131 + VP23*V231           # DG1M4
-    # Joint 2
-    D[4, 1] = WP32                             # DG2ZZ2
-    D[5, 1] = VP22                             # DG2MX2
-    D[6, 1] = -VP12                            # DG2MY2
-    D[7, 1] = QDP2                             # DG2Ia2
-    D[8, 1] = QP2                              # DG2FV2
-    D[9, 1] = GAM2a                            # DG2FS2
-    D[11, 1] = WP33                            # DG2ZZ3
-    D[12, 1] = VP23 + WP33*V232 - DV333*V132   # DG2MX3
-    D[13, 1] = -VP13 - WP33*V132 - DV333*V232  # DG2MY3
-    D[18, 1] = VP13*V132 + VP23*V232           # DG2M4
-    # Joint 3
-    D[11, 2] = WP33   # DG3ZZ3
-    D[12, 2] = VP23   # DG3MX3
-    D[13, 2] = -VP13  # DG3MY3
-    D[14, 2] = QDP3   # DG3Ia3
-    D[15, 2] = QP3    # DG3FV3
-    D[16, 2] = GAM3a  # DG3FS3
-    # Joint 4
-    D[18, 3] = VP34   # DG4M4
-    D[19, 3] = QP4    # DG4FV4
-    D[20, 3] = GAM4a  # DG4FS4
+    def _torques(GAM, X):
+        # Inputs
+        (
+            ZZ1R, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, Ia2, FV2, FS2, OFFSET2, ZZ3R, MX3R, MY3R, Ia3,
+            FV3, FS3, OFFSET3, M4R, FV4, FS4, OFFSET4R
+        ) = X
+        # Joint 4
+        F14 = M4R*VP13
+        F24 = M4R*VP23
+        F34 = M4R*VP34
+        # Joint 3
+        F13 = -MX3R*DV333 - MY3R*WP33
+        F23 = MX3R*WP33 - MY3R*DV333
+        E13 = F14 + F13
+        E23 = F24 + F23
+        N33 = ZZ3R*WP33 + MX3R*VP23 - MY3R*VP13
+        FDI13 = C3*E13 - S3*E23
+        FDI23 = S3*E13 + C3*E23
+        # Joint 2
+        F12 = -MX2R*DV332 - MY2*WP32
+        F22 = MX2R*WP32 - MY2*DV332
+        E12 = FDI13 + F12
+        E22 = FDI23 + F22
+        N32 = ZZ2R*WP32 + MX2R*VP22 - MY2*VP12
+        NE32 = N33 + D3*FDI23 + N32
+        FDI22 = S2*E12 + C2*E22
+        # Joint 1
+        N31 = ZZ1R*QDP1
+        NE31 = NE32 + D2*FDI22 + N31
+        # Torques
+        GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*signQP1
+        GAM[1] = OFFSET2 + NE32 + Ia2*QDP2 + FV2*QP2 + FS2*signQP2
+        GAM[2] = OFFSET3 + N33 + Ia3*QDP3 + FV3*QP3 + FS3*signQP3
+        GAM[3] = OFFSET4R + F34 + FV4*QP4 + FS4*signQP4
 
-
-def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X, D2, D3, g):
-    """Fill GAM, shape (4, N), from q (4, N); qd (4, N); qdd (4, N)."""
-    # Inputs
-    QP1, QP2, QP3, QP4 = qd
-    QDP1, QDP2, QDP3 = qdd[:3]
-    (
-        ZZ1R, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, Ia2, FV2, FS2, OFFSET2, ZZ3R, MX3R, MY3R, Ia3,
-        FV3, FS3, OFFSET3, M4R, FV4, FS4, OFFSET4R
-    ) = X
-    # Motion of the links
-    (
-        C2, S2, C3, S3, WP32, DV332, VP12, VP22, WP33, DV333, VP13, VP23, VP34, GAM1a, GAM2a,
-        GAM3a, GAM4a
-    ) = _motion(xp, q, qd, qdd, D2, D3, g)
-    # Joint 4
-    F14 = M4R*VP13
-    F24 = M4R*VP23
-    F34 = M4R*VP34
-    # Joint 3
-    F13 = -MX3R*DV333 - MY3R*WP33
-    F23 = MX3R*WP33 - MY3R*DV333
-    E13 = F14 + F13
-    E23 = F24 + F23
-    N33 = ZZ3R*WP33 + MX3R*VP23 - MY3R*VP13
-    FDI13 = C3*E13 - S3*E23
-    FDI23 = S3*E13 + C3*E23
-    # Joint 2
-    F12 = -MX2R*DV332 - MY2*WP32
-    F22 = MX2R*WP32 - MY2*DV332
-    E12 = FDI13 + F12
-    E22 = FDI23 + F22
-    N32 = ZZ2R*WP32 + MX2R*VP22 - MY2*VP12
-    NE32 = N33 + D3*FDI23 + N32
-    FDI22 = S2*E12 + C2*E22
-    # Joint 1
-    N31 = ZZ1R*QDP1
-    NE31 = NE32 + D2*FDI22 + N31
-    # Torques
-    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*GAM1a
-    GAM[1] = OFFSET2 + NE32 + Ia2*QDP2 + FV2*QP2 + FS2*GAM2a
-    GAM[2] = OFFSET3 + N33 + Ia3*QDP3 + FV3*QP3 + FS3*GAM3a
-    GAM[3] = OFFSET4R + F34 + FV4*QP4 + FS4*GAM4a
+    return _regressor, _torques
 
 
 def _inertia_matrix_block(xp, q, A, X, D2, D3):
@@ -753,15 +769,19 @@ def _inertia_matrix_block(xp, q, A, X, D2, D3):
     # Composite link 2
     AS12 = C2*MSP12 - S2*MSP22
     D2AS12 = D2*AS12
-    A[0, 0] = ZZ1R + JP332 + D2AS12 + D2*(AS12 + D2*M4R)
+    JP331 = ZZ1R + JP332 + D2AS12 + D2*(AS12 + D2*M4R)
     # Unit acceleration of joint 2
-    A[0, 1] = A[1, 0] = JP332 + D2AS12
+    NE312 = JP332 + D2AS12
     # Unit acceleration of joint 3
-    NE323 = A[1, 2] = A[2, 1] = ZZ3R + D3AS13
+    NE323 = ZZ3R + D3AS13
     E213 = C2*AS13 - S2*AS23
-    A[0, 2] = A[2, 0] = NE323 + D2*E213
+    NE313 = NE323 + D2*E213
     # Inertia matrix
+    A[0, 0] = JP331
+    A[0, 1] = A[1, 0] = NE312
     A[1, 1] = Ia2 + JP332
+    A[0, 2] = A[2, 0] = NE313
+    A[1, 2] = A[2, 1] = NE323
     A[2, 2] = ZZ3R + Ia3
     A[3, 3] = M4R
 
@@ -769,14 +789,17 @@ def _inertia_matrix_block(xp, q, A, X, D2, D3):
 def _gravity_block(xp, q, GAM, X, g):
     """Fill GAM, shape (4, N), from q (4, N)."""
     # Inputs
-    GAM[0] = X[3]
-    GAM[1] = X[10]
-    GAM[2] = X[17]
+    OFFSET1 = X[3]
+    OFFSET2 = X[10]
+    OFFSET3 = X[17]
     M4R = X[18]
     OFFSET4R = X[21]
     # Constants
     F34 = g*M4R
     # Torques
+    GAM[0] = OFFSET1
+    GAM[1] = OFFSET2
+    GAM[2] = OFFSET3
     GAM[3] = OFFSET4R + F34
 
 
@@ -785,24 +808,43 @@ def _frame_poses_block(xp, q, T, D2, D3):
     # Inputs
     q1, q2, q3, q4 = q
     # Trigonometry
-    C1 = T[0, 0, 0] = T[0, 1, 1] = xp.cos(q1)
-    S1 = T[0, 1, 0] = xp.sin(q1)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
     th12 = q1 + q2
-    C12 = T[1, 0, 0] = T[1, 1, 1] = xp.cos(th12)
-    S12 = T[1, 1, 0] = xp.sin(th12)
+    C12 = xp.cos(th12)
+    S12 = xp.sin(th12)
     th123 = th12 + q3
-    T[2, 0, 0] = T[2, 1, 1] = T[3, 0, 0] = T[3, 1, 1] = xp.cos(th123)
-    S123 = T[2, 1, 0] = T[3, 1, 0] = xp.sin(th123)
+    C123 = xp.cos(th123)
+    S123 = xp.sin(th123)
     # Frame 2
-    P12 = T[1, 0, 3] = D2*C1
-    P22 = T[1, 1, 3] = D2*S1
+    P12 = D2*C1
+    P22 = D2*S1
     # Frame 3
-    T[2, 0, 3] = T[3, 0, 3] = P12 + D3*C12
-    T[2, 1, 3] = T[3, 1, 3] = P22 + D3*S12
+    P13 = P12 + D3*C12
+    P23 = P22 + D3*S12
     # Poses
+    T[0, 0, 0] = C1
     T[0, 0, 1] = -S1
+    T[0, 1, 0] = S1
+    T[0, 1, 1] = C1
+    T[1, 0, 0] = C12
     T[1, 0, 1] = -S12
-    T[2, 0, 1] = T[3, 0, 1] = -S123
+    T[1, 0, 3] = P12
+    T[1, 1, 0] = S12
+    T[1, 1, 1] = C12
+    T[1, 1, 3] = P22
+    T[2, 0, 0] = C123
+    T[2, 0, 1] = -S123
+    T[2, 0, 3] = P13
+    T[2, 1, 0] = S123
+    T[2, 1, 1] = C123
+    T[2, 1, 3] = P23
+    T[3, 0, 0] = C123
+    T[3, 0, 1] = -S123
+    T[3, 0, 3] = P13
+    T[3, 1, 0] = S123
+    T[3, 1, 1] = C123
+    T[3, 1, 3] = P23
     T[3, 2, 3] = q4
     # Constants
     T[0, 2, 2] = T[0, 3, 3] = T[1, 2, 2] = T[1, 3, 3] = T[2, 2, 2] = T[2, 3, 3] = T[3, 2, 2] = 1.0

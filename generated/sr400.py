@@ -20,10 +20,11 @@ Torques     delivered by the actuators, so friction enters with a plus: Gamma = 
             FS*sign(qd) + OFFSET
 Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY
             MZ first moments
-Element     Ia      inertia: along q1, q2, q4, q5, q6, q7
-Element     FV      viscous: along q1, q2, q4, q5, q6, q7
-Element     FS      coulomb: along q1, q2, q4, q5, q6, q7
-Element     OFFSET  offset: along q1, q2, q4, q5, q6, q7
+Elements    along s = G q: Gamma gets G' times the force along s
+    Ia      inertia: along q1, q2, q4, q5, q6, q7
+    FV      viscous: along q1, q2, q4, q5, q6, q7
+    FS      coulomb: along q1, q2, q4, q5, q6, q7
+    OFFSET  offset: along q1, q2, q4, q5, q6, q7
 Loop        frame 10 coincides with cut frame 9
 Loop        q3 = pi/2 - q2 + q7
 Loop        q8 = q2 - q7
@@ -31,12 +32,12 @@ Loop        q9 = pi - q2 + q7
 
 Base parameters, 60 of 104; Gautier and Khalil (1990)
     exact, proved modulo primes
-    FORMULAS says what they are made of; what it leaves out is as it is
+    FORMULAS has those that combine several; the others are standard parameters
     No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 MZ2 MZ7
 
 Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3
-            column 1, Z132 component 1 in frame 3 of the axis of joint 2; a letter at the end is a
-            part that several share, N16a of N16
+            column 1, Z132 component 1 in frame 3 of the axis of joint 2; what several share is
+            named by its factors, C4DV134, by its function, signQP1, or by a letter, N16a in N16
     th   joint angle with its constant, rad
     C    cosine of a joint angle or of a sum of angles
     S    sine of a joint angle or of a sum of angles
@@ -88,7 +89,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: df79a2b39b34cc6b761fef09e63a334abb59cdbd83aabcd55e9c6fddf93cb530
+sha256 of all but these lines: 6776c17516cd783300f7e45e8e119826ccc2f0d7502f415d1dd2ac1f129ce863
 """
 
 import numpy as np
@@ -264,7 +265,8 @@ def _package(*arrays):
     if any(type(x).__module__.startswith("casadi") for x in arrays):
         return _Symbols()
     others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
-    if all(isinstance(x, np.ndarray | np.generic) for x in others):
+    others = [x for x in others if not isinstance(x, np.ndarray | np.generic)]
+    if not others:
         return np if _IN_PLACE else _Arrays(np, arrays)
     try:
         from array_api_compat import array_namespace
@@ -273,7 +275,13 @@ def _package(*arrays):
             f"arrays of {type(others[0]).__module__} need array_api_compat: "
             "pip install array-api-compat"
         ) from error
-    return _Arrays(array_namespace(*arrays), arrays)
+    try:
+        return _Arrays(array_namespace(*others), others)
+    except TypeError as error:
+        packages = " and ".join(sorted({type(x).__module__.partition(".")[0] for x in others}))
+        if " and " not in packages:
+            raise
+        raise TypeError(f"arrays of {packages}; expected states and X of one package") from error
 
 
 class _Arrays:
@@ -312,11 +320,19 @@ class _Arrays:
 
     def rows(self, x):
         """x[..., k], one by one."""
+        if self.package is not np and isinstance(x, np.ndarray | list | tuple):
+            raise TypeError(
+                f"states of {type(x).__name__} beside states or X of {self.package.__name__}; "
+                "make the states arrays of that package (X may be NumPy's)"
+            )
         if x.shape[-1:] != (6,):
             raise ValueError(f"state of shape {x.shape}; expected (..., 6)")
         return [x[..., k] for k in range(6)]
 
     def parameters(self, X):
+        """X[k], one by one; NumPy's as plain numbers."""
+        if self.package is not np and isinstance(X, np.ndarray | list | tuple):
+            return _parameters(_real(X, "X")).tolist()
         _parameters(X)
         return [X[k] for k in range(60)]
 
@@ -365,9 +381,9 @@ class _Symbols:
         if len(shape) == 3:
             first = [{k[1:]: x for k, x in table.items() if k[0] == i} for i in range(shape[0])]
             return [self.gathered(entries, shape[1:], like) for entries in first]
-        matrix = self.package.SX(*(*shape, 1)[:2])
+        matrix = self.package.SX(*(*shape, 1, 1)[:2])
         for place, x in table.items():
-            matrix[place] = x
+            matrix[place or 0] = x
         return matrix
 
     combined = _Arrays.combined
@@ -467,9 +483,18 @@ def base_parameters(
     order of STANDARD_PARAMETERS.
     """
     if hasattr(standard, "keys"):
-        standard = [standard[name] for name in STANDARD_PARAMETERS]
+        rest = [x for x in STANDARD_PARAMETERS if x not in standard and x not in NO_EFFECT]
+        if rest:
+            raise ValueError(f"standard: no value of {', '.join(rest)}")
+        standard = [standard.get(name) for name in STANDARD_PARAMETERS]
         xp = _package(*standard)
     else:
+        shape = tuple(standard.shape if hasattr(standard, "shape") else np.shape(standard))
+        if shape[:1] != (104,):
+            raise ValueError(
+                f"standard of shape {shape}; expected (104,) in the order of "
+                "STANDARD_PARAMETERS, or a mapping by name"
+            )
         xp = _package(standard)
         standard = standard if xp is np else [standard[k] for k in range(104)]
     (
@@ -480,8 +505,8 @@ def base_parameters(
         ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6, XX7, XY7, XZ7, YY7, YZ7, ZZ7, MX7, MY7,
         _, M7, Ia7, FV7, FS7, OFFSET7, XX8, XY8, XZ8, YY8, YZ8, ZZ8, MX8, MY8, MZ8, M8
     ) = standard
-    ZZ1R = (ZZ1 + Ia1 + YY2 + YY3 + XX7 + YY8 + D2**2*(M2 + M7 + M8) + (D2**2 + D3**2)*M3 + (D2**2 +
-        D3**2 + D4**2)*(M4 + M5 + M6))
+    ZZ1R = (ZZ1 + Ia1 + YY2 + YY3 + XX7 + YY8 + D2**2*(M2 + M7 + M8) + (D2**2 + D3**2)*M3 +
+        (D2**2 + D3**2 + D4**2)*(M4 + M5 + M6))
     XX2R = XX2 - YY2 + XX8 - YY8 - D3**2*(M3 + M4 + M5 + M6)
     XY2R = XY2 + XY8
     XZ2R = XZ2 + XZ8 - D3*MZ3
@@ -709,8 +734,20 @@ def _passive(xp):
     )
 
 
+def _regressor_block(xp, q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
+    """Fill D, shape (60, 6, N), where it is not constant, from q, qd, qdd (6, N)."""
+    _regressor, _ = _motion(xp, q, qd, qdd, D2, D3, D4, RL4, D8, g)
+    _regressor(D)
+
+
+def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X, D2, D3, D4, RL4, D8, g):
+    """Fill GAM, shape (6, N), from q, qd, qdd (6, N)."""
+    _, _torques = _motion(xp, q, qd, qdd, D2, D3, D4, RL4, D8, g)
+    _torques(GAM, X)
+
+
 def _motion(xp, q, qd, qdd, D2, D3, D4, RL4, D8, g):
-    """Velocities and accelerations of the links, which regressor and inverse_dynamics share."""
+    """Motion of the links. Returns two functions that go on from it: to D, and with X to GAM."""
     # Inputs
     q2, q4, q5, q6, q7 = q[1:]
     QP1, QP2, QP4, QP5, QP6, QP7 = qd
@@ -874,371 +911,329 @@ def _motion(xp, q, qd, qdd, D2, D3, D4, RL4, D8, g):
     VSP3_8 = VSP2_2 - D8*U3_2_3
     VP1_8 = C2m7*VSP1_8 + S2m7*VSP2_8
     # Friction, actuators
-    GAM1a = xp.sign(QP1)
-    GAM2a = xp.sign(QP2)
-    GAM3a = xp.sign(QP4)
-    GAM4a = xp.sign(QP5)
-    GAM5a = xp.sign(QP6)
-    GAM6a = xp.sign(QP7)
-    return (
-        C2, S2, C2m7, S2m7, C7, S7, C4, S4, C5, S5, C6, S6, S2QDP1, C2QDP1, DV2_3_2, WP1_2,
-        DV1_3_2, DV1_2_2, DW2_3_2, DW3_1_2, DW1_2_2, U1_2_2, U2_1_2, U2_2_2, U3_1_2, U3_2_2,
-        VSP2_2, VP1_2, VP2_2, C7QDP1, S7QDP1, DV2_3_3, WP1_3, DV1_3_3, DV1_2_3, DW2_3_3,
-        DW3_1_3, DW1_2_3, U1_1_3, U1_2_3, U2_1_3, U2_2_3, U3_1_3, U3_2_3, VSP3_3, VP1_3, VP2_3,
-        WP1_4, WP3_4, DV1_2_4, DV1_3_4, DV2_3_4, DW2_3_4, DW3_1_4, DW1_2_4, U1_1_4, U1_2_4,
-        U1_3_4, U2_1_4, U2_2_4, U2_3_4, U3_1_4, U3_2_4, VSP2_4, VP1_4, VP2_4, WP1_5, WP3_5,
-        DV1_2_5, DV1_3_5, DV2_3_5, DW2_3_5, DW3_1_5, DW1_2_5, U1_1_5, U1_2_5, U1_3_5, U2_1_5,
-        U2_2_5, U2_3_5, U3_1_5, U3_2_5, VP1_5, VP2_5, WP1_6, WP3_6, DV1_2_6, DV1_3_6, DV2_3_6,
-        DW2_3_6, DW3_1_6, DW1_2_6, U1_1_6, U1_2_6, U1_3_6, U2_1_6, U2_2_6, U2_3_6, U3_1_6,
-        U3_2_6, VP1_6, VP2_6, VP1_7, VP2_7, VSP3_8, VP1_8, GAM1a, GAM2a, GAM3a, GAM4a, GAM5a,
-        GAM6a
-    )
+    signQP1 = xp.sign(QP1)
+    signQP2 = xp.sign(QP2)
+    signQP4 = xp.sign(QP4)
+    signQP5 = xp.sign(QP5)
+    signQP6 = xp.sign(QP6)
+    signQP7 = xp.sign(QP7)
 
+    def _regressor(D):
+        # Joint axes Z and velocities V seen from link 3
+        V3_3_1 = D2 + D3*C2
+        V1_3_2 = D3*C2m7
+        V2_3_2 = D3*S2m7
+        # Joint axes Z and velocities V seen from link 4
+        Z1_4_1 = -C7*C4
+        Z2_4_1 = C7*S4
+        VS3_4_1 = V3_3_1 - RL4*C7 - D4*S7
+        V1_4_1 = -S4*VS3_4_1
+        V2_4_1 = -C4*VS3_4_1
+        VS1_4_2 = V1_3_2 - RL4
+        V3_4_2 = D4 + V2_3_2
+        V1_4_2 = C4*VS1_4_2
+        V2_4_2 = -S4*VS1_4_2
+        V1_4_3 = -RL4*C4
+        V2_4_3 = RL4*S4
+        # Joint axes Z and velocities V seen from link 5
+        Z1_5_1 = C5*Z1_4_1 + S7*S5
+        Z2_5_1 = S7*C5 - S5*Z1_4_1
+        V1_5_1 = C5*V1_4_1
+        V2_5_1 = -S5*V1_4_1
+        Z1_5_2 = -S4*C5
+        Z2_5_2 = S4*S5
+        V1_5_2 = C5*V1_4_2 + S5*V3_4_2
+        V2_5_2 = C5*V3_4_2 - S5*V1_4_2
+        V1_5_3 = C5*V1_4_3 + D4*S5
+        V2_5_3 = D4*C5 - S5*V1_4_3
+        # Joint axes Z and velocities V seen from link 6
+        Z1_6_1 = C6*Z1_5_1 + S6*Z2_4_1
+        Z2_6_1 = C6*Z2_4_1 - S6*Z1_5_1
+        V1_6_1 = C6*V1_5_1 + S6*V2_4_1
+        V2_6_1 = C6*V2_4_1 - S6*V1_5_1
+        Z1_6_2 = C6*Z1_5_2 - C4*S6
+        Z2_6_2 = -C4*C6 - S6*Z1_5_2
+        V1_6_2 = C6*V1_5_2 + S6*V2_4_2
+        V2_6_2 = C6*V2_4_2 - S6*V1_5_2
+        V1_6_3 = C6*V1_5_3 + S6*V2_4_3
+        V2_6_3 = C6*V2_4_3 - S6*V1_5_3
+        Z1_6_4 = S5*C6
+        Z2_6_4 = -S5*S6
+        # Joint axes Z and velocities V seen from link 8
+        V3_8_1 = D2 + D8*C7
+        V1_8_7 = D8*S2m7
+        V2_8_7 = D8*C2m7
+        # Contributions that several joints share
+        DV1_3_4Z2_4_1 = DV1_3_4*Z2_4_1
+        C4DV1_3_4 = C4*DV1_3_4
+        DF3MX4 = U1_1_4*V1_4_3 + U2_1_4*V2_4_3 + D4*U3_1_4
+        DF3MY4 = U1_2_4*V1_4_3 + U2_2_4*V2_4_3 + D4*U3_2_4
+        DV1_3_5Z2_5_1 = DV1_3_5*Z2_5_1
+        DV1_3_5Z2_5_2 = DV1_3_5*Z2_5_2
+        C5DV1_3_5 = C5*DV1_3_5
+        DF3MX5 = U1_1_5*V1_5_3 + U2_1_5*V2_5_3 - U3_1_5*V2_4_3
+        DF3MY5 = U1_2_5*V1_5_3 + U2_2_5*V2_5_3 - U3_2_5*V2_4_3
+        DV1_3_6Z2_6_1 = DV1_3_6*Z2_6_1
+        DV1_3_6Z2_6_2 = DV1_3_6*Z2_6_2
+        DV1_3_6Z2_6_4 = DV1_3_6*Z2_6_4
+        C6DV1_3_6 = C6*DV1_3_6
+        DF3MX6 = U1_1_6*V1_6_3 + U2_1_6*V2_6_3 + U3_1_6*V2_5_3
+        DF3MY6 = U1_2_6*V1_6_3 + U2_2_6*V2_6_3 + U3_2_6*V2_5_3
+        # Joint 1
+        D[0, 0] = QDP1                                                    # DG1ZZ1
+        D[1, 0] = QP1                                                     # DG1FV1
+        D[2, 0] = signQP1                                                 # DG1FS1
+        D[4, 0] = -S2*WP1_2 - C2*DV1_3_2                                  # DG1XX2
+        D[5, 0] = S2*U3_1_2 - C2*U3_2_2                                   # DG1XY2
+        D[6, 0] = -S2*U2_1_2 - C2*DW3_1_2                                 # DG1XZ2
+        D[7, 0] = C2*U1_2_2 - S2*DW2_3_2                                  # DG1YZ2
+        D[9, 0] = C2*VSP2_2 + D2*U3_1_2                                   # DG1MX2
+        D[10, 0] = D2*U3_2_2 - S2*VSP2_2                                  # DG1MY2
+        D[14, 0] = S7*DV1_3_3 - C7*WP1_3                                  # DG1XX3
+        D[15, 0] = C7*U3_1_3 + S7*U3_2_3                                  # DG1XY3
+        D[16, 0] = S7*DW3_1_3 - C7*U2_1_3                                 # DG1XZ3
+        D[17, 0] = -C7*DW2_3_3 - S7*U1_2_3                                # DG1YZ3
+        D[19, 0] = U3_1_3*V3_3_1 - S7*VSP3_3                              # DG1MX3
+        D[20, 0] = U3_2_3*V3_3_1 - C7*VSP3_3                              # DG1MY3
+        D[21, 0] = WP1_4*Z1_4_1 + DV1_3_4Z2_4_1 - S7*DV1_2_4              # DG1XX4
+        D[22, 0] = U3_2_4*Z2_4_1 + S7*DW1_2_4 - U3_1_4*Z1_4_1             # DG1XY4
+        D[23, 0] = U2_1_4*Z1_4_1 + DW3_1_4*Z2_4_1 - S7*U2_3_4             # DG1XZ4
+        D[24, 0] = DW2_3_4*Z1_4_1 + S7*U1_3_4 - U1_2_4*Z2_4_1             # DG1YZ4
+        D[25, 0] = DV2_3_4*Z1_4_1 + S7*WP3_4 - DV1_3_4Z2_4_1              # DG1ZZ4
+        D[26, 0] = S7*VP2_4 + U1_1_4*V1_4_1 + U2_1_4*V2_4_1 - VSP2_4*Z2_4_1  # DG1MX4
+        D[27, 0] = VSP2_4*Z1_4_1 + U1_2_4*V1_4_1 + U2_2_4*V2_4_1 - S7*VP1_4  # DG1MY4
+        D[32, 0] = WP1_5*Z1_5_1 + DV1_3_5Z2_5_1 + DV1_2_5*Z2_4_1          # DG1XX5
+        D[33, 0] = U3_2_5*Z2_5_1 - U3_1_5*Z1_5_1 - DW1_2_5*Z2_4_1         # DG1XY5
+        D[34, 0] = U2_1_5*Z1_5_1 + DW3_1_5*Z2_5_1 + U2_3_5*Z2_4_1         # DG1XZ5
+        D[35, 0] = DW2_3_5*Z1_5_1 - U1_2_5*Z2_5_1 - U1_3_5*Z2_4_1         # DG1YZ5
+        D[36, 0] = DV2_3_5*Z1_5_1 - DV1_3_5Z2_5_1 - WP3_5*Z2_4_1          # DG1ZZ5
+        # DG1MX5
+        D[37, 0] = (VP2_4*Z2_5_1 + U1_1_5*V1_5_1 + U2_1_5*V2_5_1 - VP2_5*Z2_4_1 - U3_1_5*V2_4_1)
+        # DG1MY5
+        D[38, 0] = (VP1_5*Z2_4_1 + U1_2_5*V1_5_1 + U2_2_5*V2_5_1 - VP2_4*Z1_5_1 - U3_2_5*V2_4_1)
+        D[43, 0] = WP1_6*Z1_6_1 + DV1_3_6Z2_6_1 - DV1_2_6*Z2_5_1          # DG1XX6
+        D[44, 0] = U3_2_6*Z2_6_1 + DW1_2_6*Z2_5_1 - U3_1_6*Z1_6_1         # DG1XY6
+        D[45, 0] = U2_1_6*Z1_6_1 + DW3_1_6*Z2_6_1 - U2_3_6*Z2_5_1         # DG1XZ6
+        D[46, 0] = DW2_3_6*Z1_6_1 + U1_3_6*Z2_5_1 - U1_2_6*Z2_6_1         # DG1YZ6
+        D[47, 0] = DV2_3_6*Z1_6_1 + WP3_6*Z2_5_1 - DV1_3_6Z2_6_1          # DG1ZZ6
+        # DG1MX6
+        D[48, 0] = (VP2_6*Z2_5_1 + U1_1_6*V1_6_1 + U2_1_6*V2_6_1 + U3_1_6*V2_5_1 - VP2_5*Z2_6_1)
+        # DG1MY6
+        D[49, 0] = (VP2_5*Z1_6_1 + U1_2_6*V1_6_1 + U2_2_6*V2_6_1 + U3_2_6*V2_5_1 - VP1_6*Z2_5_1)
+        D[54, 0] = C7*VSP2_2 - D2*U3_2_3                                  # DG1MX7
+        D[55, 0] = D2*U3_1_3 - S7*VSP2_2                                  # DG1MY7
+        D[59, 0] = U3_2_2*V3_8_1 - S2*VSP3_8                              # DG1MY8
+        # Joint 2
+        D[4, 1] = -DV1_2_2                                                # DG2XX2
+        D[5, 1] = DW1_2_2                                                 # DG2XY2
+        D[6, 1] = -S2QDP1                                                 # DG2XZ2
+        D[7, 1] = -C2QDP1                                                 # DG2YZ2
+        D[8, 1] = QDP2                                                    # DG2ZZ2
+        D[9, 1] = VP2_2                                                   # DG2MX2
+        D[10, 1] = -VP1_2                                                 # DG2MY2
+        D[11, 1] = QP2                                                    # DG2FV2
+        D[12, 1] = signQP2                                                # DG2FS2
+        D[19, 1] = U1_1_3*V1_3_2 + U2_1_3*V2_3_2                          # DG2MX3
+        D[20, 1] = U1_2_3*V1_3_2 + U2_2_3*V2_3_2                          # DG2MY3
+        D[26, 1] = U1_1_4*V1_4_2 + U2_1_4*V2_4_2 + U3_1_4*V3_4_2 - DF3MX4  # DG2MX4
+        D[27, 1] = U1_2_4*V1_4_2 + U2_2_4*V2_4_2 + U3_2_4*V3_4_2 - DF3MY4  # DG2MY4
+        D[37, 1] = U1_1_5*V1_5_2 + U2_1_5*V2_5_2 - U3_1_5*V2_4_2 - DF3MX5  # DG2MX5
+        D[38, 1] = U1_2_5*V1_5_2 + U2_2_5*V2_5_2 - U3_2_5*V2_4_2 - DF3MY5  # DG2MY5
+        D[48, 1] = U1_1_6*V1_6_2 + U2_1_6*V2_6_2 + U3_1_6*V2_5_2 - DF3MX6  # DG2MX6
+        D[49, 1] = U1_2_6*V1_6_2 + U2_2_6*V2_6_2 + U3_2_6*V2_5_2 - DF3MY6  # DG2MY6
+        D[59, 1] = -VP1_8                                                 # DG2MY8
+        # Joint 4
+        D[21, 2] = -DV1_2_4                                    # DG4XX4
+        D[22, 2] = DW1_2_4                                     # DG4XY4
+        D[23, 2] = -U2_3_4                                     # DG4XZ4
+        D[24, 2] = U1_3_4                                      # DG4YZ4
+        D[25, 2] = WP3_4                                       # DG4ZZ4
+        D[26, 2] = VP2_4                                       # DG4MX4
+        D[27, 2] = -VP1_4                                      # DG4MY4
+        D[28, 2] = QDP4                                        # DG4Ia4
+        D[29, 2] = QP4                                         # DG4FV4
+        D[30, 2] = signQP4                                     # DG4FS4
+        D[32, 2] = S5*WP1_5 + C5DV1_3_5                        # DG4XX5
+        D[33, 2] = C5*U3_2_5 - S5*U3_1_5                       # DG4XY5
+        D[34, 2] = S5*U2_1_5 + C5*DW3_1_5                      # DG4XZ5
+        D[35, 2] = S5*DW2_3_5 - C5*U1_2_5                      # DG4YZ5
+        D[36, 2] = S5*DV2_3_5 - C5DV1_3_5                      # DG4ZZ5
+        D[37, 2] = C5*VP2_4                                    # DG4MX5
+        D[38, 2] = -S5*VP2_4                                   # DG4MY5
+        D[43, 2] = WP1_6*Z1_6_4 + DV1_3_6Z2_6_4 - C5*DV1_2_6   # DG4XX6
+        D[44, 2] = U3_2_6*Z2_6_4 + C5*DW1_2_6 - U3_1_6*Z1_6_4  # DG4XY6
+        D[45, 2] = U2_1_6*Z1_6_4 + DW3_1_6*Z2_6_4 - C5*U2_3_6  # DG4XZ6
+        D[46, 2] = DW2_3_6*Z1_6_4 + C5*U1_3_6 - U1_2_6*Z2_6_4  # DG4YZ6
+        D[47, 2] = DV2_3_6*Z1_6_4 + C5*WP3_6 - DV1_3_6Z2_6_4   # DG4ZZ6
+        D[48, 2] = C5*VP2_6 - VP2_5*Z2_6_4                     # DG4MX6
+        D[49, 2] = VP2_5*Z1_6_4 - C5*VP1_6                     # DG4MY6
+        # Joint 5
+        D[32, 3] = -DV1_2_5                 # DG5XX5
+        D[33, 3] = DW1_2_5                  # DG5XY5
+        D[34, 3] = -U2_3_5                  # DG5XZ5
+        D[35, 3] = U1_3_5                   # DG5YZ5
+        D[36, 3] = WP3_5                    # DG5ZZ5
+        D[37, 3] = VP2_5                    # DG5MX5
+        D[38, 3] = -VP1_5                   # DG5MY5
+        D[39, 3] = QDP5                     # DG5Ia5
+        D[40, 3] = QP5                      # DG5FV5
+        D[41, 3] = signQP5                  # DG5FS5
+        D[43, 3] = -S6*WP1_6 - C6DV1_3_6    # DG5XX6
+        D[44, 3] = S6*U3_1_6 - C6*U3_2_6    # DG5XY6
+        D[45, 3] = -S6*U2_1_6 - C6*DW3_1_6  # DG5XZ6
+        D[46, 3] = C6*U1_2_6 - S6*DW2_3_6   # DG5YZ6
+        D[47, 3] = C6DV1_3_6 - S6*DV2_3_6   # DG5ZZ6
+        D[48, 3] = C6*VP2_5                 # DG5MX6
+        D[49, 3] = -S6*VP2_5                # DG5MY6
+        # Joint 6
+        D[43, 4] = -DV1_2_6  # DG6XX6
+        D[44, 4] = DW1_2_6   # DG6XY6
+        D[45, 4] = -U2_3_6   # DG6XZ6
+        D[46, 4] = U1_3_6    # DG6YZ6
+        D[47, 4] = WP3_6     # DG6ZZ6
+        D[48, 4] = VP2_6     # DG6MX6
+        D[49, 4] = -VP1_6    # DG6MY6
+        D[50, 4] = QDP6      # DG6Ia6
+        D[51, 4] = QP6       # DG6FV6
+        D[52, 4] = signQP6   # DG6FS6
+        # Joint 7
+        D[14, 5] = -DV1_2_3                                        # DG7XX3
+        D[15, 5] = DW1_2_3                                         # DG7XY3
+        D[16, 5] = -C7QDP1                                         # DG7XZ3
+        D[17, 5] = S7QDP1                                          # DG7YZ3
+        D[18, 5] = QDP7                                            # DG7ZZ3
+        D[19, 5] = VP2_3                                           # DG7MX3
+        D[20, 5] = -VP1_3                                          # DG7MY3
+        D[21, 5] = -S4*WP1_4 - C4DV1_3_4                           # DG7XX4
+        D[22, 5] = S4*U3_1_4 - C4*U3_2_4                           # DG7XY4
+        D[23, 5] = -S4*U2_1_4 - C4*DW3_1_4                         # DG7XZ4
+        D[24, 5] = C4*U1_2_4 - S4*DW2_3_4                          # DG7YZ4
+        D[25, 5] = C4DV1_3_4 - S4*DV2_3_4                          # DG7ZZ4
+        D[26, 5] = C4*VSP2_4 + DF3MX4                              # DG7MX4
+        D[27, 5] = DF3MY4 - S4*VSP2_4                              # DG7MY4
+        D[32, 5] = WP1_5*Z1_5_2 + DV1_3_5Z2_5_2 - C4*DV1_2_5       # DG7XX5
+        D[33, 5] = U3_2_5*Z2_5_2 + C4*DW1_2_5 - U3_1_5*Z1_5_2      # DG7XY5
+        D[34, 5] = U2_1_5*Z1_5_2 + DW3_1_5*Z2_5_2 - C4*U2_3_5      # DG7XZ5
+        D[35, 5] = DW2_3_5*Z1_5_2 + C4*U1_3_5 - U1_2_5*Z2_5_2      # DG7YZ5
+        D[36, 5] = DV2_3_5*Z1_5_2 + C4*WP3_5 - DV1_3_5Z2_5_2       # DG7ZZ5
+        D[37, 5] = VP2_4*Z2_5_2 + C4*VP2_5 + DF3MX5                # DG7MX5
+        D[38, 5] = DF3MY5 - VP2_4*Z1_5_2 - C4*VP1_5                # DG7MY5
+        D[43, 5] = WP1_6*Z1_6_2 + DV1_3_6Z2_6_2 - DV1_2_6*Z2_5_2   # DG7XX6
+        D[44, 5] = U3_2_6*Z2_6_2 + DW1_2_6*Z2_5_2 - U3_1_6*Z1_6_2  # DG7XY6
+        D[45, 5] = U2_1_6*Z1_6_2 + DW3_1_6*Z2_6_2 - U2_3_6*Z2_5_2  # DG7XZ6
+        D[46, 5] = DW2_3_6*Z1_6_2 + U1_3_6*Z2_5_2 - U1_2_6*Z2_6_2  # DG7YZ6
+        D[47, 5] = DV2_3_6*Z1_6_2 + WP3_6*Z2_5_2 - DV1_3_6Z2_6_2   # DG7ZZ6
+        D[48, 5] = VP2_6*Z2_5_2 + DF3MX6 - VP2_5*Z2_6_2            # DG7MX6
+        D[49, 5] = VP2_5*Z1_6_2 + DF3MY6 - VP1_6*Z2_5_2            # DG7MY6
+        D[54, 5] = VP2_7                                           # DG7MX7
+        D[55, 5] = -VP1_7                                          # DG7MY7
+        D[56, 5] = QP7                                             # DG7FV7
+        D[57, 5] = signQP7                                         # DG7FS7
+        D[59, 5] = U1_2_2*V1_8_7 + U2_2_2*V2_8_7                   # DG7MY8
 
-def _regressor_block(xp, q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
-    """Fill D, shape (60, 6, N), where it is not constant, from q (6, N); qd (6, N); qdd (6, N)."""
-    # Inputs
-    QP1, QP2, QP4, QP5, QP6, QP7 = qd
-    QDP1, QDP2, QDP4, QDP5, QDP6, QDP7 = qdd
-    # Motion of the links
-    (
-        C2, S2, C2m7, S2m7, C7, S7, C4, S4, C5, S5, C6, S6, S2QDP1, C2QDP1, _, WP1_2, DV1_3_2,
-        DV1_2_2, DW2_3_2, DW3_1_2, DW1_2_2, U1_2_2, U2_1_2, U2_2_2, U3_1_2, U3_2_2, VSP2_2,
-        VP1_2, VP2_2, C7QDP1, S7QDP1, _, WP1_3, DV1_3_3, DV1_2_3, DW2_3_3, DW3_1_3, DW1_2_3,
-        U1_1_3, U1_2_3, U2_1_3, U2_2_3, U3_1_3, U3_2_3, VSP3_3, VP1_3, VP2_3, WP1_4, WP3_4,
-        DV1_2_4, DV1_3_4, DV2_3_4, DW2_3_4, DW3_1_4, DW1_2_4, U1_1_4, U1_2_4, U1_3_4, U2_1_4,
-        U2_2_4, U2_3_4, U3_1_4, U3_2_4, VSP2_4, VP1_4, VP2_4, WP1_5, WP3_5, DV1_2_5, DV1_3_5,
-        DV2_3_5, DW2_3_5, DW3_1_5, DW1_2_5, U1_1_5, U1_2_5, U1_3_5, U2_1_5, U2_2_5, U2_3_5,
-        U3_1_5, U3_2_5, VP1_5, VP2_5, WP1_6, WP3_6, DV1_2_6, DV1_3_6, DV2_3_6, DW2_3_6, DW3_1_6,
-        DW1_2_6, U1_1_6, U1_2_6, U1_3_6, U2_1_6, U2_2_6, U2_3_6, U3_1_6, U3_2_6, VP1_6, VP2_6,
-        VP1_7, VP2_7, VSP3_8, VP1_8, GAM1a, GAM2a, GAM3a, GAM4a, GAM5a, GAM6a
-    ) = _motion(xp, q, qd, qdd, D2, D3, D4, RL4, D8, g)
-    # Joint axes Z and velocities V seen from link 3
-    V3_3_1 = D2 + D3*C2
-    V1_3_2 = D3*C2m7
-    V2_3_2 = D3*S2m7
-    # Joint axes Z and velocities V seen from link 4
-    Z1_4_1 = -C7*C4
-    Z2_4_1 = C7*S4
-    VS3_4_1 = V3_3_1 - RL4*C7 - D4*S7
-    V1_4_1 = -S4*VS3_4_1
-    V2_4_1 = -C4*VS3_4_1
-    VS1_4_2 = V1_3_2 - RL4
-    V3_4_2 = D4 + V2_3_2
-    V1_4_2 = C4*VS1_4_2
-    V2_4_2 = -S4*VS1_4_2
-    V1_4_3 = -RL4*C4
-    V2_4_3 = RL4*S4
-    # Joint axes Z and velocities V seen from link 5
-    Z1_5_1 = C5*Z1_4_1 + S7*S5
-    Z2_5_1 = S7*C5 - S5*Z1_4_1
-    V1_5_1 = C5*V1_4_1
-    V2_5_1 = -S5*V1_4_1
-    Z1_5_2 = -S4*C5
-    Z2_5_2 = S4*S5
-    V1_5_2 = C5*V1_4_2 + S5*V3_4_2
-    V2_5_2 = C5*V3_4_2 - S5*V1_4_2
-    V1_5_3 = C5*V1_4_3 + D4*S5
-    V2_5_3 = D4*C5 - S5*V1_4_3
-    # Joint axes Z and velocities V seen from link 6
-    Z1_6_1 = C6*Z1_5_1 + S6*Z2_4_1
-    Z2_6_1 = C6*Z2_4_1 - S6*Z1_5_1
-    V1_6_1 = C6*V1_5_1 + S6*V2_4_1
-    V2_6_1 = C6*V2_4_1 - S6*V1_5_1
-    Z1_6_2 = C6*Z1_5_2 - C4*S6
-    Z2_6_2 = -C4*C6 - S6*Z1_5_2
-    V1_6_2 = C6*V1_5_2 + S6*V2_4_2
-    V2_6_2 = C6*V2_4_2 - S6*V1_5_2
-    V1_6_3 = C6*V1_5_3 + S6*V2_4_3
-    V2_6_3 = C6*V2_4_3 - S6*V1_5_3
-    Z1_6_4 = S5*C6
-    Z2_6_4 = -S5*S6
-    # Joint axes Z and velocities V seen from link 8
-    V3_8_1 = D2 + D8*C7
-    V1_8_7 = D8*S2m7
-    V2_8_7 = D8*C2m7
-    # Contributions that several joints share
-    DV1_3_4Z2_4_1 = DV1_3_4*Z2_4_1
-    C4DV1_3_4 = C4*DV1_3_4
-    DF3MX4 = U1_1_4*V1_4_3 + U2_1_4*V2_4_3 + D4*U3_1_4
-    DF3MY4 = U1_2_4*V1_4_3 + U2_2_4*V2_4_3 + D4*U3_2_4
-    DV1_3_5Z2_5_1 = DV1_3_5*Z2_5_1
-    DV1_3_5Z2_5_2 = DV1_3_5*Z2_5_2
-    C5DV1_3_5 = C5*DV1_3_5
-    DF3MX5 = U1_1_5*V1_5_3 + U2_1_5*V2_5_3 - U3_1_5*V2_4_3
-    DF3MY5 = U1_2_5*V1_5_3 + U2_2_5*V2_5_3 - U3_2_5*V2_4_3
-    DV1_3_6Z2_6_1 = DV1_3_6*Z2_6_1
-    DV1_3_6Z2_6_2 = DV1_3_6*Z2_6_2
-    DV1_3_6Z2_6_4 = DV1_3_6*Z2_6_4
-    C6DV1_3_6 = C6*DV1_3_6
-    DF3MX6 = U1_1_6*V1_6_3 + U2_1_6*V2_6_3 + U3_1_6*V2_5_3
-    DF3MY6 = U1_2_6*V1_6_3 + U2_2_6*V2_6_3 + U3_2_6*V2_5_3
-    # Joint 1
-    D[0, 0] = QDP1                                                    # DG1ZZ1
-    D[1, 0] = QP1                                                     # DG1FV1
-    D[2, 0] = GAM1a                                                   # DG1FS1
-    D[4, 0] = -S2*WP1_2 - C2*DV1_3_2                                  # DG1XX2
-    D[5, 0] = S2*U3_1_2 - C2*U3_2_2                                   # DG1XY2
-    D[6, 0] = -S2*U2_1_2 - C2*DW3_1_2                                 # DG1XZ2
-    D[7, 0] = C2*U1_2_2 - S2*DW2_3_2                                  # DG1YZ2
-    D[9, 0] = C2*VSP2_2 + D2*U3_1_2                                   # DG1MX2
-    D[10, 0] = D2*U3_2_2 - S2*VSP2_2                                  # DG1MY2
-    D[14, 0] = S7*DV1_3_3 - C7*WP1_3                                  # DG1XX3
-    D[15, 0] = C7*U3_1_3 + S7*U3_2_3                                  # DG1XY3
-    D[16, 0] = S7*DW3_1_3 - C7*U2_1_3                                 # DG1XZ3
-    D[17, 0] = -C7*DW2_3_3 - S7*U1_2_3                                # DG1YZ3
-    D[19, 0] = U3_1_3*V3_3_1 - S7*VSP3_3                              # DG1MX3
-    D[20, 0] = U3_2_3*V3_3_1 - C7*VSP3_3                              # DG1MY3
-    D[21, 0] = WP1_4*Z1_4_1 + DV1_3_4Z2_4_1 - S7*DV1_2_4              # DG1XX4
-    D[22, 0] = U3_2_4*Z2_4_1 + S7*DW1_2_4 - U3_1_4*Z1_4_1             # DG1XY4
-    D[23, 0] = U2_1_4*Z1_4_1 + DW3_1_4*Z2_4_1 - S7*U2_3_4             # DG1XZ4
-    D[24, 0] = DW2_3_4*Z1_4_1 + S7*U1_3_4 - U1_2_4*Z2_4_1             # DG1YZ4
-    D[25, 0] = DV2_3_4*Z1_4_1 + S7*WP3_4 - DV1_3_4Z2_4_1              # DG1ZZ4
-    D[26, 0] = S7*VP2_4 + U1_1_4*V1_4_1 + U2_1_4*V2_4_1 - VSP2_4*Z2_4_1  # DG1MX4
-    D[27, 0] = VSP2_4*Z1_4_1 + U1_2_4*V1_4_1 + U2_2_4*V2_4_1 - S7*VP1_4  # DG1MY4
-    D[32, 0] = WP1_5*Z1_5_1 + DV1_3_5Z2_5_1 + DV1_2_5*Z2_4_1          # DG1XX5
-    D[33, 0] = U3_2_5*Z2_5_1 - U3_1_5*Z1_5_1 - DW1_2_5*Z2_4_1         # DG1XY5
-    D[34, 0] = U2_1_5*Z1_5_1 + DW3_1_5*Z2_5_1 + U2_3_5*Z2_4_1         # DG1XZ5
-    D[35, 0] = DW2_3_5*Z1_5_1 - U1_2_5*Z2_5_1 - U1_3_5*Z2_4_1         # DG1YZ5
-    D[36, 0] = DV2_3_5*Z1_5_1 - DV1_3_5Z2_5_1 - WP3_5*Z2_4_1          # DG1ZZ5
-    D[37, 0] = VP2_4*Z2_5_1 + U1_1_5*V1_5_1 + U2_1_5*V2_5_1 - VP2_5*Z2_4_1 - U3_1_5*V2_4_1  # DG1MX5
-    D[38, 0] = VP1_5*Z2_4_1 + U1_2_5*V1_5_1 + U2_2_5*V2_5_1 - VP2_4*Z1_5_1 - U3_2_5*V2_4_1  # DG1MY5
-    D[43, 0] = WP1_6*Z1_6_1 + DV1_3_6Z2_6_1 - DV1_2_6*Z2_5_1          # DG1XX6
-    D[44, 0] = U3_2_6*Z2_6_1 + DW1_2_6*Z2_5_1 - U3_1_6*Z1_6_1         # DG1XY6
-    D[45, 0] = U2_1_6*Z1_6_1 + DW3_1_6*Z2_6_1 - U2_3_6*Z2_5_1         # DG1XZ6
-    D[46, 0] = DW2_3_6*Z1_6_1 + U1_3_6*Z2_5_1 - U1_2_6*Z2_6_1         # DG1YZ6
-    D[47, 0] = DV2_3_6*Z1_6_1 + WP3_6*Z2_5_1 - DV1_3_6Z2_6_1          # DG1ZZ6
-    D[48, 0] = VP2_6*Z2_5_1 + U1_1_6*V1_6_1 + U2_1_6*V2_6_1 + U3_1_6*V2_5_1 - VP2_5*Z2_6_1  # DG1MX6
-    D[49, 0] = VP2_5*Z1_6_1 + U1_2_6*V1_6_1 + U2_2_6*V2_6_1 + U3_2_6*V2_5_1 - VP1_6*Z2_5_1  # DG1MY6
-    D[54, 0] = C7*VSP2_2 - D2*U3_2_3                                  # DG1MX7
-    D[55, 0] = D2*U3_1_3 - S7*VSP2_2                                  # DG1MY7
-    D[59, 0] = U3_2_2*V3_8_1 - S2*VSP3_8                              # DG1MY8
-    # Joint 2
-    D[4, 1] = -DV1_2_2                                                # DG2XX2
-    D[5, 1] = DW1_2_2                                                 # DG2XY2
-    D[6, 1] = -S2QDP1                                                 # DG2XZ2
-    D[7, 1] = -C2QDP1                                                 # DG2YZ2
-    D[8, 1] = QDP2                                                    # DG2ZZ2
-    D[9, 1] = VP2_2                                                   # DG2MX2
-    D[10, 1] = -VP1_2                                                 # DG2MY2
-    D[11, 1] = QP2                                                    # DG2FV2
-    D[12, 1] = GAM2a                                                  # DG2FS2
-    D[19, 1] = U1_1_3*V1_3_2 + U2_1_3*V2_3_2                          # DG2MX3
-    D[20, 1] = U1_2_3*V1_3_2 + U2_2_3*V2_3_2                          # DG2MY3
-    D[26, 1] = U1_1_4*V1_4_2 + U2_1_4*V2_4_2 + U3_1_4*V3_4_2 - DF3MX4  # DG2MX4
-    D[27, 1] = U1_2_4*V1_4_2 + U2_2_4*V2_4_2 + U3_2_4*V3_4_2 - DF3MY4  # DG2MY4
-    D[37, 1] = U1_1_5*V1_5_2 + U2_1_5*V2_5_2 - U3_1_5*V2_4_2 - DF3MX5  # DG2MX5
-    D[38, 1] = U1_2_5*V1_5_2 + U2_2_5*V2_5_2 - U3_2_5*V2_4_2 - DF3MY5  # DG2MY5
-    D[48, 1] = U1_1_6*V1_6_2 + U2_1_6*V2_6_2 + U3_1_6*V2_5_2 - DF3MX6  # DG2MX6
-    D[49, 1] = U1_2_6*V1_6_2 + U2_2_6*V2_6_2 + U3_2_6*V2_5_2 - DF3MY6  # DG2MY6
-    D[59, 1] = -VP1_8                                                 # DG2MY8
-    # Joint 4
-    D[21, 2] = -DV1_2_4                                    # DG4XX4
-    D[22, 2] = DW1_2_4                                     # DG4XY4
-    D[23, 2] = -U2_3_4                                     # DG4XZ4
-    D[24, 2] = U1_3_4                                      # DG4YZ4
-    D[25, 2] = WP3_4                                       # DG4ZZ4
-    D[26, 2] = VP2_4                                       # DG4MX4
-    D[27, 2] = -VP1_4                                      # DG4MY4
-    D[28, 2] = QDP4                                        # DG4Ia4
-    D[29, 2] = QP4                                         # DG4FV4
-    D[30, 2] = GAM3a                                       # DG4FS4
-    D[32, 2] = S5*WP1_5 + C5DV1_3_5                        # DG4XX5
-    D[33, 2] = C5*U3_2_5 - S5*U3_1_5                       # DG4XY5
-    D[34, 2] = S5*U2_1_5 + C5*DW3_1_5                      # DG4XZ5
-    D[35, 2] = S5*DW2_3_5 - C5*U1_2_5                      # DG4YZ5
-    D[36, 2] = S5*DV2_3_5 - C5DV1_3_5                      # DG4ZZ5
-    D[37, 2] = C5*VP2_4                                    # DG4MX5
-    D[38, 2] = -S5*VP2_4                                   # DG4MY5
-    D[43, 2] = WP1_6*Z1_6_4 + DV1_3_6Z2_6_4 - C5*DV1_2_6   # DG4XX6
-    D[44, 2] = U3_2_6*Z2_6_4 + C5*DW1_2_6 - U3_1_6*Z1_6_4  # DG4XY6
-    D[45, 2] = U2_1_6*Z1_6_4 + DW3_1_6*Z2_6_4 - C5*U2_3_6  # DG4XZ6
-    D[46, 2] = DW2_3_6*Z1_6_4 + C5*U1_3_6 - U1_2_6*Z2_6_4  # DG4YZ6
-    D[47, 2] = DV2_3_6*Z1_6_4 + C5*WP3_6 - DV1_3_6Z2_6_4   # DG4ZZ6
-    D[48, 2] = C5*VP2_6 - VP2_5*Z2_6_4                     # DG4MX6
-    D[49, 2] = VP2_5*Z1_6_4 - C5*VP1_6                     # DG4MY6
-    # Joint 5
-    D[32, 3] = -DV1_2_5                 # DG5XX5
-    D[33, 3] = DW1_2_5                  # DG5XY5
-    D[34, 3] = -U2_3_5                  # DG5XZ5
-    D[35, 3] = U1_3_5                   # DG5YZ5
-    D[36, 3] = WP3_5                    # DG5ZZ5
-    D[37, 3] = VP2_5                    # DG5MX5
-    D[38, 3] = -VP1_5                   # DG5MY5
-    D[39, 3] = QDP5                     # DG5Ia5
-    D[40, 3] = QP5                      # DG5FV5
-    D[41, 3] = GAM4a                    # DG5FS5
-    D[43, 3] = -S6*WP1_6 - C6DV1_3_6    # DG5XX6
-    D[44, 3] = S6*U3_1_6 - C6*U3_2_6    # DG5XY6
-    D[45, 3] = -S6*U2_1_6 - C6*DW3_1_6  # DG5XZ6
-    D[46, 3] = C6*U1_2_6 - S6*DW2_3_6   # DG5YZ6
-    D[47, 3] = C6DV1_3_6 - S6*DV2_3_6   # DG5ZZ6
-    D[48, 3] = C6*VP2_5                 # DG5MX6
-    D[49, 3] = -S6*VP2_5                # DG5MY6
-    # Joint 6
-    D[43, 4] = -DV1_2_6  # DG6XX6
-    D[44, 4] = DW1_2_6   # DG6XY6
-    D[45, 4] = -U2_3_6   # DG6XZ6
-    D[46, 4] = U1_3_6    # DG6YZ6
-    D[47, 4] = WP3_6     # DG6ZZ6
-    D[48, 4] = VP2_6     # DG6MX6
-    D[49, 4] = -VP1_6    # DG6MY6
-    D[50, 4] = QDP6      # DG6Ia6
-    D[51, 4] = QP6       # DG6FV6
-    D[52, 4] = GAM5a     # DG6FS6
-    # Joint 7
-    D[14, 5] = -DV1_2_3                                        # DG7XX3
-    D[15, 5] = DW1_2_3                                         # DG7XY3
-    D[16, 5] = -C7QDP1                                         # DG7XZ3
-    D[17, 5] = S7QDP1                                          # DG7YZ3
-    D[18, 5] = QDP7                                            # DG7ZZ3
-    D[19, 5] = VP2_3                                           # DG7MX3
-    D[20, 5] = -VP1_3                                          # DG7MY3
-    D[21, 5] = -S4*WP1_4 - C4DV1_3_4                           # DG7XX4
-    D[22, 5] = S4*U3_1_4 - C4*U3_2_4                           # DG7XY4
-    D[23, 5] = -S4*U2_1_4 - C4*DW3_1_4                         # DG7XZ4
-    D[24, 5] = C4*U1_2_4 - S4*DW2_3_4                          # DG7YZ4
-    D[25, 5] = C4DV1_3_4 - S4*DV2_3_4                          # DG7ZZ4
-    D[26, 5] = C4*VSP2_4 + DF3MX4                              # DG7MX4
-    D[27, 5] = DF3MY4 - S4*VSP2_4                              # DG7MY4
-    D[32, 5] = WP1_5*Z1_5_2 + DV1_3_5Z2_5_2 - C4*DV1_2_5       # DG7XX5
-    D[33, 5] = U3_2_5*Z2_5_2 + C4*DW1_2_5 - U3_1_5*Z1_5_2      # DG7XY5
-    D[34, 5] = U2_1_5*Z1_5_2 + DW3_1_5*Z2_5_2 - C4*U2_3_5      # DG7XZ5
-    D[35, 5] = DW2_3_5*Z1_5_2 + C4*U1_3_5 - U1_2_5*Z2_5_2      # DG7YZ5
-    D[36, 5] = DV2_3_5*Z1_5_2 + C4*WP3_5 - DV1_3_5Z2_5_2       # DG7ZZ5
-    D[37, 5] = VP2_4*Z2_5_2 + C4*VP2_5 + DF3MX5                # DG7MX5
-    D[38, 5] = DF3MY5 - VP2_4*Z1_5_2 - C4*VP1_5                # DG7MY5
-    D[43, 5] = WP1_6*Z1_6_2 + DV1_3_6Z2_6_2 - DV1_2_6*Z2_5_2   # DG7XX6
-    D[44, 5] = U3_2_6*Z2_6_2 + DW1_2_6*Z2_5_2 - U3_1_6*Z1_6_2  # DG7XY6
-    D[45, 5] = U2_1_6*Z1_6_2 + DW3_1_6*Z2_6_2 - U2_3_6*Z2_5_2  # DG7XZ6
-    D[46, 5] = DW2_3_6*Z1_6_2 + U1_3_6*Z2_5_2 - U1_2_6*Z2_6_2  # DG7YZ6
-    D[47, 5] = DV2_3_6*Z1_6_2 + WP3_6*Z2_5_2 - DV1_3_6Z2_6_2   # DG7ZZ6
-    D[48, 5] = VP2_6*Z2_5_2 + DF3MX6 - VP2_5*Z2_6_2            # DG7MX6
-    D[49, 5] = VP2_5*Z1_6_2 + DF3MY6 - VP1_6*Z2_5_2            # DG7MY6
-    D[54, 5] = VP2_7                                           # DG7MX7
-    D[55, 5] = -VP1_7                                          # DG7MY7
-    D[56, 5] = QP7                                             # DG7FV7
-    D[57, 5] = GAM6a                                           # DG7FS7
-    D[59, 5] = U1_2_2*V1_8_7 + U2_2_2*V2_8_7                   # DG7MY8
+    def _torques(GAM, X):
+        # Inputs
+        (
+            ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2, FS2, OFFSET2,
+            XX3R, XY3R, XZ3R, YZ3R, ZZ3R, MX3R, MY3R, XX4R, XY4, XZ4, YZ4, ZZ4R, MX4, MY4R, Ia4,
+            FV4, FS4, OFFSET4, XX5R, XY5, XZ5, YZ5, ZZ5R, MX5, MY5R, Ia5, FV5, FS5, OFFSET5, XX6R,
+            XY6, XZ6, YZ6, ZZ6, MX6, MY6, Ia6, FV6, FS6, OFFSET6, MX7R, MY7, FV7, FS7, OFFSET7, MY8
+        ) = X
+        # Joint 8
+        F1_8 = MY8*U1_2_2
+        F2_8 = MY8*U2_2_2
+        F3_8 = MY8*U3_2_2
+        N1_8 = MY8*VSP3_8
+        N3_8 = -MY8*VP1_8
+        FDI2_8 = S2m7*F1_8 + C2m7*F2_8
+        # Joint 7
+        F3_7 = MY7*U3_1_3 - MX7R*U3_2_3
+        E3_7 = F3_8 + F3_7
+        N1_7 = MY7*VSP2_2
+        N2_7 = -MX7R*VSP2_2
+        N3_7 = MX7R*VP2_7 - MY7*VP1_7
+        NE1_7 = C2m7*N1_8 + N1_7
+        NE2_7 = S2m7*N1_8 + N2_7 - D8*F3_8
+        NE3_7 = N3_8 + D8*FDI2_8 + N3_7
+        # Joint 6
+        F1_6 = MX6*U1_1_6 + MY6*U1_2_6
+        F2_6 = MX6*U2_1_6 + MY6*U2_2_6
+        F3_6 = MX6*U3_1_6 + MY6*U3_2_6
+        N1_6 = XX6R*WP1_6 + ZZ6*DV2_3_6 + YZ6*DW2_3_6 + XZ6*U2_1_6 + MY6*VP2_5 - XY6*U3_1_6
+        N2_6 = (XX6R - ZZ6)*DV1_3_6 + XZ6*DW3_1_6 + XY6*U3_2_6 - YZ6*U1_2_6 - MX6*VP2_5
+        N3_6 = (ZZ6*WP3_6 + XY6*DW1_2_6 + YZ6*U1_3_6 + MX6*VP2_6 - XX6R*DV1_2_6 - XZ6*U2_3_6 -
+            MY6*VP1_6)
+        FDI1_6 = C6*F1_6 - S6*F2_6
+        FDI3_6 = -S6*F1_6 - C6*F2_6
+        # Joint 5
+        F1_5 = MX5*U1_1_5 + MY5R*U1_2_5
+        F2_5 = MX5*U2_1_5 + MY5R*U2_2_5
+        F3_5 = MX5*U3_1_5 + MY5R*U3_2_5
+        E1_5 = FDI1_6 + F1_5
+        E2_5 = F3_6 + F2_5
+        E3_5 = FDI3_6 + F3_5
+        N1_5 = XX5R*WP1_5 + ZZ5R*DV2_3_5 + YZ5*DW2_3_5 + XZ5*U2_1_5 - XY5*U3_1_5 - MY5R*VP2_4
+        N2_5 = (XX5R - ZZ5R)*DV1_3_5 + XZ5*DW3_1_5 + XY5*U3_2_5 + MX5*VP2_4 - YZ5*U1_2_5
+        N3_5 = (ZZ5R*WP3_5 + XY5*DW1_2_5 + YZ5*U1_3_5 + MX5*VP2_5 - XX5R*DV1_2_5 - XZ5*U2_3_5 -
+            MY5R*VP1_5)
+        NE1_5 = C6*N1_6 + N1_5 - S6*N2_6
+        NE2_5 = N3_6 + N2_5
+        NE3_5 = N3_5 - S6*N1_6 - C6*N2_6
+        FDI1_5 = C5*E1_5 - S5*E2_5
+        FDI3_5 = S5*E1_5 + C5*E2_5
+        # Joint 4
+        F1_4 = MX4*U1_1_4 + MY4R*U1_2_4
+        F2_4 = MX4*U2_1_4 + MY4R*U2_2_4
+        F3_4 = MX4*U3_1_4 + MY4R*U3_2_4
+        E1_4 = FDI1_5 + F1_4
+        E2_4 = F2_4 - E3_5
+        E3_4 = FDI3_5 + F3_4
+        N1_4 = XX4R*WP1_4 + ZZ4R*DV2_3_4 + YZ4*DW2_3_4 + XZ4*U2_1_4 + MY4R*VSP2_4 - XY4*U3_1_4
+        N2_4 = (XX4R - ZZ4R)*DV1_3_4 + XZ4*DW3_1_4 + XY4*U3_2_4 - YZ4*U1_2_4 - MX4*VSP2_4
+        N3_4 = (ZZ4R*WP3_4 + XY4*DW1_2_4 + YZ4*U1_3_4 + MX4*VP2_4 - XX4R*DV1_2_4 - XZ4*U2_3_4 -
+            MY4R*VP1_4)
+        NE1_4 = C5*NE1_5 + N1_4 - S5*NE2_5
+        NE2_4 = N2_4 - NE3_5
+        NE3_4 = S5*NE1_5 + C5*NE2_5 + N3_4
+        FDI1_4 = C4*E1_4 - S4*E2_4
+        FDI3_4 = -S4*E1_4 - C4*E2_4
+        # Joint 3
+        F1_3 = MX3R*U1_1_3 + MY3R*U1_2_3
+        F2_3 = MX3R*U2_1_3 + MY3R*U2_2_3
+        F3_3 = MX3R*U3_1_3 + MY3R*U3_2_3
+        E1_3 = FDI1_4 + F1_3
+        E2_3 = E3_4 + F2_3
+        E3_3 = FDI3_4 + F3_3
+        N1_3 = XX3R*WP1_3 + ZZ3R*DV2_3_3 + YZ3R*DW2_3_3 + XZ3R*U2_1_3 + MY3R*VSP3_3 - XY3R*U3_1_3
+        N2_3 = (XX3R - ZZ3R)*DV1_3_3 + XZ3R*DW3_1_3 + XY3R*U3_2_3 - YZ3R*U1_2_3 - MX3R*VSP3_3
+        N3_3 = (ZZ3R*QDP7 + XY3R*DW1_2_3 + YZ3R*S7QDP1 + MX3R*VP2_3 - XX3R*DV1_2_3 - XZ3R*C7QDP1 -
+            MY3R*VP1_3)
+        NE1_3 = C4*NE1_4 + RL4*FDI3_4 + N1_3 - S4*NE2_4
+        NE2_3 = NE3_4 + N2_3 - D4*FDI3_4
+        NE3_3 = D4*E3_4 + N3_3 - S4*NE1_4 - C4*NE2_4 - RL4*FDI1_4
+        FDI2_3 = C2m7*E1_3 + S2m7*E2_3
+        # Joint 2
+        F3_2 = MX2R*U3_1_2 + MY2*U3_2_2
+        E3_2 = E3_3 + F3_2
+        N1_2 = XX2R*WP1_2 + ZZ2R*DV2_3_2 + YZ2R*DW2_3_2 + XZ2R*U2_1_2 + MY2*VSP2_2 - XY2R*U3_1_2
+        N2_2 = (XX2R - ZZ2R)*DV1_3_2 + XZ2R*DW3_1_2 + XY2R*U3_2_2 - YZ2R*U1_2_2 - MX2R*VSP2_2
+        N3_2 = (ZZ2R*QDP2 + XY2R*DW1_2_2 + MX2R*VP2_2 - XX2R*DV1_2_2 - YZ2R*C2QDP1 - XZ2R*S2QDP1 -
+            MY2*VP1_2)
+        NE1_2 = S2m7*NE1_3 + N1_2 - C2m7*NE2_3
+        NE2_2 = C2m7*NE1_3 + S2m7*NE2_3 + N2_2 - D3*E3_3
+        NE3_2 = NE3_3 + D3*FDI2_3 + N3_2
+        # Joint 1
+        N3_1 = ZZ1R*QDP1
+        NE3_1 = D2*E3_7 + D2*E3_2 + N3_1 - S7*NE1_7 - C7*NE2_7 - S2*NE1_2 - C2*NE2_2
+        # Torques
+        GAM[0] = OFFSET1 + NE3_1 + FV1*QP1 + FS1*signQP1
+        GAM[1] = OFFSET2 + NE3_2 + FV2*QP2 + FS2*signQP2 + N3_8 - NE3_3
+        GAM[2] = OFFSET4 + NE3_4 + Ia4*QDP4 + FV4*QP4 + FS4*signQP4
+        GAM[3] = OFFSET5 + NE3_5 + Ia5*QDP5 + FV5*QP5 + FS5*signQP5
+        GAM[4] = OFFSET6 + N3_6 + Ia6*QDP6 + FV6*QP6 + FS6*signQP6
+        GAM[5] = NE3_3 + OFFSET7 + NE3_7 + FV7*QP7 + FS7*signQP7 - N3_8
 
-
-def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X, D2, D3, D4, RL4, D8, g):
-    """Fill GAM, shape (6, N), from q (6, N); qd (6, N); qdd (6, N)."""
-    # Inputs
-    QP1, QP2, QP4, QP5, QP6, QP7 = qd
-    QDP1, QDP2, QDP4, QDP5, QDP6, QDP7 = qdd
-    (
-        ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2, FS2, OFFSET2,
-        XX3R, XY3R, XZ3R, YZ3R, ZZ3R, MX3R, MY3R, XX4R, XY4, XZ4, YZ4, ZZ4R, MX4, MY4R, Ia4,
-        FV4, FS4, OFFSET4, XX5R, XY5, XZ5, YZ5, ZZ5R, MX5, MY5R, Ia5, FV5, FS5, OFFSET5, XX6R,
-        XY6, XZ6, YZ6, ZZ6, MX6, MY6, Ia6, FV6, FS6, OFFSET6, MX7R, MY7, FV7, FS7, OFFSET7, MY8
-    ) = X
-    # Motion of the links
-    (
-        C2, S2, C2m7, S2m7, C7, S7, C4, S4, C5, S5, C6, S6, S2QDP1, C2QDP1, DV2_3_2, WP1_2,
-        DV1_3_2, DV1_2_2, DW2_3_2, DW3_1_2, DW1_2_2, U1_2_2, U2_1_2, U2_2_2, U3_1_2, U3_2_2,
-        VSP2_2, VP1_2, VP2_2, C7QDP1, S7QDP1, DV2_3_3, WP1_3, DV1_3_3, DV1_2_3, DW2_3_3,
-        DW3_1_3, DW1_2_3, U1_1_3, U1_2_3, U2_1_3, U2_2_3, U3_1_3, U3_2_3, VSP3_3, VP1_3, VP2_3,
-        WP1_4, WP3_4, DV1_2_4, DV1_3_4, DV2_3_4, DW2_3_4, DW3_1_4, DW1_2_4, U1_1_4, U1_2_4,
-        U1_3_4, U2_1_4, U2_2_4, U2_3_4, U3_1_4, U3_2_4, VSP2_4, VP1_4, VP2_4, WP1_5, WP3_5,
-        DV1_2_5, DV1_3_5, DV2_3_5, DW2_3_5, DW3_1_5, DW1_2_5, U1_1_5, U1_2_5, U1_3_5, U2_1_5,
-        U2_2_5, U2_3_5, U3_1_5, U3_2_5, VP1_5, VP2_5, WP1_6, WP3_6, DV1_2_6, DV1_3_6, DV2_3_6,
-        DW2_3_6, DW3_1_6, DW1_2_6, U1_1_6, U1_2_6, U1_3_6, U2_1_6, U2_2_6, U2_3_6, U3_1_6,
-        U3_2_6, VP1_6, VP2_6, VP1_7, VP2_7, VSP3_8, VP1_8, GAM1a, GAM2a, GAM3a, GAM4a, GAM5a,
-        GAM6a
-    ) = _motion(xp, q, qd, qdd, D2, D3, D4, RL4, D8, g)
-    # Joint 8
-    F1_8 = MY8*U1_2_2
-    F2_8 = MY8*U2_2_2
-    F3_8 = MY8*U3_2_2
-    N1_8 = MY8*VSP3_8
-    N3_8 = -MY8*VP1_8
-    FDI2_8 = S2m7*F1_8 + C2m7*F2_8
-    # Joint 7
-    F3_7 = MY7*U3_1_3 - MX7R*U3_2_3
-    E3_7 = F3_8 + F3_7
-    N1_7 = MY7*VSP2_2
-    N2_7 = -MX7R*VSP2_2
-    N3_7 = MX7R*VP2_7 - MY7*VP1_7
-    NE1_7 = C2m7*N1_8 + N1_7
-    NE2_7 = S2m7*N1_8 + N2_7 - D8*F3_8
-    NE3_7 = N3_8 + D8*FDI2_8 + N3_7
-    # Joint 6
-    F1_6 = MX6*U1_1_6 + MY6*U1_2_6
-    F2_6 = MX6*U2_1_6 + MY6*U2_2_6
-    F3_6 = MX6*U3_1_6 + MY6*U3_2_6
-    N1_6 = XX6R*WP1_6 + ZZ6*DV2_3_6 + YZ6*DW2_3_6 + XZ6*U2_1_6 + MY6*VP2_5 - XY6*U3_1_6
-    N2_6 = (XX6R - ZZ6)*DV1_3_6 + XZ6*DW3_1_6 + XY6*U3_2_6 - YZ6*U1_2_6 - MX6*VP2_5
-    N3_6 = ZZ6*WP3_6 + XY6*DW1_2_6 + YZ6*U1_3_6 + MX6*VP2_6 - XX6R*DV1_2_6 - XZ6*U2_3_6 - MY6*VP1_6
-    FDI1_6 = C6*F1_6 - S6*F2_6
-    FDI3_6 = -S6*F1_6 - C6*F2_6
-    # Joint 5
-    F1_5 = MX5*U1_1_5 + MY5R*U1_2_5
-    F2_5 = MX5*U2_1_5 + MY5R*U2_2_5
-    F3_5 = MX5*U3_1_5 + MY5R*U3_2_5
-    E1_5 = FDI1_6 + F1_5
-    E2_5 = F3_6 + F2_5
-    E3_5 = FDI3_6 + F3_5
-    N1_5 = XX5R*WP1_5 + ZZ5R*DV2_3_5 + YZ5*DW2_3_5 + XZ5*U2_1_5 - XY5*U3_1_5 - MY5R*VP2_4
-    N2_5 = (XX5R - ZZ5R)*DV1_3_5 + XZ5*DW3_1_5 + XY5*U3_2_5 + MX5*VP2_4 - YZ5*U1_2_5
-    N3_5 = (ZZ5R*WP3_5 + XY5*DW1_2_5 + YZ5*U1_3_5 + MX5*VP2_5 - XX5R*DV1_2_5 - XZ5*U2_3_5 -
-        MY5R*VP1_5)
-    NE1_5 = C6*N1_6 + N1_5 - S6*N2_6
-    NE2_5 = N3_6 + N2_5
-    NE3_5 = N3_5 - S6*N1_6 - C6*N2_6
-    FDI1_5 = C5*E1_5 - S5*E2_5
-    FDI3_5 = S5*E1_5 + C5*E2_5
-    # Joint 4
-    F1_4 = MX4*U1_1_4 + MY4R*U1_2_4
-    F2_4 = MX4*U2_1_4 + MY4R*U2_2_4
-    F3_4 = MX4*U3_1_4 + MY4R*U3_2_4
-    E1_4 = FDI1_5 + F1_4
-    E2_4 = F2_4 - E3_5
-    E3_4 = FDI3_5 + F3_4
-    N1_4 = XX4R*WP1_4 + ZZ4R*DV2_3_4 + YZ4*DW2_3_4 + XZ4*U2_1_4 + MY4R*VSP2_4 - XY4*U3_1_4
-    N2_4 = (XX4R - ZZ4R)*DV1_3_4 + XZ4*DW3_1_4 + XY4*U3_2_4 - YZ4*U1_2_4 - MX4*VSP2_4
-    N3_4 = (ZZ4R*WP3_4 + XY4*DW1_2_4 + YZ4*U1_3_4 + MX4*VP2_4 - XX4R*DV1_2_4 - XZ4*U2_3_4 -
-        MY4R*VP1_4)
-    NE1_4 = C5*NE1_5 + N1_4 - S5*NE2_5
-    NE2_4 = N2_4 - NE3_5
-    NE3_4 = S5*NE1_5 + C5*NE2_5 + N3_4
-    FDI1_4 = C4*E1_4 - S4*E2_4
-    FDI3_4 = -S4*E1_4 - C4*E2_4
-    # Joint 3
-    F1_3 = MX3R*U1_1_3 + MY3R*U1_2_3
-    F2_3 = MX3R*U2_1_3 + MY3R*U2_2_3
-    F3_3 = MX3R*U3_1_3 + MY3R*U3_2_3
-    E1_3 = FDI1_4 + F1_3
-    E2_3 = E3_4 + F2_3
-    E3_3 = FDI3_4 + F3_3
-    N1_3 = XX3R*WP1_3 + ZZ3R*DV2_3_3 + YZ3R*DW2_3_3 + XZ3R*U2_1_3 + MY3R*VSP3_3 - XY3R*U3_1_3
-    N2_3 = (XX3R - ZZ3R)*DV1_3_3 + XZ3R*DW3_1_3 + XY3R*U3_2_3 - YZ3R*U1_2_3 - MX3R*VSP3_3
-    N3_3 = (ZZ3R*QDP7 + XY3R*DW1_2_3 + YZ3R*S7QDP1 + MX3R*VP2_3 - XX3R*DV1_2_3 - XZ3R*C7QDP1 -
-        MY3R*VP1_3)
-    NE1_3 = C4*NE1_4 + RL4*FDI3_4 + N1_3 - S4*NE2_4
-    NE2_3 = NE3_4 + N2_3 - D4*FDI3_4
-    NE3_3 = D4*E3_4 + N3_3 - S4*NE1_4 - C4*NE2_4 - RL4*FDI1_4
-    FDI2_3 = C2m7*E1_3 + S2m7*E2_3
-    # Joint 2
-    F3_2 = MX2R*U3_1_2 + MY2*U3_2_2
-    E3_2 = E3_3 + F3_2
-    N1_2 = XX2R*WP1_2 + ZZ2R*DV2_3_2 + YZ2R*DW2_3_2 + XZ2R*U2_1_2 + MY2*VSP2_2 - XY2R*U3_1_2
-    N2_2 = (XX2R - ZZ2R)*DV1_3_2 + XZ2R*DW3_1_2 + XY2R*U3_2_2 - YZ2R*U1_2_2 - MX2R*VSP2_2
-    N3_2 = (ZZ2R*QDP2 + XY2R*DW1_2_2 + MX2R*VP2_2 - XX2R*DV1_2_2 - YZ2R*C2QDP1 - XZ2R*S2QDP1 -
-        MY2*VP1_2)
-    NE1_2 = S2m7*NE1_3 + N1_2 - C2m7*NE2_3
-    NE2_2 = C2m7*NE1_3 + S2m7*NE2_3 + N2_2 - D3*E3_3
-    NE3_2 = NE3_3 + D3*FDI2_3 + N3_2
-    # Joint 1
-    N3_1 = ZZ1R*QDP1
-    NE3_1 = D2*E3_7 + D2*E3_2 + N3_1 - S7*NE1_7 - C7*NE2_7 - S2*NE1_2 - C2*NE2_2
-    # Torques
-    GAM[0] = OFFSET1 + NE3_1 + FV1*QP1 + FS1*GAM1a
-    GAM[1] = OFFSET2 + NE3_2 + FV2*QP2 + FS2*GAM2a + N3_8 - NE3_3
-    GAM[2] = OFFSET4 + NE3_4 + Ia4*QDP4 + FV4*QP4 + FS4*GAM3a
-    GAM[3] = OFFSET5 + NE3_5 + Ia5*QDP5 + FV5*QP5 + FS5*GAM4a
-    GAM[4] = OFFSET6 + N3_6 + Ia6*QDP6 + FV6*QP6 + FS6*GAM5a
-    GAM[5] = NE3_3 + OFFSET7 + NE3_7 + FV7*QP7 + FS7*GAM6a - N3_8
+    return _regressor, _torques
 
 
 def _inertia_matrix_block(xp, q, A, X, D2, D3, D4, RL4, D8):
@@ -1284,7 +1279,7 @@ def _inertia_matrix_block(xp, q, A, X, D2, D3, D4, RL4, D8):
     C6S6 = C6*S6
     AJA1_1_6 = XX6R*C6C6 - XY6*2*C6S6
     NE1_5_6 = XZ6*C6 - YZ6*S6
-    NE3_5_6 = A[3, 4] = A[4, 3] = -XZ6*S6 - YZ6*C6
+    NE3_5_6 = -XZ6*S6 - YZ6*C6
     JP1_1_5 = XX5R + AJA1_1_6
     JP1_2_5 = XY5 + NE1_5_6
     JP1_3_5 = XZ5 + XY6 - XX6R*C6S6 - XY6*2*C6C6
@@ -1299,7 +1294,7 @@ def _inertia_matrix_block(xp, q, A, X, D2, D3, D4, RL4, D8):
     JP1_1_4a = ZZ6 - JP1_1_5
     JP1_1_4b = C5C5*JP1_1_4a + JP1_2_5*2*C5S5
     NE1_4_5 = C5*JP1_3_5 - S5*JP2_3_5
-    NE3_4_5 = A[2, 3] = A[3, 2] = S5*JP1_3_5 + C5*JP2_3_5
+    NE3_4_5 = S5*JP1_3_5 + C5*JP2_3_5
     JP1_1_4 = XX4R + ZZ6 - JP1_1_4b
     JP1_2_4 = XY4 - NE1_4_5
     JP1_3_4 = XZ4 + JP1_2_5*2*C5C5 - C5S5*JP1_1_4a - JP1_2_5
@@ -1322,9 +1317,9 @@ def _inertia_matrix_block(xp, q, A, X, D2, D3, D4, RL4, D8):
     JP1_2_3 = XY3R + AJA1_2_4 - D4*AS3_5 - RL4AS1_4
     JP1_3_3 = XZ3R + C4S4*JP1_1_3a + JP1_2_4 - JP1_2_4*2*C4C4 - D4*AS3_4
     JP2_2_3 = JP3_3_4 + 2*D4AS1_4
-    NE3_3_4 = A[2, 5] = A[5, 2] = -S4*JP1_3_4 - C4*JP2_3_4 - RL4*AS3_4
+    NE3_3_4 = -S4*JP1_3_4 - C4*JP2_3_4 - RL4*AS3_4
     JP2_3_3 = YZ3R + NE3_3_4
-    A[5, 5] = ZZ3R + JP1_1_4 + JP1_1_3b + 2*(D4AS1_4 + RL4AS3_5)
+    JP3_3_3 = ZZ3R + JP1_1_4 + JP1_1_3b + 2*(D4AS1_4 + RL4AS3_5)
     MSP1_3 = MX3R + AS1_4
     MSP2_3 = MY3R + AS3_5
     # Composite link 3
@@ -1346,51 +1341,63 @@ def _inertia_matrix_block(xp, q, A, X, D2, D3, D4, RL4, D8):
     # Composite link 2
     AS1_2 = C2*MSP1_2 - S2*MSP2_2
     NE3_1_2 = -S2*JP1_3_2 - C2*JP2_3_2
-    A[0, 0] = (ZZ1R + JP2_2_7*C7**2 + JP1_2_7*2*C7*S7 + 2*D2*AS1_7 + JP1_1_2 + JP1_2_2*2*C2*S2 +
+    JP3_3_1 = (ZZ1R + JP2_2_7*C7**2 + JP1_2_7*2*C7*S7 + 2*D2*AS1_7 + JP1_1_2 + JP1_2_2*2*C2*S2 +
         2*D2*AS1_2 - C2**2*(JP1_1_2 - JP2_2_2))
     # Unit acceleration of joint 3
-    NE3_1_3 = A[0, 5] = A[5, 0] = -S2*NE1_2_3 - C2*NE2_2_3
+    NE3_1_3 = -S2*NE1_2_3 - C2*NE2_2_3
     # Unit acceleration of joint 4
     NE1_3_4 = AJA1_2_4 - RL4AS1_4
     NE2_3_4 = JP3_3_4 + D4AS1_4
     E2_2_4 = C2m7*AS3_4
     NE1_2_4 = S2m7*NE1_3_4 - C2m7*NE2_3_4
     NE2_2_4 = C2m7*NE1_3_4 + S2m7*NE2_3_4 + D3*AS1_4
-    A[0, 2] = A[2, 0] = -S2*NE1_2_4 - C2*NE2_2_4 - D2*AS1_4
+    NE3_1_4 = -S2*NE1_2_4 - C2*NE2_2_4 - D2*AS1_4
     # Unit acceleration of joint 5
     E1_3_5 = -C4*AS3_5
     E3_3_5 = S4*AS3_5
     NE1_3_5 = C4*NE1_4_5 + S4*JP3_3_5 + RL4*E3_3_5
     NE2_3_5 = NE3_4_5 - D4*E3_3_5
-    A[3, 5] = A[5, 3] = C4*JP3_3_5 + D4*AS1_5 - S4*NE1_4_5 - RL4*E1_3_5
+    NE3_3_5 = C4*JP3_3_5 + D4*AS1_5 - S4*NE1_4_5 - RL4*E1_3_5
     E2_2_5 = C2m7*E1_3_5 + S2m7*AS1_5
     NE1_2_5 = S2m7*NE1_3_5 - C2m7*NE2_3_5
     NE2_2_5 = C2m7*NE1_3_5 + S2m7*NE2_3_5 - D3*E3_3_5
-    A[0, 3] = A[3, 0] = D2*E3_3_5 - S2*NE1_2_5 - C2*NE2_2_5
+    NE3_1_5 = D2*E3_3_5 - S2*NE1_2_5 - C2*NE2_2_5
     # Unit acceleration of joint 6
     E1_4_6 = C5*AS3_6
     E3_4_6 = S5*AS3_6
     NE1_4_6 = C5*NE1_5_6 - ZZ6*S5
-    NE3_4_6 = A[2, 4] = A[4, 2] = S5*NE1_5_6 + ZZ6*C5
+    NE3_4_6 = S5*NE1_5_6 + ZZ6*C5
     E1_3_6 = C4*E1_4_6 - S4*AS1_6
     E3_3_6 = -S4*E1_4_6 - C4*AS1_6
     NE1_3_6 = C4*NE1_4_6 + S4*NE3_5_6 + RL4*E3_3_6
     NE2_3_6 = NE3_4_6 - D4*E3_3_6
-    A[4, 5] = A[5, 4] = C4*NE3_5_6 + D4*E3_4_6 - S4*NE1_4_6 - RL4*E1_3_6
+    NE3_3_6 = C4*NE3_5_6 + D4*E3_4_6 - S4*NE1_4_6 - RL4*E1_3_6
     E2_2_6 = C2m7*E1_3_6 + S2m7*E3_4_6
     NE1_2_6 = S2m7*NE1_3_6 - C2m7*NE2_3_6
     NE2_2_6 = C2m7*NE1_3_6 + S2m7*NE2_3_6 - D3*E3_3_6
-    A[0, 4] = A[4, 0] = D2*E3_3_6 - S2*NE1_2_6 - C2*NE2_2_6
+    NE3_1_6 = D2*E3_3_6 - S2*NE1_2_6 - C2*NE2_2_6
     # Inertia matrix
+    A[0, 0] = JP3_3_1
     A[0, 1] = A[1, 0] = NE3_1_2 - NE3_1_3
     A[1, 1] = ZZ2R
+    A[0, 2] = A[2, 0] = NE3_1_4
     A[1, 2] = A[2, 1] = D3*E2_2_4
     A[2, 2] = Ia4 + JP3_3_4
+    A[0, 3] = A[3, 0] = NE3_1_5
     A[1, 3] = A[3, 1] = D3*E2_2_5
+    A[2, 3] = A[3, 2] = NE3_4_5
     A[3, 3] = Ia5 + JP3_3_5
+    A[0, 4] = A[4, 0] = NE3_1_6
     A[1, 4] = A[4, 1] = D3*E2_2_6
+    A[2, 4] = A[4, 2] = NE3_4_6
+    A[3, 4] = A[4, 3] = NE3_5_6
     A[4, 4] = ZZ6 + Ia6
+    A[0, 5] = A[5, 0] = NE3_1_3
     A[1, 5] = A[5, 1] = NE3_7_8 + D3AS1_3
+    A[2, 5] = A[5, 2] = NE3_3_4
+    A[3, 5] = A[5, 3] = NE3_3_5
+    A[4, 5] = A[5, 4] = NE3_3_6
+    A[5, 5] = JP3_3_3
 
 
 def _gravity_block(xp, q, GAM, X, g):
@@ -1472,13 +1479,12 @@ def _frame_poses_block(xp, q, T, D2, D3, D4, RL4, D8):
     # Inputs
     q1, q2, q4, q5, q6, q7 = q
     # Trigonometry
-    C1 = T[0, 0, 0] = T[0, 1, 1] = T[1, 1, 2] = T[2, 1, 2] = T[6, 1, 2] = T[7, 1, 2] = T[8, 1,
-        2] = T[9, 1, 2] = (xp.cos(q1))
-    S1 = T[0, 1, 0] = xp.sin(q1)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
     C2 = xp.cos(q2)
     S2 = xp.sin(q2)
-    C7 = T[8, 2, 1] = T[9, 2, 1] = xp.cos(q7)
-    S7 = T[2, 2, 1] = T[3, 2, 2] = T[8, 2, 0] = T[9, 2, 0] = xp.sin(q7)
+    C7 = xp.cos(q7)
+    S7 = xp.sin(q7)
     C4 = xp.cos(q4)
     S4 = xp.sin(q4)
     C5 = xp.cos(q5)
@@ -1486,70 +1492,162 @@ def _frame_poses_block(xp, q, T, D2, D3, D4, RL4, D8):
     C6 = xp.cos(q6)
     S6 = xp.sin(q6)
     # Joint axes Z and velocities V seen from link 4
-    Z1_4_1 = T[3, 2, 0] = -C7*C4
-    Z2_4_1 = T[3, 2, 1] = C7*S4
+    Z1_4_1 = -C7*C4
+    Z2_4_1 = C7*S4
     # Joint axes Z and velocities V seen from link 5
-    Z1_5_1 = T[4, 2, 0] = C5*Z1_4_1 + S7*S5
-    T[4, 2, 1] = T[5, 2, 2] = S7*C5 - S5*Z1_4_1
+    Z1_5_1 = C5*Z1_4_1 + S7*S5
+    Z2_5_1 = S7*C5 - S5*Z1_4_1
     # Joint axes Z and velocities V seen from link 6
-    T[5, 2, 0] = C6*Z1_5_1 + S6*Z2_4_1
-    T[5, 2, 1] = C6*Z2_4_1 - S6*Z1_5_1
+    Z1_6_1 = C6*Z1_5_1 + S6*Z2_4_1
+    Z2_6_1 = C6*Z2_4_1 - S6*Z1_5_1
     # Frame 2
-    R1_1_2 = T[1, 0, 0] = T[7, 0, 0] = C1*C2
-    T[1, 0, 1] = T[7, 0, 1] = -C1*S2
-    R2_1_2 = T[1, 1, 0] = T[7, 1, 0] = S1*C2
-    T[1, 1, 1] = T[7, 1, 1] = -S1*S2
-    P1_2 = T[1, 0, 3] = T[6, 0, 3] = D2*C1
-    P2_2 = T[1, 1, 3] = T[6, 1, 3] = D2*S1
+    R1_1_2 = C1*C2
+    R1_2_2 = -C1*S2
+    R2_1_2 = S1*C2
+    R2_2_2 = -S1*S2
+    P1_2 = D2*C1
+    P2_2 = D2*S1
     # Frame 3
-    R1_1_3 = T[2, 0, 0] = T[6, 0, 1] = -C1*S7
-    R1_2_3 = T[2, 0, 1] = T[3, 0, 2] = T[8, 0, 0] = T[9, 0, 0] = -C1*C7
-    R2_1_3 = T[2, 1, 0] = T[6, 1, 1] = -S1*S7
-    R2_2_3 = T[2, 1, 1] = T[3, 1, 2] = T[8, 1, 0] = T[9, 1, 0] = -S1*C7
+    R1_1_3 = -C1*S7
+    R1_2_3 = -C1*C7
+    R2_1_3 = -S1*S7
+    R2_2_3 = -S1*C7
     D3R1_1_2 = D3*R1_1_2
-    P1_3 = T[2, 0, 3] = P1_2 + D3R1_1_2
+    P1_3 = P1_2 + D3R1_1_2
     D3R2_1_2 = D3*R2_1_2
-    P2_3 = T[2, 1, 3] = P2_2 + D3R2_1_2
-    P3_3 = T[2, 2, 3] = -D3*S2
+    P2_3 = P2_2 + D3R2_1_2
+    P3_3 = -D3*S2
     # Frame 4
-    R1_1_4 = T[3, 0, 0] = C4*R1_1_3 + S1*S4
-    R1_2_4 = T[3, 0, 1] = S1*C4 - S4*R1_1_3
-    R2_1_4 = T[3, 1, 0] = C4*R2_1_3 - C1*S4
-    R2_2_4 = T[3, 1, 1] = -C1*C4 - S4*R2_1_3
-    T[3, 0, 3] = T[4, 0, 3] = T[5, 0, 3] = P1_3 + D4*R1_1_3 + RL4*R1_2_3
-    T[3, 1, 3] = T[4, 1, 3] = T[5, 1, 3] = P2_3 + D4*R2_1_3 + RL4*R2_2_3
-    T[3, 2, 3] = T[4, 2, 3] = T[5, 2, 3] = P3_3 + RL4*S7 - D4*C7
+    R1_1_4 = C4*R1_1_3 + S1*S4
+    R1_2_4 = S1*C4 - S4*R1_1_3
+    R2_1_4 = C4*R2_1_3 - C1*S4
+    R2_2_4 = -C1*C4 - S4*R2_1_3
+    P1_4 = P1_3 + D4*R1_1_3 + RL4*R1_2_3
+    P2_4 = P2_3 + D4*R2_1_3 + RL4*R2_2_3
+    P3_4 = P3_3 + RL4*S7 - D4*C7
     # Frame 5
-    R1_1_5 = T[4, 0, 0] = C5*R1_1_4 + S5*R1_2_3
-    T[4, 0, 1] = T[5, 0, 2] = C5*R1_2_3 - S5*R1_1_4
-    R2_1_5 = T[4, 1, 0] = C5*R2_1_4 + S5*R2_2_3
-    T[4, 1, 1] = T[5, 1, 2] = C5*R2_2_3 - S5*R2_1_4
+    R1_1_5 = C5*R1_1_4 + S5*R1_2_3
+    R1_2_5 = C5*R1_2_3 - S5*R1_1_4
+    R2_1_5 = C5*R2_1_4 + S5*R2_2_3
+    R2_2_5 = C5*R2_2_3 - S5*R2_1_4
     # Frame 6
-    T[5, 0, 0] = C6*R1_1_5 + S6*R1_2_4
-    T[5, 0, 1] = C6*R1_2_4 - S6*R1_1_5
-    T[5, 1, 0] = C6*R2_1_5 + S6*R2_2_4
-    T[5, 1, 1] = C6*R2_2_4 - S6*R2_1_5
+    R1_1_6 = C6*R1_1_5 + S6*R1_2_4
+    R1_2_6 = C6*R1_2_4 - S6*R1_1_5
+    R2_1_6 = C6*R2_1_5 + S6*R2_2_4
+    R2_2_6 = C6*R2_2_4 - S6*R2_1_5
     # Frame 8
-    P1_8 = T[7, 0, 3] = P1_2 - D8*R1_2_3
-    P2_8 = T[7, 1, 3] = P2_2 - D8*R2_2_3
-    P3_8 = T[7, 2, 3] = -D8*S7
+    P1_8 = P1_2 - D8*R1_2_3
+    P2_8 = P2_2 - D8*R2_2_3
+    P3_8 = -D8*S7
     # Frame 9
-    T[8, 0, 3] = T[9, 0, 3] = D3R1_1_2 + P1_8
-    T[8, 1, 3] = T[9, 1, 3] = D3R2_1_2 + P2_8
-    T[8, 2, 3] = T[9, 2, 3] = P3_3 + P3_8
+    P1_9 = D3R1_1_2 + P1_8
+    P2_9 = D3R2_1_2 + P2_8
+    P3_9 = P3_3 + P3_8
     # Poses
-    T[0, 0, 1] = T[1, 0, 2] = T[2, 0, 2] = T[6, 0, 2] = T[7, 0, 2] = T[8, 0, 2] = T[9, 0, 2] = -S1
-    T[1, 2, 0] = T[7, 2, 0] = -S2
-    T[1, 2, 1] = T[7, 2, 1] = -C2
-    T[2, 2, 0] = T[6, 2, 1] = -C7
+    T[0, 0, 0] = C1
+    T[0, 0, 1] = -S1
+    T[0, 1, 0] = S1
+    T[0, 1, 1] = C1
+    T[1, 0, 0] = R1_1_2
+    T[1, 0, 1] = R1_2_2
+    T[1, 0, 2] = -S1
+    T[1, 0, 3] = P1_2
+    T[1, 1, 0] = R2_1_2
+    T[1, 1, 1] = R2_2_2
+    T[1, 1, 2] = C1
+    T[1, 1, 3] = P2_2
+    T[1, 2, 0] = -S2
+    T[1, 2, 1] = -C2
+    T[2, 0, 0] = R1_1_3
+    T[2, 0, 1] = R1_2_3
+    T[2, 0, 2] = -S1
+    T[2, 0, 3] = P1_3
+    T[2, 1, 0] = R2_1_3
+    T[2, 1, 1] = R2_2_3
+    T[2, 1, 2] = C1
+    T[2, 1, 3] = P2_3
+    T[2, 2, 0] = -C7
+    T[2, 2, 1] = S7
+    T[2, 2, 3] = P3_3
+    T[3, 0, 0] = R1_1_4
+    T[3, 0, 1] = R1_2_4
+    T[3, 0, 2] = R1_2_3
+    T[3, 0, 3] = P1_4
+    T[3, 1, 0] = R2_1_4
+    T[3, 1, 1] = R2_2_4
+    T[3, 1, 2] = R2_2_3
+    T[3, 1, 3] = P2_4
+    T[3, 2, 0] = Z1_4_1
+    T[3, 2, 1] = Z2_4_1
+    T[3, 2, 2] = S7
+    T[3, 2, 3] = P3_4
+    T[4, 0, 0] = R1_1_5
+    T[4, 0, 1] = R1_2_5
     T[4, 0, 2] = -R1_2_4
+    T[4, 0, 3] = P1_4
+    T[4, 1, 0] = R2_1_5
+    T[4, 1, 1] = R2_2_5
     T[4, 1, 2] = -R2_2_4
+    T[4, 1, 3] = P2_4
+    T[4, 2, 0] = Z1_5_1
+    T[4, 2, 1] = Z2_5_1
     T[4, 2, 2] = -Z2_4_1
+    T[4, 2, 3] = P3_4
+    T[5, 0, 0] = R1_1_6
+    T[5, 0, 1] = R1_2_6
+    T[5, 0, 2] = R1_2_5
+    T[5, 0, 3] = P1_4
+    T[5, 1, 0] = R2_1_6
+    T[5, 1, 1] = R2_2_6
+    T[5, 1, 2] = R2_2_5
+    T[5, 1, 3] = P2_4
+    T[5, 2, 0] = Z1_6_1
+    T[5, 2, 1] = Z2_6_1
+    T[5, 2, 2] = Z2_5_1
+    T[5, 2, 3] = P3_4
     T[6, 0, 0] = -R1_2_3
+    T[6, 0, 1] = R1_1_3
+    T[6, 0, 2] = -S1
+    T[6, 0, 3] = P1_2
     T[6, 1, 0] = -R2_2_3
+    T[6, 1, 1] = R2_1_3
+    T[6, 1, 2] = C1
+    T[6, 1, 3] = P2_2
     T[6, 2, 0] = -S7
-    T[8, 0, 1] = T[9, 0, 1] = -R1_1_3
-    T[8, 1, 1] = T[9, 1, 1] = -R2_1_3
+    T[6, 2, 1] = -C7
+    T[7, 0, 0] = R1_1_2
+    T[7, 0, 1] = R1_2_2
+    T[7, 0, 2] = -S1
+    T[7, 0, 3] = P1_8
+    T[7, 1, 0] = R2_1_2
+    T[7, 1, 1] = R2_2_2
+    T[7, 1, 2] = C1
+    T[7, 1, 3] = P2_8
+    T[7, 2, 0] = -S2
+    T[7, 2, 1] = -C2
+    T[7, 2, 3] = P3_8
+    T[8, 0, 0] = R1_2_3
+    T[8, 0, 1] = -R1_1_3
+    T[8, 0, 2] = -S1
+    T[8, 0, 3] = P1_9
+    T[8, 1, 0] = R2_2_3
+    T[8, 1, 1] = -R2_1_3
+    T[8, 1, 2] = C1
+    T[8, 1, 3] = P2_9
+    T[8, 2, 0] = S7
+    T[8, 2, 1] = C7
+    T[8, 2, 3] = P3_9
+    T[9, 0, 0] = R1_2_3
+    T[9, 0, 1] = -R1_1_3
+    T[9, 0, 2] = -S1
+    T[9, 0, 3] = P1_9
+    T[9, 1, 0] = R2_2_3
+    T[9, 1, 1] = -R2_1_3
+    T[9, 1, 2] = C1
+    T[9, 1, 3] = P2_9
+    T[9, 2, 0] = S7
+    T[9, 2, 1] = C7
+    T[9, 2, 3] = P3_9
     # Constants
     T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = 1.0
     T[6, 3, 3] = T[7, 3, 3] = T[8, 3, 3] = T[9, 3, 3] = 1.0

@@ -19,19 +19,20 @@ Torques     delivered by the actuators, so friction enters with a plus: Gamma = 
             FS*sign(qd) + OFFSET
 Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY
             MZ first moments
-Element     Ia      inertia: along q1, q2, q3, q4, q6, q7, q8
-Element     FV      viscous: along q1, q2, q3, q4, q6, q7, q8
-Element     FS      coulomb: along q1, q2, q3, q4, q6, q7, q8
-Element     OFFSET  offset: along q1, q2, q3, q4, q6, q7, q8
+Elements    along s = G q: Gamma gets G' times the force along s
+    Ia      inertia: along q1, q2, q3, q4, q6, q7, q8
+    FV      viscous: along q1, q2, q3, q4, q6, q7, q8
+    FS      coulomb: along q1, q2, q3, q4, q6, q7, q8
+    OFFSET  offset: along q1, q2, q3, q4, q6, q7, q8
 
 Base parameters, 67 of 108; Gautier and Khalil (1990)
     exact, proved modulo primes
-    FORMULAS says what they are made of; what it leaves out is as it is
+    FORMULAS has those that combine several; the others are standard parameters
     No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1
 
 Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3
-            column 1, Z132 component 1 in frame 3 of the axis of joint 2; a letter at the end is a
-            part that several share, N16a of N16
+            column 1, Z132 component 1 in frame 3 of the axis of joint 2; what several share is
+            named by its factors, C4DV134, by its function, signQP1, or by a letter, N16a in N16
     th   joint angle with its constant, rad
     C    cosine of a joint angle or of a sum of angles
     S    sine of a joint angle or of a sum of angles
@@ -85,7 +86,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 1946f823f2e9fe97b0844ac82f6bc12a70856ac6bd77f36d2e8a82e0b0245272
+sha256 of all but these lines: 778f71629490e614b8bc56f4bb7148e432ac374ca596ad3d4eb9610ab3280ef3
 """
 
 import numpy as np
@@ -270,7 +271,8 @@ def _package(*arrays):
     if any(type(x).__module__.startswith("casadi") for x in arrays):
         return _Symbols()
     others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
-    if all(isinstance(x, np.ndarray | np.generic) for x in others):
+    others = [x for x in others if not isinstance(x, np.ndarray | np.generic)]
+    if not others:
         return np if _IN_PLACE else _Arrays(np, arrays)
     try:
         from array_api_compat import array_namespace
@@ -279,7 +281,13 @@ def _package(*arrays):
             f"arrays of {type(others[0]).__module__} need array_api_compat: "
             "pip install array-api-compat"
         ) from error
-    return _Arrays(array_namespace(*arrays), arrays)
+    try:
+        return _Arrays(array_namespace(*others), others)
+    except TypeError as error:
+        packages = " and ".join(sorted({type(x).__module__.partition(".")[0] for x in others}))
+        if " and " not in packages:
+            raise
+        raise TypeError(f"arrays of {packages}; expected states and X of one package") from error
 
 
 class _Arrays:
@@ -318,11 +326,19 @@ class _Arrays:
 
     def rows(self, x):
         """x[..., k], one by one."""
+        if self.package is not np and isinstance(x, np.ndarray | list | tuple):
+            raise TypeError(
+                f"states of {type(x).__name__} beside states or X of {self.package.__name__}; "
+                "make the states arrays of that package (X may be NumPy's)"
+            )
         if x.shape[-1:] != (7,):
             raise ValueError(f"state of shape {x.shape}; expected (..., 7)")
         return [x[..., k] for k in range(7)]
 
     def parameters(self, X):
+        """X[k], one by one; NumPy's as plain numbers."""
+        if self.package is not np and isinstance(X, np.ndarray | list | tuple):
+            return _parameters(_real(X, "X")).tolist()
         _parameters(X)
         return [X[k] for k in range(67)]
 
@@ -363,9 +379,9 @@ class _Symbols:
         if len(shape) == 3:
             first = [{k[1:]: x for k, x in table.items() if k[0] == i} for i in range(shape[0])]
             return [self.gathered(entries, shape[1:], like) for entries in first]
-        matrix = self.package.SX(*(*shape, 1)[:2])
+        matrix = self.package.SX(*(*shape, 1, 1)[:2])
         for place, x in table.items():
-            matrix[place] = x
+            matrix[place or 0] = x
         return matrix
 
     def solve(self, A, b):
@@ -466,9 +482,18 @@ def base_parameters(
     order of STANDARD_PARAMETERS.
     """
     if hasattr(standard, "keys"):
-        standard = [standard[name] for name in STANDARD_PARAMETERS]
+        rest = [x for x in STANDARD_PARAMETERS if x not in standard and x not in NO_EFFECT]
+        if rest:
+            raise ValueError(f"standard: no value of {', '.join(rest)}")
+        standard = [standard.get(name) for name in STANDARD_PARAMETERS]
         xp = _package(*standard)
     else:
+        shape = tuple(standard.shape if hasattr(standard, "shape") else np.shape(standard))
+        if shape[:1] != (108,):
+            raise ValueError(
+                f"standard of shape {shape}; expected (108,) in the order of "
+                "STANDARD_PARAMETERS, or a mapping by name"
+            )
         xp = _package(standard)
         standard = standard if xp is np else [standard[k] for k in range(108)]
     (
@@ -576,8 +601,8 @@ def inverse_dynamics(
 
     Shape (N, 7).
     """
-    return _evaluated(_inverse_dynamics_block, (7,), (q, qd, qdd), (X,), (D2, RL2, D4, D6, D7, RL8,
-        GX, GZ))
+    return _evaluated(_inverse_dynamics_block, (7,), (q, qd, qdd), (X,),
+        (D2, RL2, D4, D6, D7, RL8, GX, GZ))
 
 
 def inertia_matrix(
@@ -628,8 +653,8 @@ def frame_poses(
 
     Shape (N, 8, 4, 4).
     """
-    return _evaluated(_frame_poses_block, (8, 4, 4), (q,), (), (D2, RL2, D4, D5, RL5, B6, D6, D7,
-        RL8))
+    return _evaluated(_frame_poses_block, (8, 4, 4), (q,), (),
+        (D2, RL2, D4, D5, RL5, B6, D6, D7, RL8))
 
 
 def forward_dynamics(
@@ -664,8 +689,8 @@ def jacobian(
     frame = 8 if frame is None else frame
     if frame not in range(1, 9):
         raise ValueError(f"frame {frame!r}; expected 1 to 8")
-    return _evaluated(_jacobian_block, (6, 7), (q,), (), (frame, (D2, RL2, D4, D5, RL5, B6, D6, D7,
-        RL8), ()))
+    return _evaluated(_jacobian_block, (6, 7), (q,), (),
+        (frame, (D2, RL2, D4, D5, RL5, B6, D6, D7, RL8), ()))
 
 
 def _jacobian_block(xp, q, J, frame, posing, moving):
@@ -699,8 +724,20 @@ def _moving(xp):
     }
 
 
+def _regressor_block(xp, q, qd, qdd, D, D2, RL2, D4, D6, D7, RL8, GX, GZ):
+    """Fill D, shape (67, 7, N), where it is not constant, from q, qd, qdd (7, N)."""
+    _regressor, _ = _motion(xp, q, qd, qdd, D2, RL2, D4, D6, D7, RL8, GX, GZ)
+    _regressor(D)
+
+
+def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X, D2, RL2, D4, D6, D7, RL8, GX, GZ):
+    """Fill GAM, shape (7, N), from q, qd, qdd (7, N)."""
+    _, _torques = _motion(xp, q, qd, qdd, D2, RL2, D4, D6, D7, RL8, GX, GZ)
+    _torques(GAM, X)
+
+
 def _motion(xp, q, qd, qdd, D2, RL2, D4, D6, D7, RL8, GX, GZ):
-    """Velocities and accelerations of the links, which regressor and inverse_dynamics share."""
+    """Motion of the links. Returns two functions that go on from it: to D, and with X to GAM."""
     # Inputs
     q1, q2, q3, q4, q6, q7, q8 = q
     QP1, QP2, QP3, QP4, QP6, QP7, QP8 = qd
@@ -875,330 +912,288 @@ def _motion(xp, q, qd, qdd, D2, RL2, D4, D6, D7, RL8, GX, GZ):
     VP18 = C8*VSP18 + S8*VSP38
     VP28 = C8*VSP38 - S8*VSP18
     # Friction, actuators
-    GAM1a = xp.sign(QP1)
-    GAM2a = xp.sign(QP2)
-    GAM3a = xp.sign(QP3)
-    GAM4a = xp.sign(QP4)
-    GAM5a = xp.sign(QP6)
-    GAM6a = xp.sign(QP7)
-    GAM7a = xp.sign(QP8)
-    return (
-        C2, S2, r3, C4, S4, C6, S6, C7, S7, C67, S67, C8, S8, DV331, VP11, VP21, S2QDP1, C2QDP1,
-        DV232, WP12, DV132, DV122, DW232, DW312, DW122, U112, U122, U212, U222, U312, U322,
-        VSP22, VP12, VP22, DF2MZ3, VP13, VP23, VP33, WP14, WP34, DV124, DV134, DV234, DW234,
-        DW314, DW124, U114, U124, U134, U214, U224, U234, U314, U324, VSP24, VP14, VP24, S6QDP1,
-        C6QDP1, DV236, WP16, DV136, DV126, DW236, DW316, DW126, U126, U216, U316, U326, VSP16,
-        VP16, VP26, WP37, S67QDP1, C67QDP1, DV237, WP17, DV137, DV127, DW237, DW317, DW127,
-        U117, U127, U217, U227, U317, U327, VSP37, VP17, VP27, WP18, WP38, DV128, DV138, DV238,
-        DW238, DW318, DW128, U118, U128, U138, U218, U228, U238, U318, U328, VSP28, VP18, VP28,
-        GAM1a, GAM2a, GAM3a, GAM4a, GAM5a, GAM6a, GAM7a
-    )
+    signQP1 = xp.sign(QP1)
+    signQP2 = xp.sign(QP2)
+    signQP3 = xp.sign(QP3)
+    signQP4 = xp.sign(QP4)
+    signQP6 = xp.sign(QP6)
+    signQP7 = xp.sign(QP7)
+    signQP8 = xp.sign(QP8)
 
+    def _regressor(D):
+        # Joint axes Z and velocities V seen from link 2
+        V121 = -RL2*C2
+        V221 = RL2*S2
+        # Joint axes Z and velocities V seen from link 3
+        V131 = D2 + S2*r3
+        # Joint axes Z and velocities V seen from link 4
+        Z141 = C2*C4
+        Z241 = -C2*S4
+        V341 = D4*C2 - V121
+        VS341 = -V221 - D4*S2
+        V141 = S4*V131 + C4*VS341
+        V241 = C4*V131 - S4*VS341
+        # Joint axes Z and velocities V seen from link 7
+        V371 = D6 + D7*C6
+        V176 = D7*S7
+        V276 = D7*C7
+        # Joint axes Z and velocities V seen from link 8
+        Z181 = -S67*C8
+        Z281 = S67*S8
+        VS381 = V371 + RL8*S67
+        V181 = S8*VS381
+        V281 = C8*VS381
+        VS186 = RL8 + V176
+        V186 = C8*VS186
+        V286 = -S8*VS186
+        V187 = RL8*C8
+        V287 = -RL8*S8
+        # Contributions that several joints share
+        U112V121 = U112*V121
+        U212V221 = U212*V221
+        U122V121 = U122*V121
+        U222V221 = U222*V221
+        DV134Z241 = DV134*Z241
+        C4DV134 = C4*DV134
+        S4U214 = S4*U214
+        C4U124 = C4*U124
+        DV138Z281 = DV138*Z281
+        C8DV138 = C8*DV138
+        DN6XX8 = S8*WP18 + C8DV138
+        DN6XY8 = C8*U328 - S8*U318
+        DN6XZ8 = S8*U218 + C8*DW318
+        DN6YZ8 = S8*DW238 - C8*U128
+        DN6ZZ8 = S8*DV238 - C8DV138
+        DN6MX8 = C8*VSP28
+        DN6MY8 = -S8*VSP28
+        # Joint 1
+        D[0, 0] = QDP1                                                    # DG1ZZ1
+        D[1, 0] = VP21                                                    # DG1MX1
+        D[2, 0] = -VP11                                                   # DG1MY1
+        D[3, 0] = QP1                                                     # DG1FV1
+        D[4, 0] = signQP1                                                 # DG1FS1
+        D[6, 0] = -S2*WP12 - C2*DV132                                     # DG1XX2
+        D[7, 0] = S2*U312 - C2*U322                                       # DG1XY2
+        D[8, 0] = -S2*U212 - C2*DW312                                     # DG1XZ2
+        D[9, 0] = C2*U122 - S2*DW232                                      # DG1YZ2
+        D[11, 0] = C2*VSP22 + U112V121 + U212V221 + D2*U312               # DG1MX2
+        D[12, 0] = U122V121 + U222V221 + D2*U322 - S2*VSP22               # DG1MY2
+        D[16, 0] = C2*VP23 + S2QDP1*V221 - S2*VP33 - DV331*V131 - C2QDP1*V121  # DG1MX3
+        D[17, 0] = -C2*VP13 - U212V221 - U112V121 - U312*V131             # DG1MY3
+        D[18, 0] = S2*VP13 - U222V221 - U122V121 - U322*V131              # DG1MZ3
+        D[19, 0] = VP13*V131 - VP23*V121 - VP33*V221                      # DG1M3
+        D[24, 0] = WP14*Z141 + DV134Z241 - S2*DV124                       # DG1XX4
+        D[25, 0] = U324*Z241 + S2*DW124 - U314*Z141                       # DG1XY4
+        D[26, 0] = U214*Z141 + DW314*Z241 - S2*U234                       # DG1XZ4
+        D[27, 0] = DW234*Z141 + S2*U134 - U124*Z241                       # DG1YZ4
+        D[28, 0] = DV234*Z141 + S2*WP34 - DV134Z241                       # DG1ZZ4
+        D[29, 0] = S2*VP24 + U114*V141 + U214*V241 + U314*V341 - VSP24*Z241  # DG1MX4
+        D[30, 0] = VSP24*Z141 + U124*V141 + U224*V241 + U324*V341 - S2*VP14  # DG1MY4
+        D[35, 0] = -S6*WP16 - C6*DV136                                    # DG1XX6
+        D[36, 0] = S6*U316 - C6*U326                                      # DG1XY6
+        D[37, 0] = -S6*U216 - C6*DW316                                    # DG1XZ6
+        D[38, 0] = C6*U126 - S6*DW236                                     # DG1YZ6
+        D[40, 0] = D6*U316 - C6*VSP16                                     # DG1MX6
+        D[41, 0] = S6*VSP16 + D6*U326                                     # DG1MY6
+        D[45, 0] = -S67*WP17 - C67*DV137                                  # DG1XX7
+        D[46, 0] = S67*U317 - C67*U327                                    # DG1XY7
+        D[47, 0] = -S67*U217 - C67*DW317                                  # DG1XZ7
+        D[48, 0] = C67*U127 - S67*DW237                                   # DG1YZ7
+        D[50, 0] = C67*VSP37 + U317*V371                                  # DG1MX7
+        D[51, 0] = U327*V371 - S67*VSP37                                  # DG1MY7
+        D[56, 0] = WP18*Z181 + DV138Z281 - C67*DV128                      # DG1XX8
+        D[57, 0] = U328*Z281 + C67*DW128 - U318*Z181                      # DG1XY8
+        D[58, 0] = U218*Z181 + DW318*Z281 - C67*U238                      # DG1XZ8
+        D[59, 0] = DW238*Z181 + C67*U138 - U128*Z281                      # DG1YZ8
+        D[60, 0] = DV238*Z181 + C67*WP38 - DV138Z281                      # DG1ZZ8
+        D[61, 0] = VSP28*Z281 + C67*VP28 + U118*V181 + U218*V281          # DG1MX8
+        D[62, 0] = U128*V181 + U228*V281 - VSP28*Z181 - C67*VP18          # DG1MY8
+        # Joint 2
+        D[6, 1] = -DV122                # DG2XX2
+        D[7, 1] = DW122                 # DG2XY2
+        D[8, 1] = -S2QDP1               # DG2XZ2
+        D[9, 1] = -C2QDP1               # DG2YZ2
+        D[10, 1] = QDP2                 # DG2ZZ2
+        D[11, 1] = VP22                 # DG2MX2
+        D[12, 1] = -VP12                # DG2MY2
+        D[13, 1] = QP2                  # DG2FV2
+        D[14, 1] = signQP2              # DG2FS2
+        D[16, 1] = -r3*C2QDP1           # DG2MX3
+        D[17, 1] = VP33 - r3*U112       # DG2MY3
+        D[18, 1] = DF2MZ3 - VP23        # DG2MZ3
+        D[19, 1] = -r3*VP23             # DG2M3
+        D[24, 1] = S4*WP14 + C4DV134    # DG2XX4
+        D[25, 1] = C4*U324 - S4*U314    # DG2XY4
+        D[26, 1] = S4U214 + C4*DW314    # DG2XZ4
+        D[27, 1] = S4*DW234 - C4U124    # DG2YZ4
+        D[28, 1] = S4*DV234 - C4DV134   # DG2ZZ4
+        D[29, 1] = -C4*VSP24 - r3*U314  # DG2MX4
+        D[30, 1] = S4*VSP24 - r3*U324   # DG2MY4
+        # Joint 3
+        D[16, 2] = -S2QDP1           # DG3MX3
+        D[17, 2] = U212              # DG3MY3
+        D[18, 2] = U222              # DG3MZ3
+        D[19, 2] = VP33              # DG3M3
+        D[20, 2] = QDP3              # DG3Ia3
+        D[21, 2] = QP3               # DG3FV3
+        D[22, 2] = signQP3           # DG3FS3
+        D[29, 2] = C4*U114 - S4U214  # DG3MX4
+        D[30, 2] = C4U124 - S4*U224  # DG3MY4
+        # Joint 4
+        D[24, 3] = -DV124   # DG4XX4
+        D[25, 3] = DW124    # DG4XY4
+        D[26, 3] = -U234    # DG4XZ4
+        D[27, 3] = U134     # DG4YZ4
+        D[28, 3] = WP34     # DG4ZZ4
+        D[29, 3] = VP24     # DG4MX4
+        D[30, 3] = -VP14    # DG4MY4
+        D[31, 3] = QDP4     # DG4Ia4
+        D[32, 3] = QP4      # DG4FV4
+        D[33, 3] = signQP4  # DG4FS4
+        # Joint 6
+        D[35, 4] = -DV126                                      # DG6XX6
+        D[36, 4] = DW126                                       # DG6XY6
+        D[37, 4] = -S6QDP1                                     # DG6XZ6
+        D[38, 4] = -C6QDP1                                     # DG6YZ6
+        D[39, 4] = QDP6                                        # DG6ZZ6
+        D[40, 4] = VP26                                        # DG6MX6
+        D[41, 4] = -VP16                                       # DG6MY6
+        D[42, 4] = QP6                                         # DG6FV6
+        D[43, 4] = signQP6                                     # DG6FS6
+        D[45, 4] = -DV127                                      # DG6XX7
+        D[46, 4] = DW127                                       # DG6XY7
+        D[47, 4] = -S67QDP1                                    # DG6XZ7
+        D[48, 4] = -C67QDP1                                    # DG6YZ7
+        D[49, 4] = WP37                                        # DG6ZZ7
+        D[50, 4] = VP27 + U117*V176 + U217*V276                # DG6MX7
+        D[51, 4] = U127*V176 + U227*V276 - VP17                # DG6MY7
+        D[56, 4] = DN6XX8                                      # DG6XX8
+        D[57, 4] = DN6XY8                                      # DG6XY8
+        D[58, 4] = DN6XZ8                                      # DG6XZ8
+        D[59, 4] = DN6YZ8                                      # DG6YZ8
+        D[60, 4] = DN6ZZ8                                      # DG6ZZ8
+        D[61, 4] = DN6MX8 + U118*V186 + U218*V286 - U318*V276  # DG6MX8
+        D[62, 4] = DN6MY8 + U128*V186 + U228*V286 - U328*V276  # DG6MY8
+        # Joint 7
+        D[45, 5] = -DV127                          # DG7XX7
+        D[46, 5] = DW127                           # DG7XY7
+        D[47, 5] = -S67QDP1                        # DG7XZ7
+        D[48, 5] = -C67QDP1                        # DG7YZ7
+        D[49, 5] = WP37                            # DG7ZZ7
+        D[50, 5] = VP27                            # DG7MX7
+        D[51, 5] = -VP17                           # DG7MY7
+        D[52, 5] = QDP7                            # DG7Ia7
+        D[53, 5] = QP7                             # DG7FV7
+        D[54, 5] = signQP7                         # DG7FS7
+        D[56, 5] = DN6XX8                          # DG7XX8
+        D[57, 5] = DN6XY8                          # DG7XY8
+        D[58, 5] = DN6XZ8                          # DG7XZ8
+        D[59, 5] = DN6YZ8                          # DG7YZ8
+        D[60, 5] = DN6ZZ8                          # DG7ZZ8
+        D[61, 5] = DN6MX8 + U118*V187 + U218*V287  # DG7MX8
+        D[62, 5] = DN6MY8 + U128*V187 + U228*V287  # DG7MY8
+        # Joint 8
+        D[56, 6] = -DV128   # DG8XX8
+        D[57, 6] = DW128    # DG8XY8
+        D[58, 6] = -U238    # DG8XZ8
+        D[59, 6] = U138     # DG8YZ8
+        D[60, 6] = WP38     # DG8ZZ8
+        D[61, 6] = VP28     # DG8MX8
+        D[62, 6] = -VP18    # DG8MY8
+        D[63, 6] = QDP8     # DG8Ia8
+        D[64, 6] = QP8      # DG8FV8
+        D[65, 6] = signQP8  # DG8FS8
 
-def _regressor_block(xp, q, qd, qdd, D, D2, RL2, D4, D6, D7, RL8, GX, GZ):
-    """Fill D, shape (67, 7, N), where it is not constant, from q (7, N); qd (7, N); qdd (7, N)."""
-    # Inputs
-    QP1, QP2, QP3, QP4, QP6, QP7, QP8 = qd
-    QDP1, QDP2, QDP3, QDP4, QDP6, QDP7, QDP8 = qdd
-    # Motion of the links
-    (
-        C2, S2, r3, C4, S4, C6, S6, C7, S7, C67, S67, C8, S8, DV331, VP11, VP21, S2QDP1, C2QDP1,
-        _, WP12, DV132, DV122, DW232, DW312, DW122, U112, U122, U212, U222, U312, U322, VSP22,
-        VP12, VP22, DF2MZ3, VP13, VP23, VP33, WP14, WP34, DV124, DV134, DV234, DW234, DW314,
-        DW124, U114, U124, U134, U214, U224, U234, U314, U324, VSP24, VP14, VP24, S6QDP1,
-        C6QDP1, _, WP16, DV136, DV126, DW236, DW316, DW126, U126, U216, U316, U326, VSP16, VP16,
-        VP26, WP37, S67QDP1, C67QDP1, _, WP17, DV137, DV127, DW237, DW317, DW127, U117, U127,
-        U217, U227, U317, U327, VSP37, VP17, VP27, WP18, WP38, DV128, DV138, DV238, DW238,
-        DW318, DW128, U118, U128, U138, U218, U228, U238, U318, U328, VSP28, VP18, VP28, GAM1a,
-        GAM2a, GAM3a, GAM4a, GAM5a, GAM6a, GAM7a
-    ) = _motion(xp, q, qd, qdd, D2, RL2, D4, D6, D7, RL8, GX, GZ)
-    # Joint axes Z and velocities V seen from link 2
-    V121 = -RL2*C2
-    V221 = RL2*S2
-    # Joint axes Z and velocities V seen from link 3
-    V131 = D2 + S2*r3
-    # Joint axes Z and velocities V seen from link 4
-    Z141 = C2*C4
-    Z241 = -C2*S4
-    V341 = D4*C2 - V121
-    VS341 = -V221 - D4*S2
-    V141 = S4*V131 + C4*VS341
-    V241 = C4*V131 - S4*VS341
-    # Joint axes Z and velocities V seen from link 7
-    V371 = D6 + D7*C6
-    V176 = D7*S7
-    V276 = D7*C7
-    # Joint axes Z and velocities V seen from link 8
-    Z181 = -S67*C8
-    Z281 = S67*S8
-    VS381 = V371 + RL8*S67
-    V181 = S8*VS381
-    V281 = C8*VS381
-    VS186 = RL8 + V176
-    V186 = C8*VS186
-    V286 = -S8*VS186
-    V187 = RL8*C8
-    V287 = -RL8*S8
-    # Contributions that several joints share
-    U112V121 = U112*V121
-    U212V221 = U212*V221
-    U122V121 = U122*V121
-    U222V221 = U222*V221
-    DV134Z241 = DV134*Z241
-    C4DV134 = C4*DV134
-    S4U214 = S4*U214
-    C4U124 = C4*U124
-    DV138Z281 = DV138*Z281
-    C8DV138 = C8*DV138
-    DN6XX8 = S8*WP18 + C8DV138
-    DN6XY8 = C8*U328 - S8*U318
-    DN6XZ8 = S8*U218 + C8*DW318
-    DN6YZ8 = S8*DW238 - C8*U128
-    DN6ZZ8 = S8*DV238 - C8DV138
-    DN6MX8 = C8*VSP28
-    DN6MY8 = -S8*VSP28
-    # Joint 1
-    D[0, 0] = QDP1                                                    # DG1ZZ1
-    D[1, 0] = VP21                                                    # DG1MX1
-    D[2, 0] = -VP11                                                   # DG1MY1
-    D[3, 0] = QP1                                                     # DG1FV1
-    D[4, 0] = GAM1a                                                   # DG1FS1
-    D[6, 0] = -S2*WP12 - C2*DV132                                     # DG1XX2
-    D[7, 0] = S2*U312 - C2*U322                                       # DG1XY2
-    D[8, 0] = -S2*U212 - C2*DW312                                     # DG1XZ2
-    D[9, 0] = C2*U122 - S2*DW232                                      # DG1YZ2
-    D[11, 0] = C2*VSP22 + U112V121 + U212V221 + D2*U312               # DG1MX2
-    D[12, 0] = U122V121 + U222V221 + D2*U322 - S2*VSP22               # DG1MY2
-    D[16, 0] = C2*VP23 + S2QDP1*V221 - S2*VP33 - DV331*V131 - C2QDP1*V121  # DG1MX3
-    D[17, 0] = -C2*VP13 - U212V221 - U112V121 - U312*V131             # DG1MY3
-    D[18, 0] = S2*VP13 - U222V221 - U122V121 - U322*V131              # DG1MZ3
-    D[19, 0] = VP13*V131 - VP23*V121 - VP33*V221                      # DG1M3
-    D[24, 0] = WP14*Z141 + DV134Z241 - S2*DV124                       # DG1XX4
-    D[25, 0] = U324*Z241 + S2*DW124 - U314*Z141                       # DG1XY4
-    D[26, 0] = U214*Z141 + DW314*Z241 - S2*U234                       # DG1XZ4
-    D[27, 0] = DW234*Z141 + S2*U134 - U124*Z241                       # DG1YZ4
-    D[28, 0] = DV234*Z141 + S2*WP34 - DV134Z241                       # DG1ZZ4
-    D[29, 0] = S2*VP24 + U114*V141 + U214*V241 + U314*V341 - VSP24*Z241  # DG1MX4
-    D[30, 0] = VSP24*Z141 + U124*V141 + U224*V241 + U324*V341 - S2*VP14  # DG1MY4
-    D[35, 0] = -S6*WP16 - C6*DV136                                    # DG1XX6
-    D[36, 0] = S6*U316 - C6*U326                                      # DG1XY6
-    D[37, 0] = -S6*U216 - C6*DW316                                    # DG1XZ6
-    D[38, 0] = C6*U126 - S6*DW236                                     # DG1YZ6
-    D[40, 0] = D6*U316 - C6*VSP16                                     # DG1MX6
-    D[41, 0] = S6*VSP16 + D6*U326                                     # DG1MY6
-    D[45, 0] = -S67*WP17 - C67*DV137                                  # DG1XX7
-    D[46, 0] = S67*U317 - C67*U327                                    # DG1XY7
-    D[47, 0] = -S67*U217 - C67*DW317                                  # DG1XZ7
-    D[48, 0] = C67*U127 - S67*DW237                                   # DG1YZ7
-    D[50, 0] = C67*VSP37 + U317*V371                                  # DG1MX7
-    D[51, 0] = U327*V371 - S67*VSP37                                  # DG1MY7
-    D[56, 0] = WP18*Z181 + DV138Z281 - C67*DV128                      # DG1XX8
-    D[57, 0] = U328*Z281 + C67*DW128 - U318*Z181                      # DG1XY8
-    D[58, 0] = U218*Z181 + DW318*Z281 - C67*U238                      # DG1XZ8
-    D[59, 0] = DW238*Z181 + C67*U138 - U128*Z281                      # DG1YZ8
-    D[60, 0] = DV238*Z181 + C67*WP38 - DV138Z281                      # DG1ZZ8
-    D[61, 0] = VSP28*Z281 + C67*VP28 + U118*V181 + U218*V281          # DG1MX8
-    D[62, 0] = U128*V181 + U228*V281 - VSP28*Z181 - C67*VP18          # DG1MY8
-    # Joint 2
-    D[6, 1] = -DV122                # DG2XX2
-    D[7, 1] = DW122                 # DG2XY2
-    D[8, 1] = -S2QDP1               # DG2XZ2
-    D[9, 1] = -C2QDP1               # DG2YZ2
-    D[10, 1] = QDP2                 # DG2ZZ2
-    D[11, 1] = VP22                 # DG2MX2
-    D[12, 1] = -VP12                # DG2MY2
-    D[13, 1] = QP2                  # DG2FV2
-    D[14, 1] = GAM2a                # DG2FS2
-    D[16, 1] = -r3*C2QDP1           # DG2MX3
-    D[17, 1] = VP33 - r3*U112       # DG2MY3
-    D[18, 1] = DF2MZ3 - VP23        # DG2MZ3
-    D[19, 1] = -r3*VP23             # DG2M3
-    D[24, 1] = S4*WP14 + C4DV134    # DG2XX4
-    D[25, 1] = C4*U324 - S4*U314    # DG2XY4
-    D[26, 1] = S4U214 + C4*DW314    # DG2XZ4
-    D[27, 1] = S4*DW234 - C4U124    # DG2YZ4
-    D[28, 1] = S4*DV234 - C4DV134   # DG2ZZ4
-    D[29, 1] = -C4*VSP24 - r3*U314  # DG2MX4
-    D[30, 1] = S4*VSP24 - r3*U324   # DG2MY4
-    # Joint 3
-    D[16, 2] = -S2QDP1           # DG3MX3
-    D[17, 2] = U212              # DG3MY3
-    D[18, 2] = U222              # DG3MZ3
-    D[19, 2] = VP33              # DG3M3
-    D[20, 2] = QDP3              # DG3Ia3
-    D[21, 2] = QP3               # DG3FV3
-    D[22, 2] = GAM3a             # DG3FS3
-    D[29, 2] = C4*U114 - S4U214  # DG3MX4
-    D[30, 2] = C4U124 - S4*U224  # DG3MY4
-    # Joint 4
-    D[24, 3] = -DV124  # DG4XX4
-    D[25, 3] = DW124   # DG4XY4
-    D[26, 3] = -U234   # DG4XZ4
-    D[27, 3] = U134    # DG4YZ4
-    D[28, 3] = WP34    # DG4ZZ4
-    D[29, 3] = VP24    # DG4MX4
-    D[30, 3] = -VP14   # DG4MY4
-    D[31, 3] = QDP4    # DG4Ia4
-    D[32, 3] = QP4     # DG4FV4
-    D[33, 3] = GAM4a   # DG4FS4
-    # Joint 6
-    D[35, 4] = -DV126                                      # DG6XX6
-    D[36, 4] = DW126                                       # DG6XY6
-    D[37, 4] = -S6QDP1                                     # DG6XZ6
-    D[38, 4] = -C6QDP1                                     # DG6YZ6
-    D[39, 4] = QDP6                                        # DG6ZZ6
-    D[40, 4] = VP26                                        # DG6MX6
-    D[41, 4] = -VP16                                       # DG6MY6
-    D[42, 4] = QP6                                         # DG6FV6
-    D[43, 4] = GAM5a                                       # DG6FS6
-    D[45, 4] = -DV127                                      # DG6XX7
-    D[46, 4] = DW127                                       # DG6XY7
-    D[47, 4] = -S67QDP1                                    # DG6XZ7
-    D[48, 4] = -C67QDP1                                    # DG6YZ7
-    D[49, 4] = WP37                                        # DG6ZZ7
-    D[50, 4] = VP27 + U117*V176 + U217*V276                # DG6MX7
-    D[51, 4] = U127*V176 + U227*V276 - VP17                # DG6MY7
-    D[56, 4] = DN6XX8                                      # DG6XX8
-    D[57, 4] = DN6XY8                                      # DG6XY8
-    D[58, 4] = DN6XZ8                                      # DG6XZ8
-    D[59, 4] = DN6YZ8                                      # DG6YZ8
-    D[60, 4] = DN6ZZ8                                      # DG6ZZ8
-    D[61, 4] = DN6MX8 + U118*V186 + U218*V286 - U318*V276  # DG6MX8
-    D[62, 4] = DN6MY8 + U128*V186 + U228*V286 - U328*V276  # DG6MY8
-    # Joint 7
-    D[45, 5] = -DV127                          # DG7XX7
-    D[46, 5] = DW127                           # DG7XY7
-    D[47, 5] = -S67QDP1                        # DG7XZ7
-    D[48, 5] = -C67QDP1                        # DG7YZ7
-    D[49, 5] = WP37                            # DG7ZZ7
-    D[50, 5] = VP27                            # DG7MX7
-    D[51, 5] = -VP17                           # DG7MY7
-    D[52, 5] = QDP7                            # DG7Ia7
-    D[53, 5] = QP7                             # DG7FV7
-    D[54, 5] = GAM6a                           # DG7FS7
-    D[56, 5] = DN6XX8                          # DG7XX8
-    D[57, 5] = DN6XY8                          # DG7XY8
-    D[58, 5] = DN6XZ8                          # DG7XZ8
-    D[59, 5] = DN6YZ8                          # DG7YZ8
-    D[60, 5] = DN6ZZ8                          # DG7ZZ8
-    D[61, 5] = DN6MX8 + U118*V187 + U218*V287  # DG7MX8
-    D[62, 5] = DN6MY8 + U128*V187 + U228*V287  # DG7MY8
-    # Joint 8
-    D[56, 6] = -DV128  # DG8XX8
-    D[57, 6] = DW128   # DG8XY8
-    D[58, 6] = -U238   # DG8XZ8
-    D[59, 6] = U138    # DG8YZ8
-    D[60, 6] = WP38    # DG8ZZ8
-    D[61, 6] = VP28    # DG8MX8
-    D[62, 6] = -VP18   # DG8MY8
-    D[63, 6] = QDP8    # DG8Ia8
-    D[64, 6] = QP8     # DG8FV8
-    D[65, 6] = GAM7a   # DG8FS8
+    def _torques(GAM, X):
+        # Inputs
+        (
+            ZZ1R, MX1R, MY1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2, MY2, FV2, FS2,
+            OFFSET2, MX3R, MY3R, MZ3, M3R, Ia3, FV3, FS3, OFFSET3, XX4R, XY4R, XZ4R, YZ4R, ZZ4R,
+            MX4R, MY4R, Ia4, FV4, FS4, OFFSET4, XX6R, XY6, XZ6R, YZ6, ZZ6R, MX6R, MY6, FV6, FS6,
+            OFFSET6, XX7R, XY7, XZ7, YZ7, ZZ7R, MX7, MY7R, Ia7, FV7, FS7, OFFSET7, XX8R, XY8, XZ8,
+            YZ8, ZZ8, MX8, MY8, Ia8, FV8, FS8, OFFSET8
+        ) = X
+        # Joint 8
+        F18 = MX8*U118 + MY8*U128
+        F28 = MX8*U218 + MY8*U228
+        F38 = MX8*U318 + MY8*U328
+        N18 = XX8R*WP18 + ZZ8*DV238 + YZ8*DW238 + XZ8*U218 - XY8*U318 - MY8*VSP28
+        N28 = (XX8R - ZZ8)*DV138 + XZ8*DW318 + XY8*U328 + MX8*VSP28 - YZ8*U128
+        N38 = ZZ8*WP38 + XY8*DW128 + YZ8*U138 + MX8*VP28 - XX8R*DV128 - XZ8*U238 - MY8*VP18
+        FDI18 = C8*F18 - S8*F28
+        FDI38 = S8*F18 + C8*F28
+        # Joint 7
+        F17 = MX7*U117 + MY7R*U127
+        F27 = MX7*U217 + MY7R*U227
+        F37 = MX7*U317 + MY7R*U327
+        E17 = FDI18 + F17
+        E27 = F27 - F38
+        E37 = FDI38 + F37
+        N17 = XX7R*WP17 + ZZ7R*DV237 + YZ7*DW237 + XZ7*U217 + MY7R*VSP37 - XY7*U317
+        N27 = (XX7R - ZZ7R)*DV137 + XZ7*DW317 + XY7*U327 - YZ7*U127 - MX7*VSP37
+        N37 = ZZ7R*WP37 + XY7*DW127 + MX7*VP27 - XX7R*DV127 - YZ7*C67QDP1 - XZ7*S67QDP1 - MY7R*VP17
+        NE17 = C8*N18 + N17 - S8*N28 - RL8*FDI38
+        NE27 = N27 - N38
+        NE37 = S8*N18 + C8*N28 + RL8*FDI18 + N37
+        FDI27 = S7*E17 + C7*E27
+        # Joint 6
+        F36 = MX6R*U316 + MY6*U326
+        E36 = E37 + F36
+        N16 = XX6R*WP16 + ZZ6R*DV236 + YZ6*DW236 + XZ6R*U216 - XY6*U316 - MY6*VSP16
+        N26 = (XX6R - ZZ6R)*DV136 + XZ6R*DW316 + XY6*U326 + MX6R*VSP16 - YZ6*U126
+        N36 = ZZ6R*QDP6 + XY6*DW126 + MX6R*VP26 - XX6R*DV126 - YZ6*C6QDP1 - XZ6R*S6QDP1 - MY6*VP16
+        NE16 = C7*NE17 + N16 - S7*NE27
+        NE26 = S7*NE17 + C7*NE27 + N26 - D7*E37
+        NE36 = NE37 + D7*FDI27 + N36
+        # Joint 4
+        F14 = MX4R*U114 + MY4R*U124
+        F24 = MX4R*U214 + MY4R*U224
+        F34 = MX4R*U314 + MY4R*U324
+        N14 = XX4R*WP14 + ZZ4R*DV234 + YZ4R*DW234 + XZ4R*U214 + MY4R*VSP24 - XY4R*U314
+        N24 = (XX4R - ZZ4R)*DV134 + XZ4R*DW314 + XY4R*U324 - YZ4R*U124 - MX4R*VSP24
+        N34 = ZZ4R*WP34 + XY4R*DW124 + YZ4R*U134 + MX4R*VP24 - XX4R*DV124 - XZ4R*U234 - MY4R*VP14
+        FDI14 = S4*F14 + C4*F24
+        FDI34 = C4*F14 - S4*F24
+        # Joint 3
+        F13 = M3R*VP13 - MX3R*DV331 - MY3R*U312 - MZ3*U322
+        F23 = M3R*VP23 + MX3R*C2QDP1 + MY3R*U112 + MZ3*U122
+        F33 = M3R*VP33 + MY3R*U212 + MZ3*U222 - MX3R*S2QDP1
+        E13 = FDI14 + F13
+        E23 = F34 + F23
+        E33 = FDI34 + F33
+        N13 = MY3R*VP33 - MZ3*VP23
+        N23 = MZ3*VP13 - MX3R*VP33
+        N33 = MX3R*VP23 - MY3R*VP13
+        NE13 = S4*N14 + C4*N24 + N13
+        NE23 = N34 + N23 - D4*FDI34
+        NE33 = C4*N14 + D4*F34 + N33 - S4*N24
+        # Joint 2
+        F12 = MX2*U112 + MY2*U122
+        F22 = MX2*U212 + MY2*U222
+        F32 = MX2*U312 + MY2*U322
+        E12 = F12 - E23
+        E22 = F22 - E33
+        E32 = E13 + F32
+        N12 = XX2R*WP12 + ZZ2R*DV232 + YZ2R*DW232 + XZ2R*U212 + MY2*VSP22 - XY2R*U312
+        N22 = (XX2R - ZZ2R)*DV132 + XZ2R*DW312 + XY2R*U322 - YZ2R*U122 - MX2*VSP22
+        N32 = ZZ2R*QDP2 + XY2R*DW122 + MX2*VP22 - XX2R*DV122 - YZ2R*C2QDP1 - XZ2R*S2QDP1 - MY2*VP12
+        NE12 = N12 - NE23 - r3*E13
+        NE22 = N22 - NE33
+        NE32 = NE13 + N32 - r3*E23
+        FDI12 = C2*E12 - S2*E22
+        # Joint 1
+        N31 = ZZ1R*QDP1 + MX1R*VP21 - MY1R*VP11
+        NE31 = D6*E36 + D2*E32 + N31 - S6*NE16 - C6*NE26 - S2*NE12 - C2*NE22 - RL2*FDI12
+        # Torques
+        GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*signQP1
+        GAM[1] = OFFSET2 + NE32 + FV2*QP2 + FS2*signQP2
+        GAM[2] = OFFSET3 + E33 + Ia3*QDP3 + FV3*QP3 + FS3*signQP3
+        GAM[3] = OFFSET4 + N34 + Ia4*QDP4 + FV4*QP4 + FS4*signQP4
+        GAM[4] = OFFSET6 + NE36 + FV6*QP6 + FS6*signQP6
+        GAM[5] = OFFSET7 + NE37 + Ia7*QDP7 + FV7*QP7 + FS7*signQP7
+        GAM[6] = OFFSET8 + N38 + Ia8*QDP8 + FV8*QP8 + FS8*signQP8
 
-
-def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X, D2, RL2, D4, D6, D7, RL8, GX, GZ):
-    """Fill GAM, shape (7, N), from q (7, N); qd (7, N); qdd (7, N)."""
-    # Inputs
-    QP1, QP2, QP3, QP4, QP6, QP7, QP8 = qd
-    QDP1, QDP2, QDP3, QDP4, QDP6, QDP7, QDP8 = qdd
-    (
-        ZZ1R, MX1R, MY1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2, MY2, FV2, FS2,
-        OFFSET2, MX3R, MY3R, MZ3, M3R, Ia3, FV3, FS3, OFFSET3, XX4R, XY4R, XZ4R, YZ4R, ZZ4R,
-        MX4R, MY4R, Ia4, FV4, FS4, OFFSET4, XX6R, XY6, XZ6R, YZ6, ZZ6R, MX6R, MY6, FV6, FS6,
-        OFFSET6, XX7R, XY7, XZ7, YZ7, ZZ7R, MX7, MY7R, Ia7, FV7, FS7, OFFSET7, XX8R, XY8, XZ8,
-        YZ8, ZZ8, MX8, MY8, Ia8, FV8, FS8, OFFSET8
-    ) = X
-    # Motion of the links
-    (
-        C2, S2, r3, C4, S4, C6, S6, C7, S7, _, _, C8, S8, DV331, VP11, VP21, S2QDP1, C2QDP1,
-        DV232, WP12, DV132, DV122, DW232, DW312, DW122, U112, U122, U212, U222, U312, U322,
-        VSP22, VP12, VP22, _, VP13, VP23, VP33, WP14, WP34, DV124, DV134, DV234, DW234, DW314,
-        DW124, U114, U124, U134, U214, U224, U234, U314, U324, VSP24, VP14, VP24, S6QDP1,
-        C6QDP1, DV236, WP16, DV136, DV126, DW236, DW316, DW126, U126, U216, U316, U326, VSP16,
-        VP16, VP26, WP37, S67QDP1, C67QDP1, DV237, WP17, DV137, DV127, DW237, DW317, DW127,
-        U117, U127, U217, U227, U317, U327, VSP37, VP17, VP27, WP18, WP38, DV128, DV138, DV238,
-        DW238, DW318, DW128, U118, U128, U138, U218, U228, U238, U318, U328, VSP28, VP18, VP28,
-        GAM1a, GAM2a, GAM3a, GAM4a, GAM5a, GAM6a, GAM7a
-    ) = _motion(xp, q, qd, qdd, D2, RL2, D4, D6, D7, RL8, GX, GZ)
-    # Joint 8
-    F18 = MX8*U118 + MY8*U128
-    F28 = MX8*U218 + MY8*U228
-    F38 = MX8*U318 + MY8*U328
-    N18 = XX8R*WP18 + ZZ8*DV238 + YZ8*DW238 + XZ8*U218 - XY8*U318 - MY8*VSP28
-    N28 = (XX8R - ZZ8)*DV138 + XZ8*DW318 + XY8*U328 + MX8*VSP28 - YZ8*U128
-    N38 = ZZ8*WP38 + XY8*DW128 + YZ8*U138 + MX8*VP28 - XX8R*DV128 - XZ8*U238 - MY8*VP18
-    FDI18 = C8*F18 - S8*F28
-    FDI38 = S8*F18 + C8*F28
-    # Joint 7
-    F17 = MX7*U117 + MY7R*U127
-    F27 = MX7*U217 + MY7R*U227
-    F37 = MX7*U317 + MY7R*U327
-    E17 = FDI18 + F17
-    E27 = F27 - F38
-    E37 = FDI38 + F37
-    N17 = XX7R*WP17 + ZZ7R*DV237 + YZ7*DW237 + XZ7*U217 + MY7R*VSP37 - XY7*U317
-    N27 = (XX7R - ZZ7R)*DV137 + XZ7*DW317 + XY7*U327 - YZ7*U127 - MX7*VSP37
-    N37 = ZZ7R*WP37 + XY7*DW127 + MX7*VP27 - XX7R*DV127 - YZ7*C67QDP1 - XZ7*S67QDP1 - MY7R*VP17
-    NE17 = C8*N18 + N17 - S8*N28 - RL8*FDI38
-    NE27 = N27 - N38
-    NE37 = S8*N18 + C8*N28 + RL8*FDI18 + N37
-    FDI27 = S7*E17 + C7*E27
-    # Joint 6
-    F36 = MX6R*U316 + MY6*U326
-    E36 = E37 + F36
-    N16 = XX6R*WP16 + ZZ6R*DV236 + YZ6*DW236 + XZ6R*U216 - XY6*U316 - MY6*VSP16
-    N26 = (XX6R - ZZ6R)*DV136 + XZ6R*DW316 + XY6*U326 + MX6R*VSP16 - YZ6*U126
-    N36 = ZZ6R*QDP6 + XY6*DW126 + MX6R*VP26 - XX6R*DV126 - YZ6*C6QDP1 - XZ6R*S6QDP1 - MY6*VP16
-    NE16 = C7*NE17 + N16 - S7*NE27
-    NE26 = S7*NE17 + C7*NE27 + N26 - D7*E37
-    NE36 = NE37 + D7*FDI27 + N36
-    # Joint 4
-    F14 = MX4R*U114 + MY4R*U124
-    F24 = MX4R*U214 + MY4R*U224
-    F34 = MX4R*U314 + MY4R*U324
-    N14 = XX4R*WP14 + ZZ4R*DV234 + YZ4R*DW234 + XZ4R*U214 + MY4R*VSP24 - XY4R*U314
-    N24 = (XX4R - ZZ4R)*DV134 + XZ4R*DW314 + XY4R*U324 - YZ4R*U124 - MX4R*VSP24
-    N34 = ZZ4R*WP34 + XY4R*DW124 + YZ4R*U134 + MX4R*VP24 - XX4R*DV124 - XZ4R*U234 - MY4R*VP14
-    FDI14 = S4*F14 + C4*F24
-    FDI34 = C4*F14 - S4*F24
-    # Joint 3
-    F13 = M3R*VP13 - MX3R*DV331 - MY3R*U312 - MZ3*U322
-    F23 = M3R*VP23 + MX3R*C2QDP1 + MY3R*U112 + MZ3*U122
-    F33 = M3R*VP33 + MY3R*U212 + MZ3*U222 - MX3R*S2QDP1
-    E13 = FDI14 + F13
-    E23 = F34 + F23
-    E33 = FDI34 + F33
-    N13 = MY3R*VP33 - MZ3*VP23
-    N23 = MZ3*VP13 - MX3R*VP33
-    N33 = MX3R*VP23 - MY3R*VP13
-    NE13 = S4*N14 + C4*N24 + N13
-    NE23 = N34 + N23 - D4*FDI34
-    NE33 = C4*N14 + D4*F34 + N33 - S4*N24
-    # Joint 2
-    F12 = MX2*U112 + MY2*U122
-    F22 = MX2*U212 + MY2*U222
-    F32 = MX2*U312 + MY2*U322
-    E12 = F12 - E23
-    E22 = F22 - E33
-    E32 = E13 + F32
-    N12 = XX2R*WP12 + ZZ2R*DV232 + YZ2R*DW232 + XZ2R*U212 + MY2*VSP22 - XY2R*U312
-    N22 = (XX2R - ZZ2R)*DV132 + XZ2R*DW312 + XY2R*U322 - YZ2R*U122 - MX2*VSP22
-    N32 = ZZ2R*QDP2 + XY2R*DW122 + MX2*VP22 - XX2R*DV122 - YZ2R*C2QDP1 - XZ2R*S2QDP1 - MY2*VP12
-    NE12 = N12 - NE23 - r3*E13
-    NE22 = N22 - NE33
-    NE32 = NE13 + N32 - r3*E23
-    FDI12 = C2*E12 - S2*E22
-    # Joint 1
-    N31 = ZZ1R*QDP1 + MX1R*VP21 - MY1R*VP11
-    NE31 = D6*E36 + D2*E32 + N31 - S6*NE16 - C6*NE26 - S2*NE12 - C2*NE22 - RL2*FDI12
-    # Torques
-    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*GAM1a
-    GAM[1] = OFFSET2 + NE32 + FV2*QP2 + FS2*GAM2a
-    GAM[2] = OFFSET3 + E33 + Ia3*QDP3 + FV3*QP3 + FS3*GAM3a
-    GAM[3] = OFFSET4 + N34 + Ia4*QDP4 + FV4*QP4 + FS4*GAM4a
-    GAM[4] = OFFSET6 + NE36 + FV6*QP6 + FS6*GAM5a
-    GAM[5] = OFFSET7 + NE37 + Ia7*QDP7 + FV7*QP7 + FS7*GAM6a
-    GAM[6] = OFFSET8 + N38 + Ia8*QDP8 + FV8*QP8 + FS8*GAM7a
+    return _regressor, _torques
 
 
 def _inertia_matrix_block(xp, q, A, X, D2, RL2, D4, B6, D6, D7, RL8):
@@ -1236,7 +1231,7 @@ def _inertia_matrix_block(xp, q, A, X, D2, RL2, D4, B6, D6, D7, RL8):
     NE178 = XZ8*C8 - YZ8*S8 - RL8*AS18
     JP127 = XY7 - NE178
     JP137 = XZ7 + XX8R*C8S8 + XY8*2*C8C8 - XY8
-    NE378 = A[5, 6] = A[6, 5] = XZ8*S8 + YZ8*C8 - RL8*AS38
+    NE378 = XZ8*S8 + YZ8*C8 - RL8*AS38
     JP237 = YZ7 - NE378
     JP337 = ZZ7R + XX8R - AJA118
     MSP17 = MX7 + AS18
@@ -1256,13 +1251,13 @@ def _inertia_matrix_block(xp, q, A, X, D2, RL2, D4, B6, D6, D7, RL8):
     JP136 = XZ6R + NE167 - D7*AS38
     JP226 = JP117 + JP116b + JP226a
     JP236 = YZ6 + NE267
-    A[4, 4] = ZZ6R + JP337 + JP226a
+    JP336 = ZZ6R + JP337 + JP226a
     MSP16 = MX6R + AS17
     MSP26 = MY6 + AS27
     # Composite link 6
     AS26 = C6*MSP16 - S6*MSP26
     AS36 = -S6*MSP16 - C6*MSP26
-    A[0, 4] = A[4, 0] = -S6*JP136 - C6*JP236
+    NE316 = -S6*JP136 - C6*JP236
     B6AS36 = B6*AS36
     # Composite link 4
     AS14 = MX4R*S4 + MY4R*C4
@@ -1270,7 +1265,7 @@ def _inertia_matrix_block(xp, q, A, X, D2, RL2, D4, B6, D6, D7, RL8):
     S4S4 = S4**2
     C4S4 = C4*S4
     JP113 = XX4R*S4S4 + XY4R*2*C4S4
-    NE134 = A[1, 3] = A[3, 1] = XZ4R*S4 + YZ4R*C4
+    NE134 = XZ4R*S4 + YZ4R*C4
     NE334 = XZ4R*C4 - YZ4R*S4
     D4AS14 = D4*AS14
     JP223a = 2*D4AS14
@@ -1286,38 +1281,51 @@ def _inertia_matrix_block(xp, q, A, X, D2, RL2, D4, B6, D6, D7, RL8):
     JP122 = XY2R + NE334 - MY3R*r3
     JP132 = XZ2R - NE134
     JP232 = YZ2R + r3*MSP13 - JP133
-    A[1, 1] = ZZ2R + JP113 + JP112b
+    JP332 = ZZ2R + JP113 + JP112b
     MSP22 = MY2 - JP112a
     # Composite link 2
     AS12 = MSP12*C2 - S2*MSP22
     AS32 = -MSP12*S2 - C2*MSP22
-    A[0, 1] = A[1, 0] = -S2*JP132 - C2*JP232 - RL2*AS32
-    A[0, 0] = (ZZ1R + JP116 + JP126*2*C6*S6 + 2*(D6*AS26 + B6AS36) + JP112 + C2**2*(JP333 - JP112) +
+    NE312 = -S2*JP132 - C2*JP232 - RL2*AS32
+    JP331 = (ZZ1R + JP116 + JP126*2*C6*S6 + 2*(D6*AS26 + B6AS36) + JP112 + C2**2*(JP333 - JP112) +
         JP122*2*C2*S2 + D2*AS12 + RL2*MSP13 + D2*(AS12 + D2*M3R) + RL2*(MSP13 +
-            RL2*M3R) - C6**2*(JP116 - JP226) - 2*B6AS36)
+        RL2*M3R) - C6**2*(JP116 - JP226) - 2*B6AS36)
     # Unit acceleration of joint 3
     E113 = M3R*S2
-    A[0, 2] = A[2, 0] = -S2*MSP13 - RL2*E113
+    NE313 = -S2*MSP13 - RL2*E113
     # Unit acceleration of joint 4
     NE234 = ZZ4R + D4AS14
     NE124 = -NE234 - r3*AS34
     E114 = -S2*AS14
-    A[0, 3] = A[3, 0] = C2*NE334 + D2*AS34 - S2*NE124 - RL2*E114
+    NE314 = C2*NE334 + D2*AS34 - S2*NE124 - RL2*E114
     # Unit acceleration of joint 7
-    A[4, 5] = A[5, 4] = JP337 + D7AS17
-    A[0, 5] = A[5, 0] = -S6*NE167 - C6*NE267
+    NE367 = JP337 + D7AS17
+    NE317 = -S6*NE167 - C6*NE267
     # Unit acceleration of joint 8
     E268 = -S7*AS38
     NE168 = C7*NE178 + ZZ8*S7
     NE268 = S7*NE178 - ZZ8*C7 - D7*AS18
-    A[4, 6] = A[6, 4] = NE378 + D7*E268
-    A[0, 6] = A[6, 0] = D6*AS18 - S6*NE168 - C6*NE268
+    NE368 = NE378 + D7*E268
+    NE318 = D6*AS18 - S6*NE168 - C6*NE268
     # Inertia matrix
+    A[0, 0] = JP331
+    A[0, 1] = A[1, 0] = NE312
+    A[1, 1] = JP332
+    A[0, 2] = A[2, 0] = NE313
     A[1, 2] = A[2, 1] = MY3R
     A[2, 2] = M3R + Ia3
+    A[0, 3] = A[3, 0] = NE314
+    A[1, 3] = A[3, 1] = NE134
     A[2, 3] = A[3, 2] = -AS14
     A[3, 3] = ZZ4R + Ia4
+    A[0, 4] = A[4, 0] = NE316
+    A[4, 4] = JP336
+    A[0, 5] = A[5, 0] = NE317
+    A[4, 5] = A[5, 4] = NE367
     A[5, 5] = Ia7 + JP337
+    A[0, 6] = A[6, 0] = NE318
+    A[4, 6] = A[6, 4] = NE368
+    A[5, 6] = A[6, 5] = NE378
     A[6, 6] = ZZ8 + Ia8
 
 
@@ -1422,91 +1430,156 @@ def _frame_poses_block(xp, q, T, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8):
     # Inputs
     q1, q2, q3, q4, q6, q7, q8 = q
     # Trigonometry
-    C1 = T[0, 0, 0] = T[0, 1, 1] = T[1, 1, 2] = T[2, 1, 0] = xp.cos(q1)
-    S1 = T[0, 1, 0] = xp.sin(q1)
-    C2 = T[2, 2, 2] = xp.cos(q2)
-    S2 = T[2, 2, 1] = T[3, 2, 2] = T[4, 2, 1] = xp.sin(q2)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
     C4 = xp.cos(q4)
     S4 = xp.sin(q4)
     C6 = xp.cos(q6)
     S6 = xp.sin(q6)
     th67 = q6 + q7
-    C67 = T[7, 2, 2] = xp.cos(th67)
+    C67 = xp.cos(th67)
     S67 = xp.sin(th67)
     C8 = xp.cos(q8)
     S8 = xp.sin(q8)
     # Inputs
     r3 = 0.1 + q3
     # Joint axes Z and velocities V seen from link 4
-    Z141 = T[3, 2, 0] = T[4, 2, 0] = C2*C4
-    Z241 = T[3, 2, 1] = -C2*S4
+    Z141 = C2*C4
+    Z241 = -C2*S4
     # Joint axes Z and velocities V seen from link 8
-    T[7, 2, 0] = -S67*C8
-    T[7, 2, 1] = S67*S8
+    Z181 = -S67*C8
+    Z281 = S67*S8
     # Frame 2
-    R112 = T[1, 0, 0] = C1*C2
-    R122 = T[1, 0, 1] = -C1*S2
-    R212 = T[1, 1, 0] = S1*C2
-    R222 = T[1, 1, 1] = -S1*S2
-    P12 = T[1, 0, 3] = D2*C1 - RL2*S1
-    P22 = T[1, 1, 3] = D2*S1 + RL2*C1
+    R112 = C1*C2
+    R122 = -C1*S2
+    R212 = S1*C2
+    R222 = -S1*S2
+    P12 = D2*C1 - RL2*S1
+    P22 = D2*S1 + RL2*C1
     # Frame 3
-    P13 = T[2, 0, 3] = P12 - r3*R122
-    P23 = T[2, 1, 3] = P22 - r3*R222
-    P33 = T[2, 2, 3] = T[3, 2, 3] = C2*r3
+    P13 = P12 - r3*R122
+    P23 = P22 - r3*R222
+    P33 = C2*r3
     # Frame 4
-    R114 = T[3, 0, 0] = T[4, 0, 0] = -S1*S4 - C4*R122
-    R124 = T[3, 0, 1] = S4*R122 - S1*C4
-    R214 = T[3, 1, 0] = T[4, 1, 0] = C1*S4 - C4*R222
-    R224 = T[3, 1, 1] = S4*R222 + C1*C4
-    P14 = T[3, 0, 3] = P13 - D4*S1
-    P24 = T[3, 1, 3] = P23 + D4*C1
+    R114 = -S1*S4 - C4*R122
+    R124 = S4*R122 - S1*C4
+    R214 = C1*S4 - C4*R222
+    R224 = S4*R222 + C1*C4
+    P14 = P13 - D4*S1
+    P24 = P23 + D4*C1
     # Frame 5
-    T[4, 0, 3] = P14 + D5*R114 - RL5*R124
-    T[4, 1, 3] = P24 + D5*R214 - RL5*R224
-    T[4, 2, 3] = P33 + D5*Z141 - RL5*Z241
+    P15 = P14 + D5*R114 - RL5*R124
+    P25 = P24 + D5*R214 - RL5*R224
+    P35 = P33 + D5*Z141 - RL5*Z241
     # Frame 6
-    R116 = T[5, 0, 0] = -S1*C6
-    T[5, 0, 1] = S1*S6
-    R216 = T[5, 1, 0] = C1*C6
-    T[5, 1, 1] = -C1*S6
-    P16 = T[5, 0, 3] = -D6*S1
-    P26 = T[5, 1, 3] = D6*C1
+    R116 = -S1*C6
+    R126 = S1*S6
+    R216 = C1*C6
+    R226 = -C1*S6
+    P16 = -D6*S1
+    P26 = D6*C1
     # Frame 7
-    R117 = T[6, 0, 0] = -S1*C67
-    R127 = T[6, 0, 1] = S1*S67
-    R217 = T[6, 1, 0] = C1*C67
-    R227 = T[6, 1, 1] = -C1*S67
-    P17 = T[6, 0, 3] = P16 + D7*R116
-    P27 = T[6, 1, 3] = P26 + D7*R216
-    P37 = T[6, 2, 3] = B6 - D7*S6
+    R117 = -S1*C67
+    R127 = S1*S67
+    R217 = C1*C67
+    R227 = -C1*S67
+    P17 = P16 + D7*R116
+    P27 = P26 + D7*R216
+    P37 = B6 - D7*S6
     # Frame 8
-    T[7, 0, 0] = C8*R117 - C1*S8
-    T[7, 0, 1] = -C1*C8 - S8*R117
-    T[7, 1, 0] = C8*R217 - S1*S8
-    T[7, 1, 1] = -S1*C8 - S8*R217
-    T[7, 0, 3] = P17 - RL8*R127
-    T[7, 1, 3] = P27 - RL8*R227
-    T[7, 2, 3] = P37 + RL8*C67
+    R118 = C8*R117 - C1*S8
+    R128 = -C1*C8 - S8*R117
+    R218 = C8*R217 - S1*S8
+    R228 = -S1*C8 - S8*R217
+    P18 = P17 - RL8*R127
+    P28 = P27 - RL8*R227
+    P38 = P37 + RL8*C67
     # Poses
-    T[0, 0, 1] = T[1, 0, 2] = T[2, 0, 0] = T[5, 1, 2] = T[6, 1, 2] = -S1
+    T[0, 0, 0] = C1
+    T[0, 0, 1] = -S1
+    T[0, 1, 0] = S1
+    T[0, 1, 1] = C1
+    T[1, 0, 0] = R112
+    T[1, 0, 1] = R122
+    T[1, 0, 2] = -S1
+    T[1, 0, 3] = P12
+    T[1, 1, 0] = R212
+    T[1, 1, 1] = R222
+    T[1, 1, 2] = C1
+    T[1, 1, 3] = P22
     T[1, 2, 0] = -S2
     T[1, 2, 1] = -C2
-    T[2, 0, 1] = T[3, 0, 2] = T[4, 0, 1] = -R112
+    T[2, 0, 0] = -S1
+    T[2, 0, 1] = -R112
     T[2, 0, 2] = -R122
-    T[2, 1, 1] = T[3, 1, 2] = T[4, 1, 1] = -R212
+    T[2, 0, 3] = P13
+    T[2, 1, 0] = C1
+    T[2, 1, 1] = -R212
     T[2, 1, 2] = -R222
+    T[2, 1, 3] = P23
+    T[2, 2, 1] = S2
+    T[2, 2, 2] = C2
+    T[2, 2, 3] = P33
+    T[3, 0, 0] = R114
+    T[3, 0, 1] = R124
+    T[3, 0, 2] = -R112
+    T[3, 0, 3] = P14
+    T[3, 1, 0] = R214
+    T[3, 1, 1] = R224
+    T[3, 1, 2] = -R212
+    T[3, 1, 3] = P24
+    T[3, 2, 0] = Z141
+    T[3, 2, 1] = Z241
+    T[3, 2, 2] = S2
+    T[3, 2, 3] = P33
+    T[4, 0, 0] = R114
+    T[4, 0, 1] = -R112
     T[4, 0, 2] = -R124
+    T[4, 0, 3] = P15
+    T[4, 1, 0] = R214
+    T[4, 1, 1] = -R212
     T[4, 1, 2] = -R224
+    T[4, 1, 3] = P25
+    T[4, 2, 0] = Z141
+    T[4, 2, 1] = S2
     T[4, 2, 2] = -Z241
-    T[5, 0, 2] = T[6, 0, 2] = -C1
+    T[4, 2, 3] = P35
+    T[5, 0, 0] = R116
+    T[5, 0, 1] = R126
+    T[5, 0, 2] = -C1
+    T[5, 0, 3] = P16
+    T[5, 1, 0] = R216
+    T[5, 1, 1] = R226
+    T[5, 1, 2] = -S1
+    T[5, 1, 3] = P26
     T[5, 2, 0] = -S6
     T[5, 2, 1] = -C6
     T[5, 2, 3] = B6
+    T[6, 0, 0] = R117
+    T[6, 0, 1] = R127
+    T[6, 0, 2] = -C1
+    T[6, 0, 3] = P17
+    T[6, 1, 0] = R217
+    T[6, 1, 1] = R227
+    T[6, 1, 2] = -S1
+    T[6, 1, 3] = P27
     T[6, 2, 0] = -S67
     T[6, 2, 1] = -C67
+    T[6, 2, 3] = P37
+    T[7, 0, 0] = R118
+    T[7, 0, 1] = R128
     T[7, 0, 2] = -R127
+    T[7, 0, 3] = P18
+    T[7, 1, 0] = R218
+    T[7, 1, 1] = R228
     T[7, 1, 2] = -R227
+    T[7, 1, 3] = P28
+    T[7, 2, 0] = Z181
+    T[7, 2, 1] = Z281
+    T[7, 2, 2] = C67
+    T[7, 2, 3] = P38
     # Constants
     T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = 1.0
     T[6, 3, 3] = T[7, 3, 3] = 1.0

@@ -16,21 +16,23 @@ Torques     delivered by the actuators, so friction enters with a plus: Gamma = 
             FS*sign(qd) + OFFSET
 Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY
             MZ first moments
-Element     Ia      inertia: along q1, q2, q3, q4, q5; Ia6 in the form q6**2 + 2*q5*q6
-Element     FV      viscous: along q1, q2, q3, q4, q5, q6
-Element     FS      coulomb: along q1, q2, q3, q4, q5, q6
-Element     OFFSET  offset: along q1, q2, q3, q4, q5, q6
-Element     FVM     viscous: FVM6 in the form 2*q5*q6
-Element     FSM     coulomb: FSM6 along q5 + q6
+Elements    along s = G q: Gamma gets G' times the force along s; in a form q'Bq: B times qdd
+            (inertia), qd (viscous) or q (stiffness)
+    Ia      inertia: along q1, q2, q3, q4, q5; Ia6 in the form q6**2 + 2*q5*q6
+    FV      viscous: along q1, q2, q3, q4, q5, q6
+    FS      coulomb: along q1, q2, q3, q4, q5, q6
+    OFFSET  offset: along q1, q2, q3, q4, q5, q6
+    FVM     viscous: FVM6 in the form 2*q5*q6
+    FSM     coulomb: FSM6 along q5 + q6
 
 Base parameters, 60 of 86; Gautier and Khalil (1990)
     exact, proved modulo primes
-    FORMULAS says what they are made of; what it leaves out is as it is
+    FORMULAS has those that combine several; the others are standard parameters
     No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 MZ2 M2
 
 Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3
-            column 1, Z132 component 1 in frame 3 of the axis of joint 2; a letter at the end is a
-            part that several share, N16a of N16
+            column 1, Z132 component 1 in frame 3 of the axis of joint 2; what several share is
+            named by its factors, C4DV134, by its function, signQP1, or by a letter, N16a in N16
     th   joint angle with its constant, rad
     C    cosine of a joint angle or of a sum of angles
     S    sine of a joint angle or of a sum of angles
@@ -82,7 +84,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: c393d657d3a4274658c065d915ccf21b555c047bd79aa596d9f92edff6e9371a
+sha256 of all but these lines: fd5c95aa61317afe330e579b08d321a8510e2fc83c2b4a496ef2684e10ef9f2b
 """
 
 import numpy as np
@@ -247,7 +249,8 @@ def _package(*arrays):
     if any(type(x).__module__.startswith("casadi") for x in arrays):
         return _Symbols()
     others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
-    if all(isinstance(x, np.ndarray | np.generic) for x in others):
+    others = [x for x in others if not isinstance(x, np.ndarray | np.generic)]
+    if not others:
         return np if _IN_PLACE else _Arrays(np, arrays)
     try:
         from array_api_compat import array_namespace
@@ -256,7 +259,13 @@ def _package(*arrays):
             f"arrays of {type(others[0]).__module__} need array_api_compat: "
             "pip install array-api-compat"
         ) from error
-    return _Arrays(array_namespace(*arrays), arrays)
+    try:
+        return _Arrays(array_namespace(*others), others)
+    except TypeError as error:
+        packages = " and ".join(sorted({type(x).__module__.partition(".")[0] for x in others}))
+        if " and " not in packages:
+            raise
+        raise TypeError(f"arrays of {packages}; expected states and X of one package") from error
 
 
 class _Arrays:
@@ -295,11 +304,19 @@ class _Arrays:
 
     def rows(self, x):
         """x[..., k], one by one."""
+        if self.package is not np and isinstance(x, np.ndarray | list | tuple):
+            raise TypeError(
+                f"states of {type(x).__name__} beside states or X of {self.package.__name__}; "
+                "make the states arrays of that package (X may be NumPy's)"
+            )
         if x.shape[-1:] != (6,):
             raise ValueError(f"state of shape {x.shape}; expected (..., 6)")
         return [x[..., k] for k in range(6)]
 
     def parameters(self, X):
+        """X[k], one by one; NumPy's as plain numbers."""
+        if self.package is not np and isinstance(X, np.ndarray | list | tuple):
+            return _parameters(_real(X, "X")).tolist()
         _parameters(X)
         return [X[k] for k in range(60)]
 
@@ -340,9 +357,9 @@ class _Symbols:
         if len(shape) == 3:
             first = [{k[1:]: x for k, x in table.items() if k[0] == i} for i in range(shape[0])]
             return [self.gathered(entries, shape[1:], like) for entries in first]
-        matrix = self.package.SX(*(*shape, 1)[:2])
+        matrix = self.package.SX(*(*shape, 1, 1)[:2])
         for place, x in table.items():
-            matrix[place] = x
+            matrix[place or 0] = x
         return matrix
 
     def solve(self, A, b):
@@ -437,9 +454,18 @@ def base_parameters(
     order of STANDARD_PARAMETERS.
     """
     if hasattr(standard, "keys"):
-        standard = [standard[name] for name in STANDARD_PARAMETERS]
+        rest = [x for x in STANDARD_PARAMETERS if x not in standard and x not in NO_EFFECT]
+        if rest:
+            raise ValueError(f"standard: no value of {', '.join(rest)}")
+        standard = [standard.get(name) for name in STANDARD_PARAMETERS]
         xp = _package(*standard)
     else:
+        shape = tuple(standard.shape if hasattr(standard, "shape") else np.shape(standard))
+        if shape[:1] != (86,):
+            raise ValueError(
+                f"standard of shape {shape}; expected (86,) in the order of "
+                "STANDARD_PARAMETERS, or a mapping by name"
+            )
         xp = _package(standard)
         standard = standard if xp is np else [standard[k] for k in range(86)]
     (
@@ -632,8 +658,20 @@ def _moving(xp):
     }
 
 
+def _regressor_block(xp, q, qd, qdd, D, D3, RL4, g):
+    """Fill D, shape (60, 6, N), where it is not constant, from q, qd, qdd (6, N)."""
+    _regressor, _ = _motion(xp, q, qd, qdd, D3, RL4, g)
+    _regressor(D)
+
+
+def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X, D3, RL4, g):
+    """Fill GAM, shape (6, N), from q, qd, qdd (6, N)."""
+    _, _torques = _motion(xp, q, qd, qdd, D3, RL4, g)
+    _torques(GAM, X)
+
+
 def _motion(xp, q, qd, qdd, D3, RL4, g):
-    """Velocities and accelerations of the links, which regressor and inverse_dynamics share."""
+    """Motion of the links. Returns two functions that go on from it: to D, and with X to GAM."""
     # Inputs
     q2, q3, q4, q5, q6 = q[1:]
     QP1, QP2, QP3, QP4, QP5, QP6 = qd
@@ -787,372 +825,334 @@ def _motion(xp, q, qd, qdd, D3, RL4, g):
     VP26 = C6*VP24 - S6*VP15
     # Friction, actuators
     GAM6a = QDP5 + QDP6
-    GAM1a = xp.sign(QP1)
-    GAM2a = xp.sign(QP2)
-    GAM3a = xp.sign(QP3)
-    GAM4a = xp.sign(QP4)
-    GAM5a = xp.sign(QP5)
-    GAM6b = xp.sign(QP6)
+    signQP1 = xp.sign(QP1)
+    signQP2 = xp.sign(QP2)
+    signQP3 = xp.sign(QP3)
+    signQP4 = xp.sign(QP4)
+    signQP5 = xp.sign(QP5)
+    signQP6 = xp.sign(QP6)
     QPFSM6 = QP5 + QP6
-    GAM5b = xp.sign(QPFSM6)
-    return (
-        C2, S2, C3, S3, C23, S23, C4, S4, C5, S5, C6, S6, S2QDP1, C2QDP1, DV232, WP12, DV132,
-        DV122, DW232, DW312, DW122, U122, U212, U312, U322, VP12, VP22, WP33, S23QDP1, C23QDP1,
-        DV233, WP13, DV133, DV123, DW233, DW313, DW123, U113, U123, U213, U223, U313, U323,
-        VSP33, VP13, VP23, WP14, WP34, DV124, DV134, DV234, DW234, DW314, DW124, U114, U124,
-        U134, U214, U224, U234, U314, U324, VSP24, VP14, VP24, WP15, WP35, DV125, DV135, DV235,
-        DW235, DW315, DW125, U115, U125, U135, U215, U225, U235, U315, U325, VP15, VP25, WP16,
-        WP36, DV126, DV136, DV236, DW236, DW316, DW126, U116, U126, U136, U216, U226, U236,
-        U316, U326, VP16, VP26, GAM6a, GAM1a, GAM2a, GAM3a, GAM4a, GAM5a, GAM6b, GAM5b
-    )
+    signQPFSM6 = xp.sign(QPFSM6)
 
+    def _regressor(D):
+        # Joint axes Z and velocities V seen from link 3
+        V331 = D3*C2
+        V132 = D3*S3
+        V232 = D3*C3
+        # Joint axes Z and velocities V seen from link 4
+        Z141 = -S23*C4
+        Z241 = S23*S4
+        VS341 = V331 + RL4*S23
+        V141 = S4*VS341
+        V241 = C4*VS341
+        VS142 = RL4 + V132
+        V142 = C4*VS142
+        V242 = -S4*VS142
+        V143 = RL4*C4
+        V243 = -RL4*S4
+        # Joint axes Z and velocities V seen from link 5
+        Z151 = C5*Z141 - C23*S5
+        Z251 = -C23*C5 - S5*Z141
+        V151 = C5*V141
+        V251 = -S5*V141
+        Z152 = S4*C5
+        Z252 = -S4*S5
+        V152 = C5*V142 + S5*V232
+        V252 = C5*V232 - S5*V142
+        V153 = C5*V143
+        V253 = -S5*V143
+        # Joint axes Z and velocities V seen from link 6
+        Z161 = C6*Z151 + S6*Z241
+        Z261 = C6*Z241 - S6*Z151
+        V161 = C6*V151 + S6*V241
+        V261 = C6*V241 - S6*V151
+        Z162 = C6*Z152 + C4*S6
+        Z262 = C4*C6 - S6*Z152
+        V162 = C6*V152 + S6*V242
+        V262 = C6*V242 - S6*V152
+        V163 = C6*V153 + S6*V243
+        V263 = C6*V243 - S6*V153
+        Z164 = -S5*C6
+        Z264 = S5*S6
+        # Contributions that several joints share
+        DV134Z241 = DV134*Z241
+        C4DV134 = C4*DV134
+        DN2XX4 = S4*WP14 + C4DV134
+        DN2XY4 = C4*U324 - S4*U314
+        DN2XZ4 = S4*U214 + C4*DW314
+        DN2YZ4 = S4*DW234 - C4*U124
+        DN2ZZ4 = S4*DV234 - C4DV134
+        DN2MX4 = C4*VSP24
+        DN2MY4 = -S4*VSP24
+        DV135Z251 = DV135*Z251
+        DV135Z252 = DV135*Z252
+        DN2XX5 = WP15*Z152 + DV135Z252 - C4*DV125
+        C5DV135 = C5*DV135
+        DN2XY5 = U325*Z252 + C4*DW125 - U315*Z152
+        DN2XZ5 = U215*Z152 + DW315*Z252 - C4*U235
+        DN2YZ5 = DW235*Z152 + C4*U135 - U125*Z252
+        DN2ZZ5 = DV235*Z152 + C4*WP35 - DV135Z252
+        DN2MX5 = C4*VP25 - VP24*Z252
+        DN2MY5 = VP24*Z152 - C4*VP15
+        DV136Z261 = DV136*Z261
+        DV136Z262 = DV136*Z262
+        DN2XX6 = WP16*Z162 + DV136Z262 + DV126*Z252
+        DV136Z264 = DV136*Z264
+        C6DV136 = C6*DV136
+        DN2XY6 = U326*Z262 - U316*Z162 - DW126*Z252
+        DN2XZ6 = U216*Z162 + DW316*Z262 + U236*Z252
+        DN2YZ6 = DW236*Z162 - U126*Z262 - U136*Z252
+        DN2ZZ6 = DV236*Z162 - DV136Z262 - WP36*Z252
+        DN2MX6 = VP25*Z262 - VP26*Z252
+        DN2MY6 = VP16*Z252 - VP25*Z162
+        # Joint 1
+        D[0, 0] = QDP1                                                    # DG1ZZ1
+        D[1, 0] = QP1                                                     # DG1FV1
+        D[2, 0] = signQP1                                                 # DG1FS1
+        D[4, 0] = -S2*WP12 - C2*DV132                                     # DG1XX2
+        D[5, 0] = S2*U312 - C2*U322                                       # DG1XY2
+        D[6, 0] = -S2*U212 - C2*DW312                                     # DG1XZ2
+        D[7, 0] = C2*U122 - S2*DW232                                      # DG1YZ2
+        D[14, 0] = -S23*WP13 - C23*DV133                                  # DG1XX3
+        D[15, 0] = S23*U313 - C23*U323                                    # DG1XY3
+        D[16, 0] = -S23*U213 - C23*DW313                                  # DG1XZ3
+        D[17, 0] = C23*U123 - S23*DW233                                   # DG1YZ3
+        D[19, 0] = C23*VSP33 + U313*V331                                  # DG1MX3
+        D[20, 0] = U323*V331 - S23*VSP33                                  # DG1MY3
+        D[25, 0] = WP14*Z141 + DV134Z241 - C23*DV124                      # DG1XX4
+        D[26, 0] = U324*Z241 + C23*DW124 - U314*Z141                      # DG1XY4
+        D[27, 0] = U214*Z141 + DW314*Z241 - C23*U234                      # DG1XZ4
+        D[28, 0] = DW234*Z141 + C23*U134 - U124*Z241                      # DG1YZ4
+        D[29, 0] = DV234*Z141 + C23*WP34 - DV134Z241                      # DG1ZZ4
+        D[30, 0] = VSP24*Z241 + C23*VP24 + U114*V141 + U214*V241          # DG1MX4
+        D[31, 0] = U124*V141 + U224*V241 - VSP24*Z141 - C23*VP14          # DG1MY4
+        D[36, 0] = WP15*Z151 + DV135Z251 - DV125*Z241                     # DG1XX5
+        D[37, 0] = U325*Z251 + DW125*Z241 - U315*Z151                     # DG1XY5
+        D[38, 0] = U215*Z151 + DW315*Z251 - U235*Z241                     # DG1XZ5
+        D[39, 0] = DW235*Z151 + U135*Z241 - U125*Z251                     # DG1YZ5
+        D[40, 0] = DV235*Z151 + WP35*Z241 - DV135Z251                     # DG1ZZ5
+        D[41, 0] = VP25*Z241 + U115*V151 + U215*V251 + U315*V241 - VP24*Z251  # DG1MX5
+        D[42, 0] = VP24*Z151 + U125*V151 + U225*V251 + U325*V241 - VP15*Z241  # DG1MY5
+        D[47, 0] = WP16*Z161 + DV136Z261 + DV126*Z251                     # DG1XX6
+        D[48, 0] = U326*Z261 - U316*Z161 - DW126*Z251                     # DG1XY6
+        D[49, 0] = U216*Z161 + DW316*Z261 + U236*Z251                     # DG1XZ6
+        D[50, 0] = DW236*Z161 - U126*Z261 - U136*Z251                     # DG1YZ6
+        D[51, 0] = DV236*Z161 - DV136Z261 - WP36*Z251                     # DG1ZZ6
+        D[52, 0] = VP25*Z261 + U116*V161 + U216*V261 - VP26*Z251 - U316*V251  # DG1MX6
+        D[53, 0] = VP16*Z251 + U126*V161 + U226*V261 - VP25*Z161 - U326*V251  # DG1MY6
+        # Joint 2
+        D[4, 1] = -DV122                                       # DG2XX2
+        D[5, 1] = DW122                                        # DG2XY2
+        D[6, 1] = -S2QDP1                                      # DG2XZ2
+        D[7, 1] = -C2QDP1                                      # DG2YZ2
+        D[8, 1] = QDP2                                         # DG2ZZ2
+        D[9, 1] = VP22                                         # DG2MX2
+        D[10, 1] = -VP12                                       # DG2MY2
+        D[11, 1] = QP2                                         # DG2FV2
+        D[12, 1] = signQP2                                     # DG2FS2
+        D[14, 1] = -DV123                                      # DG2XX3
+        D[15, 1] = DW123                                       # DG2XY3
+        D[16, 1] = -S23QDP1                                    # DG2XZ3
+        D[17, 1] = -C23QDP1                                    # DG2YZ3
+        D[18, 1] = WP33                                        # DG2ZZ3
+        D[19, 1] = VP23 + U113*V132 + U213*V232                # DG2MX3
+        D[20, 1] = U123*V132 + U223*V232 - VP13                # DG2MY3
+        D[25, 1] = DN2XX4                                      # DG2XX4
+        D[26, 1] = DN2XY4                                      # DG2XY4
+        D[27, 1] = DN2XZ4                                      # DG2XZ4
+        D[28, 1] = DN2YZ4                                      # DG2YZ4
+        D[29, 1] = DN2ZZ4                                      # DG2ZZ4
+        D[30, 1] = DN2MX4 + U114*V142 + U214*V242 - U314*V232  # DG2MX4
+        D[31, 1] = DN2MY4 + U124*V142 + U224*V242 - U324*V232  # DG2MY4
+        D[36, 1] = DN2XX5                                      # DG2XX5
+        D[37, 1] = DN2XY5                                      # DG2XY5
+        D[38, 1] = DN2XZ5                                      # DG2XZ5
+        D[39, 1] = DN2YZ5                                      # DG2YZ5
+        D[40, 1] = DN2ZZ5                                      # DG2ZZ5
+        D[41, 1] = DN2MX5 + U115*V152 + U215*V252 + U315*V242  # DG2MX5
+        D[42, 1] = DN2MY5 + U125*V152 + U225*V252 + U325*V242  # DG2MY5
+        D[47, 1] = DN2XX6                                      # DG2XX6
+        D[48, 1] = DN2XY6                                      # DG2XY6
+        D[49, 1] = DN2XZ6                                      # DG2XZ6
+        D[50, 1] = DN2YZ6                                      # DG2YZ6
+        D[51, 1] = DN2ZZ6                                      # DG2ZZ6
+        D[52, 1] = DN2MX6 + U116*V162 + U216*V262 - U316*V252  # DG2MX6
+        D[53, 1] = DN2MY6 + U126*V162 + U226*V262 - U326*V252  # DG2MY6
+        # Joint 3
+        D[14, 2] = -DV123                                      # DG3XX3
+        D[15, 2] = DW123                                       # DG3XY3
+        D[16, 2] = -S23QDP1                                    # DG3XZ3
+        D[17, 2] = -C23QDP1                                    # DG3YZ3
+        D[18, 2] = WP33                                        # DG3ZZ3
+        D[19, 2] = VP23                                        # DG3MX3
+        D[20, 2] = -VP13                                       # DG3MY3
+        D[21, 2] = QDP3                                        # DG3Ia3
+        D[22, 2] = QP3                                         # DG3FV3
+        D[23, 2] = signQP3                                     # DG3FS3
+        D[25, 2] = DN2XX4                                      # DG3XX4
+        D[26, 2] = DN2XY4                                      # DG3XY4
+        D[27, 2] = DN2XZ4                                      # DG3XZ4
+        D[28, 2] = DN2YZ4                                      # DG3YZ4
+        D[29, 2] = DN2ZZ4                                      # DG3ZZ4
+        D[30, 2] = DN2MX4 + U114*V143 + U214*V243              # DG3MX4
+        D[31, 2] = DN2MY4 + U124*V143 + U224*V243              # DG3MY4
+        D[36, 2] = DN2XX5                                      # DG3XX5
+        D[37, 2] = DN2XY5                                      # DG3XY5
+        D[38, 2] = DN2XZ5                                      # DG3XZ5
+        D[39, 2] = DN2YZ5                                      # DG3YZ5
+        D[40, 2] = DN2ZZ5                                      # DG3ZZ5
+        D[41, 2] = DN2MX5 + U115*V153 + U215*V253 + U315*V243  # DG3MX5
+        D[42, 2] = DN2MY5 + U125*V153 + U225*V253 + U325*V243  # DG3MY5
+        D[47, 2] = DN2XX6                                      # DG3XX6
+        D[48, 2] = DN2XY6                                      # DG3XY6
+        D[49, 2] = DN2XZ6                                      # DG3XZ6
+        D[50, 2] = DN2YZ6                                      # DG3YZ6
+        D[51, 2] = DN2ZZ6                                      # DG3ZZ6
+        D[52, 2] = DN2MX6 + U116*V163 + U216*V263 - U316*V253  # DG3MX6
+        D[53, 2] = DN2MY6 + U126*V163 + U226*V263 - U326*V253  # DG3MY6
+        # Joint 4
+        D[25, 3] = -DV124                            # DG4XX4
+        D[26, 3] = DW124                             # DG4XY4
+        D[27, 3] = -U234                             # DG4XZ4
+        D[28, 3] = U134                              # DG4YZ4
+        D[29, 3] = WP34                              # DG4ZZ4
+        D[30, 3] = VP24                              # DG4MX4
+        D[31, 3] = -VP14                             # DG4MY4
+        D[32, 3] = QDP4                              # DG4Ia4
+        D[33, 3] = QP4                               # DG4FV4
+        D[34, 3] = signQP4                           # DG4FS4
+        D[36, 3] = -S5*WP15 - C5DV135                # DG4XX5
+        D[37, 3] = S5*U315 - C5*U325                 # DG4XY5
+        D[38, 3] = -S5*U215 - C5*DW315               # DG4XZ5
+        D[39, 3] = C5*U125 - S5*DW235                # DG4YZ5
+        D[40, 3] = C5DV135 - S5*DV235                # DG4ZZ5
+        D[41, 3] = C5*VP24                           # DG4MX5
+        D[42, 3] = -S5*VP24                          # DG4MY5
+        D[47, 3] = WP16*Z164 + DV136Z264 - C5*DV126  # DG4XX6
+        D[48, 3] = U326*Z264 + C5*DW126 - U316*Z164  # DG4XY6
+        D[49, 3] = U216*Z164 + DW316*Z264 - C5*U236  # DG4XZ6
+        D[50, 3] = DW236*Z164 + C5*U136 - U126*Z264  # DG4YZ6
+        D[51, 3] = DV236*Z164 + C5*WP36 - DV136Z264  # DG4ZZ6
+        D[52, 3] = VP25*Z264 + C5*VP26               # DG4MX6
+        D[53, 3] = -VP25*Z164 - C5*VP16              # DG4MY6
+        # Joint 5
+        D[36, 4] = -DV125              # DG5XX5
+        D[37, 4] = DW125               # DG5XY5
+        D[38, 4] = -U235               # DG5XZ5
+        D[39, 4] = U135                # DG5YZ5
+        D[40, 4] = WP35                # DG5ZZ5
+        D[41, 4] = VP25                # DG5MX5
+        D[42, 4] = -VP15               # DG5MY5
+        D[43, 4] = QDP5                # DG5Ia5
+        D[44, 4] = QP5                 # DG5FV5
+        D[45, 4] = signQP5             # DG5FS5
+        D[47, 4] = S6*WP16 + C6DV136   # DG5XX6
+        D[48, 4] = C6*U326 - S6*U316   # DG5XY6
+        D[49, 4] = S6*U216 + C6*DW316  # DG5XZ6
+        D[50, 4] = S6*DW236 - C6*U126  # DG5YZ6
+        D[51, 4] = S6*DV236 - C6DV136  # DG5ZZ6
+        D[52, 4] = C6*VP25             # DG5MX6
+        D[53, 4] = -S6*VP25            # DG5MY6
+        D[54, 4] = QDP6                # DG5Ia6
+        D[58, 4] = QP6                 # DG5FVM6
+        D[59, 4] = signQPFSM6          # DG5FSM6
+        # Joint 6
+        D[47, 5] = -DV126      # DG6XX6
+        D[48, 5] = DW126       # DG6XY6
+        D[49, 5] = -U236       # DG6XZ6
+        D[50, 5] = U136        # DG6YZ6
+        D[51, 5] = WP36        # DG6ZZ6
+        D[52, 5] = VP26        # DG6MX6
+        D[53, 5] = -VP16       # DG6MY6
+        D[54, 5] = GAM6a       # DG6Ia6
+        D[55, 5] = QP6         # DG6FV6
+        D[56, 5] = signQP6     # DG6FS6
+        D[58, 5] = QP5         # DG6FVM6
+        D[59, 5] = signQPFSM6  # DG6FSM6
 
-def _regressor_block(xp, q, qd, qdd, D, D3, RL4, g):
-    """Fill D, shape (60, 6, N), where it is not constant, from q (6, N); qd (6, N); qdd (6, N)."""
-    # Inputs
-    QP1, QP2, QP3, QP4, QP5, QP6 = qd
-    QDP1, QDP2, QDP3, QDP4, QDP5, QDP6 = qdd
-    # Motion of the links
-    (
-        C2, S2, C3, S3, C23, S23, C4, S4, C5, S5, C6, S6, S2QDP1, C2QDP1, _, WP12, DV132, DV122,
-        DW232, DW312, DW122, U122, U212, U312, U322, VP12, VP22, WP33, S23QDP1, C23QDP1, _,
-        WP13, DV133, DV123, DW233, DW313, DW123, U113, U123, U213, U223, U313, U323, VSP33,
-        VP13, VP23, WP14, WP34, DV124, DV134, DV234, DW234, DW314, DW124, U114, U124, U134,
-        U214, U224, U234, U314, U324, VSP24, VP14, VP24, WP15, WP35, DV125, DV135, DV235, DW235,
-        DW315, DW125, U115, U125, U135, U215, U225, U235, U315, U325, VP15, VP25, WP16, WP36,
-        DV126, DV136, DV236, DW236, DW316, DW126, U116, U126, U136, U216, U226, U236, U316,
-        U326, VP16, VP26, GAM6a, GAM1a, GAM2a, GAM3a, GAM4a, GAM5a, GAM6b, GAM5b
-    ) = _motion(xp, q, qd, qdd, D3, RL4, g)
-    # Joint axes Z and velocities V seen from link 3
-    V331 = D3*C2
-    V132 = D3*S3
-    V232 = D3*C3
-    # Joint axes Z and velocities V seen from link 4
-    Z141 = -S23*C4
-    Z241 = S23*S4
-    VS341 = V331 + RL4*S23
-    V141 = S4*VS341
-    V241 = C4*VS341
-    VS142 = RL4 + V132
-    V142 = C4*VS142
-    V242 = -S4*VS142
-    V143 = RL4*C4
-    V243 = -RL4*S4
-    # Joint axes Z and velocities V seen from link 5
-    Z151 = C5*Z141 - C23*S5
-    Z251 = -C23*C5 - S5*Z141
-    V151 = C5*V141
-    V251 = -S5*V141
-    Z152 = S4*C5
-    Z252 = -S4*S5
-    V152 = C5*V142 + S5*V232
-    V252 = C5*V232 - S5*V142
-    V153 = C5*V143
-    V253 = -S5*V143
-    # Joint axes Z and velocities V seen from link 6
-    Z161 = C6*Z151 + S6*Z241
-    Z261 = C6*Z241 - S6*Z151
-    V161 = C6*V151 + S6*V241
-    V261 = C6*V241 - S6*V151
-    Z162 = C6*Z152 + C4*S6
-    Z262 = C4*C6 - S6*Z152
-    V162 = C6*V152 + S6*V242
-    V262 = C6*V242 - S6*V152
-    V163 = C6*V153 + S6*V243
-    V263 = C6*V243 - S6*V153
-    Z164 = -S5*C6
-    Z264 = S5*S6
-    # Contributions that several joints share
-    DV134Z241 = DV134*Z241
-    C4DV134 = C4*DV134
-    DN2XX4 = S4*WP14 + C4DV134
-    DN2XY4 = C4*U324 - S4*U314
-    DN2XZ4 = S4*U214 + C4*DW314
-    DN2YZ4 = S4*DW234 - C4*U124
-    DN2ZZ4 = S4*DV234 - C4DV134
-    DN2MX4 = C4*VSP24
-    DN2MY4 = -S4*VSP24
-    DV135Z251 = DV135*Z251
-    DV135Z252 = DV135*Z252
-    DN2XX5 = WP15*Z152 + DV135Z252 - C4*DV125
-    C5DV135 = C5*DV135
-    DN2XY5 = U325*Z252 + C4*DW125 - U315*Z152
-    DN2XZ5 = U215*Z152 + DW315*Z252 - C4*U235
-    DN2YZ5 = DW235*Z152 + C4*U135 - U125*Z252
-    DN2ZZ5 = DV235*Z152 + C4*WP35 - DV135Z252
-    DN2MX5 = C4*VP25 - VP24*Z252
-    DN2MY5 = VP24*Z152 - C4*VP15
-    DV136Z261 = DV136*Z261
-    DV136Z262 = DV136*Z262
-    DN2XX6 = WP16*Z162 + DV136Z262 + DV126*Z252
-    DV136Z264 = DV136*Z264
-    C6DV136 = C6*DV136
-    DN2XY6 = U326*Z262 - U316*Z162 - DW126*Z252
-    DN2XZ6 = U216*Z162 + DW316*Z262 + U236*Z252
-    DN2YZ6 = DW236*Z162 - U126*Z262 - U136*Z252
-    DN2ZZ6 = DV236*Z162 - DV136Z262 - WP36*Z252
-    DN2MX6 = VP25*Z262 - VP26*Z252
-    DN2MY6 = VP16*Z252 - VP25*Z162
-    # Joint 1
-    D[0, 0] = QDP1                                                    # DG1ZZ1
-    D[1, 0] = QP1                                                     # DG1FV1
-    D[2, 0] = GAM1a                                                   # DG1FS1
-    D[4, 0] = -S2*WP12 - C2*DV132                                     # DG1XX2
-    D[5, 0] = S2*U312 - C2*U322                                       # DG1XY2
-    D[6, 0] = -S2*U212 - C2*DW312                                     # DG1XZ2
-    D[7, 0] = C2*U122 - S2*DW232                                      # DG1YZ2
-    D[14, 0] = -S23*WP13 - C23*DV133                                  # DG1XX3
-    D[15, 0] = S23*U313 - C23*U323                                    # DG1XY3
-    D[16, 0] = -S23*U213 - C23*DW313                                  # DG1XZ3
-    D[17, 0] = C23*U123 - S23*DW233                                   # DG1YZ3
-    D[19, 0] = C23*VSP33 + U313*V331                                  # DG1MX3
-    D[20, 0] = U323*V331 - S23*VSP33                                  # DG1MY3
-    D[25, 0] = WP14*Z141 + DV134Z241 - C23*DV124                      # DG1XX4
-    D[26, 0] = U324*Z241 + C23*DW124 - U314*Z141                      # DG1XY4
-    D[27, 0] = U214*Z141 + DW314*Z241 - C23*U234                      # DG1XZ4
-    D[28, 0] = DW234*Z141 + C23*U134 - U124*Z241                      # DG1YZ4
-    D[29, 0] = DV234*Z141 + C23*WP34 - DV134Z241                      # DG1ZZ4
-    D[30, 0] = VSP24*Z241 + C23*VP24 + U114*V141 + U214*V241          # DG1MX4
-    D[31, 0] = U124*V141 + U224*V241 - VSP24*Z141 - C23*VP14          # DG1MY4
-    D[36, 0] = WP15*Z151 + DV135Z251 - DV125*Z241                     # DG1XX5
-    D[37, 0] = U325*Z251 + DW125*Z241 - U315*Z151                     # DG1XY5
-    D[38, 0] = U215*Z151 + DW315*Z251 - U235*Z241                     # DG1XZ5
-    D[39, 0] = DW235*Z151 + U135*Z241 - U125*Z251                     # DG1YZ5
-    D[40, 0] = DV235*Z151 + WP35*Z241 - DV135Z251                     # DG1ZZ5
-    D[41, 0] = VP25*Z241 + U115*V151 + U215*V251 + U315*V241 - VP24*Z251  # DG1MX5
-    D[42, 0] = VP24*Z151 + U125*V151 + U225*V251 + U325*V241 - VP15*Z241  # DG1MY5
-    D[47, 0] = WP16*Z161 + DV136Z261 + DV126*Z251                     # DG1XX6
-    D[48, 0] = U326*Z261 - U316*Z161 - DW126*Z251                     # DG1XY6
-    D[49, 0] = U216*Z161 + DW316*Z261 + U236*Z251                     # DG1XZ6
-    D[50, 0] = DW236*Z161 - U126*Z261 - U136*Z251                     # DG1YZ6
-    D[51, 0] = DV236*Z161 - DV136Z261 - WP36*Z251                     # DG1ZZ6
-    D[52, 0] = VP25*Z261 + U116*V161 + U216*V261 - VP26*Z251 - U316*V251  # DG1MX6
-    D[53, 0] = VP16*Z251 + U126*V161 + U226*V261 - VP25*Z161 - U326*V251  # DG1MY6
-    # Joint 2
-    D[4, 1] = -DV122                                       # DG2XX2
-    D[5, 1] = DW122                                        # DG2XY2
-    D[6, 1] = -S2QDP1                                      # DG2XZ2
-    D[7, 1] = -C2QDP1                                      # DG2YZ2
-    D[8, 1] = QDP2                                         # DG2ZZ2
-    D[9, 1] = VP22                                         # DG2MX2
-    D[10, 1] = -VP12                                       # DG2MY2
-    D[11, 1] = QP2                                         # DG2FV2
-    D[12, 1] = GAM2a                                       # DG2FS2
-    D[14, 1] = -DV123                                      # DG2XX3
-    D[15, 1] = DW123                                       # DG2XY3
-    D[16, 1] = -S23QDP1                                    # DG2XZ3
-    D[17, 1] = -C23QDP1                                    # DG2YZ3
-    D[18, 1] = WP33                                        # DG2ZZ3
-    D[19, 1] = VP23 + U113*V132 + U213*V232                # DG2MX3
-    D[20, 1] = U123*V132 + U223*V232 - VP13                # DG2MY3
-    D[25, 1] = DN2XX4                                      # DG2XX4
-    D[26, 1] = DN2XY4                                      # DG2XY4
-    D[27, 1] = DN2XZ4                                      # DG2XZ4
-    D[28, 1] = DN2YZ4                                      # DG2YZ4
-    D[29, 1] = DN2ZZ4                                      # DG2ZZ4
-    D[30, 1] = DN2MX4 + U114*V142 + U214*V242 - U314*V232  # DG2MX4
-    D[31, 1] = DN2MY4 + U124*V142 + U224*V242 - U324*V232  # DG2MY4
-    D[36, 1] = DN2XX5                                      # DG2XX5
-    D[37, 1] = DN2XY5                                      # DG2XY5
-    D[38, 1] = DN2XZ5                                      # DG2XZ5
-    D[39, 1] = DN2YZ5                                      # DG2YZ5
-    D[40, 1] = DN2ZZ5                                      # DG2ZZ5
-    D[41, 1] = DN2MX5 + U115*V152 + U215*V252 + U315*V242  # DG2MX5
-    D[42, 1] = DN2MY5 + U125*V152 + U225*V252 + U325*V242  # DG2MY5
-    D[47, 1] = DN2XX6                                      # DG2XX6
-    D[48, 1] = DN2XY6                                      # DG2XY6
-    D[49, 1] = DN2XZ6                                      # DG2XZ6
-    D[50, 1] = DN2YZ6                                      # DG2YZ6
-    D[51, 1] = DN2ZZ6                                      # DG2ZZ6
-    D[52, 1] = DN2MX6 + U116*V162 + U216*V262 - U316*V252  # DG2MX6
-    D[53, 1] = DN2MY6 + U126*V162 + U226*V262 - U326*V252  # DG2MY6
-    # Joint 3
-    D[14, 2] = -DV123                                      # DG3XX3
-    D[15, 2] = DW123                                       # DG3XY3
-    D[16, 2] = -S23QDP1                                    # DG3XZ3
-    D[17, 2] = -C23QDP1                                    # DG3YZ3
-    D[18, 2] = WP33                                        # DG3ZZ3
-    D[19, 2] = VP23                                        # DG3MX3
-    D[20, 2] = -VP13                                       # DG3MY3
-    D[21, 2] = QDP3                                        # DG3Ia3
-    D[22, 2] = QP3                                         # DG3FV3
-    D[23, 2] = GAM3a                                       # DG3FS3
-    D[25, 2] = DN2XX4                                      # DG3XX4
-    D[26, 2] = DN2XY4                                      # DG3XY4
-    D[27, 2] = DN2XZ4                                      # DG3XZ4
-    D[28, 2] = DN2YZ4                                      # DG3YZ4
-    D[29, 2] = DN2ZZ4                                      # DG3ZZ4
-    D[30, 2] = DN2MX4 + U114*V143 + U214*V243              # DG3MX4
-    D[31, 2] = DN2MY4 + U124*V143 + U224*V243              # DG3MY4
-    D[36, 2] = DN2XX5                                      # DG3XX5
-    D[37, 2] = DN2XY5                                      # DG3XY5
-    D[38, 2] = DN2XZ5                                      # DG3XZ5
-    D[39, 2] = DN2YZ5                                      # DG3YZ5
-    D[40, 2] = DN2ZZ5                                      # DG3ZZ5
-    D[41, 2] = DN2MX5 + U115*V153 + U215*V253 + U315*V243  # DG3MX5
-    D[42, 2] = DN2MY5 + U125*V153 + U225*V253 + U325*V243  # DG3MY5
-    D[47, 2] = DN2XX6                                      # DG3XX6
-    D[48, 2] = DN2XY6                                      # DG3XY6
-    D[49, 2] = DN2XZ6                                      # DG3XZ6
-    D[50, 2] = DN2YZ6                                      # DG3YZ6
-    D[51, 2] = DN2ZZ6                                      # DG3ZZ6
-    D[52, 2] = DN2MX6 + U116*V163 + U216*V263 - U316*V253  # DG3MX6
-    D[53, 2] = DN2MY6 + U126*V163 + U226*V263 - U326*V253  # DG3MY6
-    # Joint 4
-    D[25, 3] = -DV124                            # DG4XX4
-    D[26, 3] = DW124                             # DG4XY4
-    D[27, 3] = -U234                             # DG4XZ4
-    D[28, 3] = U134                              # DG4YZ4
-    D[29, 3] = WP34                              # DG4ZZ4
-    D[30, 3] = VP24                              # DG4MX4
-    D[31, 3] = -VP14                             # DG4MY4
-    D[32, 3] = QDP4                              # DG4Ia4
-    D[33, 3] = QP4                               # DG4FV4
-    D[34, 3] = GAM4a                             # DG4FS4
-    D[36, 3] = -S5*WP15 - C5DV135                # DG4XX5
-    D[37, 3] = S5*U315 - C5*U325                 # DG4XY5
-    D[38, 3] = -S5*U215 - C5*DW315               # DG4XZ5
-    D[39, 3] = C5*U125 - S5*DW235                # DG4YZ5
-    D[40, 3] = C5DV135 - S5*DV235                # DG4ZZ5
-    D[41, 3] = C5*VP24                           # DG4MX5
-    D[42, 3] = -S5*VP24                          # DG4MY5
-    D[47, 3] = WP16*Z164 + DV136Z264 - C5*DV126  # DG4XX6
-    D[48, 3] = U326*Z264 + C5*DW126 - U316*Z164  # DG4XY6
-    D[49, 3] = U216*Z164 + DW316*Z264 - C5*U236  # DG4XZ6
-    D[50, 3] = DW236*Z164 + C5*U136 - U126*Z264  # DG4YZ6
-    D[51, 3] = DV236*Z164 + C5*WP36 - DV136Z264  # DG4ZZ6
-    D[52, 3] = VP25*Z264 + C5*VP26               # DG4MX6
-    D[53, 3] = -VP25*Z164 - C5*VP16              # DG4MY6
-    # Joint 5
-    D[36, 4] = -DV125              # DG5XX5
-    D[37, 4] = DW125               # DG5XY5
-    D[38, 4] = -U235               # DG5XZ5
-    D[39, 4] = U135                # DG5YZ5
-    D[40, 4] = WP35                # DG5ZZ5
-    D[41, 4] = VP25                # DG5MX5
-    D[42, 4] = -VP15               # DG5MY5
-    D[43, 4] = QDP5                # DG5Ia5
-    D[44, 4] = QP5                 # DG5FV5
-    D[45, 4] = GAM5a               # DG5FS5
-    D[47, 4] = S6*WP16 + C6DV136   # DG5XX6
-    D[48, 4] = C6*U326 - S6*U316   # DG5XY6
-    D[49, 4] = S6*U216 + C6*DW316  # DG5XZ6
-    D[50, 4] = S6*DW236 - C6*U126  # DG5YZ6
-    D[51, 4] = S6*DV236 - C6DV136  # DG5ZZ6
-    D[52, 4] = C6*VP25             # DG5MX6
-    D[53, 4] = -S6*VP25            # DG5MY6
-    D[54, 4] = QDP6                # DG5Ia6
-    D[58, 4] = QP6                 # DG5FVM6
-    D[59, 4] = GAM5b               # DG5FSM6
-    # Joint 6
-    D[47, 5] = -DV126  # DG6XX6
-    D[48, 5] = DW126   # DG6XY6
-    D[49, 5] = -U236   # DG6XZ6
-    D[50, 5] = U136    # DG6YZ6
-    D[51, 5] = WP36    # DG6ZZ6
-    D[52, 5] = VP26    # DG6MX6
-    D[53, 5] = -VP16   # DG6MY6
-    D[54, 5] = GAM6a   # DG6Ia6
-    D[55, 5] = QP6     # DG6FV6
-    D[56, 5] = GAM6b   # DG6FS6
-    D[58, 5] = QP5     # DG6FVM6
-    D[59, 5] = GAM5b   # DG6FSM6
+    def _torques(GAM, X):
+        # Inputs
+        (
+            ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2, XZ2R, YZ2, ZZ2R, MX2R, MY2, FV2, FS2, OFFSET2, XX3R,
+            XY3, XZ3, YZ3, ZZ3R, MX3, MY3R, Ia3, FV3, FS3, OFFSET3, XX4R, XY4, XZ4, YZ4, ZZ4R, MX4,
+            MY4R, Ia4, FV4, FS4, OFFSET4, XX5R, XY5, XZ5, YZ5, ZZ5R, MX5, MY5R, Ia5, FV5, FS5,
+            OFFSET5, XX6R, XY6, XZ6, YZ6, ZZ6, MX6, MY6, Ia6, FV6, FS6, OFFSET6, FVM6, FSM6
+        ) = X
+        # Joint 6
+        F16 = MX6*U116 + MY6*U126
+        F26 = MX6*U216 + MY6*U226
+        F36 = MX6*U316 + MY6*U326
+        N16 = XX6R*WP16 + ZZ6*DV236 + YZ6*DW236 + XZ6*U216 - XY6*U316 - MY6*VP25
+        N26 = (XX6R - ZZ6)*DV136 + XZ6*DW316 + XY6*U326 + MX6*VP25 - YZ6*U126
+        N36 = ZZ6*WP36 + XY6*DW126 + YZ6*U136 + MX6*VP26 - XX6R*DV126 - XZ6*U236 - MY6*VP16
+        FDI16 = C6*F16 - S6*F26
+        FDI36 = S6*F16 + C6*F26
+        # Joint 5
+        F15 = MX5*U115 + MY5R*U125
+        F25 = MX5*U215 + MY5R*U225
+        F35 = MX5*U315 + MY5R*U325
+        E15 = FDI16 + F15
+        E25 = F25 - F36
+        E35 = FDI36 + F35
+        N15 = XX5R*WP15 + ZZ5R*DV235 + YZ5*DW235 + XZ5*U215 + MY5R*VP24 - XY5*U315
+        N25 = (XX5R - ZZ5R)*DV135 + XZ5*DW315 + XY5*U325 - YZ5*U125 - MX5*VP24
+        N35 = ZZ5R*WP35 + XY5*DW125 + YZ5*U135 + MX5*VP25 - XX5R*DV125 - XZ5*U235 - MY5R*VP15
+        NE15 = C6*N16 + N15 - S6*N26
+        NE25 = N25 - N36
+        NE35 = S6*N16 + C6*N26 + N35
+        FDI15 = C5*E15 - S5*E25
+        FDI35 = -S5*E15 - C5*E25
+        # Joint 4
+        F14 = MX4*U114 + MY4R*U124
+        F24 = MX4*U214 + MY4R*U224
+        F34 = MX4*U314 + MY4R*U324
+        E14 = FDI15 + F14
+        E24 = E35 + F24
+        E34 = FDI35 + F34
+        N14 = XX4R*WP14 + ZZ4R*DV234 + YZ4*DW234 + XZ4*U214 - XY4*U314 - MY4R*VSP24
+        N24 = (XX4R - ZZ4R)*DV134 + XZ4*DW314 + XY4*U324 + MX4*VSP24 - YZ4*U124
+        N34 = ZZ4R*WP34 + XY4*DW124 + YZ4*U134 + MX4*VP24 - XX4R*DV124 - XZ4*U234 - MY4R*VP14
+        NE14 = C5*NE15 + N14 - S5*NE25
+        NE24 = NE35 + N24
+        NE34 = N34 - S5*NE15 - C5*NE25
+        FDI14 = C4*E14 - S4*E24
+        FDI34 = S4*E14 + C4*E24
+        # Joint 3
+        F13 = MX3*U113 + MY3R*U123
+        F23 = MX3*U213 + MY3R*U223
+        F33 = MX3*U313 + MY3R*U323
+        E13 = FDI14 + F13
+        E23 = F23 - E34
+        E33 = FDI34 + F33
+        N13 = XX3R*WP13 + ZZ3R*DV233 + YZ3*DW233 + XZ3*U213 + MY3R*VSP33 - XY3*U313
+        N23 = (XX3R - ZZ3R)*DV133 + XZ3*DW313 + XY3*U323 - YZ3*U123 - MX3*VSP33
+        N33 = ZZ3R*WP33 + XY3*DW123 + MX3*VP23 - XX3R*DV123 - YZ3*C23QDP1 - XZ3*S23QDP1 - MY3R*VP13
+        NE13 = C4*NE14 + N13 - S4*NE24 - RL4*FDI34
+        NE23 = N23 - NE34
+        NE33 = S4*NE14 + C4*NE24 + RL4*FDI14 + N33
+        FDI23 = S3*E13 + C3*E23
+        # Joint 2
+        N12 = XX2R*WP12 + ZZ2R*DV232 + YZ2*DW232 + XZ2R*U212 - XY2*U312
+        N22 = (XX2R - ZZ2R)*DV132 + XZ2R*DW312 + XY2*U322 - YZ2*U122
+        N32 = ZZ2R*QDP2 + XY2*DW122 + MX2R*VP22 - XX2R*DV122 - YZ2*C2QDP1 - XZ2R*S2QDP1 - MY2*VP12
+        NE12 = C3*NE13 + N12 - S3*NE23
+        NE22 = S3*NE13 + C3*NE23 + N22 - D3*E33
+        NE32 = NE33 + D3*FDI23 + N32
+        # Joint 1
+        N31 = ZZ1R*QDP1
+        NE31 = N31 - S2*NE12 - C2*NE22
+        # Friction, actuators
+        signQPFSM6FSM6 = FSM6*signQPFSM6
+        # Torques
+        GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*signQP1
+        GAM[1] = OFFSET2 + NE32 + FV2*QP2 + FS2*signQP2
+        GAM[2] = OFFSET3 + NE33 + Ia3*QDP3 + FV3*QP3 + FS3*signQP3
+        GAM[3] = OFFSET4 + NE34 + Ia4*QDP4 + FV4*QP4 + FS4*signQP4
+        GAM[4] = (OFFSET5 + NE35 + Ia5*QDP5 + Ia6*QDP6 + FV5*QP5 + FS5*signQP5 + FVM6*QP6 +
+            signQPFSM6FSM6)
+        GAM[5] = OFFSET6 + N36 + Ia6*GAM6a + FV6*QP6 + FS6*signQP6 + FVM6*QP5 + signQPFSM6FSM6
 
-
-def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X, D3, RL4, g):
-    """Fill GAM, shape (6, N), from q (6, N); qd (6, N); qdd (6, N)."""
-    # Inputs
-    QP1, QP2, QP3, QP4, QP5, QP6 = qd
-    QDP1, QDP2, QDP3, QDP4, QDP5, QDP6 = qdd
-    (
-        ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2, XZ2R, YZ2, ZZ2R, MX2R, MY2, FV2, FS2, OFFSET2, XX3R,
-        XY3, XZ3, YZ3, ZZ3R, MX3, MY3R, Ia3, FV3, FS3, OFFSET3, XX4R, XY4, XZ4, YZ4, ZZ4R, MX4,
-        MY4R, Ia4, FV4, FS4, OFFSET4, XX5R, XY5, XZ5, YZ5, ZZ5R, MX5, MY5R, Ia5, FV5, FS5,
-        OFFSET5, XX6R, XY6, XZ6, YZ6, ZZ6, MX6, MY6, Ia6, FV6, FS6, OFFSET6, FVM6, FSM6
-    ) = X
-    # Motion of the links
-    (
-        C2, S2, C3, S3, _, _, C4, S4, C5, S5, C6, S6, S2QDP1, C2QDP1, DV232, WP12, DV132, DV122,
-        DW232, DW312, DW122, U122, U212, U312, U322, VP12, VP22, WP33, S23QDP1, C23QDP1, DV233,
-        WP13, DV133, DV123, DW233, DW313, DW123, U113, U123, U213, U223, U313, U323, VSP33,
-        VP13, VP23, WP14, WP34, DV124, DV134, DV234, DW234, DW314, DW124, U114, U124, U134,
-        U214, U224, U234, U314, U324, VSP24, VP14, VP24, WP15, WP35, DV125, DV135, DV235, DW235,
-        DW315, DW125, U115, U125, U135, U215, U225, U235, U315, U325, VP15, VP25, WP16, WP36,
-        DV126, DV136, DV236, DW236, DW316, DW126, U116, U126, U136, U216, U226, U236, U316,
-        U326, VP16, VP26, GAM6a, GAM1a, GAM2a, GAM3a, GAM4a, GAM5a, GAM6b, GAM5b
-    ) = _motion(xp, q, qd, qdd, D3, RL4, g)
-    # Joint 6
-    F16 = MX6*U116 + MY6*U126
-    F26 = MX6*U216 + MY6*U226
-    F36 = MX6*U316 + MY6*U326
-    N16 = XX6R*WP16 + ZZ6*DV236 + YZ6*DW236 + XZ6*U216 - XY6*U316 - MY6*VP25
-    N26 = (XX6R - ZZ6)*DV136 + XZ6*DW316 + XY6*U326 + MX6*VP25 - YZ6*U126
-    N36 = ZZ6*WP36 + XY6*DW126 + YZ6*U136 + MX6*VP26 - XX6R*DV126 - XZ6*U236 - MY6*VP16
-    FDI16 = C6*F16 - S6*F26
-    FDI36 = S6*F16 + C6*F26
-    # Joint 5
-    F15 = MX5*U115 + MY5R*U125
-    F25 = MX5*U215 + MY5R*U225
-    F35 = MX5*U315 + MY5R*U325
-    E15 = FDI16 + F15
-    E25 = F25 - F36
-    E35 = FDI36 + F35
-    N15 = XX5R*WP15 + ZZ5R*DV235 + YZ5*DW235 + XZ5*U215 + MY5R*VP24 - XY5*U315
-    N25 = (XX5R - ZZ5R)*DV135 + XZ5*DW315 + XY5*U325 - YZ5*U125 - MX5*VP24
-    N35 = ZZ5R*WP35 + XY5*DW125 + YZ5*U135 + MX5*VP25 - XX5R*DV125 - XZ5*U235 - MY5R*VP15
-    NE15 = C6*N16 + N15 - S6*N26
-    NE25 = N25 - N36
-    NE35 = S6*N16 + C6*N26 + N35
-    FDI15 = C5*E15 - S5*E25
-    FDI35 = -S5*E15 - C5*E25
-    # Joint 4
-    F14 = MX4*U114 + MY4R*U124
-    F24 = MX4*U214 + MY4R*U224
-    F34 = MX4*U314 + MY4R*U324
-    E14 = FDI15 + F14
-    E24 = E35 + F24
-    E34 = FDI35 + F34
-    N14 = XX4R*WP14 + ZZ4R*DV234 + YZ4*DW234 + XZ4*U214 - XY4*U314 - MY4R*VSP24
-    N24 = (XX4R - ZZ4R)*DV134 + XZ4*DW314 + XY4*U324 + MX4*VSP24 - YZ4*U124
-    N34 = ZZ4R*WP34 + XY4*DW124 + YZ4*U134 + MX4*VP24 - XX4R*DV124 - XZ4*U234 - MY4R*VP14
-    NE14 = C5*NE15 + N14 - S5*NE25
-    NE24 = NE35 + N24
-    NE34 = N34 - S5*NE15 - C5*NE25
-    FDI14 = C4*E14 - S4*E24
-    FDI34 = S4*E14 + C4*E24
-    # Joint 3
-    F13 = MX3*U113 + MY3R*U123
-    F23 = MX3*U213 + MY3R*U223
-    F33 = MX3*U313 + MY3R*U323
-    E13 = FDI14 + F13
-    E23 = F23 - E34
-    E33 = FDI34 + F33
-    N13 = XX3R*WP13 + ZZ3R*DV233 + YZ3*DW233 + XZ3*U213 + MY3R*VSP33 - XY3*U313
-    N23 = (XX3R - ZZ3R)*DV133 + XZ3*DW313 + XY3*U323 - YZ3*U123 - MX3*VSP33
-    N33 = ZZ3R*WP33 + XY3*DW123 + MX3*VP23 - XX3R*DV123 - YZ3*C23QDP1 - XZ3*S23QDP1 - MY3R*VP13
-    NE13 = C4*NE14 + N13 - S4*NE24 - RL4*FDI34
-    NE23 = N23 - NE34
-    NE33 = S4*NE14 + C4*NE24 + RL4*FDI14 + N33
-    FDI23 = S3*E13 + C3*E23
-    # Joint 2
-    N12 = XX2R*WP12 + ZZ2R*DV232 + YZ2*DW232 + XZ2R*U212 - XY2*U312
-    N22 = (XX2R - ZZ2R)*DV132 + XZ2R*DW312 + XY2*U322 - YZ2*U122
-    N32 = ZZ2R*QDP2 + XY2*DW122 + MX2R*VP22 - XX2R*DV122 - YZ2*C2QDP1 - XZ2R*S2QDP1 - MY2*VP12
-    NE12 = C3*NE13 + N12 - S3*NE23
-    NE22 = S3*NE13 + C3*NE23 + N22 - D3*E33
-    NE32 = NE33 + D3*FDI23 + N32
-    # Joint 1
-    N31 = ZZ1R*QDP1
-    NE31 = N31 - S2*NE12 - C2*NE22
-    # Friction, actuators
-    GAM5bFSM6 = FSM6*GAM5b
-    # Torques
-    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*GAM1a
-    GAM[1] = OFFSET2 + NE32 + FV2*QP2 + FS2*GAM2a
-    GAM[2] = OFFSET3 + NE33 + Ia3*QDP3 + FV3*QP3 + FS3*GAM3a
-    GAM[3] = OFFSET4 + NE34 + Ia4*QDP4 + FV4*QP4 + FS4*GAM4a
-    GAM[4] = OFFSET5 + NE35 + Ia5*QDP5 + Ia6*QDP6 + FV5*QP5 + FS5*GAM5a + FVM6*QP6 + GAM5bFSM6
-    GAM[5] = OFFSET6 + N36 + Ia6*GAM6a + FV6*QP6 + FS6*GAM6b + FVM6*QP5 + GAM5bFSM6
+    return _regressor, _torques
 
 
 def _inertia_matrix_block(xp, q, A, X, D3, RL4):
@@ -1198,7 +1198,7 @@ def _inertia_matrix_block(xp, q, A, X, D3, RL4):
     JP114a = ZZ6 - JP115
     JP114b = C5C5*JP114a + JP125*2*C5S5
     NE145 = C5*JP135 - S5*JP235
-    NE345 = A[3, 4] = A[4, 3] = -S5*JP135 - C5*JP235
+    NE345 = -S5*JP135 - C5*JP235
     JP114 = XX4R + ZZ6 - JP114b
     JP124 = XY4 + NE145
     JP134 = XZ4 + C5S5*JP114a + JP125 - JP125*2*C5C5
@@ -1218,7 +1218,7 @@ def _inertia_matrix_block(xp, q, A, X, D3, RL4):
     NE134 = C4*JP134 - S4*JP234 - RL4*AS14
     JP123 = XY3 - NE134
     JP133 = XZ3 + JP124*2*C4C4 - C4S4*JP113a - JP124
-    NE334 = A[2, 3] = A[3, 2] = S4*JP134 + C4*JP234 - RL4*AS34
+    NE334 = S4*JP134 + C4*JP234 - RL4*AS34
     JP233 = YZ3 - NE334
     JP333 = ZZ3R + JP114 + JP113b - JP113c
     MSP13 = MX3 + AS14
@@ -1239,47 +1239,63 @@ def _inertia_matrix_block(xp, q, A, X, D3, RL4):
     JP132 = XZ2R + NE123 - D3*AS34
     JP222 = JP113 + JP112b + JP222a
     JP232 = YZ2 + NE223
-    A[1, 1] = ZZ2R + JP333 + JP222a
+    JP332 = ZZ2R + JP333 + JP222a
     # Composite link 2
-    A[0, 1] = A[1, 0] = -S2*JP132 - C2*JP232
-    A[0, 0] = ZZ1R + JP112 + JP122*2*C2*S2 - C2**2*(JP112 - JP222)
+    NE312 = -S2*JP132 - C2*JP232
+    JP331 = ZZ1R + JP112 + JP122*2*C2*S2 - C2**2*(JP112 - JP222)
     # Unit acceleration of joint 3
-    A[1, 2] = A[2, 1] = JP333 + D3AS13
-    A[0, 2] = A[2, 0] = -S2*NE123 - C2*NE223
+    NE323 = JP333 + D3AS13
+    NE313 = -S2*NE123 - C2*NE223
     # Unit acceleration of joint 4
     E224 = -S3*AS34
     NE124 = C3*NE134 + S3*JP334
     NE224 = S3*NE134 - C3*JP334 - D3*AS14
-    A[1, 3] = A[3, 1] = NE334 + D3*E224
-    A[0, 3] = A[3, 0] = -S2*NE124 - C2*NE224
+    NE324 = NE334 + D3*E224
+    NE314 = -S2*NE124 - C2*NE224
     # Unit acceleration of joint 5
     E135 = C4*AS35
     E335 = S4*AS35
     NE135 = C4*NE145 - S4*JP335 - RL4*E335
-    NE335 = A[2, 4] = A[4, 2] = S4*NE145 + C4*JP335 + RL4*E135
+    NE335 = S4*NE145 + C4*JP335 + RL4*E135
     E225 = S3*E135 + C3*AS15
     NE125 = C3*NE135 + S3*NE345
     NE225 = S3*NE135 - C3*NE345 - D3*E335
-    A[1, 4] = A[4, 1] = NE335 + D3*E225
-    A[0, 4] = A[4, 0] = -S2*NE125 - C2*NE225
+    NE325 = NE335 + D3*E225
+    NE315 = -S2*NE125 - C2*NE225
     # Unit acceleration of joint 6
     E146 = -C5*AS36
     E346 = S5*AS36
     NE146 = C5*NE156 + ZZ6*S5
-    NE346 = A[3, 5] = A[5, 3] = ZZ6*C5 - S5*NE156
+    NE346 = ZZ6*C5 - S5*NE156
     E136 = C4*E146 - S4*AS16
     E336 = S4*E146 + C4*AS16
     NE136 = C4*NE146 - S4*NE356 - RL4*E336
-    NE336 = A[2, 5] = A[5, 2] = S4*NE146 + C4*NE356 + RL4*E136
+    NE336 = S4*NE146 + C4*NE356 + RL4*E136
     E226 = S3*E136 - C3*E346
     NE126 = C3*NE136 + S3*NE346
     NE226 = S3*NE136 - C3*NE346 - D3*E336
-    A[1, 5] = A[5, 1] = NE336 + D3*E226
-    A[0, 5] = A[5, 0] = -S2*NE126 - C2*NE226
+    NE326 = NE336 + D3*E226
+    NE316 = -S2*NE126 - C2*NE226
     # Inertia matrix
+    A[0, 0] = JP331
+    A[0, 1] = A[1, 0] = NE312
+    A[1, 1] = JP332
+    A[0, 2] = A[2, 0] = NE313
+    A[1, 2] = A[2, 1] = NE323
     A[2, 2] = Ia3 + JP333
+    A[0, 3] = A[3, 0] = NE314
+    A[1, 3] = A[3, 1] = NE324
+    A[2, 3] = A[3, 2] = NE334
     A[3, 3] = Ia4 + JP334
+    A[0, 4] = A[4, 0] = NE315
+    A[1, 4] = A[4, 1] = NE325
+    A[2, 4] = A[4, 2] = NE335
+    A[3, 4] = A[4, 3] = NE345
     A[4, 4] = Ia5 + JP335
+    A[0, 5] = A[5, 0] = NE316
+    A[1, 5] = A[5, 1] = NE326
+    A[2, 5] = A[5, 2] = NE336
+    A[3, 5] = A[5, 3] = NE346
     A[4, 5] = A[5, 4] = Ia6 + NE356
     A[5, 5] = ZZ6 + Ia6
 
@@ -1357,12 +1373,12 @@ def _frame_poses_block(xp, q, T, D3, RL4):
     # Inputs
     q1, q2, q3, q4, q5, q6 = q
     # Trigonometry
-    C1 = T[0, 0, 0] = T[0, 1, 1] = T[1, 1, 2] = T[2, 1, 2] = xp.cos(q1)
-    S1 = T[0, 1, 0] = xp.sin(q1)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
     C2 = xp.cos(q2)
     S2 = xp.sin(q2)
     th23 = q2 + q3
-    C23 = T[3, 2, 2] = xp.cos(th23)
+    C23 = xp.cos(th23)
     S23 = xp.sin(th23)
     C4 = xp.cos(q4)
     S4 = xp.sin(q4)
@@ -1371,56 +1387,105 @@ def _frame_poses_block(xp, q, T, D3, RL4):
     C6 = xp.cos(q6)
     S6 = xp.sin(q6)
     # Joint axes Z and velocities V seen from link 4
-    Z141 = T[3, 2, 0] = -S23*C4
-    Z241 = T[3, 2, 1] = T[4, 2, 2] = S23*S4
+    Z141 = -S23*C4
+    Z241 = S23*S4
     # Joint axes Z and velocities V seen from link 5
-    Z151 = T[4, 2, 0] = C5*Z141 - C23*S5
-    Z251 = T[4, 2, 1] = -C23*C5 - S5*Z141
+    Z151 = C5*Z141 - C23*S5
+    Z251 = -C23*C5 - S5*Z141
     # Joint axes Z and velocities V seen from link 6
-    T[5, 2, 0] = C6*Z151 + S6*Z241
-    T[5, 2, 1] = C6*Z241 - S6*Z151
+    Z161 = C6*Z151 + S6*Z241
+    Z261 = C6*Z241 - S6*Z151
     # Frame 2
-    R112 = T[1, 0, 0] = C1*C2
-    T[1, 0, 1] = -C1*S2
-    R212 = T[1, 1, 0] = S1*C2
-    T[1, 1, 1] = -S1*S2
+    R112 = C1*C2
+    R122 = -C1*S2
+    R212 = S1*C2
+    R222 = -S1*S2
     # Frame 3
-    R113 = T[2, 0, 0] = C1*C23
-    R123 = T[2, 0, 1] = -C1*S23
-    R213 = T[2, 1, 0] = S1*C23
-    R223 = T[2, 1, 1] = -S1*S23
-    P13 = T[2, 0, 3] = D3*R112
-    P23 = T[2, 1, 3] = D3*R212
-    P33 = T[2, 2, 3] = -D3*S2
+    R113 = C1*C23
+    R123 = -C1*S23
+    R213 = S1*C23
+    R223 = -S1*S23
+    P13 = D3*R112
+    P23 = D3*R212
+    P33 = -D3*S2
     # Frame 4
-    R114 = T[3, 0, 0] = C4*R113 - S1*S4
-    R124 = T[3, 0, 1] = T[4, 0, 2] = -S1*C4 - S4*R113
-    R214 = T[3, 1, 0] = C4*R213 + C1*S4
-    R224 = T[3, 1, 1] = T[4, 1, 2] = C1*C4 - S4*R213
-    T[3, 0, 3] = T[4, 0, 3] = T[5, 0, 3] = P13 - RL4*R123
-    T[3, 1, 3] = T[4, 1, 3] = T[5, 1, 3] = P23 - RL4*R223
-    T[3, 2, 3] = T[4, 2, 3] = T[5, 2, 3] = P33 + RL4*C23
+    R114 = C4*R113 - S1*S4
+    R124 = -S1*C4 - S4*R113
+    R214 = C4*R213 + C1*S4
+    R224 = C1*C4 - S4*R213
+    P14 = P13 - RL4*R123
+    P24 = P23 - RL4*R223
+    P34 = P33 + RL4*C23
     # Frame 5
-    R115 = T[4, 0, 0] = C5*R114 + S5*R123
-    R125 = T[4, 0, 1] = C5*R123 - S5*R114
-    R215 = T[4, 1, 0] = C5*R214 + S5*R223
-    R225 = T[4, 1, 1] = C5*R223 - S5*R214
+    R115 = C5*R114 + S5*R123
+    R125 = C5*R123 - S5*R114
+    R215 = C5*R214 + S5*R223
+    R225 = C5*R223 - S5*R214
     # Frame 6
-    T[5, 0, 0] = C6*R115 + S6*R124
-    T[5, 0, 1] = C6*R124 - S6*R115
-    T[5, 1, 0] = C6*R215 + S6*R224
-    T[5, 1, 1] = C6*R224 - S6*R215
+    R116 = C6*R115 + S6*R124
+    R126 = C6*R124 - S6*R115
+    R216 = C6*R215 + S6*R224
+    R226 = C6*R224 - S6*R215
     # Poses
-    T[0, 0, 1] = T[1, 0, 2] = T[2, 0, 2] = -S1
+    T[0, 0, 0] = C1
+    T[0, 0, 1] = -S1
+    T[0, 1, 0] = S1
+    T[0, 1, 1] = C1
+    T[1, 0, 0] = R112
+    T[1, 0, 1] = R122
+    T[1, 0, 2] = -S1
+    T[1, 1, 0] = R212
+    T[1, 1, 1] = R222
+    T[1, 1, 2] = C1
     T[1, 2, 0] = -S2
     T[1, 2, 1] = -C2
+    T[2, 0, 0] = R113
+    T[2, 0, 1] = R123
+    T[2, 0, 2] = -S1
+    T[2, 0, 3] = P13
+    T[2, 1, 0] = R213
+    T[2, 1, 1] = R223
+    T[2, 1, 2] = C1
+    T[2, 1, 3] = P23
     T[2, 2, 0] = -S23
     T[2, 2, 1] = -C23
+    T[2, 2, 3] = P33
+    T[3, 0, 0] = R114
+    T[3, 0, 1] = R124
     T[3, 0, 2] = -R123
+    T[3, 0, 3] = P14
+    T[3, 1, 0] = R214
+    T[3, 1, 1] = R224
     T[3, 1, 2] = -R223
+    T[3, 1, 3] = P24
+    T[3, 2, 0] = Z141
+    T[3, 2, 1] = Z241
+    T[3, 2, 2] = C23
+    T[3, 2, 3] = P34
+    T[4, 0, 0] = R115
+    T[4, 0, 1] = R125
+    T[4, 0, 2] = R124
+    T[4, 0, 3] = P14
+    T[4, 1, 0] = R215
+    T[4, 1, 1] = R225
+    T[4, 1, 2] = R224
+    T[4, 1, 3] = P24
+    T[4, 2, 0] = Z151
+    T[4, 2, 1] = Z251
+    T[4, 2, 2] = Z241
+    T[4, 2, 3] = P34
+    T[5, 0, 0] = R116
+    T[5, 0, 1] = R126
     T[5, 0, 2] = -R125
+    T[5, 0, 3] = P14
+    T[5, 1, 0] = R216
+    T[5, 1, 1] = R226
     T[5, 1, 2] = -R225
+    T[5, 1, 3] = P24
+    T[5, 2, 0] = Z161
+    T[5, 2, 1] = Z261
     T[5, 2, 2] = -Z251
+    T[5, 2, 3] = P34
     # Constants
     T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = 1.0
 
@@ -1470,3 +1535,4 @@ VALUES = {
     'M6': 0.21, 'Ia6': 0.014, 'FV6': 0.721, 'FS6': 1.8, 'OFFSET6': 0.166, 'FVM6': 0.7,
     'FSM6': 1.6,
 }
+BASE_VALUES = base_parameters(VALUES)  # X of the robot file

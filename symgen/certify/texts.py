@@ -121,7 +121,7 @@ class TextCheck:
         run.
         """
         if self.not_run:
-            return f"not run: {self.not_run}"
+            return self.not_run
         uses = ", ".join(self.uses)
         return (
             f"{', '.join(self.errors)} at random states, parameters and {self.constants} agree with "
@@ -140,11 +140,17 @@ def text_check(file: str, text: str, target: str, witness: Witness) -> TextCheck
     key = sha256(text.encode("utf-8")).hexdigest()
     compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc")
     if file.endswith(".h"):
-        return TextCheck(target, key, not_run="it declares what the C file has")
+        return TextCheck(
+            target,
+            key,
+            not_run=f"it declares the functions of {file[:-2]}.c, where their certificate stands",
+        )
     if not file.endswith((".py", ".c")):
-        return TextCheck(target, key, not_run=f"nothing here runs {TARGETS[target].language}")
+        return TextCheck(
+            target, key, not_run=f"not run: nothing here runs {TARGETS[target].language}"
+        )
     if file.endswith(".c") and compiler is None:
-        return TextCheck(target, key, not_run="there is no C compiler")
+        return TextCheck(target, key, not_run="not run: there is no C compiler")
     left_out = tuple(sorted(witness.left_out))
     with TemporaryDirectory(prefix="symgen-", ignore_cleanup_errors=True) as folder:
         path = Path(folder) / file

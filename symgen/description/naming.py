@@ -38,6 +38,7 @@ LAYOUT = frozenset(
         "self",
         "GAM",
         "STANDARD_PARAMETERS",
+        "NO_EFFECT",
         "inertia_matrix",
         "bias",
         "inverse_dynamics",

@@ -5,10 +5,10 @@ For each function: its arguments, its lines, and the entries of its result.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
-from symgen.derive.graph import SYM, Node, Scalar
+from symgen.derive.graph import SYM, Node
 from symgen.derive.models import Entry
 from symgen.description.naming import Namespace
 from symgen.emit.printers import Language, Section, Text, under_titles
@@ -60,10 +60,6 @@ Inputs = Callable[[str, Sequence[tuple[int, str]], int], list[str]]
 """Lines that name entries (index, name) of a source that has so many."""
 
 
-Call = Callable[[Sequence[str], Sequence[str]], list[str]]
-"""Lines that give names to what a function of some arguments gives, _ to what is not read."""
-
-
 class FunctionPrinter:
     """Printer of several functions of a robot that are computed from one common expression graph.
 
@@ -96,84 +92,56 @@ class FunctionPrinter:
         labels = [label(f, e) for f in functions for e in f.values.entries]
         headings = functions[0].values.algebra.sections
         self.text = Text(outputs, headings, names, labels, language)
-        self.shared: set[int] = set()  # nodes of all functions, where there are several
-        if len(functions) > 1:
-            self.shared = set.intersection(*({n.index for n in f.nodes} for f in functions))
+        nodes = [{n.index for n in f.nodes} for f in functions]
+        self.shared = set.intersection(*nodes) if len(nodes) > 1 else set()
 
     @property
-    def given(self) -> list[str]:
-        """Names of the intermediate variables that are computed once for all functions."""
-        read = {n.index for f in self.functions for n in self._read(f)}
-        return [self.text.called[k] for k in sorted(read & self.shared & self.text.named)]
+    def motion(self) -> tuple[Section, ...]:
+        """Lines that come first in all functions: the states, and the motion of the links."""
+        nodes = {n.index: n for f in self.functions for n in f.nodes}
+        return self._sections({*STATES, self.rates}, [*nodes.values()], self.shared)
 
-    @property
-    def motion(self) -> Block:
-        """Source text that computes the intermediate variables common to all functions: the link
-        motion.
-        """
-        own = [n for n in self.functions[0].nodes if n.index in self.shared]
-        operands = {x.node.index for n in own for x in n.operands}
-        return self._block(self.functions[0], own, [n for n in own if n.index in operands], ())
-
-    def block(self, f: Function, call: Call = lambda names, arguments: []) -> Block:
-        """Write one function as source text; the link motion, which all functions share, is not
-        written again.
-
-        `call` writes the lines that get the shared variables from the block `motion`.
-        """
-        own = [n for n in f.nodes if n.index not in self.shared]
-        names = {self.text.called.get(n.index, "") for n in self._read(f)}
-        given = [name if name in names else "_" for name in self.given]
-        lines = call(given, self.motion.arguments) if self.shared else []
-        return self._block(f, own, self._read(f), lines)
-
-    def _read(self, f: Function) -> list[Node]:
-        """List the nodes of the expression graph that the lines of a function use or compute."""
-        read = {o.node.index for o in f.values.outputs if isinstance(o, Scalar)}
-        for node in f.nodes:
-            if node.index not in self.shared:
-                read |= {node.index, *(x.node.index for x in node.operands)}
-        return [node for node in f.nodes if node.index in read]
-
-    def _block(
-        self, f: Function, own: Sequence[Node], read: Sequence[Node], call: Sequence[str]
-    ) -> Block:
-        """Write the lines that compute the nodes `own` of the expression graph, with their inputs.
-
-        `read` are the nodes that these lines use. The lines `call` stand before the steps and
-        provide the shared values.
-        """
+    def block(self, f: Function) -> Block:
+        """Write one function as source text, without the lines that all functions share."""
         spec = self.spec
-        joints, independent = spec.robot.joints, spec.derivation.closure.independent
-        sources = {s: [f"{letter}{j}" for j in independent] for s, letter in STATES.items()}
-        sources[self.rates] = [
-            spec.derivation.algebra.named("G", u, i) for u in spec.tied for i in joints
-        ]
-        sources["X"] = list(spec.regrouping.names)
-        called = {str(n.value): self.text.called[n.index] for n in read if n.op == SYM}
-        inputs: list[str] = []
-        for source, items in sources.items():
-            wanted = [(k, called[item]) for k, item in enumerate(items) if item in called]
-            inputs += self.inputs(source, wanted, len(items))
-        sections = [
-            Section("Inputs", tuple(inputs)),
-            Section("Motion of the links", tuple(call)),
-            *self.text.sections_of({n.index for n in own}),
-        ]
         states, reads_X = f.model.states, ["X"] if f.model.reads_X else []
         if spec.tied and not f.model.of_loops:
             states = ("q", "qd", "qdd", self.rates)
-        used = {n.value.name for n in (f.nodes if call else read) if n.op == SYM}
+        used = {n.value.name for n in f.nodes if n.op == SYM}
         constants = [c for c in spec.regrouping.constants if c in used]
         constants.sort(key=spec.robot.channels.__contains__)
+        sources = reads_X if self.shared else [*states, *reads_X]
+        own = {n.index for n in f.nodes} - self.shared
         return Block(
             f,
             self.text,
-            tuple(section for section in sections if section.lines),
+            self._sections(sources, f.nodes, own),
             self.results[f.model.name],
             (*states, *reads_X, *constants),
             tuple(constants),
         )
+
+    def _sections(
+        self, sources: Collection[str], read: Sequence[Node], own: Collection[int]
+    ) -> tuple[Section, ...]:
+        """Write the lines that compute the nodes `own` of the expression graph.
+
+        Before them, the entries of `sources` (states, X) that the nodes `read` are get names.
+        """
+        spec = self.spec
+        joints, independent = spec.robot.joints, spec.derivation.closure.independent
+        items = {s: [f"{letter}{j}" for j in independent] for s, letter in STATES.items()}
+        items[self.rates] = [
+            spec.derivation.algebra.named("G", u, i) for u in spec.tied for i in joints
+        ]
+        items["X"] = list(spec.regrouping.names)
+        called = {str(n.value): self.text.called[n.index] for n in read if n.op == SYM}
+        inputs: list[str] = []
+        for source, names in items.items():
+            wanted = [(k, called[x]) for k, x in enumerate(names) if x in called]
+            inputs += self.inputs(source, wanted, len(names)) if source in sources else []
+        sections = [Section("Inputs", tuple(inputs)), *self.text.sections_of(own)]
+        return tuple(section for section in sections if section.lines)
 
 
 def label(f: Function, entry: Entry) -> str:

@@ -33,7 +33,7 @@ from symgen.description.robot import FIXED, PRISMATIC
 from symgen.emit.blocks import label
 from symgen.emit.header import header, line_of, packed, plain
 from symgen.emit.printers import Language, Section, Text, under_titles
-from symgen.emit.python_target import signature
+from symgen.emit.python_target import tuple_of
 from symgen.emit.render import WIDTH, laid_out
 from symgen.emit.spec import STATES, Function, ModuleSpec
 from symgen.version import VERSION
@@ -70,6 +70,8 @@ C = Language(
     square="{0}*{0}",
     number=number,
     comment="//",
+    prose=("/*", "*/"),
+    breaks=True,
     step="const real {} = {};",
     entry="{} = {};",
     is_word=is_word,
@@ -132,6 +134,24 @@ def _needed(outputs: Iterable[Node]) -> Iterator[int]:
         yield node.index
         if node.op not in (COS, SIN, CONST) and not node.fixed:
             stack.extend(x.node for x in node.operands)
+
+
+class Signature(NamedTuple):
+    """A C function without its body: `int32_t tx40_bias` and `const real *q`, ..."""
+
+    start: str
+    parameters: Sequence[str]
+
+    def of(self, real: str) -> str:
+        """Write the signature with another name of the type `real`, on several lines if needed."""
+        given = [re.sub(r"\breal\b", real, p) for p in self.parameters]
+        flat = f"{self.start}({', '.join(given)})"
+        if len(flat) < WIDTH:
+            return flat
+        return "\n".join((f"{self.start}(", *packed(given), ")")).replace(",\n)", "\n)")
+
+    def __str__(self) -> str:
+        return self.of("real")
 
 
 # --- arguments: one pointer for each of q, qd, qdd, or one struct with all of them ---
@@ -271,15 +291,13 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
 
     The same robot file and the same version give the same bytes.
     """
-    return laid_out("kernels.c", _context(spec, command))
+    return laid_out("kernels.c", _context(spec, command), C)
 
 
 def render_header(spec: ModuleSpec, *, command: str | None = None) -> str:
     """Return the text of the C header file that declares the functions of the C file."""
-    context = _context(spec, command)
     real = f"{spec.robot.name.upper()}_REAL"
-    declared = re.sub(r"\breal\b", real, laid_out("declared.h", context))
-    return laid_out("header.h", {**context, "declared": declared})
+    return laid_out("header.h", {**_context(spec, command), "real": real}, C)
 
 
 @lru_cache(maxsize=1)
@@ -322,6 +340,8 @@ def _context(spec: ModuleSpec, command: str | None) -> dict[str, Any]:
         "parameters": packed([f'"{name}"' for name in spec.regrouping.names]),
         "constant_names": packed([f'"{name}"' for name in free] or ['""']),
         "constants": packed([repr(float(x)) for x in free.values()] or ["0.0"]),
+        "values": packed(list(map(repr, spec.base_values))) if spec.base_values else [],
+        "real": "real",
         "helpers": {
             name: any(f"{name}(" in line for line in lines) for name in ("sign", "above", "below")
         },
@@ -349,7 +369,7 @@ def _loops(
         "mode": int(loops.mode()),
         "curvatures": spec.functions["curvature"].shape[0],
         "calls": {kernel["name"]: kernel["state_call"] for kernel in closing},
-        "closed1": signature(
+        "closed1": Signature(
             f"int32_t {name}_closed1", [*actuated, "const real *constants", f"{name}_state *s"]
         ),
     }
@@ -367,11 +387,12 @@ def _kinematics(spec: ModuleSpec, states: CStates, names: Namespace) -> dict[str
     ]
     read = {symbol for _, _, rate in moved for symbol in rate.symbols}
     free, n = [*spec.regrouping.constants], len(robot.joints)
-    rates: dict[int, list[str]] = {}  # of a frame by an actuated joint, tied ones by G
+    rates: dict[tuple[int, int], list[str]] = {}  # of a frame by an actuated joint, tied ones by G
     for j, k, rate in moved:
         for i in (k,) if k < n else range(n):
             by_tied = "" if k < n else f"*G[{(k - n) * n + i}]"
-            rates.setdefault((j - 1) * n + i, []).append(f"({_constant(rate)}){by_tied}")
+            rates.setdefault((j, i), []).append(f"({_constant(rate)}){by_tied}")
+    first = [sum(j < f.j for j, _ in rates) for f in robot.frames]
     pointers = [*states.parameters("q", "qd"), *(f"const real *{x}" for x in ("tau", "X"))]
     return {
         "ant": ", ".join(str(f.ant) for f in robot.frames),
@@ -381,14 +402,16 @@ def _kinematics(spec: ModuleSpec, states: CStates, names: Namespace) -> dict[str
             for k, c in enumerate(free)
             if c in read
         ],
-        "rates": [f"rate[{place}] = {' + '.join(terms)};" for place, terms in rates.items()],
-        "jacobian": signature(
+        "first": ", ".join(map(str, [*first, len(rates)])),
+        "moves": ", ".join(str(i) for _, i in rates),
+        "rates": [" + ".join(terms) for terms in rates.values()],
+        "jacobian": Signature(
             f"int32_t {name}_jacobian1",
             ["int32_t frame", *states.parameters("q"), "const real *constants", "real *J"],
         ),
         "forward": ""
         if robot.loaded
-        else signature(
+        else Signature(
             f"int32_t {name}_forward_dynamics1", [*pointers, "const real *constants", "real *qdd"]
         ),
     }
@@ -612,33 +635,32 @@ def _signatures(
     own = ["int64_t N", *given, "real *S"]
     read = used if model.of_loops else map(states.read, used)
     filled = model.result if model.of_loops else "S"
-    shape = ", ".join(map(str, f.shape))
-    size = prod(f.shape)
+    shape, size = tuple_of(f.shape), prod(f.shape)
     tile = ", ".join([*(f"{s}_tile" for s in used), *needs, *scratch, result])
     rooms = {"T": calls, result: computed}
     read_first = words([line for section in laid["trigonometry"] for line in section.lines])
     return {
         "parts": parts,
         "before": read_by(read_first, laid["opening"]) if parts else laid["opening"],
-        "summary": f"/* {model.summary} S has shape ({shape}, N). */",
-        "one_summary": f"/* {model.summary} S has shape ({shape}). */",
+        "summary": f"/* {model.summary} S has shape {tuple_of([*f.shape, 'N'])}. */",
+        "one_summary": f"/* {model.summary} S has shape {shape if f.shape else '(1,)'}. */",
         "size": size,
         "unread": [p for p in (*taken, *pointers) if p not in (*used, *["s"] * bool(used), *needs)],
-        "body_prototype": signature(
+        "body_prototype": Signature(
             f"{inline} void {model.name}_body", ["const size_t lanes", *body]
         ),
-        "tile_prototype": signature(f"{kernel} void {model.name}_lanes", body),
+        "tile_prototype": Signature(f"{kernel} void {model.name}_lanes", body),
         "tile_call": ", ".join(["TILE", *used, *needs, *scratch, result]),
         "tile_arguments": tile,
-        "one_prototype": signature(f"void {name}_{model.name}1", [*given, "real *S"]),
-        "state_prototype": signature(
+        "one_prototype": Signature(f"void {name}_{model.name}1", [*given, "real *S"]),
+        "state_prototype": Signature(
             f"static void {model.name}_state",
             [*(f"const real *{p}" for p in (*used, *needs)), "real *S"],
         ),
         "state_call": f"{model.name}_state({', '.join([*read, *needs, filled])})",
         "one_call": ", ".join(["1", *used, *needs, *scratch, result]),
         "one_scratch": ", ".join(f"{x}[{rooms[x]}]" for x in (*scratch, result)),
-        "prototype": signature(f"int32_t {name}_{model.name}", own),
+        "prototype": Signature(f"int32_t {name}_{model.name}", own),
         "scratch": ", ".join(
             [
                 *(f"{s}_tile[{states.widths[s]}*TILE]" for s in used),
@@ -663,7 +685,7 @@ def _part(
     return {
         "sections": part.sections,
         "before": before,
-        "prototype": signature(f"PART void {name}", ["const size_t lanes", *given]),
+        "prototype": Signature(f"PART void {name}", ["const size_t lanes", *given]),
         "call": f"{name}({', '.join(['lanes', *(p.split()[-1].lstrip('*') for p in given)])})",
     }
 

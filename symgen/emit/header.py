@@ -47,7 +47,8 @@ def header(spec: ModuleSpec, texts: Mapping[str, Text], formulas: bool) -> list[
             "XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), "
             "MX MY MZ first moments",
         ),
-        *(f"Element     {line}" for line in element_lines(robot)),
+        *(line_of("Elements", _laws(robot)) if robot.elements else ()),
+        *(line for text in element_lines(robot) for line in wrap_text(text, "    ", " " * 12)),
         *(line for text in channel_lines(robot) for line in line_of("Channel", text)),
         *(
             line
@@ -62,7 +63,9 @@ def header(spec: ModuleSpec, texts: Mapping[str, Text], formulas: bool) -> list[
         for name, formula in grouped(regrouping).items():
             lines += wrap_text(f"{name} = {formula}", "    ")
     else:
-        lines.append("    FORMULAS says what they are made of; what it leaves out is as it is")
+        lines.append(
+            "    FORMULAS has those that combine several; the others are standard parameters"
+        )
     without = [name for name in regrouping.no_effect if name not in robot.assume]
     lines += wrap_text("No effect: " + (" ".join(without) or "none"), "    ")
     if robot.assume:
@@ -80,8 +83,8 @@ def header(spec: ModuleSpec, texts: Mapping[str, Text], formulas: bool) -> list[
         *line_of(
             "Names",
             "family, then component digits, then link: W12 is component 1 of link 2, U312 row 3 "
-            "column 1, Z132 component 1 in frame 3 of the axis of joint 2; a letter at the end "
-            "is a part that several share, N16a of N16",
+            "column 1, Z132 component 1 in frame 3 of the axis of joint 2; what several share is named "
+            "by its factors, C4DV134, by its function, signQP1, or by a letter, N16a in N16",
         ),
     ]
     given = {name for text in texts.values() for name in text.given}
@@ -173,8 +176,16 @@ def element_lines(robot: Robot) -> list[str]:
         parts += [f"{e.family}{j} in the form {_form_text(form)}" for j, form in e.form.items()]
         when = f", {e.when} motion only" if e.when else ""
         when += _law_text(e)
-        lines += wrap_text(f"{e.family:<7} {e.kind}{when}: {'; '.join(parts)}", "", "            ")
+        lines.append(f"{e.family:<7} {e.kind}{when}: {'; '.join(parts)}")
     return lines
+
+
+def _laws(robot: Robot) -> str:
+    """Say how the elements of a robot enter the torques, along a row G or in a form B."""
+    form = "; in a form q'Bq: B times qdd (inertia), qd (viscous) or q (stiffness)"
+    return "along s = G q: Gamma gets G' times the force along s" + form * any(
+        e.form for e in robot.elements
+    )
 
 
 def channel_lines(robot: Robot) -> list[str]:

@@ -1,8 +1,8 @@
 """Printer: turns the nodes of an expression graph into lines of source text.
 
 A node gets a line of its own if it has a name or is used more than once. A node without a name gets
-one from its hint, from its factors (C4DV23 = C4*DV23), or from the quantity that it is a part of
-(N16a, a part of N16).
+one from its hint, from its factors (C4DV23 = C4*DV23), from its function and the argument (signQP1 =
+sign(QP1)), or from the quantity that it is a part of (N16a, a part of N16).
 
 Every other node is written inside the only expression that uses it, so that each operation of the
 graph occurs in the text exactly once.
@@ -20,7 +20,7 @@ from operator import itemgetter
 from string import ascii_lowercase
 from typing import NamedTuple
 
-from symgen.derive.graph import ADD, CONST, COS, INV, MUL, SIN, SYM, Node, Scalar, reachable
+from symgen.derive.graph import ADD, CONST, COS, INV, MUL, POS, SIN, SYM, Node, Scalar, reachable
 from symgen.description.expression import FUNCTIONS, Expression, decimal
 from symgen.description.naming import Namespace
 
@@ -47,6 +47,10 @@ class Language(NamedTuple):
         Writes a rational number.
     comment : str
         Mark that starts a comment up to the end of the line.
+    prose : tuple of str
+        Marks at the start and at the end of a text of several lines.
+    breaks : bool
+        Whether a line may be broken at every space, or only within brackets.
     step, entry : str
         Line that gives a name to a value, and line that assigns a value to an entry of a result; {}
         stands for the name, then for the value.
@@ -64,6 +68,8 @@ class Language(NamedTuple):
     square: str = "{0}**2"
     number: Callable[[Fraction], str] = number
     comment: str = "#"
+    prose: tuple[str, str] = ('"""', '"""')
+    breaks: bool = False
     step: str = "{} = {}"
     entry: str = "{} = {}"
     chained: bool = True
@@ -195,7 +201,8 @@ class Text:
         whole = self._wholes(outputs, labels)
         for node in waiting:
             if not node.hint:
-                self.called[node.index] = self._made_of(node) or self._part_of(node, whole)
+                name = self._made_of(node) or self._value_of(node)
+                self.called[node.index] = name or self._part_of(node, whole)
 
     def _wholes(self, outputs: Sequence[Scalar | int], labels: Sequence[str]) -> dict[int, str]:
         """Find, for each graph node, the named quantity that is computed from it, such as N16 for
@@ -225,6 +232,22 @@ class Text:
             return ""
         self.sign[node.index] = self._sign_of(node)
         return self.names.own("".join(sorted(words, key=lambda w: w.startswith("x"))))
+
+    def _value_of(self, node: Node) -> str:
+        """Name an intermediate variable after its function and argument: signQP1 = sign(QP1).
+
+        posQP1 is max(QP1, 0), negQP1 is min(QP1, 0). The name is empty for an operation that is no
+        function of one named variable.
+        """
+        x, *more = node.operands
+        if more or node.op == INV or x.node.index not in self.called:
+            return ""
+        positive = x.sign * self._name_sign(x.node) > 0
+        if not positive and node.op != POS:
+            return ""
+        self.sign[node.index] = 1 if positive else -1
+        function = node.op if positive else "neg"
+        return self.names.own(function + self.called[x.node.index])
 
     def _factors(self, node: Node) -> list[str] | None:
         if node.op != MUL:
@@ -344,10 +367,16 @@ class Text:
             square = self.language.square.format(self._factor(self._as_named(a.node)))
             return ("-" if sign < 0 else "") + square
         for x in sorted((a, b), key=lambda x: not x.node.fixed):
-            name_sign = self._name_sign(x.node) if x.node.index in self.called else 1
-            sign *= x.sign * name_sign
-            factors.append(self._factor(self._positive(x.node, name_sign)))
+            own = self._own_sign(x.node)
+            sign *= x.sign * own
+            factors.append(self._factor(self._positive(x.node, own)))
         return ("-" if sign < 0 else "") + "*".join(factors)
+
+    def _own_sign(self, node: Node) -> int:
+        """Return the sign with which a node is written without a minus, as min(x, 0) is."""
+        if node.index in self.called:
+            return self._name_sign(node)
+        return -1 if node.op == POS and node.operands[0].sign < 0 else 1
 
     def _factor(self, s: Scalar) -> str:
         text = self._operand(s)

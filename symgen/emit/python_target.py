@@ -8,10 +8,8 @@ own.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from textwrap import wrap
-from typing import Any
 
 from symgen.derive.closure import Closure
 from symgen.derive.loop_equations import loop_system
@@ -29,7 +27,7 @@ from symgen.version import VERSION
 
 BLOCK = 4096  # samples
 MANY = 8  # values of a source that are named in one assignment, others beside them
-FEWEST_SHARED = 8  # values of the motion of the links that are worth a function of their own
+FEWEST_SHARED = 8  # steps of the motion of the links that are worth one text for two functions
 
 
 def render(spec: ModuleSpec, *, command: str | None = None) -> str:
@@ -51,12 +49,16 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
     passive = [e for j in robot.passive for e in (closure.offset[j], *closure.row[j].values())]
     coefficients = [c for b in regrouping.base for c in b.combination.values()]
     coefficients += [ratio for _, ratio, _ in sign_conditions(regrouping)]
-    taken = {name: b.constants for name, b in blocks.items()} | {
+    taken = {name: {*b.constants} for name, b in blocks.items()} | {
         "base_parameters": _symbols(coefficients),
         "moving": _symbols(rates),
         "passive_joints": _symbols(passive),
     }
+    if motion:
+        taken |= dict.fromkeys(SHARING, set.union(*(taken[name] for name in SHARING)))
     constants = {name: [c for c in free if c in used] for name, used in taken.items()}
+    for names in constants.values():
+        names.sort(key=robot.channels.__contains__)
     slides = any(robot.frame(j).sigma == PRISMATIC for j in closure.independent)
     return laid_out(
         "module.py",
@@ -109,113 +111,72 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
             "packed": packed(list(regrouping.names)),
             "moving": _moving(robot, closure),
             "passive_rows": _passive_rows(robot, closure),
-            "motion": motion,
-            "blocks": [_laid_out(spec, b) for b in blocks.values()],
+            "motion": _broken(motion),
+            "blocks": {
+                name: _laid_out(spec, b, 8 if motion and name in SHARING else 4)
+                for name, b in blocks.items()
+            },
             "functions": spec.functions,
             "slides": slides,
             "turn": loop_system(robot).turn() if spec.tied else None,
             "pace": f"{loop_system(robot).pace():.2g}" if spec.tied else "",
             "joint": robot.joints[0],
             "closed": loop_system(robot).tolerance if spec.tied else "",
+            "valued": spec.base_values,
         },
+        PYTHON,
     )
 
 
-def _blocks(spec: ModuleSpec) -> tuple[dict[str, Block], dict[str, Any] | None]:
-    """Write all functions of the Python module, and the link motion that two of them share.
+def _blocks(spec: ModuleSpec) -> tuple[dict[str, Block], tuple[Section, ...]]:
+    """Write all functions of the Python module, and the motion of the links that two of them share.
 
-    The motion is None if the regressor and the inverse dynamics share only few values.
+    The motion is empty if the regressor and the inverse dynamics share only few steps.
     """
     names = spec.names(PYTHON.is_word)
     functions = {name: f for name, f in spec.functions.items() if not f.model.case_of}
-    sharing = [functions[name] for name in SHARING]
-    shared = FunctionPrinter(spec, sharing, names.inner(), PYTHON, _unpack)
-    in_one = len(shared.given) >= FEWEST_SHARED
-    blocks = {}
-    for name, f in functions.items():
-        if in_one and name in SHARING:
-            blocks[name] = shared.block(f, _motion)
-        else:
-            blocks[name] = FunctionPrinter(spec, [f], names.inner(), PYTHON, _unpack).block(f)
-    if not in_one:
-        return blocks, None
-    motion = shared.motion
-    sections = [Section(s.title, tuple(broken(s.lines))) for s in motion.sections]
-    returned = [f"    {line}" for line in wrap(", ".join(shared.given), WIDTH - 12)]
-    lines = ["return (", *returned, ")"]
-    return blocks, {"arguments": motion.arguments, "sections": sections, "returned": lines}
+    both = [functions[name] for name in SHARING]
+    shared = FunctionPrinter(spec, both, names.inner(), PYTHON, _unpack)
+    in_one = len(shared.shared & shared.text.named) >= FEWEST_SHARED
+    blocks = {
+        name: shared.block(f)
+        if in_one and name in SHARING
+        else FunctionPrinter(spec, [f], names.inner(), PYTHON, _unpack).block(f)
+        for name, f in functions.items()
+    }
+    return blocks, shared.motion if in_one else ()
 
 
-def _motion(names: Sequence[str], arguments: Sequence[str]) -> list[str]:
-    return unpacked(names, f"_motion({', '.join(['xp', *arguments])})")
-
-
-def _laid_out(spec: ModuleSpec, block: Block) -> dict[str, object]:
-    f, sizes = block.function, spec.sizes
-
-    def target(place: Sequence[int]) -> str:
-        return f"{block.result}[{', '.join(map(str, place))}]"
-
+def _laid_out(spec: ModuleSpec, block: Block, indent: int = 4) -> dict[str, object]:
+    """Collect the lines of one function for the template, which indents them by so many columns."""
+    f = block.function
+    results = block.results(lambda place: _entry(block.result, place))
     constant = [] if f.model.by_columns else _constant_entries(f, block.result)
-    steps, results = _filled_at_once(block.sections, block.results(target))
-    sections = [*steps, *results, Section("Constants", tuple(constant))]
-    count = len(block.arguments) - len(block.constants) - f.model.reads_X
-    states, rest = block.arguments[:count], block.arguments[count:]
-    rows = [
-        f"{s} ({sizes['m'] * sizes['n'] if k == 3 and spec.tied else sizes['k']}, N)"
-        for k, s in enumerate(states)
-    ]
+    sections = [*block.sections, *results, Section("Constants", tuple(constant))]
+    states = block.arguments[: len(block.arguments) - len(block.constants) - f.model.reads_X]
+    k, rates = spec.sizes["k"], spec.sizes["m"] * spec.sizes["n"]
+    rows = f"{', '.join(states[:3])} ({k}, N)" + f" and {states[-1]} ({rates}, N)" * (
+        len(states) > 3
+    )
     return {
-        "name": f.model.name,
-        "arguments": ", ".join(["xp", *states, block.result, *rest]),
-        "summary": f"Fill {block.result}, shape ({', '.join(map(str, f.shape))}, N)"
-        + ", where it is not constant" * f.model.by_columns
-        + f", from {'; '.join(rows)}.",
-        "sections": [Section(s.title, tuple(broken(s.lines))) for s in sections if s.lines],
+        "states": ", ".join(["xp", *states]),
+        "result": block.result,
+        "X": ", X" * f.model.reads_X,
+        "filled": f"{block.result}, shape {tuple_of([*f.shape, 'N'])}"
+        + ", where it is not constant" * f.model.by_columns,
+        "rows": rows,
+        "sections": _broken(sections, indent),
     }
 
 
-def _filled_at_once(
-    steps: Sequence[Section], results: Sequence[Section]
-) -> tuple[list[Section], list[Section]]:
-    """Merge assignments: `N1 = x` and `Gamma[0] = N1` become `N1 = Gamma[0] = x`.
+def _broken(sections: Iterable[Section], indent: int = 4) -> list[Section]:
+    """Break the long lines of sections; sections without lines are left out."""
+    return [Section(s.title, tuple(broken(s.lines, indent))) for s in sections if s.lines]
 
-    N1 is left out of this line if no other line uses N1. Entries with the same value are assigned
-    in one line; entries with a remark are not merged. Return the sections of the steps, and the
-    sections of the results that remain.
-    """
-    named = {line.partition(" = ")[0] for section in steps for line in section.lines}
-    targets: dict[str, list[str]] = {}
-    left = []
-    for section in results:
-        lines: dict[str, str] = {}
-        for line in section.lines:
-            places, _, value = line.rpartition(" = ")
-            if "#" in line or not value.lstrip("-").isidentifier():
-                lines[line] = line
-            elif value in named:
-                targets.setdefault(value, []).append(places)
-            elif value in lines:
-                lines[value] = f"{lines[value].removesuffix(value)}{places} = {value}"
-            else:
-                lines[value] = line
-        left.append(Section(section.title, tuple(lines.values())))
-    read = {
-        word
-        for section in (*steps, *left)
-        for line in section.lines
-        for word in re.findall(r"\w+", line.rpartition(" = ")[2])
-    }
-    at_once = []
-    for section in steps:
-        joined = []
-        for line in section.lines:
-            name, _, value = line.partition(" = ")
-            if name in targets:
-                line = " = ".join([name] * (name in read) + [*targets[name], value])
-            joined.append(line)
-        at_once.append(Section(section.title, tuple(joined)))
-    return at_once, left
+
+def _entry(result: str, place: Sequence[int]) -> str:
+    """Write an entry of a result array: A[0, 1], or PW[()] of a model that is one number."""
+    return f"{result}[{', '.join(map(str, place)) or '()'}]"
 
 
 def _passed_constants(robot: Robot, names: Sequence[str]) -> str:
@@ -248,7 +209,7 @@ def _constant_entries(f: Function, result: str) -> list[str]:
     """
     by_value: dict[float, list[str]] = {}
     for place, value in f.preset:
-        by_value.setdefault(value, []).append(f"{result}[{', '.join(map(str, place))}]")
+        by_value.setdefault(value, []).append(_entry(result, place))
     lines = []
     for value, targets in by_value.items():
         line = ""
@@ -348,9 +309,9 @@ def unpacked(names: Sequence[str], source: str) -> list[str]:
     return ["(", *(f"    {line}" for line in wrap(text, WIDTH - 12)), f") = {source}"]
 
 
-def broken(lines: Iterable[str]) -> list[str]:
+def broken(lines: Iterable[str], indent: int = 4) -> list[str]:
     """Enclose in brackets the values of assignments that are too long for one line."""
-    return [_bracketed(line) if len(line) > WIDTH - 4 else line for line in lines]
+    return [_bracketed(line) if len(line) > WIDTH - indent else line for line in lines]
 
 
 def _bracketed(line: str) -> str:

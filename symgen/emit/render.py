@@ -7,6 +7,8 @@ from contextlib import suppress
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+from symgen.emit.printers import Language
+
 if TYPE_CHECKING:
     from jinja2 import Environment
     from jinja2.bccache import Bucket
@@ -42,50 +44,71 @@ def _environment() -> Environment:
     )
 
 
-def laid_out(template: str, context: Mapping[str, object]) -> str:
+def laid_out(template: str, context: Mapping[str, object], language: Language) -> str:
     """Fill in the template `templates/<template>.jinja` and break lines that are too long.
 
     `context` holds the values for the template.
     """
     text = _environment().get_template(f"{template}.jinja").render(context)
-    return "\n".join(_lines_that_fit(text.split("\n"), template.endswith((".c", ".h"))))
+    return "\n".join(lines_that_fit(text.split("\n"), language))
 
 
-def _lines_that_fit(lines: Iterable[str], in_c: bool) -> Iterator[str]:
+def lines_that_fit(lines: Iterable[str], language: Language) -> Iterator[str]:
     """Yield the lines of a text, with lines longer than 100 columns broken at a space.
 
-    A line stays long if it has no space at which the language allows a break.
+    A comment at the end of a long line gets a line of its own, before it. A line stays long if it
+    has no space at which the language allows a break.
     """
-    in_text = False
+    start, end = language.prose
+    mark = f"{language.comment} "
+    prose = False
     for line in lines:
-        quotes = line.count('"""')
-        while len(line) > WIDTH and (end := _end(line, in_c or in_text or quotes > 0)):
-            yield line[:end].rstrip()
-            indent = " " * (len(line) - len(line.lstrip()) + (0 if in_text or quotes else 4))
-            remark = "# " if line.lstrip().startswith("# ") else ""
-            line = f"{indent}{remark}{line[end:].lstrip()}"
-        in_text ^= quotes % 2 == 1
-        yield line
+        before = line[: len(line) - len(line.lstrip())]
+        opens = not prose and line.lstrip().startswith(start)
+        code, remark, comment = line.partition(f"  {mark}")
+        if len(line) > WIDTH and remark and not prose and not opens and code.strip():
+            yield from _fitted(f"{before}{mark}{comment}", before + mark, True, True)
+            line = code.rstrip()
+        if prose or opens:
+            more = before + " " * (3 if opens and start != end else 0)
+        else:
+            more = before + (mark if line.lstrip().startswith(mark) else "    ")
+        words = prose or opens or line.lstrip().startswith(mark)
+        yield from _fitted(line, more, words, words or language.breaks)
+        marks = line.count(start) if start == end else line.count(start) - line.count(end)
+        prose = prose ^ (marks % 2 == 1) if start == end else prose + marks > 0
 
 
-def _end(line: str, in_text: bool) -> int:
+def _fitted(line: str, more: str, words: bool, free: bool) -> Iterator[str]:
+    """Yield the parts of a line; all but the first start with `more`.
+
+    `words` says whether the line is a comment, `free` whether it may be broken outside brackets.
+    """
+    while len(line) > WIDTH and (end := _end(line, more, words, free)):
+        yield line[:end].rstrip()
+        line = f"{more}{line[end:].lstrip()}"
+    yield line
+
+
+def _end(line: str, more: str, words: bool, free: bool) -> int:
     """Find the column at which to break a line: its last suitable space within 100 columns.
 
-    In code, only spaces inside brackets and outside strings count. The result is 0 without such a
-    space.
+    A space outside inner brackets is better, if it leaves no short line. Spaces inside strings do
+    not count, in a comment all do. The result is 0 without such a space.
     """
-    start = len(line) - len(line.lstrip())
-    free = in_text or line[start:].startswith("# ")
-    depth, quote, end = 0, "", 0
+    start = len(more) if line.startswith(more) else len(line) - len(line.lstrip())
+    depth, quote = 0, ""
+    ends: dict[int, int] = {}  # the last space at each depth of brackets
     for k, c in enumerate(line[: WIDTH + 1]):
         if quote:
             quote = "" if c == quote else quote
-        elif c in "\"'" and not free:
+        elif c in "\"'" and not words:
             quote = c
         elif c in "([{":
             depth += 1
         elif c in ")]}":
             depth -= 1
         elif c == " " and k > start + 4 and (free or depth > 0):
-            end = k
-    return end
+            ends[0 if words else depth] = k
+    good = [end for _, end in sorted(ends.items()) if end > WIDTH // 2]
+    return [*good, *ends.values(), 0][0]

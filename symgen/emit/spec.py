@@ -129,6 +129,17 @@ class ModuleSpec:
         acts = {place for place, e in self.functions["regressor"].by_place if e.value != 0}
         return tuple(tuple((k, row) in acts for row in range(n)) for k in range(b))
 
+    @cached_property
+    def base_values(self) -> tuple[float, ...]:
+        """Base parameters X of the values in the robot file; empty if it lacks one they contain."""
+        values, constants = self.robot.values, self.robot.constants
+        rows = [b.combination for b in self.regrouping.base]
+        if not {name for row in rows for name in row} <= {*values}:
+            return ()
+        return tuple(
+            sum(c.value(constants) * values[name] for name, c in row.items()) for row in rows
+        )
+
     @property
     def sizes(self) -> dict[str, int]:
         """Numbers of joints, parameters and frames by name: n, m, k, b, p, frames.

@@ -13,7 +13,12 @@ from campaign import campaign, sampled, some
 from oracles.random_robots import describe_mix, random_robot
 from oracles.same_draw import same_draw
 from symgen.certify import lagrange
-from symgen.certify.certificate import certify_formulas, numeric_rank
+from symgen.certify.certificate import (
+    certify_formulas,
+    independent,
+    numeric_rank,
+    rank_by_gap,
+)
 from symgen.derive import newton_euler
 from symgen.derive.derivation import derive
 from symgen.description import Robot, load_robot, packaged_robots
@@ -74,6 +79,26 @@ def test_a_dependent_base_is_caught() -> None:
     extra = BaseParameter("M2", "M2", {"M2": Expression.number(1)})
     certificate = certify_formulas(replace(regrouping, base=(*regrouping.base, extra)))
     assert not certificate.valid and certificate.rank == len(regrouping)
+
+
+@pytest.mark.parametrize("name", ["planar_2r", "tx40", "haptic", "panda", "scara"])
+def test_a_gap_tells_dependent_columns(name: str) -> None:
+    """Ten sets of columns a robot, each with one that is a combination of others; and a matrix whose
+    singular values fall without a gap, which tells nothing.
+    """
+    regrouping = regroup(load_robot(name))
+    W = independent(regrouping.robot).W
+    W = W[:, [regrouping.robot.parameters.index(own) for own in regrouping.own]]
+    assert rank_by_gap(W) == (len(regrouping), True)
+    rng = np.random.default_rng(3)
+    for _ in range(10):
+        k, *others = rng.permutation(len(regrouping))[: rng.integers(3, 6)]
+        dependent = W.copy()
+        dependent[:, k] = W[:, others] @ rng.uniform(0.5, 2, len(others))
+        assert rank_by_gap(dependent) == (len(regrouping) - 1, True)
+    U, V = (np.linalg.qr(rng.normal(size=(40, 20)))[0] for _ in range(2))
+    rank, told = rank_by_gap(U * 10.0 ** -np.arange(20.0) @ V[:20].T)
+    assert rank < 20 and not told
 
 
 def test_a_missing_base_parameter_is_caught() -> None:

@@ -70,8 +70,9 @@ def cache(tmp_path, monkeypatch):
 def wrong(text: str, function: str) -> str:
     """The text with 0.001 added to one entry of a function."""
     head, mark, block = text.partition(f"def _{function}_block(")
+    entry = {"regressor": "D", "inertia_matrix": "A"}.get(function, "GAM")
     changed, count = re.subn(
-        r"^( +(?:D|GAM|A)\[[^=]*\] = )(?=[^=]*$)",
+        rf"^( +{entry}\[[^=]*\] = )(?=[^=]*$)",
         r"\g<1>1e-3 + ",
         block,
         count=1,

@@ -12,11 +12,9 @@
 enum { JOINTS = PLANAR_2R_JOINTS, PARAMETERS = PLANAR_2R_PARAMETERS, STEPS = 10000 };
 static const double PERIOD = 0.001; /* s */
 
-/* Base parameters in the order of planar_2r_parameters, SI: from `symgen identify`, or from
-   base_parameters() of planar_2r.py. */
-static const PLANAR_2R_REAL X[PARAMETERS] = {
-    /* ZZ1R MX1R MY1 FV1 FS1 OFFSET1 */ 0.7173, 1.5, 0, 0.5, 0.8, 0.1,
-    /* ZZ2 MX2 MY2 Ia2 FV2 FS2 OFFSET2 */ 0.1673, 0.5, 0, 0.02, 0.3, 0.4, -0.05};
+/* Base parameters of the robot file; yours come from `symgen identify`, in the order of
+   planar_2r_parameters. */
+static const PLANAR_2R_REAL *const X = planar_2r_values;
 
 /* Torques that follow q_r = (sin t, cos 2t): Gamma = A(q) v + C qd + Q + friction, with
    v = qdd_r + 20 (qd_r - qd) + 100 (q_r - q). */
