@@ -224,7 +224,7 @@ class Reading:
             cause = found
         if ({*cause.constants} & {*self.constants}) - {*GRAVITY}:
             return None  # one number is fitted once
-        cause = self._rounded(cause)
+        cause = self._of_columns(self._rounded(cause))
         constants = {**self.constants, **cause.constants}
         delay = self._reordered(cause.T)
         if delay is None:
@@ -326,6 +326,19 @@ class Reading:
         E = {name: np.vectorize(lambda x: float(f"{x:.4g}"))(x) for name, x in E.items()}
         robot = self.robot
         return replace(cause, **robot.positions(E["P"]), **robot.torques(E["T"]))
+
+    def _of_columns(self, cause: Cause) -> Cause:
+        """Apply a change of motor positions before the offset of the drives, as a file has it.
+
+        q' = P (q - offset) + offset
+        """
+        still = np.array_equal(cause.P, np.eye(len(self.p)))
+        if still or self.sides[0] != "motor" or self.drives is None:
+            return cause
+        if cause.kind in ("side", "coupling"):
+            return cause
+        offset = self.drives.offset
+        return replace(cause, p=offset - cause.P @ offset)
 
     @property
     def robot(self) -> Robot:
