@@ -227,10 +227,13 @@ def _scaled(record: Lines, key: str, factors: Array, n: int) -> bool:
 
 
 def _at_side(record: Lines, cause: Cause, place: Place) -> bool:
-    """Write another side of positions or torques of a record."""
+    """Write another side of positions or torques; False if this is not what the cause changes."""
+    before, still = sides_of(record), np.eye(place.n)
     for key, side in cause.change.items():
         record[key.removeprefix("record.")] = side
-    return bool(cause.change) and place.drives is not None
+    moved = [a != b for a, b in zip(before, sides_of(record), strict=True)]
+    changed = [not np.array_equal(x, still) for x in (cause.P, cause.T)]
+    return bool(cause.change) and place.drives is not None and moved == changed
 
 
 def _at_rate(record: Lines, cause: Cause, place: Place) -> bool:
@@ -265,7 +268,7 @@ def _coupled(study: Lines, cause: Cause, place: Place) -> bool:
         return False
     ratio = R @ np.linalg.inv(P)
     robot["drives"] = {"ratio": [[float(f"{x:.10g}") for x in row] for row in ratio]}
-    if offset.any():
+    if offset.any() and both[0]:
         robot["drives"]["offset"] = [float(x) for x in P @ offset]
     for record in records_in(study):
         record["side"], record["torque_side"] = "motor", None

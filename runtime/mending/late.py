@@ -18,8 +18,7 @@ from runtime.ground.limits import limits
 from runtime.mending.reading import Reading
 from runtime.plausible.bodies import Grams, least_squares
 
-LIMIT = limits("runtime.plausible")
-OWN = limits(__package__)
+LIMIT, TOLD = limits(__package__), limits("runtime.plausible")
 
 Array = np.ndarray
 
@@ -41,7 +40,7 @@ def late_torques(reading: Reading) -> tuple[Array, str] | None:
 
     start = reading.delay
     before = score(start)
-    tried = {sign * d: 0.0 for d in OWN.DELAYS_TRIED for sign in (1, -1)}
+    tried = {sign * d: 0.0 for d in LIMIT.DELAYS_TRIED for sign in (1, -1)}
     tried = {d: score(start + d) for d in tried}
     grid = sorted(tried)
     k = grid.index(min(tried, key=tried.__getitem__))
@@ -56,18 +55,18 @@ def late_torques(reading: Reading) -> tuple[Array, str] | None:
                 return score(np.where(np.arange(n) == j, d, alone))
 
             far = min((alone[j] + d for d in grid), key=own)
-            near = (far - LIMIT.LATE_JOINT, far + LIMIT.LATE_JOINT)
+            near = (far - TOLD.LATE_JOINT, far + TOLD.LATE_JOINT)
             d = _least(own, near)
-            if abs(d - common[j]) > LIMIT.LATE_JOINT and best - own(d) > LIMIT.LATE_GAIN:
+            if abs(d - common[j]) > TOLD.LATE_JOINT and best - own(d) > TOLD.LATE_GAIN:
                 alone[j] = d
                 best = score(alone)
         delay = alone
-    if np.abs(delay - start).max() < LIMIT.LATE or before - best < LIMIT.LATE_GAIN:
+    if np.abs(delay - start).max() < TOLD.LATE or before - best < TOLD.LATE_GAIN:
         return None
     if len({*np.round(delay, 4)}) > 1:  # what is common is judged anew beside single joints
-        apart = np.abs(delay - common) > LIMIT.LATE_JOINT
+        apart = np.abs(delay - common) > TOLD.LATE_JOINT
         still = np.where(apart, delay, start)
-        if score(still) - best < LIMIT.LATE_GAIN:
+        if score(still) - best < TOLD.LATE_GAIN:
             delay = still
     told = [f"{1e3 * d:.1f}" for d in delay]
     text = told[0] if len({*told}) == 1 else ", ".join(told)

@@ -16,7 +16,7 @@ from runtime.mending.reading import Reading
 from runtime.plausible.causes import Item, Maps, Robot, Row, factor_words, joints
 from runtime.plausible.trials import Trial, search_number
 
-LIMIT = limits("runtime.plausible")
+TRIED = limits("runtime.plausible")
 
 
 def _maps(robot: Robot, item: Item, xi: float) -> Maps:
@@ -49,7 +49,7 @@ def other_ratios(reading: Reading) -> list[Trial]:
         if step is None:
             continue
         xi, variance = float(step[0][0]), float(step[1][0, 0])
-        if 0.5 * xi**2 / variance < LIMIT.WORTH_SEARCHING * LIMIT.DECISIVE:
+        if 0.5 * xi**2 / variance < TRIED.WORTH_SEARCHING * TRIED.DECISIVE:
             continue
         trial = search_number(baseline, RATIO, change, xi)
         if trial is not None:

@@ -243,7 +243,11 @@ class Reading:
             sides = (q, cause.change.get("record.torque_side", sides[1]) or q)
         if cause.kind == "coupling":
             sides, made = ("motor", "motor"), study["robot"]["drives"]
-            drives = Drives(np.array(made["ratio"]), made.get("offset", 0.0), np.ones(len(self.p)))
+            drives = Drives(
+                np.array(made["ratio"]),
+                made.get("offset", 0.0 if drives is None else drives.offset),
+                np.ones(len(self.p)),
+            )
         order = monomial(of_files(cause, self.sides, self.drives)[0])
         if order is not None and "q" in units and order[0] != [*range(len(self.p))]:
             units["q"] = tuple(units["q"][k] for k in order[0])

@@ -218,7 +218,7 @@ def repair(problem: Problem, study: Any, *, variants: Any, columns: Columns) -> 
     hidden = tuple(dict.fromkeys(cause.subject for cause in same))
     if not kept:
         ranked = sorted(found.readings.values(), key=lambda one: one.score(found.N))
-        listed = [one for one in ranked if one.steps][: LIMIT.BEAM]
+        listed = [one for one in ranked if one.steps and best.steps][: LIMIT.BEAM]
         return Repair(
             False,
             reason,
