@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, model_validator
+from pydantic_core import ArgsKwargs
 
 from runtime.core import study as chapter
 from runtime.core.model import GeneratedModel
@@ -36,7 +37,14 @@ from runtime.reading.datasets import DATASETS, dataset_study
 from runtime.reading.formats import endings, is_measured, read_table
 from runtime.reading.likely_columns import candidates, known_columns
 from runtime.reading.records import read_records
-from runtime.reading.settings import Records, RecordSettings, Rows, ValidateSettings, with_law
+from runtime.reading.settings import (
+    Records,
+    RecordSettings,
+    Rows,
+    ValidateSettings,
+    inherited,
+    with_law,
+)
 
 RARE_WRAPS = 0.05
 """Share of the steps between two samples that may be jumps of an angle by a full turn."""
@@ -63,7 +71,8 @@ class Study(chapter.Study, Recorded):
     Attributes
     ----------
     payload : PayloadSettings or None
-        Records with a load.
+        Records with a load; columns, units, side and rate that they leave out are those of the
+        first record.
     controller : Controller or None
         Closed loop for simulation, IV and DIDIM.
     excitation : ExcitationSettings or None
@@ -80,6 +89,22 @@ class Study(chapter.Study, Recorded):
     controller: Controller | None = None
     excitation: ExcitationSettings | None = None
     robot: Corrections | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _loaded_alike(cls, value: Any) -> Any:
+        """Give payload.record the columns, units and side of `record`, if it leaves them out."""
+        given = value.kwargs or {} if isinstance(value, ArgsKwargs) else value
+        load = given.get("payload") if isinstance(given, Mapping) else None
+        if not (isinstance(load, Mapping) and load.get("record")):
+            return value
+        several = isinstance(load["record"], list | tuple)
+        own = [
+            inherited(record, given.get("record"))
+            for record in (load["record"] if several else [load["record"]])
+        ]
+        whole = {**given, "payload": {**load, "record": own if several else own[0]}}
+        return ArgsKwargs(value.args, whole) if isinstance(value, ArgsKwargs) else whole
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "record", with_law(self.record, self.controller))

@@ -61,6 +61,7 @@ def identify(
             help="Search several errors of the study at once, judge them on rows that were not used, and write the mended study; then identify with it. The given files stay as they are."
         ),
     ] = None,
+    at: options.At = None,
     json: options.Json = False,
 ) -> None:
     """Identify the base parameters of ROBOT from RECORD, or from several records fitted together.
@@ -73,6 +74,7 @@ def identify(
 
         described = session.robot_of(robot, trust=trust, exact=exact)
         study = session.study_of_arguments(record)
+        study = study if at is None else session.changed(study, payload={"at": at})
         robot_file, described = described, session.corrected(described, study)
         model = session.model_of(described, study=study)
         study = study if suggest is None else session.suggested_study(study, model, suggest)
