@@ -787,7 +787,8 @@ def repair(
         return own.columns.q or q, own.columns.tau or tau
 
     stated = study if study.record else replace(study, record=(RecordSettings(),))
-    return repairing.repair(whole, stated, variants=variants, columns=columns)
+    given = list_records(records)
+    return repairing.repair(whole, stated, records=given, variants=variants, columns=columns)
 
 
 def extras(asked: Mapping[str, Mapping[str, Any]], attempted: bool = False) -> list[Extra]:

@@ -181,7 +181,14 @@ def _shown(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def repair(problem: Problem, study: Any, *, variants: Any, columns: Columns) -> Repair:
+def repair(
+    problem: Problem,
+    study: Any,
+    *,
+    records: Sequence[Record],
+    variants: Any,
+    columns: Columns,
+) -> Repair:
     """Search the lines of a study that are wrong, and write the study in which they are right.
 
     Parameters
@@ -190,6 +197,8 @@ def repair(problem: Problem, study: Any, *, variants: Any, columns: Columns) -> 
         Prepared.
     study : Study
         As it was given, with at least one entry in `record`.
+    records : sequence of Record
+        As they were read, before any preparation step.
     variants : GeneratedModel or None
         The module of `symgen.variants`; without it, no entry of the robot file is corrected.
     columns : function of the settings of a record
@@ -202,7 +211,7 @@ def repair(problem: Problem, study: Any, *, variants: Any, columns: Columns) -> 
     """
     case = _case(problem, variants)
     lines = to_mapping(study)
-    data = data_of(case, problem, lines, columns)
+    data = data_of(case, problem, lines, columns, records[0].rate)
     start = Reading.given(data, lines)
     if start.baseline is None:
         raise InputError("the rows of the study cannot be fitted; identify says why")
@@ -226,7 +235,7 @@ def repair(problem: Problem, study: Any, *, variants: Any, columns: Columns) -> 
             start.unseen_error,
             best.unseen_error,
             study,
-            problem.records,
+            tuple(records),
             hidden=hidden,
             candidates=tuple(_candidate(one, start) for one in listed),
             readings=found.expanded,
@@ -238,7 +247,7 @@ def repair(problem: Problem, study: Any, *, variants: Any, columns: Columns) -> 
         start.unseen_error,
         best.unseen_error,
         structure(type(study), best.study),
-        tuple(record_of(best, one) for one in problem.records),
+        tuple(record_of(best, one) for one in records),
         equivalent=tuple(_candidate(one, start) for one in others),
         hidden=hidden,
         readings=found.expanded,
@@ -285,7 +294,7 @@ def _require_one_publisher(record: Record) -> None:
         raise sent.refused(note)
 
 
-def data_of(case: Case, problem: Problem, study: Lines, columns: Columns) -> Data:
+def data_of(case: Case, problem: Problem, study: Lines, columns: Columns, rate: float) -> Data:
     """Set blocks of the records aside, before anything is searched."""
     samples = case.samples
     seen, aside = set_aside(samples, 1 / samples.cutoff)
@@ -293,12 +302,11 @@ def data_of(case: Case, problem: Problem, study: Lines, columns: Columns) -> Dat
     if case.unseen:
         unseen = samples_of([part for one in case.unseen for part in excerpts(one)], case.study)
         unseen = replace(unseen, record=unseen.record + len(case.through))
-    record = problem.records[0]
     place = Place(
         joints=tuple(int(j) for j in problem.model.JOINTS),
         turning=case.turning,
         drives=drives_of(problem.model),
-        rate=record.rate,
+        rate=rate,
         timed=study["record"][0]["rate"] is None,
         columns=columns,
     )

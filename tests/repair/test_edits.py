@@ -69,6 +69,7 @@ def start(request: Any, tmp_path_factory: pytest.TempPathFactory) -> tuple[Readi
             record["columns"]["q"] or ["q1", "q2", "q3"],
             record["columns"]["tau"] or ["tau1", "tau2", "tau3"],
         ),
+        RATE,
     )
     return Reading.given(data, to_mapping(study)), robot, model, folder
 

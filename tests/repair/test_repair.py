@@ -209,7 +209,7 @@ def test_blocks_set_aside_do_not_matter_to_the_search(made: Any) -> None:
     for factor in (1.0, 3.0):
         whole = problem(model, runtime.Record(t, q, tau * (1, -1, 1)), study)
         data = mending.data_of(
-            case_of(whole, variants), whole, to_mapping(study), lambda record: ((), ())
+            case_of(whole, variants), whole, to_mapping(study), lambda record: ((), ()), RATE
         )
         other = np.where(data.aside[:, None], factor, 1.0) * data.samples.tau
         data = replace(data, samples=replace(data.samples, tau=other))
