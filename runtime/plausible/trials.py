@@ -535,13 +535,13 @@ def _of_numbers(baseline: Baseline, robot: Robot) -> list[Trial]:
                 steps.append((gain, xi, row, change))
     steps.sort(key=lambda item: -item[0])
     for _, xi, row, number in steps[: LIMIT.NUMBERS_SEARCHED]:
-        trial = _search_number(baseline, row, number, xi)
+        trial = search_number(baseline, row, number, xi)
         if trial is not None:
             trials.append(trial)
     return trials
 
 
-def _search_number(baseline: Baseline, row: Row, change: Change, first: float) -> Trial | None:
+def search_number(baseline: Baseline, row: Row, change: Change, first: float) -> Trial | None:
     """Search the size xi of one possible error, such as a torque factor, that fits the record best.
 
     None if no size improves the fit enough. A few sizes are tried with the joint weights of the
