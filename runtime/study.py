@@ -31,6 +31,7 @@ from runtime.ground.arrays import require_kind
 from runtime.ground.errors import InputError
 from runtime.ground.settings import Settings, structure, to_mapping
 from runtime.loop.settings import CestacSettings, Controller
+from runtime.mending.settings import Corrections
 from runtime.payload.settings import PayloadSettings
 from runtime.reading.datasets import DATASETS, dataset_study
 from runtime.reading.formats import endings, is_measured, read_table
@@ -76,6 +77,8 @@ class Study(chapter.Study, Recorded):
         Closed loop for simulation, IV and DIDIM.
     excitation : ExcitationSettings or None
         Search for an exciting motion.
+    robot : Corrections or None
+        Entries that replace those of the robot file.
     """
 
     signals: Signals = field(default_factory=Signals)
@@ -85,6 +88,7 @@ class Study(chapter.Study, Recorded):
     payload: PayloadSettings | None = None
     controller: Controller | None = None
     excitation: ExcitationSettings | None = None
+    robot: Corrections | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -263,24 +267,32 @@ def located(study: Study, folder: Path) -> Study:
     return _with_files(study, lambda file: str(folder / file))
 
 
-def study_text(study: Study, destination: Path, *, defaults: bool = True) -> str:
+def study_text(
+    study: Study,
+    destination: Path,
+    *,
+    defaults: bool = True,
+    comments: Mapping[tuple[str | int, ...], str] | None = None,
+) -> str:
     """Write the text of study.yaml for the folder `destination`.
 
     File names are relative to that folder.
 
     defaults : True: every setting; False: only settings that differ from their default, and the
         units of each record.
+    comments : comments at the ends of lines, by the keys that lead to the line.
     """
     mapping = to_mapping(
         _with_files(study, lambda file: Path(os.path.relpath(file, destination)).as_posix())
     )
     if not defaults:
-        mapping = {"symgen": mapping["symgen"], **_differing(mapping, to_mapping(Study()))}
+        usual = to_mapping(Study(robot=study.robot and Corrections()))
+        mapping = {"symgen": mapping["symgen"], **_differing(mapping, usual)}
         usual = to_mapping(RecordSettings())
         mapping["record"] = [
             _differing(record, usual) | {"units": record["units"]} for record in mapping["record"]
         ]
-    return yaml_text(mapping)
+    return yaml_text(mapping, comments)
 
 
 def _differing(mapping: Mapping[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:

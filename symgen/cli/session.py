@@ -209,6 +209,17 @@ def model_of(robot: Robot | GeneratedModel, *, study: Study | None = None) -> Ge
     return load_model(symgen.model(robot, options=options))
 
 
+def corrected(robot: Robot | GeneratedModel, study: Study) -> Robot | GeneratedModel:
+    """Replace entries of a robot by those of the section `robot` of a study, if it has one.
+
+    A generated module stays as it is: the study is refused with it, unless it has the corrections.
+    """
+    from symgen.description import Robot
+    from symgen.description.corrected import corrected
+
+    return corrected(robot, study) if isinstance(robot, Robot) else robot
+
+
 def described_robot(
     source: str, at_values: bool = False, exact: bool = False, base: str | None = None
 ) -> Robot:
