@@ -366,9 +366,8 @@ def robot_of_tree(
     The notes list which joint is which q, which link is which kept frame, and what was not read.
     Raises DescriptionError, with the line of the wrong joint, if the tree describes no robot.
     """
-    free = [joint for joint in tree.joints if joint.kind == FREE_TYPE]
-    if free:
-        tree = _on_its_base(tree, free)
+    free = any(joint.kind == FREE_TYPE for joint in tree.joints)
+    tree = on_its_base(tree)
     table = placed(tree, keep_fixed=keep_fixed)
     try:
         robot = _robot(table, file, sha256, base="moving" if free else "fixed")
@@ -386,11 +385,16 @@ def robot_of_tree(
     return robot, (*legends, *tree.notes, *table.notes)
 
 
-def _on_its_base(tree: Tree, free: Sequence[Joint]) -> Tree:
+def on_its_base(tree: Tree) -> Tree:
     """Return the tree that stands on the link of its free joint: frame 0 of a base that moves.
+
+    A tree without a free joint is not changed.
 
     Raises DescriptionError unless the one free joint carries all other joints that move.
     """
+    free = [joint for joint in tree.joints if joint.kind == FREE_TYPE]
+    if not free:
+        return tree
     base = free[0]
     inside = {base.child}
     for _ in tree.joints:

@@ -230,3 +230,35 @@ def test_a_study_names_the_columns_of_the_base(case, tmp_path: Path):
         (tmp_path / "study.yaml").write_text(study_text(wrong), encoding="utf-8")
         with pytest.raises(SettingsError, match=message):
             runtime.read_record(tmp_path / "study.yaml", module)
+
+
+@pytest.mark.parametrize("flying", [False, True])
+def test_identified_values_are_written_into_the_file(case, tmp_path: Path, flying):
+    """Into the URDF with --base moving, or into one whose root joint is floating: mass of the forearm."""
+    _, module, _, (t, q, tau, base, _) = case
+    rng = np.random.default_rng(12)
+    noisy = tau + 0.1 * rng.normal(size=tau.shape)
+    result = runtime.identify(module, runtime.Record(t, q, noisy, channels={"base_motion": base}))
+    text = ur5()
+    if flying:
+        root = text.split('<link name="')[1].split('"')[0]
+        text = text.replace(
+            "</robot>",
+            '<link name="earth"/><joint name="fly" type="floating"><parent link="earth"/>'
+            f'<child link="{root}"/></joint></robot>',
+        )
+    file = tmp_path / "ur5.urdf"
+    file.write_text(text, encoding="utf-8")
+    applied = symgen.apply(result, file, base=None if flying else "moving")
+    new = tmp_path / "new.urdf"
+    applied.write(new)
+    before, after = (read_tree(f.read_bytes(), f.name)[0] for f in (file, new))
+    assert after.base == before.base == ("moving" if flying else "fixed")
+    X = [
+        module.base_parameters(dict.fromkeys(module.STANDARD_PARAMETERS, 0.0) | dict(r.values))
+        for r in (before, after)
+    ]
+    inertial = [n for n in module.BASE_PARAMETERS if n[:2] in ("XX", "ZZ", "MX", "MY")]
+    for n in inertial:
+        k = module.BASE_PARAMETERS.index(n)
+        assert abs(X[1][k] - X[0][k]) < 0.02 * max(map(abs, X[0])), n
