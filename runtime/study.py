@@ -22,6 +22,7 @@ from pydantic import TypeAdapter
 
 from runtime.core import study as chapter
 from runtime.core.model import GeneratedModel
+from runtime.core.record import Record
 from runtime.counts.settings import Signals
 from runtime.documents.files import settings_from_text, text_of
 from runtime.documents.yaml_text import yaml_text
@@ -43,6 +44,7 @@ from runtime.reading.records import read_records
 from runtime.reading.settings import Records, RecordSettings, Rows, ValidateSettings, with_law
 from runtime.reading.units import likely_time_unit
 
+BEYOND = 2.0  # times the limits of the robot file: positions so large are no rad
 RARE_WRAPS = 0.05
 """Share of the steps between two samples that may be jumps of an angle by a full turn."""
 
@@ -218,6 +220,9 @@ def suggested(study: Study, model: GeneratedModel, *, missing: bool = False) -> 
             f"suggested: record: {{units: {{t: {unit}}}}}"
         )
         study = _with_settings(study, {"units": {"t": unit}})
+    open_: dict[str, str] = {}
+    if beyond := _beyond_limits(study.record, records, model):
+        open_["record.units.q"] = beyond
     if any(r.resample is not None and r.resample.method != "count" for r in study.record):
         sentences.append(
             f"the stamps are not uniform: positions and torques are interpolated at {records[0].rate:g} Hz; "
@@ -228,7 +233,28 @@ def suggested(study: Study, model: GeneratedModel, *, missing: bool = False) -> 
         sentences.append("positions start anew at full turns; suggested: record: {unwrap: true}")
         pairs = zip(study.record, turns, strict=True)
         study = replace(study, record=tuple(replace(r, unwrap=r.unwrap or t) for r, t in pairs))
-    return Suggestion(study, tuple(sentences))
+    return Suggestion(study, tuple(sentences), open_)
+
+
+def _beyond_limits(
+    settings: Sequence[RecordSettings], records: Sequence[Record], model: GeneratedModel
+) -> str:
+    """Tell that no joint can be where the record has it, read as rad: degrees, or of motors.
+
+    The positions of every joint exceed the limits of the robot file more than `BEYOND` times; ""
+    otherwise.
+    """
+    limits = getattr(model, "LIMITS", {}).get("q", ())
+    if not limits or not all(limits) or any(one.units.q != "rad" for one in settings):
+        return ""
+    bounds = np.array([max(map(abs, limit)) for limit in limits])
+    reached = np.max([np.abs(record.q).max(axis=0) for record in records], axis=0)
+    if not np.all(reached > BEYOND * bounds):
+        return ""
+    return (
+        f"unit of the positions, which reach {reached.max():.3g} where the limits of the robot file "
+        f"are {bounds.max():.3g} rad (deg, or record.side: motor)"
+    )
 
 
 def _with_settings(study: Study, settings: Mapping[str, Any]) -> Study:
@@ -279,8 +305,13 @@ def _unfinished(
     if not timed and study.record[0].rate is None and table.joints is None:
         open_["record.columns.t"] = "time, or the sampling rate in record.rate"
     listed = candidates(table.columns, joints)
+    own = study.record[0]
+    taken = {own.columns.t, *own.columns.q, *own.columns.tau}
     perhaps = {
-        f"record.columns.{key}": tuple(names or table.names[:8]) for key, names in listed.items()
+        f"record.columns.{key}": tuple(
+            [name for name in names or table.names if name not in taken][:8]
+        )
+        for key, names in listed.items()
     }
     if not open_:
         open_["record"] = first_line(error.message)

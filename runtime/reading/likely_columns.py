@@ -184,10 +184,10 @@ def _parent(family: Family) -> str:
 
 
 def _runs(t: Array) -> bool:
-    """Whether the values of a column increase, as those of a time do."""
+    """Whether the values of a column increase, as those of a time do; True if they are unknown."""
     t = np.asarray(t, dtype=float).reshape(-1)
     step = np.diff(t[np.isfinite(t)])
-    return bool(len(step) and np.sum(step > 0) > np.sum(step < 0) and np.any(step > 0))
+    return not len(step) or bool(np.sum(step > 0) > np.sum(step < 0))
 
 
 def may_be_currents(names: Sequence[str]) -> bool:

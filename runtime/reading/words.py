@@ -148,7 +148,12 @@ def stated_unit(name: str, quantity: str, written: bool = False) -> str:
     listed = [*bracketed, *reversed(pieces)]
     for text in (
         *listed,
-        *(word for piece in reversed(pieces) for word in re.findall(WORD, piece)),
+        *(
+            word
+            for piece in reversed(pieces)
+            for word in re.findall(WORD, piece)
+            if not (word.isupper() and len(word) > 1)  # MACur
+        ),
     ):
         unit = UNITS.get(plain(text).lower(), UNITS.get(text.lower(), ""))
         if not unit and text in LETTERS:
