@@ -1,7 +1,7 @@
 """Columns and units that `identify --suggest` proposes for the lists of tests/reading/column_lists.py.
 
-    python benchmarks/column_names.py --before FILE    # in an earlier tree: write what it proposes
-    python benchmarks/column_names.py FILE             # write column_names.md, before and after
+python benchmarks/column_names.py --before FILE    # in an earlier tree: write what it proposes
+python benchmarks/column_names.py FILE             # write column_names.md, before and after
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "reading"))
 
-from column_lists import LISTS  # noqa: E402
+from column_lists import LISTS
 
-from runtime.reading.likely_columns import known_columns  # noqa: E402
+from runtime.reading.likely_columns import known_columns
 
 PAGE = Path(__file__).with_suffix(".md")
 

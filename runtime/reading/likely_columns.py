@@ -317,6 +317,8 @@ def _quantity(name: str, stem: str = "") -> tuple[str, int]:
     for exact in (True, False):
         for key in ("other", "qd", "tau", "q", "t"):
             for place, word in enumerate(WORDS[key]):
+                if word == "t" and not words <= {"t", "s", "ms", "us", "ns", "sec", "с"}:
+                    continue  # t_ms, but not O_T_EE
                 if has_word(words, word, exact):
                     meanings.setdefault(key, place)
                     break

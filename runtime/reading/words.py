@@ -20,7 +20,7 @@ from runtime.ground.errors import InputError
 from runtime.reading.units import position_unit, speed_unit, time_unit, torque_unit
 
 LANGUAGES = {  # time | position | torque | current | velocity | measured | commanded
-    "en": "t time times timestamp stamp seconds secs clock elapsed | q qm pos position positions qpos angle angles theta jpos | tau torque torques effort efforts moment trq tq tor qfrc | current currents cur curr amps | qd dq vel velocity velocities speed speeds qdot qvel omega rpm | actual act measured meas feedback fb fbk present real | target tgt desired des ref reference cmd command commanded commands setpoint set goal action ctrl plan planned demand window d",
+    "en": "t time times timestamp stamp ts tick ticks seconds secs clock elapsed | q qm pos position positions qpos angle angles theta jpos jp | tau torque torques effort efforts moment trq tq tor qfrc jf | current currents cur curr amps | qd dq vel velocity velocities speed speeds qdot qvel jv omega rpm | actual act measured meas feedback fb fbk present real | target tgt desired des ref reference cmd command commanded commands setpoint set goal action ctrl plan planned demand window d",
     "de": "zeit zeitstempel uhrzeit | winkel stellung lage gelenkwinkel achswinkel position | drehmoment moment | strom motorstrom | geschwindigkeit drehzahl | ist istwert gemessen | soll sollwert vorgabe ziel führung",
     "fr": "temps horodatage | position angle | couple couples | courant intensité | vitesse | mesure mesuré mesurée réel réelle | consigne commande cible désirée désiré référence",
     "it": "tempo | posizione posizioni angolo | coppia coppie momento | corrente correnti | velocità | misurata misurato effettiva effettivo reale attuale | riferimento comandata comando obiettivo desiderata desiderato",
@@ -29,7 +29,7 @@ LANGUAGES = {  # time | position | torque | current | velocity | measured | comm
     "nl": "tijd tijdstip tijdstempel | positie hoek stand | koppel draaimoment | stroom motorstroom | snelheid | gemeten werkelijk werkelijke huidige | gewenst gewenste doel streefwaarde instelwaarde",
     "pl": "czas | pozycja położenie kąt | moment momenty | prąd | prędkość | zmierzony zmierzona zmierzone rzeczywisty rzeczywista aktualna | zadana zadany zadane docelowa",
     "tr": "zaman süre | konum pozisyon açı | tork moment | akım | hız | ölçülen gerçek | hedef istenen komut referans",
-    "ru": "время | положени позици угол угла | момент усили | ток тока | скорост | измерен фактическ текущ | задан желаем целев уставк",
+    "ru": "время | положени позици угол угла | момент усили | ток тока | скорост | измерен факт фактическ текущ | зад задан желаем целев уставк",
     "zh": "时间 時間 时刻 时间戳 | 位置 角度 关节角 關節角 转角 | 力矩 扭矩 转矩 轉矩 | 电流 電流 | 速度 转速 | 实际 實際 测量 測量 反馈 | 目标 目標 指令 期望 给定 参考 设定",
     "ja": "時間 時刻 タイム | 位置 角度 関節角 | トルク | 電流 | 速度 | 実測 実際 測定 計測 現在 | 目標 指令 指示 参照",
     "ko": "시간 시각 | 위치 각도 | 토크 | 전류 | 속도 | 실제 측정 현재 | 목표 지령 명령 기준",
@@ -71,7 +71,7 @@ COMMANDED = _column(6)
 WORDS = {  # the first words of a quantity are taken before the others
     "t": _column(0),
     "q": (*_column(1), "state", "states"),
-    "tau": (*_column(2), *CURRENTS),
+    "tau": (*_column(2), *CURRENTS, "force", "forces"),
     "qd": _column(4),
     "other": tuple(plain(word).lower() for word in OTHER.split()),
 }
@@ -106,7 +106,7 @@ def has_word(words: set[str], word: str, exact: bool) -> bool:
 UNIT_NAMES = {  # as they are written, in small letters and without accents
     "deg": "deg degs degree degrees ° ˚ º grad gradi grados graus degres graden stopnie derece градус градусы 度 도",
     "rad": "rad rads radian radians radiant radianti radianes radianos радиан рад 弧度 라디안 radyan radialen radiany",
-    "counts": "count counts cnt ticks",
+    "counts": "count counts cnt",
     "rev": "rev revs turns",
     "mm": "mm",
     "Nm": "nm n*m n·m n-m n.m newtonmeter newtonmeters нм н·м н*м 牛米 牛顿米",
