@@ -216,7 +216,7 @@ def suggested(study: Study, model: GeneratedModel, *, missing: bool = False) -> 
         if unit == "s" or own.units.t != "s" or own.rate is not None:
             break
         sentences.append(
-            f"the time steps of {records[0].period:g} s are too long for seconds; "
+            f"the time steps of {1 / records[0].rate:g} s are too long for seconds; "
             f"suggested: record: {{units: {{t: {unit}}}}}"
         )
         study = _with_settings(study, {"units": {"t": unit}})
@@ -314,7 +314,7 @@ def _unfinished(
         for key, names in listed.items()
     }
     if not open_:
-        open_["record"] = first_line(error.message)
+        open_["record"] = first_line(error)
     return Suggestion(study, tuple(sentences), open_, perhaps)
 
 

@@ -313,7 +313,7 @@ def _quantity(name: str, stem: str = "") -> tuple[str, int]:
     torques. Return ("", 0) if the name means no quantity.
     """
     words = words_of(stem or name)
-    meanings = {}
+    meanings: dict[str, int] = {}
     for exact in (True, False):
         for key in ("other", "qd", "tau", "q", "t"):
             for place, word in enumerate(WORDS[key]):

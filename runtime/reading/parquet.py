@@ -35,16 +35,10 @@ def read_parquet(path: Path, options: Options) -> Table:
         widths: dict[str, int] = {}
         for name, kind in kinds.items():
             inner = getattr(kind, "inner", kind)
-            lists = isinstance(kind, polars.List | polars.Array)
-            if lists and inner.is_numeric():
-                lengths = polars.col(name).list if isinstance(kind, polars.List) else None
-                shortest, longest = (
-                    (kind.shape[0],) * 2
-                    if lengths is None
-                    else file.select(low=lengths.len().min(), high=lengths.len().max())
-                    .collect()
-                    .row(0)
-                )
+            if isinstance(kind, polars.List | polars.Array) and inner.is_numeric():
+                length = polars.col(name).cast(polars.List(polars.Float64)).list.len()
+                ends = file.select(low=length.min(), high=length.max()).collect()
+                shortest, longest = ends.row(0)
                 if shortest == longest and longest and longest <= WIDEST:
                     widths[name] = int(longest)
                 else:
@@ -66,10 +60,8 @@ def read_parquet(path: Path, options: Options) -> Table:
         frame = file.select(polars.col(list(widths))).collect()
         for name, width in widths.items():
             own = frame[name]
-            if isinstance(own.dtype, polars.List | polars.Array):
-                own = own.explode()
-            values = own.cast(polars.Float64).to_numpy()
-            listed = isinstance(frame[name].dtype, polars.List | polars.Array)
+            listed = isinstance(own.dtype, polars.List | polars.Array)
+            values = (own.explode() if listed else own).cast(polars.Float64).to_numpy()
             columns[name] = np.asarray(values.reshape(-1, width) if listed else values)
     named = {
         f"{name}.{label}": columns[name][:, k]

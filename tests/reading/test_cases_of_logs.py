@@ -219,3 +219,23 @@ def test_a_column_time_is_a_time(tmp_path: Path) -> None:
             assert "set record.units.t: ms" in said and "--suggest FILE" in said
         else:
             assert value(text, "MX2") == pytest.approx(0.100, abs=1e-3)
+
+
+def test_milliseconds_of_a_record_that_is_read_as_it_is(tmp_path: Path) -> None:
+    table = read_table(CASES / "hdf5" / "episode_0.hdf5")
+    q, tau = table.columns["observations.qpos"], table.columns["observations.effort"]
+    rows = np.column_stack([5.0 * np.arange(len(q)), q, tau])
+    path, study = tmp_path / "log.csv", tmp_path / "study.yaml"
+    np.savetxt(path, rows, delimiter=",", header="t,q1,q2,tau1,tau2", comments="")
+    code, text, said = identified(CASES / "hdf5" / "two.urdf", path, "--suggest", study)
+    assert code == 0 and "the time steps of 5 s are too long for seconds" in said
+    assert load_study(study).record[0].units.t == "ms"
+    assert value(text, "MX2") == pytest.approx(0.100, abs=1e-3)
+
+
+def test_a_null_row_of_lists_is_missing(tmp_path: Path) -> None:
+    import polars
+
+    polars.DataFrame({"a": [[1.0, 2.0], None, [3.0, 4.0]]}).write_parquet(tmp_path / "a.parquet")
+    with pytest.raises(InputError):
+        read_table(tmp_path / "a.parquet").read(["a"])
