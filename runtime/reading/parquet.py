@@ -36,7 +36,7 @@ def read_parquet(path: Path, options: Options) -> Table:
         for name, kind in kinds.items():
             inner = getattr(kind, "inner", kind)
             if isinstance(kind, polars.List | polars.Array) and inner.is_numeric():
-                length = polars.col(name).cast(polars.List(polars.Float64)).list.len()
+                length = polars.col(name).cast(polars.List(polars.Float64)).list.len().fill_null(0)
                 ends = file.select(low=length.min(), high=length.max()).collect()
                 shortest, longest = ends.row(0)
                 if shortest == longest and longest and longest <= WIDEST:

@@ -237,5 +237,21 @@ def test_a_null_row_of_lists_is_missing(tmp_path: Path) -> None:
     import polars
 
     polars.DataFrame({"a": [[1.0, 2.0], None, [3.0, 4.0]]}).write_parquet(tmp_path / "a.parquet")
-    with pytest.raises(InputError):
+    with pytest.raises(InputError, match="lists of the column have 0 to 2 numbers"):
         read_table(tmp_path / "a.parquet").read(["a"])
+
+
+def test_episodes_are_records(tmp_path: Path) -> None:
+    """Three episodes in one file: the time starts anew at each; counted, not interpolated."""
+    table = read_table(CASES / "lerobot" / "file-000.parquet")
+    q = np.radians(table.columns["observation.state"])
+    t = np.float32(np.concatenate([np.arange(n) / 200 for n in (1200, 1000, 800)]))
+    rows = np.column_stack([t, q, table.columns["observation.effort"]])
+    path, study = tmp_path / "log.csv", tmp_path / "study.yaml"
+    np.savetxt(path, rows, delimiter=",", header="timestamp,q1,q2,tau1,tau2", comments="")
+    code, text, _ = identified(CASES / "hdf5" / "two.urdf", path, "--suggest", study)
+    resample = load_study(study).record[0].resample
+    assert code == 0 and "3 records" in text
+    assert resample is not None
+    assert (resample.method, resample.gaps, resample.rate) == ("count", "split", 200)
+    assert value(text, "MX2") == pytest.approx(0.100, abs=1e-3)
