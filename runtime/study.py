@@ -207,7 +207,12 @@ def suggested(study: Study, model: GeneratedModel, *, missing: bool = False) -> 
         except InputError as e:
             text = f"{e}; suggested: record: {' '.join(yaml_text(e.remedy or {}).split())}"
             if not e.remedy or text in sentences:
-                return _unfinished(study, model, sentences, e)
+                rest = _unfinished(study, model, sentences, e)
+                if rest.study == study or rest.unrecognised.keys() != {"record"}:
+                    return rest
+                sentences.append(f"{e}; suggested: the columns and units that the names show")
+                study = rest.study  # all is recognised: try again
+                continue
             sentences.append(text)
             study = _with_settings(study, e.remedy)
             continue

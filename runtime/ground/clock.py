@@ -111,8 +111,13 @@ def rate_of(stamps: Stamps, t: Array) -> float:
             else:
                 split = {"gaps": "split"} if regularity.gaps or regularity.resets else {}
                 resample = {**split, "method": "count", "rate": counted}
-                written = ", ".join(f"{key}: {value}" for key, value in resample.items())
-                message += f". The samples are uniform at {counted:g} Hz, with stamps rounded to {resolution(t):g} s. Remedy: record.resample: {{{written}}}, which uses the samples as they are"
+                written = ", ".join(
+                    f"{key}: {value:g}" if key == "rate" else f"{key}: {value}"
+                    for key, value in resample.items()
+                )
+                off = regularity.repeats or regularity.jitter > stamps.jitter
+                rounded = f", with stamps rounded to {resolution(t):g} s" if off else ""
+                message += f". The samples are uniform at {counted:g} Hz{rounded}. Remedy: record.resample: {{{written}}}, which uses the samples as they are"
     raise InputError(
         message,
         file=stamps.file,

@@ -251,7 +251,7 @@ def test_episodes_are_records(tmp_path: Path) -> None:
     np.savetxt(path, rows, delimiter=",", header="timestamp,q1,q2,tau1,tau2", comments="")
     code, text, _ = identified(CASES / "hdf5" / "two.urdf", path, "--suggest", study)
     resample = load_study(study).record[0].resample
-    assert code == 0 and "3 records" in text
+    assert code == 0 and "(3 of 3)" in text
     assert resample is not None
     assert (resample.method, resample.gaps, resample.rate) == ("count", "split", 200)
     assert value(text, "MX2") == pytest.approx(0.100, abs=1e-3)
