@@ -53,12 +53,11 @@ def study_of(robot: str, method: str, place: str, runs: int) -> dict[str, Any]:
     b = bench(robot)
     signs = np.sign(np.random.default_rng(1).uniform(-1, 1, len(b.truth)))
     start = dict(zip(b.model.BASE_PARAMETERS, (b.truth * (1 + AWAY * signs)).tolist(), strict=True))
-    options: dict[str, Any] = (
-        {"around": AROUND[robot]} if place == "loop" or method in ("iv", "didim") else {}
-    )
-    if method in ("iv", "didim"):
-        options |= {"start": start, "gains": "one"}
+    simulates = method in ("iv", "didim")
+    options: dict[str, Any] = {"start": start, "gains": "one"} if simulates else {}
     mapping = to_mapping(b.study)
+    if place == "loop" or simulates:
+        mapping["rows"] = {**mapping["rows"], "around": AROUND[robot]}
     cestac = {
         "columns": "all",
         "runs": runs,

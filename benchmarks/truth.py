@@ -16,6 +16,8 @@ of them; `classes` was run once on it for docs/reliability.md (truth_classes_fin
     counts         the reader of counts beside the best low-pass of a grid, and with faults
     counts_random  random readings: which contradict their counts, which are refused
     classes        right studies of seven classes: causes, intervals, expected error, verdict
+    rests          right records with rests and stick friction, by the defaults
+    weights        true error by weights by joint over that of the default
     physics        feasibility of right records, and what bounds by reach cut off
 
 Truth of base parameters: least squares of pinocchio's torques in random states on the emitted
@@ -42,6 +44,7 @@ import truth_simulator as world
 from scipy.stats import spearmanr
 from truth_classes import classes, classes_table, share, stribeck
 from truth_counts import counts, counts_random, counts_random_table, counts_table
+from truth_rests import rests, rests_table
 from truth_shared import (
     LEVEL,
     Array,
@@ -59,6 +62,7 @@ from truth_shared import (
     true_parameters,
 )
 from truth_simulator import Encoder, Motion, Robot, Truth, encoded, noise
+from truth_weights import weights, weights_table
 
 import runtime
 
@@ -94,7 +98,7 @@ def coverage(k: int, seed: int, seeds: str) -> list[Row]:
     )
     tau = truth.torque(move)
     record = record_of(move, tau + noise(tau, world.NOISES[kind], SHARE, seed))
-    settings = study(robot, motion)
+    settings = study()
     result = runtime.identify(model, record, settings)
     fits = dict(result.sets) or {"all": result.estimate}
     unseen = Unseen(truth, seed)
@@ -172,7 +176,7 @@ def ends(k: int, seed: int, seeds: str) -> list[Row]:
             "2/cutoff + 27 samples": {"rows": {"trim": 27 + int(2 * world.RATE / cutoff / factor)}},
         }
         for label, more in cases.items():
-            settings = study(robot, motion, signals={"lowpass": {"cutoff": cutoff}}, **more)
+            settings = study(signals={"lowpass": {"cutoff": cutoff}}, **more)
             fit = runtime.estimate(model, record, settings)
             z = np.abs(fit.X - X) / deviations(fit)
             rows.append({"robot": robot.name, "motion": motion, "cutoff": cutoff, "ends": label, "left": fit.relative_error,
@@ -218,9 +222,7 @@ def homogeneity(k: int, seed: int, seeds: str) -> list[Row]:
         move = world.MOTIONS[motion](robot, seed + 250_000 * i, seconds=seconds)
         tau = own.torque(move)
         records.append(record_of(move, tau + noise(tau, world.NOISES[kind], SHARE, seed + i)))
-    agree = runtime.identify(emitted(robot.name)[0], records, study(robot, motion)).part(
-        "homogeneity"
-    )
+    agree = runtime.identify(emitted(robot.name)[0], records, study()).part("homogeneity")
     assert agree is not None
     tested = len(agree.records) > 1
     return [{"noise": kind, "robot": robot.name, "motion": motion, "seconds": seconds, "different": different, "tested": tested,
@@ -312,9 +314,7 @@ def verdict(k: int, seed: int, seeds: str, **sections: Any) -> list[Row]:
     kind, robot = STUDIES[k % len(STUDIES)], robots[(k // len(STUDIES) + k) % len(robots)]
     truth, motion, move, q, tau, share = study_of(kind, robot, seed, k)
     model, variants = emitted(robot.name)
-    result = runtime.identify(
-        model, record_of(move, tau, q), study(robot, motion, **sections), variants=variants
-    )
+    result = runtime.identify(model, record_of(move, tau, q), study(**sections), variants=variants)
     checks = result.checklist.checks
     total, worst = Unseen(truth, seed).errors(result.model_estimate.names, result.model_estimate.X)
     if not result.determined:  # no values are printed
@@ -484,7 +484,7 @@ def causes(k: int, seed: int, seeds: str) -> list[Row]:
         q, tau = wrong.spoil(truth, move, q, tau, j, rng)
     model, variants = emitted(robot.name)
     record = runtime.Record(np.arange(len(q)) / world.RATE, q, tau)
-    found = runtime.plausibility(model, record, study(robot, motion), variants=variants)
+    found = runtime.plausibility(model, record, study(), variants=variants)
     told = [c for c in found.checks() if c.state in ("doubtful", "no")]
     named = [one["cause"] for one in found.named_causes]
     texts = [*(f"{c.question} {c.finding}" for c in told), *named]
@@ -578,7 +578,7 @@ def physics(k: int, seed: int, seeds: str) -> list[Row]:
         "said": "",
     }
     try:
-        result = runtime.identify(model, record, study(robot, "fourier"), physical=True)
+        result = runtime.identify(model, record, study(), physical=True)
     except (runtime.InputError, ValueError) as e:
         return [row | {"said": str(e)}]
     row["said"] = "; ".join(result.missing) if label == "one joint at rest" else ""
@@ -589,7 +589,7 @@ def physics(k: int, seed: int, seeds: str) -> list[Row]:
             "margin": float(judged.margin),
             "blocking": [c for c, _ in judged.blocking],
         }
-    own = study(robot, "fourier", estimate={"method": "feasible"})
+    own = study(estimate={"method": "feasible"})
     try:
         fit = runtime.estimate(model, record, own)
     except (runtime.InputError, ValueError) as e:
@@ -668,6 +668,8 @@ QUESTIONS: dict[
     "counts_random": (counts_random, counts_random_table, 10_000),
     "physics": (physics, physics_table, 60),
     "classes": (classes, classes_table, 700),
+    "rests": (rests, rests_table, 100),
+    "weights": (weights, weights_table, 204),
 }
 
 

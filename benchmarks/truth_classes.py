@@ -7,7 +7,7 @@ Class k % 7; every class has all robots by turns. docs/reliability.md has its ta
     slow                a quarter of the speed, 16 s
     coarse encoder      500 to 2000 counts per turn at the joint, positions as counted; half of them slow
     short               3 s
-    rests               point to point, 25 % of the time at rest
+    rests               point to point with stick friction, 15 to 50 % of the time at rest (truth_rests.py)
     AR(0.99)            noise that a first-order recursion with 0.99 makes, point to point
     friction left out   Stribeck friction that the model does not have
 """
@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import truth_simulator as world
+from truth_rests import resting_record
 from truth_shared import (
     LEVEL,
     Array,
@@ -29,7 +30,6 @@ from truth_shared import (
     markdown,
     record_of,
     robots_of,
-    study,
     true_parameters,
 )
 from truth_simulator import Encoder, Motion, Truth, encoded, noise
@@ -43,11 +43,13 @@ CLASSES = ("ordinary", "slow", "coarse encoder", "short", "rests", "AR(0.99)", "
 def classes(k: int, seed: int, seeds: str) -> list[Row]:
     """One right study as `symgen identify` does it."""
     kind, robots = CLASSES[k % len(CLASSES)], robots_of(seeds)
-    robot = robots[(k // len(CLASSES)) % len(robots)]
+    turn = k // len(CLASSES)
+    robot = robots[turn % len(robots)]
     rng, truth = np.random.default_rng([seed, 71]), Truth(robot, seed)
-    motion = {"slow": "slow", "rests": "points", "AR(0.99)": "points"}.get(
-        kind, str(rng.choice(["fourier", "chirp"]))
-    )
+    if kind == "rests":
+        record, _ = resting_record(robot, truth, seed, turn)
+        return [{"class": kind, "robot": robot.name, "motion": kind, **judged(record, truth, seed)}]
+    motion = {"slow": "slow", "AR(0.99)": "points"}.get(kind, str(rng.choice(["fourier", "chirp"])))
     seconds = {"short": 3.0, "slow": 16.0}.get(kind, 10.0)
     if kind == "coarse encoder" and rng.uniform() < 0.5:
         motion, seconds = "slow", float(rng.choice([3.0, 10.0]))
@@ -59,10 +61,8 @@ def classes(k: int, seed: int, seeds: str) -> list[Row]:
     q = move.q
     if kind == "coarse encoder":
         q = encoded(robot, move, Encoder(2 * pi / float(rng.choice([500, 1000, 2000]))), seed)
-    model, variants = emitted(robot.name)
     record = record_of(move, tau + noise(tau, rho, share, seed), q)
-    result = runtime.identify(model, record, study(robot, motion), variants=variants)
-    return [{"class": kind, "robot": robot.name, "motion": motion, **judged(result, truth, seed)}]
+    return [{"class": kind, "robot": robot.name, "motion": motion, **judged(record, truth, seed)}]
 
 
 def stribeck(truth: Truth, move: Motion) -> Array:
@@ -71,15 +71,17 @@ def stribeck(truth: Truth, move: Motion) -> Array:
     return np.asarray(0.5 * truth.bodies.dry * np.sign(move.qd) * np.exp(-((move.qd / slow) ** 2)))
 
 
-def judged(result: Any, truth: Truth, seed: int) -> Row:
-    """What an identification says, beside the truth."""
+def judged(record: Any, truth: Truth, seed: int) -> Row:
+    """What the identification of a record by the defaults says, beside the truth."""
+    model, variants = emitted(truth.robot.name)
+    result = runtime.identify(model, record, variants=variants)
     plausible = result.part("plausibility")
     causes = [one["cause"] for one in plausible.named_causes] if plausible else []
     row: Row = {"state": result.checklist.answer, "causes": causes}
     row["doubts"] = [c.question for c in result.checklist.checks if c.state in ("no", "doubtful")]
     if not (result.determined and result.usable):
         return row | {"count": 0, "inside": 0}
-    fit, model = result.model_estimate, result.model
+    fit = result.model_estimate
     X = true_parameters(truth, seed)
     expected = result.part("expected_error").expected
     full = np.zeros(len(model.BASE_PARAMETERS))

@@ -111,10 +111,9 @@ class Unseen:
         )
 
 
-def study(robot: Robot, motion: str, **sections: Any) -> Any:
-    """Default settings; rows at rest are left out of motions from point to point."""
-    rows = {"low_speed": [0.02 * j.speed for j in robot.joints]} if motion == "points" else {}
-    return study_from_mapping({**({"rows": rows} if rows else {}), **sections})
+def study(**sections: Any) -> Any:
+    """Default settings, beside those of the given sections."""
+    return study_from_mapping(sections)
 
 
 def record_of(move: Motion, tau: Array, q: Array | None = None) -> Any:

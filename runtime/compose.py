@@ -4,7 +4,7 @@
     READERS    Record, Signals -> States: signals.reader of a study (`runtime.core.signals.reader`)
     METHODS    Observation -> rows of a least squares -> their fit: estimate.method of a study
     EXTRAS     Identification -> Part: further analyses of the records
-    QUESTIONS  Identification -> Check: what the verdict asks, before the questions of the parts
+    QUESTIONS  Identification -> Check: what the verdict asks; a part asks its own
 
 Each call builds a Problem from model, records and study, prepares it by STEPS and passes it to one
 function of the package. A feature is one file and one line of a list.
@@ -46,11 +46,12 @@ from runtime.counts.encoder_advice import EncoderSteps
 from runtime.expected import ExpectedError
 from runtime.ground.arrays import kind_of, require_kind
 from runtime.ground.errors import InputError, SettingsError
-from runtime.ground.part import About
 from runtime.ground.settings_errors import gone
 from runtime.late import Late, Listed, PartWhen, When
 from runtime.link_side import stated_sides, torques_of_links
 from runtime.median import pulses_in_torques
+from runtime.packets.packets import KIND as PACKETS
+from runtime.packets.packets import packets_once
 from runtime.payload.settings import LOADED
 from runtime.reading.formats import is_measured
 from runtime.reading.records import read_records
@@ -60,7 +61,7 @@ from runtime.speeds import recorded_speeds
 from runtime.study import Study, study_of, study_schema
 from runtime.threads import alone_each, single_threaded
 from runtime.verdict import questions
-from runtime.verdict.verdict import Ask, verdict
+from runtime.verdict.verdict import Ask, of_parts, verdict
 
 if TYPE_CHECKING:
     from runtime.advisor.advice import Advice
@@ -86,6 +87,7 @@ STEPS: list[Step] = [
         lambda p: any(c.startswith(WRENCH) for r in (*p.records, *p.unseen) for c in r.channels),
     ),
     torques_of_links,
+    packets_once,
     pulses_in_torques,
     recorded_speeds,
     automatic_cutoff,
@@ -95,6 +97,10 @@ STEPS: list[Step] = [
     When(
         Late("runtime.controller.fitted:law_of_controller"),
         lambda p: any("law_v" in r.channels for r in p.records),
+    ),
+    When(
+        Late("runtime.plausible.rests:rows_at_rest"),
+        lambda p: p.settings.rows.low_speed == "auto" and bool(p.records),
     ),
 ]
 READERS: Listed[Reader] = Listed(
@@ -117,7 +123,15 @@ METHODS: Listed[Method] = Listed(
     }
 )
 EXTRAS: list[Extra] = [
+    PartWhen(
+        Late("runtime.packets.packets:packets_told"),
+        lambda r: r.problem.noted(PACKETS) is not None,
+    ),
     PartWhen(Late("runtime.plausible.known:torque_unit"), lambda r: bool(r.model.VALUES)),
+    PartWhen(
+        Late("runtime.controller.fitted:fitted_law"),
+        lambda r: any(record.origin.by_law for record in r.records),
+    ),
     PartWhen(
         Late("runtime.controller.fitted:doubt_of_gains"),
         lambda r: any("law_v" in record.channels for record in r.records),
@@ -162,17 +176,19 @@ EXTRAS: list[Extra] = [
     ),
 ]
 
-QUESTIONS: Mapping[About, list[Ask]] = {
-    "record": [questions.determined],
-    "prediction": [questions.total_error, questions.explained_by_joint, questions.predicted],
-    "values": [
-        questions.signs,
-        questions.certain,
-        questions.separate,
-        questions.conditioned,
-    ],
-}
-judged = partial(verdict, questions=QUESTIONS)
+RECORD_QUESTIONS: list[Ask] = [questions.determined, of_parts("record")]
+QUESTIONS: list[Ask] = [
+    questions.total_error,
+    questions.explained_by_joint,
+    of_parts("prediction"),
+    questions.predicted,
+    questions.signs,
+    questions.certain,
+    questions.separate,
+    questions.conditioned,
+    of_parts("values"),
+]
+judged = partial(verdict, on_record=RECORD_QUESTIONS, on_parameters=QUESTIONS)
 
 Records = Record | Sequence[Record]
 T = TypeVar("T")
@@ -832,6 +848,7 @@ __all__ = [
     "METHODS",
     "QUESTIONS",
     "READERS",
+    "RECORD_QUESTIONS",
     "STEPS",
     "InputError",
     "advise",

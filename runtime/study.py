@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, model_validator
+from pydantic_core import ArgsKwargs
 
 from runtime.core import study as chapter
 from runtime.core.model import GeneratedModel
@@ -41,7 +42,14 @@ from runtime.reading.likely_columns import (
     missing_joints,
 )
 from runtime.reading.records import read_records
-from runtime.reading.settings import Records, RecordSettings, Rows, ValidateSettings, with_law
+from runtime.reading.settings import (
+    Records,
+    RecordSettings,
+    Rows,
+    ValidateSettings,
+    inherited,
+    with_law,
+)
 from runtime.reading.units import likely_time_unit
 
 BEYOND = 2.0  # times the limits of the robot file: positions so large are no rad
@@ -70,7 +78,8 @@ class Study(chapter.Study, Recorded):
     Attributes
     ----------
     payload : PayloadSettings or None
-        Records with a load.
+        Records with a load; columns, units, side and rate that they leave out are those of the
+        first record.
     controller : Controller or None
         Closed loop for simulation, IV and DIDIM.
     excitation : ExcitationSettings or None
@@ -84,6 +93,22 @@ class Study(chapter.Study, Recorded):
     payload: PayloadSettings | None = None
     controller: Controller | None = None
     excitation: ExcitationSettings | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _loaded_alike(cls, value: Any) -> Any:
+        """Give payload.record the columns, units and side of `record`, if it leaves them out."""
+        given = value.kwargs or {} if isinstance(value, ArgsKwargs) else value
+        load = given.get("payload") if isinstance(given, Mapping) else None
+        if not (isinstance(load, Mapping) and load.get("record")):
+            return value
+        several = isinstance(load["record"], list | tuple)
+        own = [
+            inherited(record, given.get("record"))
+            for record in (load["record"] if several else [load["record"]])
+        ]
+        whole = {**given, "payload": {**load, "record": own if several else own[0]}}
+        return ArgsKwargs(value.args, whole) if isinstance(value, ArgsKwargs) else whole
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "record", with_law(self.record, self.controller))

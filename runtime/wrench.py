@@ -92,9 +92,10 @@ def force_sensors(problem: Problem) -> Problem:
         )
     n = len(problem.model.JOINTS)
     torques = any(record.tau.any() for record in problem.records)
-    slow = per_joint(settings.rows.low_speed, n, "rows.low_speed") if torques else [UNMEASURED] * n
-    low_speed = (*map(float, slow), *[0.0] * 6 * len(channels))
-    settings = replace(settings, rows=replace(settings.rows, low_speed=low_speed))
+    if not torques or settings.rows.low_speed != "auto":
+        slow = per_joint(settings.rows.slow, n, "rows.low_speed") if torques else [UNMEASURED] * n
+        low_speed = (*map(float, slow), *[0.0] * 6 * len(channels))
+        settings = replace(settings, rows=replace(settings.rows, low_speed=low_speed))
     if problem.method.linear and not problem.method.weighs:  # N and N m in one sum
         method = linear_method("joint", problem.methods)
         weighted = replace(settings.estimate, method=method, weights="joint")

@@ -274,29 +274,20 @@ class Demonstration:
     def verdict(self) -> str:
         """Sentences on the fit, its prediction error, and the effect of each encoder step."""
         result, names = self.result, self.result.essential.names
-        words = {
-            "unbiased": "do not bias the parameters",
-            "doubtful": "make the parameters doubtful",
-            "biased": "bias the parameters",
-        }
-        levels = {
+        of = {
             verdict: [
                 r.level.label for r in self.resolution.levels if r.residual_verdict == verdict
             ]
-            for verdict in words
+            for verdict in ("unbiased", "doubtful", "biased")
         }
-        steps = ", ".join(
-            f"encoder steps of {' and '.join(labels)} {words[verdict]}"
-            for verdict, labels in levels.items()
-            if labels
-        )
+        residual = "; ".join(f"{verdict} at {', '.join(at)}" for verdict, at in of.items() if at)
         return (
             f"{'SIMULATED record: ' if self.prepared.note else ''}{len(names)} of "
             f"{len(result.estimate.names)} parameters leave "
             f"{result.essential.estimate.relative_error:.1f} % of the torques of "
             f"{result.model.NAME} unexplained, {result.prediction_error:.1f} % on a half of the "
-            "record that the fit has not seen. Judged by the residual of least squares, "
-            f"{steps}.{self.resolution.finer_for_values}"
+            "record that the fit has not seen. Judged by the parameters, eq. (21): "
+            f"{self.resolution.message} Judged by the residual alone, eq. (22): {residual}."
         )
 
     def files(self, folder: Path) -> Files:

@@ -69,7 +69,7 @@ FAULTS = (
     Fault("runtime/core/signals/filters.py", "np.gradient(x, 1 / rate, axis=0", "np.gradient(x, 2 / rate, axis=0", "velocities half as large", SIGNALS),
     Fault("runtime/core/signals/filters.py", "CUTOFF * rate / (2 * signals.lowpass.hertz)", "CUTOFF * rate / signals.lowpass.hertz", "decimation by twice the factor of eq. (13)", SIGNALS),
     Fault("runtime/core/signals/filters.py", "np.minimum(np.maximum(a, b), shifted[-1])", "np.minimum(np.minimum(a, b), shifted[-1])", "the running median is the smaller of two", SIGNALS),
-    Fault("runtime/core/rows/selection.py", "np.abs(qd[instants].T) >= slow", "np.abs(qd[instants]).max(axis=1) >= slow", "low speed judged by the fastest joint", ("core/test_observation.py",)),
+    Fault("runtime/core/rows/selection.py", "slow <= speed[instants].T", "slow <= speed[instants].max(axis=1)", "low speed judged by the fastest joint", ("core/test_observation.py",)),
     Fault("runtime/core/rows/selection.py", 'np.searchsorted(t, t1, side="right"', 'np.searchsorted(t, t1, side="left"', "the last sample of a window is lost", ("core/test_observation.py",)),
     Fault("runtime/core/rows/prepared.py", "median_filtered(tau, selection.signals.torque_median)", "tau", "torques without their median filter", ("core/test_observation.py", "core/test_cestac.py")),
     Fault("runtime/core/rows/factor.py", "R=joint.R * w)", "R=joint.R * w**2)", "weights of the joints squared", ESTIMATES),

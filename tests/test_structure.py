@@ -42,6 +42,7 @@ EDGES = {  # of runtime: a feature imports the ground, the core and itself; what
     "expected": {
         "counts": "the steps of an encoder are an error of predictions",
         "physical": "predictions are those of bodies that exist",
+        "unmodelled": "a torque that the model lacks is an error of predictions",
     },
     "friction": {"physical": "which base parameters are friction alone follows from the bodies"},
     "payload": {

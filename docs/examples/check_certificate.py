@@ -16,7 +16,8 @@ those of LAWS. sin and cos are of sums of whole multiples of joints and constant
 pi, and numbers; sign and abs of the coordinate of the law or of its rate; exp and tanh of arguments
 that are linearly independent of each other and of 1, so that their values are independent of
 each other and of the state (J. Ax, On Schanuel's conjectures, Annals of Mathematics 93, 1971).
-Not judged are joints that only closure equations tie, roots, and columns that are energies.
+Not judged are numeric coefficients, joints that only closure equations tie, roots, and columns that
+are energies.
 """
 
 import ast
@@ -545,6 +546,8 @@ def require(condition, text):
 def well_formed(claim):
     """SkipError where the claim is none."""
     require(isinstance(claim, dict), "it is no object of keys")
+    if str(claim.get("method")).startswith("numeric"):
+        raise NotJudgedError("coefficients that are numeric, for the constants of the file alone")
     require(re.fullmatch(r"[\w.-]{1,80}", claim["robot"], re.ASCII), "the robot has no name")
     lists = ("frames", "gravity", "joints", "tied", "loops", "elements", "standard_parameters", "base_parameters", "no_effect", "primes")  # fmt: skip
     for key in lists:

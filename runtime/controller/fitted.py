@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from runtime.controller.law import late, torque_law
 from runtime.core.least_squares.estimate import Estimate
@@ -33,9 +34,10 @@ from runtime.core.record import Record
 from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared, stacked, with_torques
+from runtime.ground.check import Check
 from runtime.ground.documents import Result
 from runtime.ground.limits import limits
-from runtime.ground.part import Doubt
+from runtime.ground.part import Doubt, Part
 from runtime.loop.settings import Law
 
 LIMIT = limits(__package__)
@@ -86,12 +88,19 @@ def law_of_controller(problem: Problem) -> Problem:
     if not asked or not any("law_v" in record.channels for record in problem.records):
         return problem
     law = asked[0].law
+    if problem.reader.at_rest and law.delay == "fit":  # poses have no clock
+        law = replace(law, delay=0.0)
+        if law.kd != "fit":
+            return problem
     saturation = torque_law(controllers[0], problem.records[0].n, problem.model.LIMITS).saturation
     estimate = law_estimate(problem, law, saturation)
     bound = np.where(np.isfinite(estimate.kd) | (law.kd != "fit"), saturation, np.inf)
 
     def with_torque(record: Record) -> Record:
-        channels = {key: x for key, x in record.channels.items() if key != "law_v"}
+        channels = dict(record.channels)
+        v = channels.pop("law_v")
+        if law.kd != "fit":
+            channels["law_v"] = late(record.t, v, np.nan_to_num(estimate.delay))
         tau = torque_of(record, np.nan_to_num(estimate.kd), estimate.delay, bound)
         return replace(record, tau=tau, channels=channels)
 
@@ -99,11 +108,34 @@ def law_of_controller(problem: Problem) -> Problem:
     if sums := friction_and_gain(model, law, estimate):
         model = UnsignedModel(model, sums)
     return problem.changed(
-        Note(KIND, estimate.text, {KIND: estimate.summary()}, estimate),
+        Note(KIND, "", {KIND: estimate.summary()}, estimate),
         model=model,
         records=tuple(map(with_torque, problem.records)),
         unseen=tuple(map(with_torque, problem.unseen)),
     )
+
+
+class FittedLaw(Part):
+    """Part that tells what was fitted of the control law, ahead of the values of the parameters."""
+
+    name = "law_of_controller"
+    title = "Law of the controller"
+    about = "record"
+
+    def __init__(self, estimate: LawEstimate) -> None:
+        self.estimate = estimate
+
+    def checks(self) -> tuple[Check, ...]:
+        """Return one check, which is good: the fitted gains and the fitted delay."""
+        finding = self.estimate.text.rstrip(".")
+        question = "What was fitted of the law of the controller?"
+        return (Check(question, "good", finding, ahead=True),)
+
+
+def fitted_law(result: Identification) -> FittedLaw | None:
+    """Return the part on the fitted control law; None if nothing of it was fitted."""
+    note = result.problem.noted(KIND)
+    return FittedLaw(note.result) if note is not None and note.result.text.strip(".") else None
 
 
 def friction_and_gain(model: GeneratedModel, law: Law, estimate: LawEstimate) -> tuple[str, ...]:
@@ -174,7 +206,7 @@ def gain_doubt(problem: Problem, error: float) -> str:
     if error < LIMIT.LAW_DOUBT or not all(by_law) or not laws or laws[0].kd == "fit":
         return ""
     uncut = np.full(problem.records[0].n, np.inf)
-    estimate = law_estimate(problem, Law(kp=laws[0].kp, kd="fit"), uncut)
+    estimate = law_estimate(problem, Law(kp=laws[0].kp, kd="fit", delay=0.0), uncut)
     if not estimate.error < error / 2:
         return ""
     stated = laws[0].gains(problem.records[0].n)["Vm"]
@@ -199,43 +231,121 @@ def law_estimate(problem: Problem, law: Law, saturation: Array) -> LawEstimate:
     model = problem.model
     n = problem.records[0].n
     labels = joint_labels(model)
-    rows = stacked(model, problem.prepared)
-    torques = TorquesOfLaw(model, problem.prepared, rows, saturation)
     asked = [f"KD{j}" for j in labels] if law.kd == "fit" else []
     cuts = bool(asked) and bool(np.isfinite(saturation).any())
-    starts = LIMIT.LAW_STARTS if cuts else (0.0,)
-    stiffness = law.gains(n)["P"]
-    ends = [_search_kd(torques, asked, law.delay == "fit", s * stiffness, cuts) for s in starts]
-    kd, delay, _ = min(ends, key=lambda end: end[2])
-    fit = torques.fit(asked, law.delay == "fit", kd, delay)
+    starts = [s * law.gains(n)["P"] for s in (LIMIT.LAW_STARTS if cuts else (0.0,))]
+    late_by = (np.nan, np.nan)
+    if law.delay == "fit":
+        slow = problem.prepared if asked else slow_records(problem)  # kd needs all frequencies
+        rows = stacked(model, slow)
+        rows = rows if asked else away_from_reversals(rows, slow)
+        late_by = _delay(TorquesOfLaw(model, slow, rows, saturation), asked, starts, cuts)
+    delay = float(np.nan_to_num(late_by[0]))
+    torques = TorquesOfLaw(model, problem.prepared, stacked(model, problem.prepared), saturation)
+    kd = _best(torques, asked, False, starts, delay, cuts)[0]
+    fit = torques.fit(asked, False, kd, delay)
     gains = [name for name in asked if name in fit.names and _apart(fit, name)]
     if len(gains) < len(asked):  # FV is the sum of both: without a cut the share of kd is zero
         lost = np.array([f"KD{j}" not in gains for j in labels])
         torques = replace(torques, saturation=np.where(lost, np.inf, saturation))
-        start = np.where(lost, 0.0, kd)
-        kd, delay, _ = _search_kd(torques, gains, law.delay == "fit", start, cuts)
-        fit = torques.fit(gains, law.delay == "fit", kd, delay)
+        kd = _best(torques, gains, False, [np.where(lost, 0.0, kd)], delay, cuts)[0]
+        fit = torques.fit(gains, False, kd, delay)
     sigma = dict(zip(fit.names, np.fmax(fit.sigma, fit.sigma_corrected), strict=True))
     sigmas = np.array([sigma.get(f"KD{j}", np.nan) for j in labels])
     kd = np.where(np.isfinite(sigmas), kd, np.nan)
-    late_by = (delay, sigma["delay"]) if "delay" in sigma else (np.nan, np.nan)
     text = _text(labels, kd, sigmas, late_by, law)
     return LawEstimate(tuple(labels), kd, sigmas, late_by[0], late_by[1], text, fit.relative_error)
 
 
-def _search_kd(
-    torques: TorquesOfLaw, gains: Sequence[str], late_too: bool, kd: Array, cuts: bool
+def _delay(
+    torques: TorquesOfLaw, gains: Sequence[str], starts: Sequence[Array], cuts: bool
+) -> tuple[float, float]:
+    """Estimate the delay of a control law and its standard deviation, s; nan if it is uncertain."""
+    kd, delay, _ = _best(torques, gains, True, starts, 0.0, cuts)
+    fit = torques.fit(gains, True, kd, delay)
+    sigma = dict(zip(fit.names, np.fmax(fit.sigma, fit.sigma_corrected), strict=True))
+    known = abs(delay) + sigma.get("delay", np.inf) < LIMIT.LAW_LONGEST
+    return (delay, sigma["delay"]) if known else (np.nan, np.nan)
+
+
+def slow_records(problem: Problem) -> tuple[Prepared, ...]:
+    """Prepare the records with a low-pass near the frequencies of the motion.
+
+    The noise of positions and velocities is in the torque of the law and in W, and its correlation
+    between both looks like a delay; it grows with the third power of the cut-off.
+    """
+    study: Any = problem.settings
+    low = study.signals.lowpass
+    if low is None:
+        return problem.prepared
+    hertz = min([low.hertz, *(LIMIT.LAW_BAND * _fastest(record) for record in problem.records)])
+    signals = replace(study.signals, lowpass=replace(low, cutoff=hertz))
+    return tuple(own.by(replace(study, signals=signals)) for own in problem.prepared)
+
+
+def _fastest(record: Record) -> float:
+    """Return the frequency, Hz, below which 95 % of the power of the reference velocities lie."""
+    q = record.channels.get("q_r", record.q)
+    power = np.abs(np.fft.rfft(np.diff(q, axis=0), axis=0)) ** 2
+    share = np.cumsum(power[1:], axis=0) / np.maximum(power[1:].sum(axis=0), 1e-300)
+    f = np.fft.rfftfreq(len(q) - 1, 1 / record.rate)[1:]
+    return float(max(f[int(np.argmax(own >= 0.95))] for own in share.T))
+
+
+def away_from_reversals(rows: Observation, records: Sequence[Prepared]) -> Observation:
+    """Return the rows in which the joint moves and does not reverse nearby.
+
+    Near a reversal, a joint may stick, and the filters smear the step of dry friction, so that the
+    residual would be taken for a delay. All rows are returned if too few are left.
+    """
+    kept = np.zeros(len(rows.Y), dtype=bool)
+    for number, own in enumerate(records):
+        qd, low = own.states.qd, own.study.signals.lowpass
+        reach = round(
+            LIMIT.REVERSAL * own.record.rate / (own.record.rate if low is None else low.hertz)
+        )
+        slow = np.abs(qd) < LIMIT.STANDING * np.abs(qd).max(axis=0)
+        slow[1:] |= np.sign(qd[1:]) != np.sign(qd[:-1])
+        near = maximum_filter1d(slow.astype(np.int8), 2 * reach + 1, axis=0) > 0
+        mine = rows.record == number
+        samples = np.searchsorted(own.record.t, rows.t[mine]).clip(max=len(qd) - 1)
+        kept[mine] = ~near[samples, rows.joints[mine]]
+    least = LIMIT.LAW_ROWS * len(rows.names)
+    return rows.where(kept) if kept.sum() >= least else rows
+
+
+def _best(
+    torques: TorquesOfLaw,
+    gains: Sequence[str],
+    late_too: bool,
+    starts: Sequence[Array],
+    delay: float,
+    cuts: bool,
 ) -> tuple[Array, float, float]:
-    """Search velocity gains kd and delay by Gauss-Newton iterations that start from the given kd.
+    """Search kd and delay from several kd; return those of the smallest misfit, and the misfit."""
+    ends = [_search_kd(torques, gains, late_too, kd, delay, cuts) for kd in starts]
+    return min(ends, key=lambda end: end[2])
+
+
+def _search_kd(
+    torques: TorquesOfLaw,
+    gains: Sequence[str],
+    late_too: bool,
+    kd: Array,
+    delay: float,
+    cuts: bool,
+) -> tuple[Array, float, float]:
+    """Search velocity gains kd and delay by Gauss-Newton iterations from given kd and delay.
 
     Returns kd, the delay and their misfit, which is nan if the drives do not cut.
 
     cuts : whether the drives cut the torque; then the law is not linear in kd.
     """
     labels = [f"KD{j}" for j in joint_labels(torques.model)]
-    delay = 0.0
     misfit = torques.misfit(kd, delay) if cuts else np.nan
-    for _ in range(LIMIT.LAW_CUT_PASSES if cuts else LIMIT.LAW_PASSES):
+    for _ in range(
+        (LIMIT.LAW_CUT_PASSES if cuts else LIMIT.LAW_PASSES) if gains or late_too else 0
+    ):
         fit = torques.fit(gains, late_too, kd, delay)
         step = {name: x for name, x in zip(fit.names, fit.X, strict=True) if np.isfinite(x)}
         by_kd = np.array([step.get(name, 0.0) for name in labels])
@@ -334,7 +444,8 @@ class TorquesOfLaw:
 def torque_of(record: Record, kd: Array, delay: float, saturation: Array) -> Array:
     """Compute the torque of the control law for a record, delayed by `delay` s, shape (N, n)."""
     tau = record.tau + kd * record.channels["law_v"] if np.any(kd) else record.tau
-    return late(record.t, np.clip(tau, -saturation, saturation), np.nan_to_num(delay))
+    cut = late(record.t, np.clip(tau, -saturation, saturation), np.nan_to_num(delay))
+    return np.asarray(np.clip(cut, -saturation, saturation))  # the spline may exceed the limit
 
 
 def _apart(fit: Estimate, name: str) -> bool:

@@ -67,30 +67,6 @@ class Missing:
         return near
 
 
-def held_samples(q: Array) -> Array:
-    """Find the samples at which a controller repeated all positions of the previous sample.
-
-    Return bool, shape (N,). Although one joint moves before and after, all positions repeat, and
-    the next step makes up for the repetition: it is the neighbouring step times the number of
-    samples, within a factor of 1 +- 0.4. A joint at rest, or between two counts of a coarse
-    encoder, shows no such step.
-    """
-    steps = np.abs(np.diff(q, axis=0))
-    same = ~steps.any(axis=1)
-    ends = np.flatnonzero(np.diff(same, prepend=False, append=False)).reshape(-1, 2)
-    count = np.where(steps > 0, steps, np.inf).min(axis=0)  # of an encoder
-    held = np.zeros(len(q), dtype=bool)
-    for a, b in ends:  # steps a to b - 1 are none
-        if a < 2 or b + 2 >= len(steps):
-            continue
-        beside = np.concatenate([steps[a - 2 : a], steps[b + 1 : b + 3]])
-        usual = beside.mean(axis=0) * beside.all(axis=0)
-        j = int(np.argmax(usual))
-        if usual[j] > 2.5 * count[j] and abs(steps[b, j] / usual[j] / (b - a + 1) - 1) < 0.4:
-            held[a + 1 : b + 1] = True
-    return held
-
-
 def bridged(q: Array, missing: Array) -> Array:
     """Replace missing positions in q, shape (N, n), by linear interpolation between neighbours.
 

@@ -153,13 +153,24 @@ class Rows(Settings):
         Decimated samples left out at each end of the window, where the filters start. auto: 3, and
         before the decimation also the samples within 3/cutoff of an end of the record, at most a
         tenth of it.
-    low_speed : float or tuple of float, rad/s or m/s
+    low_speed : float or tuple of float or str, rad/s or m/s
         Rows of joint j with |qd_j| below this speed are left out, because sign(qd) is noise there.
+        auto: found from the record for joints whose torques at rest are not those of the model;
+        zero for other joints.
+    around : float, s
+        Rows within this time of such a row are left out too; low_speed: auto sets it to the reach
+        of the decimation.
     """
 
     window: Interval = (None, None)
     trim: Annotated[Whole, Field(ge=0)] | Literal["auto"] = "auto"
-    low_speed: PerJoint[NotNegative] = 0.0
+    low_speed: PerJoint[NotNegative] | Literal["auto"] = "auto"
+    around: NotNegative = 0.0
+
+    @property
+    def slow(self) -> PerJoint[float]:
+        """Speeds `low_speed` as numbers, rad/s or m/s; "auto" gives 0 until a record is known."""
+        return 0.0 if isinstance(self.low_speed, str) else self.low_speed
 
 
 Weights = Literal["none", "joint", "iterated", "covariance"]

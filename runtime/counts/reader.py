@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from runtime.core.drives import Drives, encoder_drives, encoder_root
-from runtime.core.missing import Missing, held_samples
+from runtime.core.missing import Missing
 from runtime.core.record import Record
 from runtime.core.signals.filters import SpeedErrors, States, filtered_states
 from runtime.core.signals.reader import Reader, Steps
@@ -36,7 +36,6 @@ def counted(record: Record, signals: Signals) -> States:
     """
     drives = encoder_drives(signals.side, record.origin.drives)
     position = encoder_position(record.q, drives, record.missing)
-    position[held_samples(record.q)] = np.nan
     reading = read_counts(position, record.rate, signals.step, name=record.name)
     q, deviation = reading.motion
     q = q if drives is None else drives.joint_position(q)

@@ -42,6 +42,10 @@ class Check:
     change : mapping of str to value
         The remedy as a change of the study, if there is such a change: {"record.units.q": "deg"}.
         Entries under record.scale are factors, one per joint, on the present scale.
+    explains : float
+        Share of the unexplained torque of a joint that the remedy takes away; 0 if it is unknown.
+    outcome : bool
+        Whether the question is about a result, such as an error, not about what may cause it.
     """
 
     question: str
@@ -51,6 +55,8 @@ class Check:
     remedy: str = ""
     ahead: bool = False
     change: Mapping[str, Any] = field(default_factory=dict)
+    explains: float = 0.0
+    outcome: bool = False
 
     @property
     def sentence(self) -> str:
@@ -70,6 +76,7 @@ class Answer(NamedTuple):
     remedy: str | None = None
     limit: str | None = None
     change: Mapping[str, Any] = {}
+    explains: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -84,6 +91,7 @@ class Question:
     limit: str = ""
     remedy: str = ""
     ahead: bool = False
+    outcome: bool = False
 
     def __call__(self, judge: Callable[P, Answer | None]) -> Callable[P, Any]:
         @wraps(judge)
@@ -93,15 +101,35 @@ class Question:
                 return None
             limit = self.limit if answer.limit is None else answer.limit
             remedy = self.remedy if answer.remedy is None else answer.remedy
-            state, finding, change = answer.state, answer.finding, answer.change
-            return Check(self.question, state, finding, limit, remedy, self.ahead, change)
+            return Check(
+                self.question,
+                answer.state,
+                answer.finding,
+                limit,
+                remedy,
+                self.ahead,
+                answer.change,
+                answer.explains,
+                self.outcome,
+            )
 
         return check
 
 
 def worst_of(checks: Sequence[Check]) -> Check | None:
-    """Return the first check with the worst state; None if no check is "doubtful" or "no"."""
-    return next((c for state in WORST[:2] for c in checks if c.state == state), None)
+    """Return the check to name first; None if no check is "doubtful" or "no".
+
+    It is the first check of the worst state, unless another explains more: one of the same state,
+    or any one if the first is about a result only.
+    """
+    worst = next((c for state in WORST[:2] for c in checks if c.state == state), None)
+    if worst is None:
+        return None
+    rivals = [
+        c for c in checks if c.state == worst.state or (worst.outcome and c.state in WORST[:2])
+    ]
+    strongest = max(rivals, key=lambda check: check.explains)
+    return strongest if strongest.explains > worst.explains else worst
 
 
 def first_names(names: Sequence[str]) -> str:

@@ -103,6 +103,7 @@ RATIO = (
 )
 WENT: Mapping[str, str] = {
     "estimate.options.prior: entropic": "the distance entropic was removed; use euclidean or none",
+    "estimate.options.around": "this setting moved to the section rows: write rows: {around: 0.1}, for every method",
     "estimate.method: tls": "total least squares was removed; use wls, and `symgen cestac --advise` to see the effect of the encoder on the estimate",
     "estimate.method: cloe": "output error of the closed loop was removed; use didim, which uses the same records of the same loop",
     "record.ratio": RATIO,

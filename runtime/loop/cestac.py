@@ -17,7 +17,7 @@ shows almost nothing, because didim uses only the first position. With place: lo
 seed of its own for phase, torque noise and disturbance, the same for every Delta and method. The
 runs are compared with runs of the same seeds whose encoder is that of the study (an exact encoder,
 if the study gives none), so that %e shows the effect of the steps alone. With place: loop, the
-option `around` of estimate.options applies to every method.
+option `reference` of estimate.options applies to every method.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 
-ALIKE = ("around", "reference")  # estimate.options that are the loop's, whatever the method
+ALIKE = ("reference",)  # estimate.options that are the loop's, whatever the method
 
 
 @dataclass(frozen=True)
@@ -91,10 +91,7 @@ class Loop:
 
     @property
     def options(self) -> Mapping[str, Any]:
-        """The options `around` and `reference` of the closed loop, if the study sets them.
-
-        around : s, rows near slow rows are left out. reference : how the reference is known.
-        """
+        """The option `reference` of the closed loop, if the study sets it."""
         return {
             key: self.study.estimate.options[key]
             for key in ALIKE
@@ -130,7 +127,7 @@ class Loop:
     def estimate(self) -> EstimateSettings:
         """Settings of the estimate, without loop options if its method simulates no closed loop.
 
-        The loop options are `around` and `reference`.
+        The loop option is `reference`.
         """
         settings: EstimateSettings = self.study.estimate
         if self.problem.method.observe is not None:

@@ -17,7 +17,7 @@ is far from the truth. Rows are chosen by the velocity of the reference, never b
 measured positions: a choice that depends on noise biases every method. Slow rows of joint j
 (`rows.low_speed`) are rows where a dry friction that acts on the joint slips slowly (coupled
 friction of a wrist included): at rest its torque is anything between -FS and FS, not W X, and the
-decimation spreads that into the rows `around`. Instants with the torque at its limit are left out.
+decimation spreads that into the rows near them (`rows.around`). Instants with the torque at its limit are left out.
 
 If the reference is not known (`reference: measured`), the measured motion through the filters
 replaces it: then the instruments contain the noise of the same run, and DIDIM is output error about
@@ -31,7 +31,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from scipy.ndimage import minimum_filter1d
 
 from runtime.core.model import GeneratedModel, is_axis, joint_labels
 from runtime.core.problem import Problem
@@ -45,7 +44,7 @@ from runtime.counts.reading import REACH
 from runtime.ground.errors import InputError, SettingsError
 from runtime.ground.limits import limits
 from runtime.ground.progress import at
-from runtime.ground.settings import NotNegative, Settings, structure
+from runtime.ground.settings import Settings, structure
 from runtime.loop.law_check import LawFit, law_fits, law_text
 from runtime.loop.reference import Reference, of_record, reference_of, require_rate
 from runtime.loop.result import Simulation
@@ -73,12 +72,9 @@ class LoopOptions(Settings):
     reference : str
         known (from the settings, or from the columns qr1 ... of each record), or measured: the
         measured motion replaces a reference that is not known.
-    around : float, s
-        Rows within this time of slow rows (`rows.low_speed`) are also left out.
     """
 
     reference: Literal["known", "measured"] = "known"
-    around: NotNegative = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,7 +262,7 @@ def observed_loop(problem: Problem, simulator: Simulator | None = None) -> Obser
     if simulator is None:
         return stacked(problem.model, problem.prepared)
     options = settings.estimate.options
-    asked = {key: options[key] for key in ("reference", "around") if key in options}
+    asked = {key: options[key] for key in ("reference",) if key in options}
     return closed_loop(problem, problem.prepared, simulator, **asked).measured()
 
 
@@ -285,7 +281,6 @@ def closed_loop(
     controller, model, study = simulator.controller, problem.model, problem.settings
     parts = []
     every = controller.record_every
-    around = 2 * round(asked.around * (controller.rate / every)) + 1  # samples
     for k, own in enumerate(measured):
         record = own.record
         require_rate(record, controller)
@@ -306,7 +301,7 @@ def closed_loop(
         speed = slips(followed.qd[::every][: len(record)], simulator.friction.G)
         selection = select_rows(
             record,
-            minimum_filter1d(speed, around, axis=0, mode="nearest"),
+            speed,
             study.signals,
             study.rows,
             keep=_usable(simulator, record),

@@ -130,11 +130,11 @@ def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
             )
         return np.broadcast_to(x, (n,)).copy()
 
-    if "fit" in (law.kd, law.delay):
+    if law.kd == "fit":
         raise SettingsError(
             "a simulation needs a number, not `fit`; identify the record first, and write the "
             "fitted number here",
-            path=("controller", "law", "kd" if law.kd == "fit" else "delay"),
+            path=("controller", "law", "kd"),
         )
     gains = law.gains(n)
     one, zero = np.ones(n), np.zeros(n)

@@ -70,8 +70,8 @@ class Law(Settings):
     gain : float or tuple of float, N m or N
         Torque for one unit of u.
     delay : float or str, s
-        Delay from the logged signals to the torque, for a law that replaces a measured torque; fit:
-        found with the parameters. For a simulated loop: controller.delay.
+        Delay from the logged signals to the torque, for a law that replaces a measured torque; fit
+        (the default): found with the parameters. A simulated loop has controller.delay.
     antiwindup : float or tuple of float or None
         Largest |I|; null: unlimited.
     """
@@ -84,7 +84,7 @@ class Law(Settings):
     cv: PerJoint[Real] = 0.0
     ca: PerJoint[Real] = 0.0
     gain: PerJoint[Real] = 1.0
-    delay: Real | Literal["fit"] = 0.0
+    delay: Real | Literal["fit"] = "fit"
     antiwindup: PerJoint[Positive] | None = None
 
     def __post_init__(self) -> None:

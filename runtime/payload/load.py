@@ -37,6 +37,7 @@ from runtime.ground.documents import Result
 from runtime.ground.errors import InputError, SettingsError
 from runtime.ground.limits import limits
 from runtime.ground.table import Table, number
+from runtime.payload.body import Body, Place, body_at, place_on
 from runtime.payload.settings import PayloadSettings
 from runtime.physical.inertia import INERTIAL, PhysicalModel, physical_model, pseudo_inertia
 
@@ -55,8 +56,10 @@ class Payload(Result):
 
     Attributes
     ----------
-    link : int
-        Number of the link to which the load is fixed.
+    mount : Mount
+        Link to which the load is fixed, and frame of its parameters.
+    at : Place
+        Place of the robot file at which mass, centre and inertia are given.
     names : tuple of str
         Families XX .. M of the unknown parameters that have an effect, in that order.
     value : ndarray, shape (u,), kg m^2, kg m or kg
@@ -66,26 +69,42 @@ class Payload(Result):
         Parameters that were given, by family.
     estimate : Estimate
         All base parameters and those of the load, fitted together.
-    frame : int or None
-        Number of the frame at which the parameters are meant; None: that of the link.
     """
 
-    link: int
+    mount: Mount
+    at: Place
     names: tuple[str, ...]
     value: Array
     sigma: Array
     given: Mapping[str, float]
     estimate: Estimate
-    frame: int | None = None
+
+    @property
+    def link(self) -> int:
+        """Number of the link to which the load is fixed."""
+        return self.mount.link
 
     @property
     def place(self) -> str:
-        """Words that name the link or frame to which the load is fixed, such as "link 6"."""
-        return (
-            f"link {self.link}"
-            if self.frame in (None, self.link)
-            else f"frame {self.frame} of link {self.link}"
-        )
+        """Words that name link and frame of the parameters: "link 6, in Khalil's frame 6"."""
+        return f"link {self.mount.link}, in Khalil's frame {self.mount.frame}"
+
+    @property
+    def body(self) -> Body | None:
+        """Mass, centre and inertia at the place `at`; None if the mass is not positive."""
+        fit, families = self.estimate, [*INERTIAL]
+        chi, C = np.zeros(10), np.zeros((10, 10))
+        places = [families.index(name) for name in self.names]
+        columns = [fit.names.index(f"{name}{LOAD}") for name in self.names]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            factor = np.nan_to_num(self.sigma / fit.sigma[columns], nan=1.0, posinf=1.0)
+        covariance = np.nan_to_num(fit.covariance[np.ix_(columns, columns)])
+        C[np.ix_(places, places)] = covariance * np.outer(factor, factor)
+        chi[places] = self.value
+        for family, x in self.given.items():
+            chi[families.index(family)] = x
+        unknown = [name not in self.names and name not in self.given for name in families]
+        return body_at(self.at, self.mount.T, chi, C, unknown)
 
     def __getitem__(self, family: str) -> float:
         """Return the value of one parameter of the load, such as payload["M"] for the mass."""
@@ -102,8 +121,8 @@ class Payload(Result):
             (name, number(x, ".6g"), number(sigma, ".2g"), _unit(name))
             for name, x, sigma in zip(self.names, self.value, self.sigma, strict=True)
         ]
-        caption = f"Load on {self.place}, its parameters there, SI"
-        return Table(caption, (f"load on {self.place}", "value", "sigma", "unit"), rows)
+        caption = f"Load on {self.place}, SI"
+        return Table(caption, (f"load on link {self.link}", "value", "sigma", "unit"), rows)
 
     def to_table(self) -> str:
         """Return the table of the load as text."""
@@ -115,11 +134,13 @@ class Payload(Result):
             n: {"value": x, "sigma": s}
             for n, x, s in zip(self.names, self.value, self.sigma, strict=True)
         }
+        body = self.body
         return {
             "link": self.link,
-            "frame": self.frame or self.link,
+            "frame": self.mount.frame,
             "known": dict(self.given),
             "parameters": parameters,
+            "body": None if body is None else body.summary(),
         }
 
 
@@ -154,6 +175,8 @@ def payload(
         )
     physical = physical_model(model)
     load = load_columns(model, physical, settings)
+    mounts = getattr(model, "MOUNTS", {})
+    at = place_on(mounts, load.mount.link, load.mount.frame, settings.at, load.mount.T)
     friction = friction_columns(model, physical) if settings.friction else []
     names = (
         *model.BASE_PARAMETERS,
@@ -186,15 +209,8 @@ def payload(
     sigma = np.where(
         np.isnan(fit.sigma_corrected), fit.sigma, np.fmax(fit.sigma, fit.sigma_corrected)
     )
-    return Payload(
-        load.mount.link,
-        load.unknown,
-        fit.X[place],
-        sigma[place],
-        dict(settings.known),
-        fit,
-        load.mount.frame,
-    )
+    known = dict(settings.known)
+    return Payload(load.mount, at, load.unknown, fit.X[place], sigma[place], known, fit)
 
 
 def friction_columns(model: GeneratedModel, physical: PhysicalModel) -> list[int]:

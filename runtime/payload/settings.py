@@ -28,6 +28,9 @@ class PayloadSettings(Settings):
     frame : int or None
         Frame fixed to that link, such as a tool frame (sigma 2), at which the parameters of the
         load are meant; default: that of the link.
+    at : str or None
+        Name of a link of the robot file, or a site of an MJCF, at which mass, centre and inertia of
+        the load are given; default: tool0, flange or the last one on that link.
     known : mapping of float, SI
         Parameters of the load, among XX XY XZ YY YZ ZZ MX MY MZ M at that frame, that were
         weighed or computed.
@@ -42,6 +45,7 @@ class PayloadSettings(Settings):
 
     link: Whole | None = None
     frame: Whole | None = None
+    at: Text | None = None
     known: Mapping[Text, Real] = field(default_factory=dict)
     friction: Flag = False
     gains: Flag = False

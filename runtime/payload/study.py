@@ -27,6 +27,7 @@ from runtime.ground.documents import Result
 from runtime.ground.errors import SettingsError
 from runtime.ground.part import Part
 from runtime.ground.table import Table, in_lines, with_intervals
+from runtime.payload.body import Body
 from runtime.payload.gains import DriveGains, drive_gains, scaled
 from runtime.payload.load import Payload, payload
 from runtime.payload.settings import LOADED
@@ -56,9 +57,10 @@ class PayloadStudy(Result, Part, keys="payload drive_gains:gains"):
         return how if self.gains is None else f"{how}\nTorque constants: {self.gains.text}."
 
     def tables(self) -> list[Table]:
-        """Return the table of the load, and the table of the torque constants if it exists."""
+        """Return the tables of the load, and the table of the torque constants if it exists."""
         gains = [] if self.gains is None else [self.gains.table()]
-        return [self.payload.table(), *gains]
+        body = self.payload.body
+        return [*([] if body is None else [body.table()]), self.payload.table(), *gains]
 
     def entries(self) -> dict[str, Any]:
         """Return the entries of estimate.json: the load and the torque constants."""
@@ -66,16 +68,38 @@ class PayloadStudy(Result, Part, keys="payload drive_gains:gains"):
 
     def brief(self) -> str:
         """Return the load and the torque constants, with 95 % confidence intervals, as text."""
-        load, gains = self.payload, self.gains
+        load, body, gains = self.payload, self.payload.body, self.gains
+        lines = [] if body is None else _brief(body)
         given = [f"{name} {value:.4g} (given)" for name, value in load.given.items()]
         estimated = with_intervals(load.names, load.value, load.sigma)
-        lines = [f"The load on {load.place}, SI, +- 95 %", *in_lines([*given, *estimated])]
+        lines += [f"The load on {load.place}, SI, +- 95 %", *in_lines([*given, *estimated])]
         if gains is not None:
             value, sigma = (gains.constant * x for x in (gains.together, gains.sigma))
             values = with_intervals([f"motor {joint}" for joint in gains.joints], value, sigma)
             known = [x for j, x in zip(gains.joints, values, strict=True) if j not in gains.refused]
             lines += ["Torque constants, SI, +- 95 %", *in_lines(known), gains.text]
         return "\n".join(lines)
+
+
+def _brief(body: Body) -> list[str]:
+    """Write mass, centre and inertia of a load in lines, with 95 % confidence intervals."""
+
+    def cells(of: str) -> list[str]:
+        rows = [row for row in body.rows if row[0].startswith(of)]
+        labels = [name.split()[-1] for name, *_ in rows]
+        return with_intervals(labels, [x for _, x, *_ in rows], [s for _, _, s, _ in rows])
+
+    mass, centre = " ".join(cells("mass")[0].split()), cells("centre")
+    return [
+        f"The load at {body.place.words}, +- 95 %: {mass} kg{', centre, m' * bool(centre)}",
+        *in_lines(centre),
+        *(
+            ["Inertia about the centre, kg m^2", *in_lines(inertia)]
+            if (inertia := cells("inertia"))
+            else []
+        ),
+        *([body.missing] if body.missing else []),
+    ]
 
 
 def load_of_study(result: Identification) -> PayloadStudy | None:

@@ -18,7 +18,6 @@ from itertools import combinations
 import numpy as np
 from scipy.ndimage import median_filter
 
-from runtime.core.missing import held_samples
 from runtime.core.model import drives_of, joint_torque_units
 from runtime.core.record import Record
 from runtime.core.signals.filters import median_filtered
@@ -98,23 +97,6 @@ def same_positions(case: Case, course: Course) -> Answer | None:
     return None
 
 
-def held_packets(case: Case, course: Course) -> Answer | None:
-    """Tell samples that a controller held, if every jump is near such samples."""
-    held = held_samples(course.record.q)
-    near = LIMIT.JUMP_STEPS + course.window
-    runs = zip(*course.jumps(), strict=True) if course.high.any() else ()
-    if not held.any() or not all(held[max(a - near, 0) : b + near].any() for a, b in runs):
-        return None
-    packets = int(np.count_nonzero(np.diff(held, prepend=False) & held))
-    return Answer(
-        "good" if held.mean() < LIMIT.HELD_SHARE else "doubtful",
-        f"The controller held the positions at {packets} instants ({int(held.sum())} of "
-        f"{len(held)} samples), then jumped to the new positions",
-        "log without lost packets, or leave these times out (rows.window); signals: "
-        "{reader: counts} treats these samples as missing",
-    )
-
-
 def frozen_encoder(case: Case, course: Course) -> Answer | None:
     """Tell a joint that moves and whose position suddenly stays at one value."""
     pairs = zip(course.steps.T, course.sharp.T, strict=True)
@@ -162,7 +144,7 @@ def jumping_joints(case: Case, course: Course) -> Answer | None:
     return Answer("no", text, remedy)
 
 
-FINDINGS = (same_positions, held_packets, frozen_encoder, jumping_joints)
+FINDINGS = (same_positions, frozen_encoder, jumping_joints)
 
 
 @Question(

@@ -31,6 +31,7 @@ from runtime.ground.check import Answer, Question, State, first_names
 from runtime.ground.errors import InputError
 from runtime.ground.limits import limits
 from runtime.plausible.case import Case
+from runtime.plausible.rests import friction_determined, rounded_up
 from runtime.plausible.samples import Samples
 
 LIMIT = limits(__package__)
@@ -66,6 +67,12 @@ def rest(case: Case) -> Answer:
     systems = map(weighted_system, (case.observation, without))
     before, after = (percent(*system.norms(system.solve().X)) for system in systems)
     text += f"; without these rows, the error of the fit is {after:.1f} % instead of {before:.1f} %"
+    slow = per_joint(proposed, case.samples.n, "rows.low_speed")
+    lost = slow > per_joint(study.rows.slow, case.samples.n, "rows.low_speed")
+    lost &= [not friction_determined(model, without, j) for j in range(len(lost))]
+    if lost.any():
+        text += f", but do not determine the friction of joint {case.joints(lost)}"
+        remedy, change = f"move joint {case.joints(lost)} in both directions, at several speeds", {}
     state: State = "doubtful" if after < 0.8 * before else "good"
     if after < 0.5 * before and before > LIMIT.TOTAL_ERROR[0]:  # else friction of that joint alone
         state = "no"
@@ -77,7 +84,7 @@ def standing_share(samples: Samples, study: Study) -> Array:
     speed = np.where(
         samples.still, np.inf, np.abs(samples.qd)
     )  # a joint that never moves is told as such
-    used = speed >= per_joint(study.rows.low_speed, samples.n, "rows.low_speed")
+    used = speed >= per_joint(study.rows.slow, samples.n, "rows.low_speed")
     standing = used & (speed <= samples.standing())
     return np.asarray(standing.sum(axis=0) / np.maximum(used.sum(axis=0), 1))
 
@@ -85,26 +92,19 @@ def standing_share(samples: Samples, study: Study) -> Array:
 def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ...] | None:
     """Propose a speed `rows.low_speed`, below which the samples of a joint are left out as resting.
 
-    In rad/s or m/s: one number for all joints if their thresholds are similar, otherwise one for
-    each joint. None if every joint rests in at most LIMIT.REST_SHARE of its rows.
+    In rad/s or m/s, one number for each joint; joints that rest in at most LIMIT.REST_SHARE of
+    their rows keep that of the study. None if all joints do.
     """
-    if standing_share(samples, study).max() <= LIMIT.REST_SHARE:
+    share = standing_share(samples, study)
+    if share.max() <= LIMIT.REST_SHARE:
         return None
-    low = per_joint(study.rows.low_speed, samples.n, "rows.low_speed")
+    low = per_joint(study.rows.slow, samples.n, "rows.low_speed")
+    rests = (share > LIMIT.REST_SHARE) & ~samples.still
     wanted = tuple(
-        _rounded_up(max(v, x))
-        for v, x in zip(np.where(samples.still, 0.0, samples.standing()), low, strict=True)
+        rounded_up(max(v, x))
+        for v, x in zip(np.where(rests, samples.standing(), 0.0), low, strict=True)
     )
-    return max(wanted) if max(wanted) <= 3 * min(wanted) else wanted
-
-
-def _rounded_up(x: float) -> float:
-    """Round a speed threshold x up to two significant digits.
-
-    A smaller threshold would not leave out all rows at rest.
-    """
-    digit = 10.0 ** (np.floor(np.log10(x)) - 1) if x > 0 else 1.0
-    return float(f"{np.ceil(x / digit * (1 - 1e-12)) * digit:.2g}")
+    return wanted[0] if samples.n == 1 else wanted
 
 
 @Question(

@@ -42,7 +42,8 @@ def not_asked(case: Case) -> Answer | None:
 @Question(
     "Can a physical robot explain the record?",
     "about the same error",
-    "a sign, an axis, a length or the order of the columns is wrong: see the alternatives below",
+    "a sign, an axis, a length or the order of the columns is wrong: check them in the robot file "
+    "and in record.columns",
 )
 def physics(case: Case) -> Answer | None:
     """Compare, for each joint, the torque error of a physical robot with that of free parameters.
@@ -163,7 +164,18 @@ def values(case: Case) -> Answer | None:
         )
     if off := case.robot_values.off:
         return Answer("doubtful", f"No: {'; '.join(off[:4])}")
+    if (other := case.robot_values.other_weights).any():
+        ratio = case.robot_values.weight[other][0]
+        return Answer(
+            "doubtful",
+            f"The weight on the slide of joint {case.joints(other)} is {ratio:.2g} times that of the "
+            "values; no record shows a factor of this force, because the mass hides it",
+            "check torque constant, ratio and unit of this joint, and the number of its motors; or "
+            "correct the masses of the robot file",
+        )
     ratios = [x for x in (*case.robot_values.gravity, *case.robot_values.inertia) if np.isfinite(x)]
+    if not ratios and case.coarse:
+        return Answer("open", "The positions are too coarse to judge inertia torques", "")
     if not ratios:
         return Answer(
             "good", "Gravity and inertia torques are too small compared with friction to judge"
@@ -217,7 +229,13 @@ def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
         if case.sides[1] == "law"
         else f"shift the torques by {', '.join(f'{-1e3 * x:+.1f}' for x in shift)} ms against the "
         "positions before reading the record, or repair the logger",
+        explains=explained(late.before[j], late.after[j]),
     )
+
+
+def explained(before: float, after: float) -> float:
+    """Compute the share of an error, %, that a correction takes away: 1 - after/before, or 0."""
+    return max(0.0, 1.0 - float(after) / float(before)) if before > 0 else 0.0
 
 
 def _from_to(text: str, before: float, after: float) -> str:
@@ -310,4 +328,6 @@ def better(case: Case, named: Sequence[Trial]) -> Answer:
         "; the errors do not change, but the parameters are nearer to the values of the robot file"
     )
     first = named[0].cause
-    return Answer("good" if friction else "no", text, first.remedy, change=first.change)
+    state: State = "good" if friction else "no"
+    gain = explained(before[j], after[j])
+    return Answer(state, text, first.remedy, change=first.change, explains=gain)

@@ -42,6 +42,7 @@ from runtime.plausible.physics import (
     size,
     values,
 )
+from runtime.plausible.registers import signed
 from runtime.plausible.samples import excerpts, filtered, samples_of
 from runtime.plausible.sizes import (
     accelerations,
@@ -69,6 +70,7 @@ CHECKS: tuple[Callable[[Case], Check | None], ...] = (
     motion_excites,
     not_asked,
     cut_torques,
+    signed,
     friction,
     physics,
     measured,
@@ -223,7 +225,12 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
     if case.baseline is None:
         return Plausibility(tuple(checks), robot_values=case.robot_values)
     question = "Is the study the best explanation of the record?"
-    for check, text in ((jumps, "the positions jump"), (cut_torques, "torques are cut off")):
+    broken_by = (
+        (jumps, "the positions jump"),
+        (signed, "torques lack their sign"),
+        (cut_torques, "torques are cut off"),
+    )
+    for check, text in broken_by:
         # what explains a broken record better is no cause
         if (broken := answers[check]) is not None and broken.state == "no":
             checks.append(Check(question, "open", f"Not checked: {text}"))

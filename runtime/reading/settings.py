@@ -365,6 +365,32 @@ def each_record(settings: Sequence[RecordSettings]) -> tuple[RecordSettings, ...
     )
 
 
+INHERITED = (  # keys that belong together: all are those of another record, or none
+    ("columns",),
+    ("side", "torque_side", "coupling"),
+    ("units", "scale", "counts_per_revolution", "torque_constant"),
+    ("rate", "jitter", "resample"),
+    ("unwrap",),
+    ("topic",),
+    ("decimal",),
+)
+"""Keys of a record with a load that are those of the records without it, if left out."""
+
+
+def inherited(record: Any, others: Any) -> Any:
+    """Add to the mapping of a record the settings of the first of `others` that it leaves out.
+
+    Both are settings as in a file, or RecordSettings; anything else is returned as it is, and
+    refused later.
+    """
+    first = others[0] if isinstance(others, list | tuple) and others else others
+    if not (isinstance(record, Mapping) and isinstance(first, Mapping | RecordSettings)):
+        return record
+    like = first if isinstance(first, Mapping) else {k: getattr(first, k) for k in vars(first)}
+    free = [keys for keys in INHERITED if not any(key in record for key in keys)]
+    return {**{key: like[key] for keys in free for key in keys if key in like}, **record}
+
+
 Records = Annotated[Many[RecordSettings], AfterValidator(each_record)]
 """Settings of one record or of several, one entry each."""
 
@@ -378,9 +404,10 @@ class Rows(chapter.Rows):
 
     Attributes
     ----------
-    low_speed : float or tuple of float, rad/s or m/s
+    low_speed : float or tuple of float or str, rad/s or m/s
         Rows of joint j with |qd_j| below this speed are left out, because sign(qd) is noise in
-        them. A text may have another unit: 2 rpm.
+        them. A text may have another unit: 2 rpm. auto: found from the record for joints whose
+        torques at rest are not those of the model; zero for other joints.
     """
 
     _with_unit = field_validator("low_speed", mode="before")(speed)

@@ -80,6 +80,7 @@ def rank_and_condition(result: Identification) -> Answer:
     f"{LIMIT.TOTAL_ERROR[0]:g} % (usable to {LIMIT.TOTAL_ERROR[1]:g} %)",
     "check the joints named below: first units, signs and ratios of the drives, "
     "then friction (--friction)",
+    outcome=True,
 )
 def total_error(result: Identification) -> Answer:
     """Check the relative error 100 ||Y - W X|| / ||Y|| of the fit over all joints, in %."""
@@ -88,7 +89,11 @@ def total_error(result: Identification) -> Answer:
     return Answer(state_of(fit.relative_error, *LIMIT.TOTAL_ERROR), text)
 
 
-@Question("On every joint?", f"{LIMIT.JOINT_ERROR[0]:g} % (usable to {LIMIT.JOINT_ERROR[1]:g} %)")
+@Question(
+    "On every joint?",
+    f"{LIMIT.JOINT_ERROR[0]:g} % (usable to {LIMIT.JOINT_ERROR[1]:g} %)",
+    outcome=True,
+)
 def explained_by_joint(result: Identification) -> Answer | None:
     """Check the largest relative error of the fit on a single joint; the total error may hide it.
 
@@ -109,24 +114,25 @@ def explained_by_joint(result: Identification) -> Answer | None:
     )
 
 
-@Question("Does it predict data it has not seen?")
+@Question("Does it predict data it has not seen?", outcome=True)
 def predicted(result: Identification) -> Answer:
     """Check the relative error, %, of torques that the model predicts for data not fitted.
 
     The answer is "open" if there are no such data. If they are one part of the record, predicted
-    with parameters from the other part, which may not excite all parameters, the answer is good up
-    to the second limit, or up to the last limit if predictions of other motions are expected to be
-    good, and never "no".
+    with parameters from another part, which may not excite all parameters, the answer is good up to
+    the error that the deviations of these parameters explain (but not above the last limit), and
+    never "no".
     """
-    fit, error, expected = result.model_estimate, result.prediction_error, result.expected_error
+    fit, error = result.model_estimate, result.prediction_error
     halves = bool(result.validation) and not result.by_records
     levels = [
         min(max(times * fit.relative_error, least), most)
         for (times, least), most in zip(LIMIT.PREDICTION_ERROR, LIMIT.PREDICTION_MOST, strict=True)
     ]
     if halves:
-        sure = expected <= LIMIT.EXPECTED_ERROR
-        levels = [LIMIT.PREDICTION_MOST[1] if sure else levels[1], np.inf]
+        unknown = levels[0] < error and np.isnan(result.unseen_error)
+        explained = levels[1] if unknown else result.unseen_error if error > levels[0] else 0.0
+        levels = [min(max(levels[0], explained), LIMIT.PREDICTION_MOST[1]), np.inf]
     state: State = "open" if not np.isfinite(error) else state_of(error, *levels)
     remedy = "a longer or richer record"
     if "standard" not in fit.details:

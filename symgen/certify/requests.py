@@ -22,8 +22,10 @@ from symgen.certify.importing import (
     key_of,
     without_certificate,
 )
+from symgen.description.bodies import impossible_links
 from symgen.description.expression import Expression
 from symgen.description.files import load_robot
+from symgen.description.mounts import mounts
 from symgen.description.robot import Robot
 from symgen.version import VERSION
 
@@ -65,14 +67,22 @@ def model(robot: str | Path | Robot, *, options: Sequence[str] = ()) -> ModuleTy
 def module_of(robot: Robot, request: object, derived: Callable[[Robot], Path]) -> ModuleType:
     """Import a module of a robot from the cache, or else from the path that `derived` returns.
 
+    The module gets the named places of the robot, MOUNTS (`symgen.description.mounts`).
+
     `request` : what is asked for besides the robot, such as the options. The derivation warns of
     inertias that no body can have, so that a robot with such inertias is always derived.
     """
+    module = _module_of(robot, request, derived)
+    module.MOUNTS = mounts(robot)  # type: ignore[attr-defined]
+    return module
+
+
+def _module_of(robot: Robot, request: object, derived: Callable[[Robot], Path]) -> ModuleType:
     asked = entry(f"{VERSION} {_sources()} {_written(request)} {_written(robot)}")
     if asked is None:
         return imported(derived(robot))
     asked = asked.with_name(f"asked-{asked.name}")  # no text has such a name
-    path = None if robot.impossible else _answer(asked, f"{robot.name}.py")
+    path = None if impossible_links(robot) else _answer(asked, f"{robot.name}.py")
     if path is None:
         path = derived(robot)
         if path.is_relative_to(asked.parent):

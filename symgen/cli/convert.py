@@ -74,7 +74,8 @@ def convert(
     """
     with reported_errors():
         from symgen.description.angles import SNAPPED
-        from symgen.description.files import read_robot, write_robot
+        from symgen.description.bodies import impossible_links
+        from symgen.description.files import not_read_text, read_robot, write_robot
         from symgen.description.tree import DROPPED
         from symgen.description.values import assignment, values_of_csv, with_estimate, with_values
         from symgen.regroup.regrouping import regroup
@@ -89,7 +90,7 @@ def convert(
             lock=dict(assignment(text, "--lock") for text in lock or ()),
             chain=chain,
         )
-        if robot.impossible:
+        if impossible_links(robot):
             regroup(robot)  # whose note names the base parameters
         if values is not None:
             from runtime.reading.files import read_bytes
@@ -102,8 +103,9 @@ def convert(
             fit = load_whole_estimate(estimate)
             require_torques(fit)
             robot = with_estimate(robot, fit.details.get("standard"), str(estimate))
-        comments = [f"Converted from {robot.file}.", *([robot.angles] if exact else []), *read]
-        text, written = write_robot(robot, output.name, comments=comments)
+        angles = [robot.angles] if exact else []
+        comments = [f"Converted from {robot.file}.", *angles, not_read_text(robot), *read]
+        text, written = write_robot(robot, output.name, comments=list(filter(None, comments)))
         write_all(output.parent, {output.name: text})
         typer.echo(
             f"{output}: {robot.name}, {len(robot.joints)} joints, {len(robot.parameters)} standard "

@@ -55,6 +55,7 @@ def identify(
             help="Write a study file with the settings that the records need (columns guessed from their names, resampling, units), then identify with it."
         ),
     ] = None,
+    at: options.At = None,
     json: options.Json = False,
 ) -> None:
     """Identify the base parameters of ROBOT from RECORD, or from several records fitted together.
@@ -68,6 +69,7 @@ def identify(
 
         described = session.robot_of(robot, trust=trust, exact=exact)
         study = session.study_of_arguments(record)
+        study = study if at is None else session.changed(study, payload={"at": at})
         model = session.model_of(described, study=study)
         study = study if suggest is None else session.suggested_study(study, model, suggest)
         records = records_of(study.record, model, study)

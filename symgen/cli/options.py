@@ -127,4 +127,11 @@ Chain = Annotated[
         help="URDF or MJCF only: keep the joints between two links and lock all others at zero.",
     ),
 ]
+At = Annotated[
+    Text,
+    typer.Option(
+        help="Link of the robot file at which mass, centre and inertia of the load of the study are given, "
+        "such as tool0. Default: tool0, flange or the last one."
+    ),
+]
 Force = Annotated[bool, typer.Option("--force", help="Replace the file if it exists.")]

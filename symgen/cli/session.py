@@ -46,8 +46,8 @@ def reported_errors() -> Iterator[None]:
     """Report errors inside the block as messages of the command line; use one BLAS thread there.
 
     Bad input gives one message on the error stream and exit code 2, a false certificate exit code
-    1, never a traceback. A note is printed for each angle whose value differs from the text of the
-    file.
+    1, never a traceback. Warnings on the robot file and the record are printed as notes, after the
+    answer.
     """
     from runtime.ground.errors import DataUnavailableError, InputError
     from symgen.errors import CertificateError, SymgenError
@@ -78,21 +78,25 @@ def _noted_warnings() -> Iterator[None]:
     from symgen.description.angles import RobotFileWarning
 
     noted = (RobotFileWarning, RecordWarning)
+    notes: dict[str, None] = {}  # each once: a verb may regroup its robot twice
     with warnings.catch_warnings():
         show = warnings.showwarning
-        told: set[str] = set()  # a verb may regroup its robot twice
 
         def note(message: Warning | str, category: type[Warning], *place: Any) -> None:
-            if not issubclass(category, noted):
+            if issubclass(category, noted):
+                notes.setdefault(str(message))
+            else:
                 show(message, category, *place)
-            elif str(message) not in told:
-                told.add(str(message))
-                typer.echo(f"note: {message}", err=True)
 
         warnings.showwarning = note  # type: ignore[assignment]
         for kind in noted:
             warnings.simplefilter("always", kind)
-        yield
+        try:
+            yield
+        finally:
+            width = get_terminal_size().columns
+            for text in notes:
+                typer.echo(_wrapped(f"note: {text}", width), err=True)
 
 
 @contextmanager
@@ -201,17 +205,21 @@ def model_of(robot: Robot | GeneratedModel, *, study: Study | None = None) -> Ge
 
 
 def described_robot(source: str, at_values: bool = False, exact: bool = False) -> Robot:
-    """Load a robot by its name or from a file, and print notes on the robot to the error stream.
+    """Load a robot by its name or from a file; doubts about the robot are printed as notes.
 
     at_values : whether to replace its constants by their values.
     """
+    import warnings
+
     from symgen.derive.doubts import doubts
     from symgen.description import load_robot
+    from symgen.description.angles import RobotFileWarning
+    from symgen.description.distal import frames_text
     from symgen.description.values import at_values as with_values
 
     robot = load_robot(source, exact=exact)
-    for sentence in doubts(robot):
-        typer.echo(f"note: {sentence}", err=True)
+    for sentence in filter(None, (*doubts(robot), frames_text(robot))):
+        warnings.warn(sentence, RobotFileWarning, stacklevel=1)
     return with_values(robot) if at_values else robot
 
 

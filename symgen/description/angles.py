@@ -12,6 +12,7 @@ from symgen.description.expression import PI, twelfths
 SNAP = 1e-4  # rad: angles of a file this close to a multiple of pi/12 are taken as that
 SNAPPED = "snapped:"  # how the note on them starts
 ALL_DIGITS = 1e-12  # rad: closer to a multiple of pi/12 is that multiple in every digit
+TOLD = 1e-9  # rad: a smaller change of an angle is not told
 
 
 class RobotFileWarning(UserWarning):
@@ -19,7 +20,11 @@ class RobotFileWarning(UserWarning):
 
 
 class InertiaWarning(RobotFileWarning):
-    """Warning about a URDF link whose mass and inertia tensor no physical body can have."""
+    """Warning about a link whose mass and inertia tensor no physical body can have."""
+
+
+class NotReadWarning(RobotFileWarning):
+    """Warning about parts of a robot file that change the torques and are not in the equations."""
 
 
 class AngleWarning(RobotFileWarning):
@@ -60,20 +65,23 @@ class Angles:
         """Write which angles near multiples of pi/12 were rounded: a text for file headers, and
         notes for the user.
 
-        If angles were rounded, a note names the largest change, and an AngleWarning is issued. Both
-        results are empty if the file has no such angle.
+        If angles were rounded by more than TOLD, a note names the largest change, and an
+        AngleWarning is issued. Both results are empty if the file has no such angle.
         """
-        if not self.near:
+        changes = [
+            (k * (math.pi / 12) - angle, name, angle, k)
+            for name, angle, k in self.near
+            if self.exact or abs(k * (math.pi / 12) - angle) > TOLD
+        ]
+        if not changes:
             return "", ()
-        near = f"{len(self.near)} angle{'s' * (len(self.near) > 1)} near multiples of pi/12"
+        near = f"{len(changes)} angle{'s' * (len(changes) > 1)} near multiples of pi/12"
         if self.exact:
             return f"{near} are those of {file}", ()
-        changes = {k * (math.pi / 12) - angle: (name, angle, k) for name, angle, k in self.near}
-        most = max(changes, key=abs)
-        name, angle, k = changes[most]
+        most, name, angle, k = max(changes, key=lambda change: abs(change[0]))
         farthest = f"{name} from {angle:.12g} to {PI * Fraction(k, 12)}, by {most:.1e} rad"
-        if len(self.near) > 1:
-            farthest += f", and {len(self.near) - 1} by less"
+        if len(changes) > 1:
+            farthest += f", and {len(changes) - 1} by less"
         text = f"{near} taken as these"
         message = f"{file}: {text}; exact=True or --exact keeps them: {farthest}"
         warnings.warn(message, AngleWarning, stacklevel=7)

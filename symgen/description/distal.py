@@ -51,6 +51,18 @@ def khalil_frames(frames: tuple[Frame, ...]) -> tuple[Frame, ...]:
     return (*turned, *tips)
 
 
+def frames_text(robot: Any) -> str:
+    """Say in which frames parameters are, if the file of the robot has a classic table; else ""."""
+    if not robot.distal:
+        return ""
+    values = f", but `values` of {robot.file or robot.name} in those of its classic table"
+    return (
+        "parameters are in Khalil's frames, frame j at joint j"
+        f"{values if robot.values else ', not in those of the classic table'}: "
+        "one name, such as MX2, has another number there"
+    )
+
+
 def khalil_values(robot: Any) -> dict[str, float]:
     """Convert the link parameters of a classic (distal) table to Khalil's link frames.
 

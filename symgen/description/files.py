@@ -6,10 +6,12 @@ The suffix of the file selects the format. Robot files and URDF can be written.
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 
+from symgen.description.angles import NotReadWarning
 from symgen.description.fields import located
 from symgen.description.par import read_par
 from symgen.description.robot import Robot
@@ -53,12 +55,13 @@ def load_robot(source: str | Path, *, keep_fixed: bool = False, exact: bool = Fa
     exact : bool
         For a URDF, MJCF or `.par` file: whether angles stay as written, which a calibrated robot
         needs. Otherwise, an angle within 1e-4 rad of a multiple of pi/12 becomes this multiple, and
-        an AngleWarning names the largest change.
+        an AngleWarning names the largest change, if it exceeds 1e-9 rad.
 
     Returns
     -------
     Robot
-        The checked, immutable robot.
+        The checked, immutable robot. A NotReadWarning names the parts of the file that change the
+        torques and are not in the equations, such as closed loops of a URDF (`Robot.not_read`).
 
     Raises
     ------
@@ -97,6 +100,32 @@ def read_robot(
         As in `load_robot`; also if `lock` or `chain` is given for another format, or names a joint
         or link that the file does not have.
     """
+    robot, notes = _read(source, constants, exact, keep_fixed, lock, chain)
+    warn_not_read(robot)
+    return robot, notes
+
+
+def warn_not_read(robot: Robot) -> None:
+    """Warn of the parts of the robot's file that change the torques and are not in the equations."""
+    if robot.not_read:
+        warnings.warn(not_read_text(robot), NotReadWarning, stacklevel=4)
+
+
+def not_read_text(robot: Robot) -> str:
+    """Name the parts of the robot's file that are not in the equations; "" if there are none."""
+    parts = "; ".join(robot.not_read)
+    return f"{robot.file}: not read, hence not in the equations: {parts}" if parts else ""
+
+
+def _read(
+    source: str | Path,
+    constants: Mapping[str, float] | None,
+    exact: bool,
+    keep_fixed: bool,
+    lock: Mapping[str, float] | None,
+    chain: tuple[str, str] | None,
+) -> tuple[Robot, tuple[str, ...]]:
+    """Read a robot file in the format of its suffix, without the warning of `read_robot`."""
     if not isinstance(source, str | Path):
         raise DescriptionError(
             f"robot is {source!r:.40} ({type(source).__name__}); expected the name of a packaged "

@@ -38,9 +38,11 @@ from symgen.description.angles import SNAP, Angles
 from symgen.description.expression import ZERO, Expression, ratio, twelfths
 from symgen.description.fields import located
 from symgen.description.tree import (
+    DROPPED,
     FIXED_TYPE,
     FREE_TYPE,
     MAX_JOINTS,
+    SHOWN,
     Array,
     Inertial,
     Joint,
@@ -64,6 +66,7 @@ IGNORED = (
 DRAWN = ("light", "camera")  # of bodies, without effect on the mechanism
 RELATIONS = ("joint", "tendon")
 FLUID = ("density", "viscosity", "wind")
+FORCES = ("constraint", "equality", "frictionloss", "passive", "spring", "damper")  # flags
 TEXTS = re.compile(r"\w*(name|class|joint\d?|tendon\d?|body\d?|model|mesh|material|file)\w*")
 
 
@@ -84,8 +87,8 @@ class Mjcf:
         `model`.
     driven : frozenset of str
         Names of the joints that an actuator drives.
-    notes : tuple of str
-        What was left out.
+    notes, not_read : tuple of str
+        What was left out without effect on the torques, and with effect.
     """
 
     name: str
@@ -96,6 +99,7 @@ class Mjcf:
     relations: list[int]
     driven: frozenset[str]
     notes: tuple[str, ...]
+    not_read: tuple[str, ...]
 
 
 def with_includes(content: bytes, read: Callable[[str, int], bytes]) -> bytes:
@@ -155,9 +159,15 @@ def compiled(content: bytes) -> Mjcf:
     for drawn in (*spec.geoms, *spec.sites):
         drawn.material = ""
     model = _errors_with_lines(spec.compile, lines)
-    notes += [key for key in FLUID if np.any(getattr(model.opt, key))]
-    notes += [f"<{tag[:30]}>" for tag in sorted(tendons - {"fixed"})]
-    notes += [f"flag {key[:30]}" for key, value in sorted(flags.items()) if value != "enable"]
+    off = [key[:30] for key, value in sorted(flags.items()) if value != "enable"]
+    notes += [f"flag {key}" for key in off if key not in FORCES]
+    fluid = [key for key in FLUID if np.any(getattr(model.opt, key))]
+    not_read = [
+        *([f"forces of a fluid ({', '.join(fluid)})"] if fluid else []),
+        *(f"<{tag[:30]}> in <tendon>" for tag in sorted(tendons - {"fixed"})),
+        *(f"flag {key}" for key in off if key in FORCES),
+        *_forces(model),
+    ]
     return Mjcf(
         root.attrib.get("model", ""),
         model,
@@ -166,7 +176,8 @@ def compiled(content: bytes) -> Mjcf:
         [x.line for e in bodies for x in e.own("joint", "freejoint")],
         [x.line for section in root.own("equality") for x in section],
         frozenset(filter(None, driven)),
-        (f"not read: {', '.join(notes)}",) if notes else (),
+        (f"{DROPPED} {', '.join(notes)}",) if notes else (),
+        tuple(not_read),
     )
 
 
@@ -346,17 +357,19 @@ def parse_mjcf(content: bytes, file: str, *, exact: bool = False, sites: bool = 
     for b in range(1, model.nbody):
         _body(growing, b)
     places = dict(list(growing.place.values())[1:])
-    if sites:
-        for s in range(model.nsite):
-            link, pose = growing.place[int(model.site_bodyid[s])]
-            name = _new(growing, model.site(s).name or f"site{s}")
+    of_links: dict[str, tuple[str, Array]] = {}
+    for s in range(model.nsite):
+        link, pose = growing.place[int(model.site_bodyid[s])]
+        name = _new(growing, model.site(s).name or f"site{s}")
+        rule = angles if sites else Angles(exact=True)
+        own = _turned(model.site_pos[s], model.site_quat[s], f"site {name!a:.60}", rule)
+        of_links[name] = link, pose @ own
+        if sites:
             growing.links[name] = None
-            own = _turned(model.site_pos[s], model.site_quat[s], f"site {name!a:.60}", angles)
             growing.joints.append(_fixed(name, link, pose @ own))
     gx, gy, gz = (0.0 if mjcf.weightless else float(x) + 0.0 for x in model.opt.gravity)
     relations, joints = _relations(growing), tuple(growing.joints)
     text, snapped = angles.report(file)
-    notes = (*mjcf.notes, *_left_out(model), *snapped)
     return Tree(
         mjcf.name,
         growing.links,
@@ -365,9 +378,11 @@ def parse_mjcf(content: bytes, file: str, *, exact: bool = False, sites: bool = 
         relations,
         frozenset(growing.bare),
         (gx, gy, gz),
-        notes,
+        (*mjcf.notes, *snapped),
         places,
         text,
+        mjcf.not_read,
+        of_links,
     )
 
 
@@ -533,11 +548,11 @@ def _joint(growing: _Growing, k: int, parent: str, child: str, pose: Array) -> t
     return joint, np.linalg.inv(anchor)
 
 
-def _left_out(model: Any) -> list[str]:
-    """Return notes on forces in the model that a Robot cannot store, such as forces of tendons."""
-    notes = []
+def _forces(model: Any) -> list[str]:
+    """Name the forces in the model that a Robot cannot store, such as forces of tendons."""
+    forces = []
     if names := [model.body(b).name for b in range(model.nbody) if model.body_gravcomp[b]]:
-        notes.append(f"gravcomp not read: {', '.join(f'{name!a:.60}' for name in names[:20])}")
+        forces.append(f"gravcomp of {_quoted(names)}")
     for what, polynomial in (
         ("damping that grows with speed", "dof_dampingpoly"),
         ("stiffness that grows with deflection", "jnt_stiffnesspoly"),
@@ -546,20 +561,22 @@ def _left_out(model: Any) -> list[str]:
         joints = model.dof_jntid if polynomial.startswith("dof") else range(model.njnt)
         acting = (k for k, row in zip(joints, rows, strict=False) if np.any(row))
         if names := [model.joint(k).name for k in acting]:
-            notes.append(f"{what} not read: {', '.join(f'{name!a:.60}' for name in names[:20])}")
-    forces = [
+            forces.append(f"{what} of {_quoted(names)}")
+    of_tendons = [
         model.tendon_stiffness,
         model.tendon_damping,
         model.tendon_frictionloss,
         *(getattr(model, "tendon_armature", ()),),
     ]
-    tendons = sorted({int(t) for force in forces for t in np.flatnonzero(force)})
+    tendons = sorted({int(t) for force in of_tendons for t in np.flatnonzero(force)})
     if tendons:
-        notes.append(
-            "forces of tendons not read: "
-            f"{', '.join(ascii(model.tendon(t).name) for t in tendons[:20])}"
-        )
-    return notes
+        forces.append(f"forces of the tendons {_quoted([model.tendon(t).name for t in tendons])}")
+    return forces
+
+
+def _quoted(names: Sequence[str]) -> str:
+    """List at most SHOWN names in quotes."""
+    return ", ".join(f"{name!a:.60}" for name in names[:SHOWN])
 
 
 # --- relations ---

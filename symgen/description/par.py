@@ -96,6 +96,8 @@ class _Par:
         Tables in the comments, by name: constants, values, start 1, ...
     notes : list of str
         What was read differently from the file.
+    not_read : list of str
+        What was left out and changes the torques.
     """
 
     angles: Angles
@@ -104,6 +106,7 @@ class _Par:
     lists: dict[str, list[tuple[str, int]]] = field(default_factory=dict)
     numbers: dict[str, dict[str, float]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    not_read: list[str] = field(default_factory=list)
 
     def line(self, path: Path) -> int:
         """Find the line of the `.par` file that defines a field of the Robot, given by its path of
@@ -143,7 +146,8 @@ def read_par(
         _scan(_text(content), par)
         robot = _robot(par, dict(constants or {}), file, hashlib.sha256(content).hexdigest())
     angles, notes = par.angles.report(file)
-    return replace(robot, angles=angles), (*par.notes, *notes)
+    robot = replace(robot, angles=angles, not_read=tuple(par.not_read))
+    return robot, (*par.notes, *notes)
 
 
 def _text(content: bytes) -> str:
@@ -452,11 +456,9 @@ def _value(e: Expression, name: str, line: int) -> float:
 def _note_rest(par: _Par) -> None:
     """Add notes on data in the file that a Robot cannot store, such as external forces."""
     if any(text != "0" for key in WRENCH for text, _ in par.lists.get(key, ())):
-        par.notes.append(
-            "forces of the environment (FX ... CZ) are not read; a robot here moves freely"
-        )
+        par.not_read.append("forces of the environment (FX ... CZ)")
     for key in (*BASE_MOTION, "eta", "k"):
         if any(text not in ("0", "") for text, _ in par.lists.get(key, ())):
-            par.notes.append(f"{key} is not read: the base rests and joints are rigid")
+            par.not_read.append(f"{key} (the base rests and joints are rigid)")
     if "Z" in par.lists and "".join(text for text, _ in par.lists["Z"]) != _IDENTITY:
         par.notes.append("Z is not read: all vectors are in frame 0")

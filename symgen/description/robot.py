@@ -212,6 +212,10 @@ class Robot:
     angles: Annotated[str, *UNWRITTEN] = ""  # how those of a foreign file were read
     # of links whose inertia no body can have: the frame, and what is wrong
     impossible: Annotated[tuple[tuple[int, str], ...], *UNWRITTEN] = ()
+    # parts of a foreign file that change the torques and are not in the equations
+    not_read: Annotated[tuple[str, ...], *UNWRITTEN] = ()
+    # of a foreign file, on which a load is mounted: name, link, pose in its frame (`mounts`)
+    mounts: Annotated[tuple[tuple[str, int, Any], ...], *UNWRITTEN] = ()
     distal: Annotated[int, *UNWRITTEN] = 0  # rows of a classic table in the file; 0: Khalil's
     file: Annotated[str, *UNWRITTEN] = ""
     sha256: Annotated[str, *UNWRITTEN] = ""

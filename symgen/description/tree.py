@@ -140,12 +140,16 @@ class Tree:
     gravity : tuple of float, m/s^2
         Acceleration of gravity in the root link.
     notes : tuple of str
-        What was not read.
+        What was left out and has no effect on the torques.
+    not_read : tuple of str
+        What was left out and changes the torques.
     places : mapping
         For an MJCF, in the order of its bodies: pose (4, 4) of the frame of each body in the frame
         of its link. A URDF has one frame for both.
     angles : str
         How angles near multiples of pi/12 were read.
+    sites : mapping
+        For an MJCF: the link of each site, and the pose (4, 4) of the site in the frame of this link.
     """
 
     name: str
@@ -158,6 +162,8 @@ class Tree:
     notes: tuple[str, ...] = ()
     places: Mapping[str, Array] = field(default_factory=dict)
     angles: str = ""
+    not_read: tuple[str, ...] = ()
+    sites: Mapping[str, tuple[str, Array]] = field(default_factory=dict)
 
 
 def turn(axis: int, angle: float) -> Array:

@@ -31,12 +31,14 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
 from symgen.description.expression import ONE, PI, ZERO, Expression, twelfths
 from symgen.description.fields import located
 from symgen.description.mjcf import parse_mjcf
+from symgen.description.mounts import rows_of
 from symgen.description.naming import is_label
 from symgen.description.robot import (
     FIXED,
@@ -423,9 +425,25 @@ def _robot(table: Table, file: str, sha256: str) -> Robot:
             for own in map(table.tree.links.__getitem__, body.links)
             if own is not None and own.wrong
         ),
+        not_read=table.tree.not_read,
+        mounts=_mounts(table),
         file=file,
         sha256=sha256,
     )
+
+
+def _mounts(table: Table) -> tuple[tuple[str, int, Any], ...]:
+    """List the links and sites of the moving bodies, with their poses in the frames of the bodies."""
+    tree, found = table.tree, []
+    for j in table.joint:
+        body = table.bodies[j]
+        for name, X in body.links.items():
+            if name not in tree.bare:
+                found.append((name, j, rows_of(X @ tree.places.get(name, np.eye(4)))))
+        for name, (link, pose) in tree.sites.items():
+            if link in body.links and name not in body.links:
+                found.append((name, j, rows_of(body.links[link] @ pose)))
+    return tuple(found)
 
 
 def _labels(table: Table) -> dict[int, str]:

@@ -17,11 +17,13 @@ import math
 import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from symgen.description.angles import Angles
+from symgen.description.bodies import no_body
 from symgen.description.expression import Expression, ratio
 from symgen.description.robot import (
     FIXED,
@@ -59,9 +61,19 @@ READ = {
     "link": {"inertial"},
     "joint": {"parent", "child", "origin", "axis", "limit", "dynamics", "mimic"},
 }
-
-
-ROUNDING = 1e-6  # of moments that a file rounds
+# children without effect on the torques; of others it is not known
+HARMLESS = {
+    "robot": {"gazebo", "mujoco", "ros2_control", "sensor", "transmission", "verbose"},
+    "link": {"audio", "capsule", "collision", "contact", "material", "origin", "self_collision_checking", "sensor", "visual"},
+    "joint": {"calibration", "hardwareInterface", "safety_controller", "sensor"},
+}  # fmt: skip
+# children of <gazebo> that change the torques, and the values that do not
+FORCES = {
+    "turnGravityOff": ("", "0", "false"),
+    "gravity": ("", "1", "true"),
+    "springStiffness": ("", "0", "0.0"),
+    "inertial": (),
+}
 
 
 def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
@@ -94,6 +106,8 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
         raise DescriptionError(
             f"the file has {len(joints)} joints; the limit is {MAX_JOINTS}", line=root.line
         )
+    rotors, unread = _rotors(root)
+    joints = [replace(joint, armature=rotors.get(joint.name, 0.0)) for joint in joints]
     base = _root(links, joints, root.line)
     other = Counter(_left_out(root))
     notes: tuple[str, ...] = (
@@ -131,13 +145,67 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
         _relations(joints, mimics),
         notes=notes,
         angles=angles_text,
+        not_read=(*_not_read(root), *unread),
     )
 
 
+def _rotors(root: XmlElement) -> tuple[dict[str, float], list[str]]:
+    """Read the motor inertias of <transmission> elements, kg m^2, on the joint's side of the gear.
+
+    With <motorInertia> J of the rotor and <mechanicalReduction> N, each in <transmission> or in its
+    only <actuator> or <joint>, Ia = N^2 J. Return Ia by the name of the joint, and the elements
+    that cannot be read, because they have several joints or motors.
+    """
+    rotors: dict[str, float] = {}
+    unread: list[str] = []
+    for e in root.own("transmission"):
+        inertias, ratios = (list(e.iter(tag)) for tag in ("motorInertia", "mechanicalReduction"))
+        if not inertias:
+            continue
+        joints = [child.word("name") for child in e if child.tag == "joint"]
+        if len(joints) != 1 or len(inertias) > 1 or len(ratios) > 1 or joints[0] in rotors:
+            unread.append(f"<motorInertia> of {_named(e)} of several joints or motors")
+            continue
+        N = _content(ratios[0]) if ratios else 1.0
+        rotors[joints[0]] = N**2 * _content(inertias[0])
+    return rotors, unread
+
+
+def _content(e: XmlElement) -> float:
+    """Read the number in an element, either its text or its attribute `value`."""
+    text = e.attrib.get("value", e.content.strip())
+    return XmlElement(e.tag, {"value": text}, e.line, e.byte).number("value")
+
+
 def _left_out(root: XmlElement) -> Iterator[str]:
-    """Yield the tags of XML elements in the robot, its links and joints that are not read."""
+    """Yield the tags of XML elements, without effect on the torques, that are not read."""
     for e in (root, *root):
-        yield from (child.tag for child in e if e.tag in READ and child.tag not in READ[e.tag])
+        yield from (child.tag for child in e if child.tag in HARMLESS.get(e.tag, ()))
+
+
+def _not_read(root: XmlElement) -> Iterator[str]:
+    """Yield what is not read and changes the torques, such as a constraint that closes a loop.
+
+    In <gazebo>, these are a <joint> between two links, a switch of gravity, and a spring.
+    """
+    for e in (root, *root):
+        known = READ.get(e.tag, set()) | HARMLESS.get(e.tag, set())
+        for child in e if e.tag in READ else ():
+            if child.tag not in known:
+                yield _named(child)
+    for gazebo in root.own("gazebo"):
+        of = f" in <gazebo reference={gazebo.word('reference', '')!a:.60}>"
+        of = of if "reference" in gazebo.attrib else " in <gazebo>"
+        for child in gazebo:
+            closes = child.tag == "joint" and child.find("parent") is not None
+            acts = child.tag in FORCES and child.content.strip() not in FORCES[child.tag]
+            if closes or acts:
+                yield _named(child, of)
+
+
+def _named(e: XmlElement, where: str = "") -> str:
+    name = f" {e.attrib['name']!a:.60}" if "name" in e.attrib else ""
+    return f"<{e.tag:.40}>{name}{where} (line {e.line})"
 
 
 def _relations(joints: list[Joint], mimics: dict[str, Mimic]) -> dict[str, Expression]:
@@ -195,31 +263,9 @@ def _inertial(link: XmlElement, angles: Angles) -> Inertial | None:
         return Inertial(M, pose, np.zeros((3, 3)))
     xx, xy, xz, yy, yz, zz = (inertia.number(name) for name in MOMENTS)
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    wrong = no_body(M, tensor)
+    wrong = no_body(M, tensor, ("ixx", "iyy", "izz"))
     name = f"link {link.word('name')!a:.60} (line {inertia.line})"
     return Inertial(M, pose, tensor, f"{name}: {wrong}" if wrong else "")
-
-
-def no_body(M: float, tensor: Array) -> str:
-    """Explain why no body has mass M and this tensor about its centre of mass; "" if a body can."""
-    if not M and tensor.any():
-        return "mass 0 with an inertia"
-    small, middle, large = np.linalg.eigvalsh(tensor)
-    if small >= -ROUNDING * abs(large) and large <= (1 + ROUNDING) * (small + middle):
-        return ""
-    names = ("ixx", "iyy", "izz")
-    for k, name in enumerate(names):
-        others = [other for other in names if other != name]
-        rest = np.trace(tensor) - tensor[k, k]
-        if tensor[k, k] > (1 + ROUNDING) * rest:
-            return (
-                f"no body has this inertia about its centre of mass: {name} {tensor[k, k]:g} > "
-                f"{' + '.join(others)} {rest:g}"
-            )
-    return (
-        "no body has this inertia about its centre of mass: principal moments "
-        f"{small:.3g}, {middle:.3g}, {large:.3g}"
-    )
 
 
 def _joint(e: XmlElement, angles: Angles) -> Joint:

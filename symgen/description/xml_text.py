@@ -21,11 +21,14 @@ MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS, LARGEST = 5_000_000, 30, 50_000, 1e9
 
 
 class XmlElement(ElementTree.Element):
-    """An element of an XML file, with the line and the byte at which it starts."""
+    """An element of an XML file, with the line and the byte at which it starts.
+
+    `content` is the text between its tags, without that of its children.
+    """
 
     def __init__(self, tag: str, attributes: dict[str, str], line: int, byte: int) -> None:
         super().__init__(tag, attributes)
-        self.line, self.byte = line, byte
+        self.line, self.byte, self.content = line, byte, ""
 
     if TYPE_CHECKING:  # an element holds elements of its class
 
@@ -105,6 +108,9 @@ def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> XmlElement:
         open_.append(XmlElement(tag, attributes, line, parser.CurrentByteIndex))
         open_[-2].append(open_[-1])
 
+    def characters(text: str) -> None:
+        open_[-1].content += text
+
     def refuse(*_: object) -> int:
         raise DescriptionError(
             "the file declares a document type or an entity, which are not read; remove <!DOCTYPE ...>",
@@ -113,6 +119,7 @@ def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> XmlElement:
 
     parser.StartElementHandler = start
     parser.EndElementHandler = lambda _: open_.pop()
+    parser.CharacterDataHandler = characters
     parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = parser.ExternalEntityRefHandler = (
         refuse
     )

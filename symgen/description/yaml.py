@@ -36,7 +36,8 @@ SCHEMA = 1  # version of the robot file
 READER = TypeAdapter(Robot)  # its validators are built when the first file is read
 CONVENTIONS = {
     "proximal": "Khalil and Kleinfinger",
-    "distal": "classic DH, with its a as d and its d as r",
+    "distal": "classic DH, with its a as d and its d as r; `values` are then in the frames of that "
+    "table, but every parameter that symgen prints or identifies is in Khalil's frame of its link",
 }
 
 

@@ -83,6 +83,7 @@ def mapping(regrouping: Regrouping, only: str | None = None) -> dict[str, Any]:
             {"name": b.name, **b.formula.mapping()} for b in selected(regrouping, only)
         ],
         "no_effect": list(regrouping.no_effect),
+        "not_read": list(regrouping.robot.not_read),
         "operations": operations(regrouping),
     }
 

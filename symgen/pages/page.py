@@ -26,6 +26,7 @@ from symgen.derive.closure import Closure
 from symgen.derive.loops import close
 from symgen.derive.regressor import unit
 from symgen.description.expression import ONE, Expression
+from symgen.description.files import not_read_text
 from symgen.description.parts import GEOMETRY
 from symgen.description.robot import PRISMATIC, Element, Robot
 from symgen.emit.header import informative_columns
@@ -119,7 +120,8 @@ def _verdict(regrouping: Regrouping) -> str:
         f"{len(regrouping)} base parameters of {len(robot.parameters)} standard parameters, "
         f"{len(regrouping.no_effect)} without effect"
     )
-    return f"{counts}; {regrouping.method}."
+    missing = not_read_text(robot)
+    return f"{counts}; {regrouping.method}.{f' {missing}.' if missing else ''}"
 
 
 def _frame_rows(robot: Robot) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from symgen.derive.exact import Draw
 from symgen.derive.loops import close
 from symgen.derive.regressor import element_names, inertial_names, is_opaque
 from symgen.description.angles import InertiaWarning
+from symgen.description.bodies import impossible_links
 from symgen.description.element import OWN_LAWS
 from symgen.description.expression import ONE, ZERO, Expression, simplified, with_known_cosines
 from symgen.description.robot import INERTIAL, PRISMATIC, Robot, parameter
@@ -209,12 +210,17 @@ def _warn(regrouping: Regrouping) -> None:
 
     The warning names this line, wherever `regroup` was called: Python shows a warning once per line.
     """
-    for j, wrong in regrouping.robot.impossible:
+    advice = (
+        "Give the moments about the centre of mass in kg m^2, from CAD or of a box, or identify the moments"
+        if regrouping.robot.impossible
+        else "XX .. ZZ under values are about the origin of the link frame: add M (c'c 1 - c c') to "
+        "the moments about the centre of mass c"
+    )
+    for j, wrong in impossible_links(regrouping.robot):
         moments = {parameter(p, j) for p in INERTIAL[:6]}
         names = [b.name for b in regrouping.base if moments & b.combination.keys()]
         warnings.warn(
-            f"{wrong}; this inertia enters {', '.join(names) or 'no base parameter'}. Give the "
-            "moments about the centre of mass in kg m^2, from CAD or of a box, or identify the moments",
+            f"{wrong}; this inertia enters {', '.join(names) or 'no base parameter'}. {advice}",
             InertiaWarning,
             stacklevel=1,
         )

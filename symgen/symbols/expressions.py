@@ -46,7 +46,8 @@ def product(c: Fraction, factors: Iterable[Tree]) -> Tree:
     """Multiply the number c by the factors; a minus sign stays in front of the whole product."""
     written = [f for f in factors if f != 1]
     if not written:
-        return rational(c) if c.denominator == 1 else signed(c, power(Number(abs(c)), 1))
+        number = Number(abs(c))
+        return signed(c, power(number, 1)) if "." in number.text else rational(c)
     if abs(c) != 1:
         written.insert(0, rational(abs(c)))
     return signed(c, sympy.Mul(*written, evaluate=False))
@@ -62,13 +63,16 @@ def negative(x: Tree) -> Tree:
     if x.is_Number:
         return -x
     if is_negative(x):
-        return x.args[1] if len(x.args) == 2 else sympy.Mul(*x.args[1:], evaluate=False)
+        first, *rest = x.args
+        factors = rest if first is MINUS else (-first, *rest)
+        return sympy.Mul(*factors, evaluate=False) if len(factors) > 1 else factors[0]
     return sympy.Mul(MINUS, x, evaluate=False)
 
 
 def is_negative(x: Tree) -> bool:
     """Whether the printed form of x starts with a minus sign."""
-    return bool(x.is_negative if x.is_Number else x.is_Mul and x.args[0] is MINUS)
+    first = x.args[0] if x.is_Mul else x
+    return bool(first.is_Number and first.is_negative)
 
 
 def total(terms: Iterable[Tree]) -> Tree:

@@ -28,6 +28,7 @@ GREEK = {
     "gamma": "γ",
     "delta": "δ",
     "theta": "θ",
+    "vartheta": "ϑ",
     "phi": "φ",
     "psi": "ψ",
     "pi": "π",
@@ -40,7 +41,7 @@ FAMILIES = {
     "FVM": ("F", "vm"),
     "FSM": ("F", "sm"),
     "GAM": ("Gamma", ""),
-    "th": ("theta", ""),
+    "th": ("vartheta", ""),
 }
 DOTS = {"QP": "dot", "QDP": "ddot"}
 ANGLE = re.compile(r"(C|S|th)(\d[\d_mox]*)(b*)")
@@ -106,6 +107,11 @@ class Ordered:
 class Grammar(Ordered, StrPrinter):  # type: ignore[misc]
     """Printer that writes an expression in the grammar of robot files."""
 
+    def _print_Function(self, x: Tree) -> str:
+        return f"{x.func.__name__.lower()}({self.stringify(x.args, ', ')})"
+
+    _print_Abs = _print_Max = _print_Function
+
 
 def text(x: Tree) -> str:
     """Write an expression in the grammar of robot files."""
@@ -122,6 +128,11 @@ class Latex(Ordered, LatexPrinter):  # type: ignore[misc]
 
     def _print_Symbol(self, x: Tree) -> str:
         return latex_symbol(x.name)
+
+    def _print_ExpBase(self, x: Tree, exp: str | None = None) -> str:
+        """A constant of a robot may be called e."""
+        power = f"^{{{exp}}}" if exp else ""
+        return rf"\exp{power}{{\left({self._print(x.args[0])} \right)}}"
 
 
 def latex(x: Tree) -> str:
@@ -203,9 +214,10 @@ class Presentation(MathMLPresentationPrinter):  # type: ignore[misc]
     def _print_Mul(self, x: Tree) -> Any:
         if is_negative(x):
             return self.term(x)
-        number, _ = split_sign(x)
-        if number == 1 and not all(y.is_Integer or y.free_symbols for y in x.args):
-            return self.row(*super()._print_Mul(x).childNodes)  # pi/2
+        number, rest = x.as_coeff_Mul()
+        if rest is sympy.pi and number.q != 1:  # 2*pi/3
+            above = rest if number.p == 1 else sympy.Mul(number.p, rest, evaluate=False)
+            return self.element("mfrac", self._print(above), self._print(sympy.Integer(number.q)))
         parts: list[Any] = []
         for y in x.args:
             times = [self.element("mo", "\u2062"), self.element("mspace", width="0.14em")]
@@ -232,6 +244,8 @@ class Presentation(MathMLPresentationPrinter):  # type: ignore[misc]
         else:
             shown = GREEK.get(stem, stem.replace("'", "\u2032"))
             base = self.element("mn" if stem[0].isdigit() else "mi", shown)
+            if ENTRY.fullmatch(x.name):  # C(1,2) beside C1_2, the cosine of q1 + q2
+                base.setAttribute("class", "matrix")
         if subscript:
             pieces = re.findall(rf"\d[\d,{MINUS_SIGN}]*|[^\d]+", subscript.replace("-", MINUS_SIGN))
             below = [self.element("mn" if p[0].isdigit() else "mi", p) for p in pieces]

@@ -5,14 +5,21 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from math import isfinite
 from pathlib import Path
+from textwrap import wrap
 
 from runtime.ground.documents import json_text
-from runtime.ground.table import Table, notebook, number
+from runtime.ground.table import LINE, Table, aligned, interval, notebook, number
 from runtime.reporting.result_files import write_all
 
 NOTHING = 1e-12  # SI; smaller numbers are rounding
-SOURCES = {"record": "the record", "sum": "the record, in sums", "file": "feasibility"}
+SOURCES = {"record": "record", "sum": "sums", "file": "physics"}
+LEGEND = {
+    "record": "record: the record determines the number; sigma is its standard deviation",
+    "sum": "sums: the record determines only sums with other numbers; this number is the one nearest to the file, so it has no sigma",
+    "file": "physics: no torque depends on the number; without the change no physical link was left",
+}
 
 
 @dataclass(frozen=True)
@@ -26,8 +33,8 @@ class Change:
     before, after : float
         Value in the file, and value in the new text.
     sigma : float
-        Standard deviation of the part of the number that the record determines, without the
-        conditions of a physical robot; nan if the record does not determine the number.
+        Standard deviation of the number, without the conditions of a physical robot; nan if the
+        record does not determine it alone.
     told_by : str
         Source of the value. record: the record determines it. sum: the record determines only a sum
         with other numbers, and this is the value nearest to the file. file: no torque depends on
@@ -53,6 +60,9 @@ class Applied:
         Name of the file, and URDF or MJCF.
     before, content : bytes
         The text before and after.
+    error : float, %
+        Share of the torques of the record that the new file with the placeless parameters leaves
+        unexplained; nan if it is not known.
     changes : tuple of Change
         Numbers that changed.
     added : tuple of str
@@ -60,9 +70,9 @@ class Applied:
     placeless : mapping, SI
         Parameters for which the format has no attribute, by name.
     placeless_sigma : mapping, SI
-        Standard deviations of these parameters.
-    joints : mapping
-        Name of the joint of each placeless parameter.
+        Standard deviations of these parameters; nan where the record determines only sums.
+    joints, units : mapping
+        Name of the joint, and unit, of each placeless parameter that acts on one joint.
     spread : tuple of str
         Links on fixed joints that also changed, because no physical link was possible otherwise.
     undetermined : tuple of str
@@ -79,11 +89,13 @@ class Applied:
     format: str
     before: bytes
     content: bytes
+    error: float
     changes: tuple[Change, ...]
     added: tuple[str, ...]
     placeless: Mapping[str, float]
     placeless_sigma: Mapping[str, float]
     joints: Mapping[str, str]
+    units: Mapping[str, str]
     spread: tuple[str, ...]
     undetermined: tuple[str, ...]
     strange: tuple[str, ...]
@@ -111,13 +123,13 @@ class Applied:
         return "".join(difflib.unified_diff(old, new, self.file, f"{self.file} (identified)", n=0))
 
     def table(self) -> Table:
-        """Return a table of the changed numbers."""
+        """Return a table of the changed numbers, rounded to two digits of their deviations."""
         rows = [
             (
                 c.place,
                 c.number,
                 f"{c.before if abs(c.before) > NOTHING else 0:.6g}",
-                f"{c.after:.6g}",
+                interval(c.after, c.sigma)[0],
                 _percent(c),
                 number(c.sigma, ".2g"),
                 c.unit,
@@ -125,23 +137,53 @@ class Applied:
             )
             for c in self.changes
         ]
-        return Table(
-            "changes",
-            ("where", "number", "from", "to", "change %", "sigma", "unit", "source"),
-            rows,
-            wide=(1, 6, 7),
+        header = ("where", "number", "from", "to", "change %", "sigma", "unit", "source")
+        return Table("changes", header, rows, wide=(1, 6, 7))
+
+    def answer(self) -> list[str]:
+        """Say in sentences what the new file explains, what is far from the file, and what is left.
+
+        The parameters that the format cannot store follow, one a line.
+        """
+        count = len(self.changes)
+        head = f"{self.file}: {count or 'no'} number{'s' * (count > 1)} change{'s' * (count < 2)}"
+        rest = ", with the values below," if self.placeless else ""
+        explained = (
+            f"; the new file{rest} leaves {self.error:.1f} % of the torques of the record unexplained"
+            if isfinite(self.error)
+            else ""
         )
+        none = "no mass by a factor of 2, no centre by the size of its link"
+        far = f"Far from the file: {'; '.join(self.strange) or none}."
+        lines = [f"{head}{explained}.", far]
+        if self.strange:
+            lines[-1] += (
+                " The torques are right, but the values of single links need not be: weigh the links, or give known values and bounds to method feasible."
+            )
+        if not self.placeless:
+            return [*lines, f"Everything identified has a place in the {self.format}."]
+        lines.append(f"Without a place in the {self.format}, set these in your program:")
+        return lines + [f"  {line}" for line in self._rest()]
+
+    def _rest(self) -> list[str]:
+        """Write each parameter without a place: value, deviation, unit and joint."""
+        lines = []
+        for name, x in self.placeless.items():
+            sigma = self.placeless_sigma[name]
+            value, deviation = interval(x, sigma)
+            lines.append(
+                f"{name} = {value}{f' ± {deviation}' if isfinite(sigma) else ''} "
+                f"{self.units.get(name, '')}".rstrip()
+                + (f" ({self.joints[name]})" if name in self.joints else "")
+                + ("" if isfinite(sigma) else ", determined only in sums")
+            )
+        return lines
 
     def notes(self) -> list[str]:
-        """List remarks for the user, for instance on parameters that the format cannot store."""
-        notes = [f"added: {'; '.join(self.added)}"] if self.added else []
-        if self.placeless:
-            listed = ", ".join(
-                f"{name} = {x:.4g} ± {self.placeless_sigma[name]:.2g}"
-                + (f" ({self.joints[name]})" if name in self.joints else "")
-                for name, x in self.placeless.items()
-            )
-            notes.append(f"no place in a {self.format}, set these in your program: {listed}")
+        """List further remarks for the user, for instance on numbers that no torque determines."""
+        sources = {c.told_by for c in self.changes}
+        notes = [text for told_by, text in LEGEND.items() if told_by in sources]
+        notes += [f"added: {'; '.join(self.added)}"] if self.added else []
         if self.spread:
             notes.append(
                 "links on fixed joints that changed too, no physical link was left otherwise: "
@@ -152,17 +194,6 @@ class Applied:
                 f"not in the estimate, or not shown by the record: {', '.join(self.lost)}; the "
                 "values of the file stay"
             )
-        if self.strange:
-            notes.append(
-                f"far from the file: {'; '.join(self.strange)}. The torques are right, but "
-                "the values of single links need not be: weigh the links, or give known values "
-                "and bounds to method feasible"
-            )
-        if decided := [c for c in self.changes if c.told_by == "file"]:
-            notes.append(
-                "on which no torque of this robot depends, changed since no physical link was left "
-                f"otherwise: {_by_place([f'{c.place}: {c.number}' for c in decided])}"
-            )
         if self.undetermined:
             notes.append(
                 "on which no torque of this robot depends, hence of the file: "
@@ -171,19 +202,26 @@ class Applied:
         return notes
 
     def __str__(self) -> str:
-        if not self.changes:
-            return "\n".join(
-                [f"{self.file}: no number changes", *(f"- {note}" for note in self.notes())]
-            )
-        head = f"{self.file}: {len(self.changes)} numbers change"
-        return "\n".join(
-            [head, "", self.table().to_text(), "", *(f"- {note}" for note in self.notes())]
-        )
+        lines = [piece for line in self.answer() for piece in _wrapped(line, "  ")]
+        if self.changes:
+            lines += ["", *self._by_link()]
+        notes = [piece for note in self.notes() for piece in _wrapped(f"- {note}", "  ")]
+        return "\n".join([*lines, *([""] if notes else []), *notes])
+
+    def _by_link(self) -> list[str]:
+        """Write the table of changes with a heading for each link and joint."""
+        table = self.table()
+        head, *rows = aligned([row[1:] for row in (table.header, *table.rows)]).split("\n")
+        lines, place = [f"  {head}"], ""
+        for change, row in zip(self.changes, rows, strict=True):
+            if change.place != place:
+                place = change.place
+                lines.append(place)
+            lines.append(f"  {row}")
+        return lines
 
     def _repr_html_(self) -> str:
-        return notebook(
-            [f"{self.file}: {len(self.changes)} numbers change", *self.notes()], self.table()
-        )
+        return notebook([*self.answer(), *self.notes()], self.table())
 
     def to_json(self) -> str:
         """Return a JSON text with the file name, the format, the changes and the remarks."""
@@ -192,6 +230,7 @@ class Applied:
                 "schema": "symgen-apply/1",
                 "file": self.file,
                 "format": self.format,
+                "error": self.error,
                 "changes": [asdict(change) for change in self.changes],
                 "added": self.added,
                 "placeless": dict(self.placeless),
@@ -205,7 +244,21 @@ class Applied:
 
 
 def _percent(c: Change) -> str:
-    return f"{100 * (c.after - c.before) / abs(c.before):+.2f}" if abs(c.before) > NOTHING else "-"
+    """Write the change in % of the number before; "-" if this number is zero."""
+    return f"{100 * (c.after - c.before) / abs(c.before):+.3g}" if abs(c.before) > NOTHING else "-"
+
+
+def _wrapped(line: str, indent: str) -> list[str]:
+    """Wrap a line at the width of the table, between words."""
+    return wrap(
+        line,
+        LINE,
+        subsequent_indent=indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+        replace_whitespace=False,
+        drop_whitespace=True,
+    )
 
 
 def _by_place(lines: Sequence[str]) -> str:

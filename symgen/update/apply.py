@@ -25,7 +25,7 @@ from runtime.core.model import load_model
 from runtime.documents.estimates import load_whole_estimate
 from runtime.physical.inertia import PhysicalModel, physical_model
 from symgen.certify.requests import model as emitted
-from symgen.description.files import content_of, read_robot
+from symgen.description.files import content_of, read_robot, warn_not_read
 from symgen.description.robot import Robot, one_joint_parameters, parameter
 from symgen.description.tree import Array, TreePart
 from symgen.errors import DescriptionError
@@ -89,7 +89,7 @@ class Writing:
                     unit,
                     before,
                     before if same(after, before) else after,
-                    self.sigma(at[k]) if self.nearest.seen[at[k]] else np.nan,
+                    self.sigma(at[k]),
                     self._told_by(at[k]),
                 )
             )
@@ -112,19 +112,23 @@ class Writing:
             before = self.text.joint_values(j)
             values = {self.own[name][0]: self._value(name) for name in attributes}
             self.text.places.set_joint(edits, joint, values, before)
-            units = SLIDING if joint.kind == "prismatic" else UNITS
             for name, attribute in attributes.items():
                 family, k = self.own[name][0], self.nearest.elements[name]
                 row = (before[family], values[family], self.sigma(k))
-                place = f"joint {joint.name!a:.60}"
-                rows.append(Change(place, attribute, units[family], *row, self._told_by(k)))
+                place, unit = f"joint {joint.name!a:.60}", _unit(self.text, family, j)
+                rows.append(Change(place, attribute, unit, *row, self._told_by(k)))
         return rows
 
     def _value(self, name: str) -> float:
         return float(self.nearest.u[self.nearest.elements[name]])
 
     def sigma(self, k: int) -> float:
-        """Compute the standard deviation of number k in the list of all link and joint values."""
+        """Compute the standard deviation of number k in the list of all link and joint values.
+
+        The result is nan if the record does not determine the number, or only in sums.
+        """
+        if self._told_by(k) != "record":
+            return np.nan
         return float(np.linalg.norm(self.nearest.gain[k] @ self.root))
 
     @property
@@ -166,6 +170,10 @@ class Writing:
                 "no file is written, because the mass of a link would be zero, and a program that "
                 "reads the file would ignore the inertia of this link"
             )
+
+
+def _unit(text: RobotText, family: str, j: int) -> str:
+    return (SLIDING if text.table.joint[j].kind == "prismatic" else UNITS)[family]
 
 
 # --- from an estimate to the text ---
@@ -214,6 +222,7 @@ def apply(
         (text.robot, text.file) if robot is None else (read_robot(robot)[0], Path(robot).name)
     )
     require_same_frames(text, described, of)
+    warn_not_read(text.robot)
     result = _estimate(estimate)
     require_torques(result)
     _require_same_joints(result, described, of)
@@ -262,11 +271,13 @@ def apply(
         format=text.places.attributes.format,
         before=content,
         content=new,
+        error=np.nan if lost else result.relative_error,
         changes=tuple(row for row in rows if not same(row.before, row.after)),
         added=tuple(edits.added),
         placeless=placeless,
         placeless_sigma={name: writing.sigma(closest.elements[name]) for name in placeless},
         joints={name: text.table.joint[own[name][1]].name for name in placeless if name in own},
+        units={name: _unit(text, *own[name]) for name in placeless if name in own},
         spread=closest.spread,
         undetermined=tuple(
             f"{row.place}: {row.number}"

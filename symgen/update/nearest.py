@@ -50,6 +50,7 @@ LINEARISED, STILL = 10, 1e-4  # of the distance: how often, and the sizes that i
 FAR = 1e6  # sizes that a number may move
 ROTORS = 1e6  # size of a motor inertia beside that of the file
 NEAR = 1e-6  # of the size of a number: nearer to the file is rounding
+EQUAL = 1e-9  # of the size of a number: so near, a number of the file stays in any case
 BARRIER = 2 * LIMIT.LEAST_EIGENVALUE  # what the program keeps an element from zero
 STRANGE = 2.0  # mass over that of the file
 NO_MASS = 1e-15  # kg; a link with no more has no mass, as in MuJoCo
@@ -337,20 +338,35 @@ def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple
             f"no inertial values in this file can give the identified {lost}, because a moving "
             "link has no <inertial>; add <inertial> to this link"
         )
+    missed_most = MISSED * float(sizes.max())
     u = _solve(part, K, rest, part.u0, ~part.masses)
-    if u is None or _violated(part, u):
-        answer = feasibility(part.physical, names, rest)
-        if not answer.feasible:
-            return None, answer.text
-        u = _physical(part, K, rest, part.u0 if u is None else u, answer.chi)
+    for v in () if u is None else (_clean(part, K, rest, u, missed_most), u):
+        if not _violated(part, v):
+            return v, ""
+    answer = feasibility(part.physical, names, rest)
+    if not answer.feasible:
+        return None, answer.text
+    u = _physical(part, K, rest, part.u0 if u is None else u, answer.chi)
+    v = _clean(part, K, rest, u, missed_most)
+    return (u if _violated(part, v) else v), ""
+
+
+def _clean(part: Numbers, K: Array, rest: Array, u: Array, missed_most: float) -> Array:
+    """Set numbers that have hardly moved to those of the file; the others then give K chi = rest.
+
+    A number that moved by NEAR of its size is one of the file if the others can do without it, and
+    one that moved by EQUAL of its size in any case that K chi = rest allows.
+    """
     near = NEAR * part.size
     alone = [c.numbers[0] for c in part.physical.conditions if len(c.numbers) == 1]
     near[alone] += BARRIER
     moved = np.abs(u - part.u0) > near
     clean = _solve(part, K, rest, np.where(moved, u, part.u0), moved)
-    if clean is None or np.abs(K @ part.chi(clean) - rest).max() > MISSED * sizes.max():
-        return u, ""
-    return (u if _violated(part, clean) else clean), ""
+    kept = np.where(np.abs(u - part.u0) > EQUAL * part.size, u, part.u0)
+    for v in (clean, kept):
+        if v is not None and np.abs(K @ part.chi(v) - rest).max() <= missed_most:
+            return v
+    return u
 
 
 def _violated(part: Numbers, u: Array) -> bool:

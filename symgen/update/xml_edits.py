@@ -15,7 +15,8 @@ from dataclasses import dataclass, field
 from symgen.description.xml_text import XmlElement
 from symgen.errors import DescriptionError
 
-UNCHANGED = 1e-12  # a number that changes by less, relative above 1, stays as it is written
+UNCHANGED = 1e-9  # of its size: a number that changes by less stays as it is written
+ZERO = 1e-15  # SI; smaller numbers are zero
 NAME = rb"[^\s=/>\"']+"
 TAG = re.compile(
     rb"<(?P<tag>" + NAME + rb")(?:\s+" + NAME + rb"\s*=\s*(?:\"[^\"]*\"|'[^']*'))*\s*(?P<end>/?>)"
@@ -139,8 +140,8 @@ class XmlEdits:
 
 
 def same(x: float, y: float) -> bool:
-    """Whether two numbers differ by no more than the tolerance UNCHANGED."""
-    return abs(x - y) <= UNCHANGED * max(1.0, abs(x), abs(y))
+    """Whether two numbers differ by no more than UNCHANGED of their size, or both are zero."""
+    return abs(x - y) <= max(UNCHANGED * max(abs(x), abs(y)), ZERO)
 
 
 def number(x: float) -> str:

@@ -15,6 +15,18 @@ from pathlib import Path
 
 import pytest
 from campaign import sampled, some
+from certify.forgeries import (
+    BESIDE,
+    EDITS,
+    LAWS,
+    OTHER_LAWS,
+    PAIRS,
+    TRIPLES,
+    edited,
+    text_of,
+    told,
+    with_laws,
+)
 from typer.testing import CliRunner
 
 from symgen.cli.main import app
@@ -428,3 +440,34 @@ def test_angles_that_are_numbers_have_one_unit(tmp_path: Path) -> None:
     assert verdict(claim, tmp_path)[0] == 0
     b["coefficients"]["M2"] = f"D2*{one}*cos(0.3)"
     assert verdict(claim, tmp_path)[0] == 1
+
+
+TRUE = [(columns, 0) for columns in LAWS] + [(columns, 2) for columns in OTHER_LAWS]
+
+
+@pytest.mark.parametrize("case", sampled(TRUE, 2, more=3), ids=lambda case: told(case[0]))
+def test_a_true_claim_is_verified_or_not_judged(case, tmp_path: Path) -> None:
+    """`benchmarks/certificates.py` judges all of them, and all forged claims."""
+    columns, right = case
+    code, text = verdict(json.loads(text_of(columns)), tmp_path)
+    assert code == right, text
+    assert right == 0 or text.startswith("not judged: ")
+
+
+@pytest.mark.parametrize(
+    "laws", sampled([*PAIRS, *((x,) for x in BESIDE), *TRIPLES], 12, more=12), ids=" and ".join
+)
+def test_dependent_laws_are_not_verified(laws, tmp_path: Path) -> None:
+    assert verdict(with_laws(laws, 2), tmp_path)[0] in (1, 2)
+
+
+def test_numeric_coefficients_are_not_judged(folder: Path) -> None:
+    claim = json.loads(claimed("planar_2r", folder)) | {"method": "numeric, for the constants"}
+    code, text = verdict(claim, folder)
+    assert code == 2 and text.startswith("not judged: coefficients that are numeric")
+
+
+@pytest.mark.parametrize("k", sampled(range(len(EDITS)), 2, more=4))
+def test_an_edited_claim_is_not_verified(k: int, tmp_path: Path) -> None:
+    what, claim = [*edited(k + 1, 3)][k]
+    assert verdict(claim, tmp_path)[0] in (1, 2), what

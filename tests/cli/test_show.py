@@ -75,6 +75,7 @@ def test_json_contract():
         "base_parameters",
         "no_effect",
         "operations",
+        "not_read",
     } == {*document} - {"method"}
     assert (document["name"], document["count"], document["standard_count"]) == ("tx40", 60, 86)
     assert set(document["operations"]) == {

@@ -237,6 +237,18 @@ def missing_samples(folder: Path) -> Case:
     return replace(case, records=records, unseen=tuple(map(with_gap, case.unseen)))
 
 
+def slower_bus(folder: Path) -> Case:
+    """Each row is written four times: a bus of a quarter of the rate."""
+
+    def logged(record: Record) -> Record:
+        first = np.arange(len(record)) // 4 * 4
+        return replace(record, q=record.q[first], tau=record.tau[first])
+
+    model = arm()
+    records = pair(model, logged)
+    return Case(model, *records, study())
+
+
 def automatic_cutoff(folder: Path) -> Case:
     model = arm()
     return Case(model, *pair(model), study(signals={"lowpass": {"cutoff": "auto"}}))
@@ -341,6 +353,7 @@ FEATURES: Mapping[str, Callable[[Path], Case]] = {
     "law, delay: fit": law_with_delay,
     "counts": counts,
     "missing samples": missing_samples,
+    "slower bus": slower_bus,
     "automatic cut-off": automatic_cutoff,
     "torque median": torque_median,
     "recorded speeds": recorded_speeds,

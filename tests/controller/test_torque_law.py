@@ -197,7 +197,7 @@ def test_a_stated_delay_and_gain_serve_as_the_found_ones(tmp_path):
     study = logged_early(tmp_path, kd=GAIN.tolist(), delay=LATE, noise=0.0)
     result = identified(study)
     np.testing.assert_allclose(result.estimate.X, TRUE, rtol=0.02, atol=0.02)
-    wrong = identified(logged_early(tmp_path, kd=GAIN.tolist(), noise=0.0))
+    wrong = identified(logged_early(tmp_path, kd=GAIN.tolist(), delay=0.0, noise=0.0))
     assert result.estimate.relative_error < 0.2 * wrong.estimate.relative_error
 
 
@@ -205,7 +205,7 @@ def test_kd_beside_a_reference_at_rest_is_told(tmp_path):
     """Its column is that of FV: a sentence, FV the sum of both."""
     result = identified(logged_early(tmp_path, kd="fit", moving=False, late=0.0))
     law = result.estimate.provenance["law"]
-    assert np.isnan(law["kd"]).all() and np.isnan(law["delay"])
+    assert np.isnan(law["kd"]).all() and abs(law["delay"]) < 3 * law["sigma_delay"]
     assert "kd and FV of joint 1, 2 cannot be separated" in result.brief()
     viscous = [result.estimate["FV1"], result.estimate["FV2"]]
     np.testing.assert_allclose(viscous, GAIN + TRUE[[3, 8]], rtol=0.02)
@@ -320,3 +320,17 @@ def test_friction_below_zero_is_told_as_a_gain(tmp_path):
     assert all_of_them["FV1"] == pytest.approx(model.VALUES["FV1"] - 5, abs=0.2)
     told = replace(result, sets=Sets(all_of_them)).own_warnings
     assert any("kd of the law is larger than that of the drive" in text for text in told)
+
+
+def test_the_delay_is_fitted_by_default_and_told_first(tmp_path):
+    """A law whose torque acts 4.2 ms later, and a right one whose interval contains 0."""
+    late = identified(logged_early(tmp_path, kd=GAIN.tolist()))
+    law = late.estimate.provenance["law"]
+    assert abs(law["delay"] - LATE) < 3 * law["sigma_delay"] < 1e-3
+    assert str(late).startswith("The torque of the law comes 4.")
+    right = identified(logged_early(tmp_path, kd=GAIN.tolist(), late=0.0))
+    law = right.estimate.provenance["law"]
+    assert abs(law["delay"]) < 1.96 * law["sigma_delay"]
+    given = identified(logged_early(tmp_path, kd=GAIN.tolist(), delay=0.0))
+    assert "law" not in given.estimate.provenance
+    assert late.estimate.relative_error < 0.5 * given.estimate.relative_error

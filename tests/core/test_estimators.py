@@ -377,19 +377,24 @@ def test_wrong_settings_say_what_to_do(settings, text):
         estimate_of(observation(N=50), settings)
 
 
-def test_covariance_weights_need_every_joint_at_every_instant():
-    seen = observation(N=50)
-    keep = np.r_[0:50, 55:100]
-    short = replace(
-        seen,
-        W=seen.W[keep],
-        Y=seen.Y[keep],
-        rows=(50, 45),
-        t=seen.t[keep],
-        record=seen.record[keep],
-    )
-    with pytest.raises(SettingsError, match="50, 45"):
-        estimate_of(short, EVERY[3])
+def test_covariance_weights_of_joints_that_rest_at_different_times():
+    """Generalised least squares with the dense covariance of the rows that are left."""
+    mixing = np.array([[0.3, 0.0], [0.12, 0.05]])
+    seen = observation(noise=(1.0, 1.0), colour=lambda white: mixing @ white, seed=3)
+    seen = seen.where(np.r_[np.arange(300) >= 40, abs(np.arange(300) - 250) > 30])
+    X, *_ = np.linalg.lstsq(seen.W, seen.Y, rcond=None)
+    E = np.zeros((2, 300))
+    instant = np.searchsorted(np.unique(seen.t), seen.t)
+    E[seen.joints, instant] = seen.Y - seen.W @ X
+    both = (E != 0).astype(float)
+    Omega = E @ E.T / (both @ both.T - 10 / 2)
+    V = np.linalg.inv(Omega[seen.joints[:, None], seen.joints] * (instant[:, None] == instant))
+    expected = np.linalg.solve(seen.W.T @ V @ seen.W, seen.W.T @ V @ seen.Y)
+    found = estimate_of(seen, EVERY[3])
+    assert seen.rows == (260, 239)
+    np.testing.assert_allclose(found.X, expected, rtol=1e-8)
+    np.testing.assert_allclose(found.covariance, np.linalg.inv(seen.W.T @ V @ seen.W), rtol=1e-7)
+    assert np.isfinite(found.sigma_corrected).all()
 
 
 def test_wrong_shapes_name_both():

@@ -232,7 +232,12 @@ def test_settings_are_written_in_full(record):
         "on": ["q", "qd"],
         "padding": "matlab",
     }
-    assert o.settings["rows"] == {"window": [None, None], "trim": "auto", "low_speed": 0.0}
+    assert o.settings["rows"] == {
+        "window": [None, None],
+        "trim": "auto",
+        "low_speed": 0.0,
+        "around": 0.0,
+    }
     assert o.files == {"arm.csv": "ab" * 32}
 
 

@@ -334,7 +334,7 @@ def test_settings_made_in_python_are_checked():
         (lambda: Lowpass(cutoff=-1), "cutoff: -1; expected more than 0"),
         (lambda: Lowpass(50, 4, ("q", "qdd")), r"on[1]: 'qdd'; expected q or qd"),
         (lambda: Lowpass(frequency=50), "unknown key frequency; known: cutoff, order, on, padding"),
-        (lambda: Rows((0, 1), 3, 0.0, 5), "Unexpected positional argument"),
+        (lambda: Rows((0, 1), 3, 0.0, 0.0, 5), "Unexpected positional argument"),
         (lambda: Signals(lowpass=3), "lowpass: 3; expected a mapping with some of cutoff"),
     ):
         with pytest.raises(SettingsError) as e:
@@ -354,7 +354,9 @@ def test_settings_are_values():
     study = study_from_text(DESIGN)
     assert hash(study.rows) == hash(study_from_text(DESIGN).rows)
     assert study == pickle.loads(pickle.dumps(study))  # noqa: S301
-    assert replace(study, rows=replace(study.rows, trim=0)).rows == Rows(window=(0, 7.5), trim=0)
+    assert replace(study, rows=replace(study.rows, trim=0)).rows == Rows(
+        window=(0, 7.5), trim=0, low_speed=0
+    )
     with pytest.raises(FrozenInstanceError):
         study.rows = Rows()
 

@@ -4,11 +4,13 @@ torques that go with them.
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import symgen
 from oracles.pinocchio_model import PinocchioModel
 from oracles.random_robots import random_parameters
 from symgen.certify.lagrange import Lagrange
+from symgen.cli.main import app
 from symgen.derive.doubts import doubts
 from symgen.description import parse_robot, write_yaml
 from symgen.errors import DescriptionError
@@ -231,3 +233,18 @@ def test_values_without_those_that_enter_are_refused():
     some = table(((0, 0.4, 0), (0, 0.3, 0))) + "\nvalues: {M1: 3.0, MX1: -0.6, ZZ1: 0.16}\n"
     moved = parse_robot(some.encode(), "arm.yaml").values
     assert moved == pytest.approx({"M1": 3.0, "MX1": 0.6, "ZZ1": 0.16 - 2 * 0.4 * 0.6 + 3 * 0.16})
+
+
+def test_commands_say_that_values_and_parameters_are_in_two_frames(tmp_path):
+    """MX1 is -0.6 in the file and 0.6 in Khalil's frame (the test above)."""
+    rows = ((0, 0.4, 0), (0, 0.3, 0))
+    values = "\nvalues: {M1: 3.0, MX1: -0.6, ZZ1: 0.16}\n"
+    for file, text, told in (
+        ("a.yaml", table(rows) + values, "`values` of a.yaml in those of its classic table"),
+        ("b.yaml", table(rows), "not in those of the classic table"),
+        ("c.yaml", table(rows, head="convention: proximal") + values, ""),
+    ):
+        (tmp_path / file).write_text(text)
+        result = CliRunner().invoke(app, ["show", str(tmp_path / file)])
+        said = " ".join(result.stderr.split())
+        assert told in said and ("Khalil's frames" in said) == bool(told)

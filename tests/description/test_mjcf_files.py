@@ -174,16 +174,16 @@ def test_what_is_left_out_is_said():
     robot, notes = read_tree(text.encode(), "small.xml")
     assert (
         "not read: flag contact" in notes
-        and "gravcomp not read: 'b'" in notes
+        and robot.not_read == ("gravcomp of 'b'",)
         and [str(g) for g in robot.gravity] == ["0", "0", "0"]
     )
     polynomial = SMALL.replace('axis="0 1 0"', 'axis="0 1 0" damping="1 0.5"')
     try:
-        said = read_tree(polynomial.encode(), "small.xml")[1]
+        said = read_tree(polynomial.encode(), "small.xml")[0].not_read
     except DescriptionError as error:  # MuJoCo before 4 knows one damping
         assert "MuJoCo refuses" in error.message
     else:
-        assert "damping that grows with speed not read: 'e'" in said
+        assert "damping that grows with speed of 'e'" in said
 
 
 def test_fluid_and_spatial_tendons_are_said():
@@ -194,8 +194,8 @@ def test_fluid_and_spatial_tendons_are_said():
         "</worldbody>",
         '</worldbody><tendon><spatial stiffness="3"><site site="w"/></spatial></tendon>',
     )
-    notes = read_tree(text.encode(), "small.xml")[1]
-    assert "not read: density, wind, <spatial>" in notes
+    robot, _ = read_tree(text.encode(), "small.xml")
+    assert robot.not_read == ("forces of a fluid (density, wind)", "<spatial> in <tendon>")
 
 
 def test_convert_and_every_verb(tmp_path):

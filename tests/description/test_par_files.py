@@ -110,7 +110,8 @@ def test_foreign_file():
         "Ia3",
         "FV4",
     ]
-    assert "ZZ2 (written J2)" in notes[0] and "MY1" in notes[1] and "FX" in notes[2]
+    assert "ZZ2 (written J2)" in notes[0] and "MY1" in notes[1] and len(notes) == 2
+    assert robot.not_read == ("forces of the environment (FX ... CZ)",)
     assert regroup(robot).base
 
 

@@ -18,6 +18,8 @@ from symgen.description.yaml import write_yaml
 READ_FROM_OTHERS = (
     "angles",
     "impossible",
+    "not_read",
+    "mounts",
     "distal",
     "file",
     "sha256",

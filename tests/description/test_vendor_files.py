@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from symgen.description import load_robot
+from symgen.description.bodies import no_body
 from symgen.description.par import read_par
-from symgen.description.urdf import no_body
 from symgen.errors import DescriptionError
 
 URDF = """<robot name="m"><link name="base"/>
@@ -24,7 +24,7 @@ URDF = """<robot name="m"><link name="base"/>
         ({"xx": 0.006, "yy": 0.006, "zz": 0.02}, "izz 0.02 > ixx + iyy 0.012"),
         ({"xx": 0.02, "yy": 0.02, "zz": 0.01, "xy": 0.019}, "principal moments"),
         ({"M": 0, "xx": 1e-3, "yy": 1e-3, "zz": 1e-3}, "mass 0 with an inertia"),
-        ({"xx": -0.01, "yy": 0.02, "zz": 0.02}, "iyy 0.02 > ixx + izz 0.01"),
+        ({"xx": -0.01, "yy": 0.02, "zz": 0.02}, "ixx -0.01 below zero"),
     ],
 )
 def test_an_inertia_that_no_body_can_have_is_found(tmp_path, moments, wrong) -> None:
@@ -42,6 +42,8 @@ def test_inertias_of_bodies_are_left_alone() -> None:
         tensor = np.sum([(p @ p) * np.eye(3) - np.outer(p, p) for p in x], axis=0)
         assert no_body(1.0, tensor) == ""
     assert no_body(0.0, np.zeros((3, 3))) == ""
+    rounding = 1.35525e-20 * np.ones((3, 3))
+    assert no_body(0.2675, rounding) == no_body(0.0, rounding) == ""
 
 
 @pytest.mark.parametrize(

@@ -125,9 +125,8 @@ def test_the_encoder_in_the_loop_has_a_random_phase(arm, study, simulator):  # n
 @campaign
 def test_didim_sees_the_encoder_in_the_loop(arm, study, simulator):  # noqa: F811
     model, *_, truth, _ = arm
-    asked = in_loop(
-        method(study, "didim", start=away(truth, model.BASE_PARAMETERS), gains="one", around=0.05)
-    )
+    asked = in_loop(method(study, "didim", start=away(truth, model.BASE_PARAMETERS), gains="one"))
+    asked = replace(asked, rows=replace(asked.rows, around=0.05))
     found = cestac(model, (), asked, simulator=simulator)
     assert found.levels[0].e[found.names.index("ZZ1R")] > 0.2
 

@@ -55,16 +55,14 @@ def test_torques_frames_and_round_trip(path: Path) -> None:
 @pytest.mark.parametrize("path", FOUND, ids=lambda p: p.stem)
 def test_torques_with_snapped_angles(path: Path) -> None:
     """The default: angles within SNAP of a multiple of pi/12 are that; the same text with such
-    angles moves alike.
+    angles moves alike. Changes that are not told change no torque by more than rounding.
     """
     if path.stem in REFUSED:
         pytest.skip(REFUSED[path.stem])
     text = path.read_text("utf-8")
     robot, notes = read_tree(text.encode(), path.name)
-    assert (
-        any(note.startswith(SNAPPED) for note in notes)
-        or robot.frames == read_tree(text.encode(), path.name, exact=True)[0].frames
-    )
+    told = any(note.startswith(SNAPPED) for note in notes)
+    assert told or not robot.values or difference(text, robot, legend(notes)) < 1e-7
     assert not robot.values or difference(snapped_text(text), robot, legend(notes)) < 1e-9
 
 

@@ -126,7 +126,7 @@ def test_load_identified_at_the_tool_frame(arm) -> None:
     loaded = [observe(arm, record(arm, on_link, 2, 0.0, link=6), PAYLOAD_STUDY)]
     found = payload(arm, without, loaded, PayloadSettings(frame=7))
     assert (
-        found.place == ("link 7" if 7 in physical.links else "frame 7 of link 6")
+        found.place == f"link {7 if 7 in physical.links else 6}, in Khalil's frame 7"
         and found.link == at.link
         and found.summary()["frame"] == 7
     )

@@ -27,9 +27,7 @@ def judged(name, seed, spoil, motion="fourier", seconds=10.0, counts=0):
     q = encoded(robot, move, Encoder(2 * pi / counts), seed) if counts else move.q
     q, tau = spoil(q, tau + noise(tau, 0.0, 0.01, seed))
     model, variants = emitted(name)
-    return runtime.plausibility(
-        model, record_of(move, tau, q), study(robot, motion), variants=variants
-    )
+    return runtime.plausibility(model, record_of(move, tau, q), study(), variants=variants)
 
 
 def right(q, tau):

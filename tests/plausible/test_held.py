@@ -7,7 +7,7 @@ import pytest
 
 import runtime
 import symgen
-from runtime.core.missing import held_samples
+from runtime.packets.held import held_positions
 from runtime.study import study_from_mapping
 
 T = np.arange(0, 21, 0.002)
@@ -42,24 +42,25 @@ def arm():
 def test_held_samples_are_found(count, length) -> None:
     q = motion()[0]
     held, at = with_holds(q, count, length)
-    np.testing.assert_array_equal(held_samples(held), at)
-    assert not held_samples(q).any()
+    np.testing.assert_array_equal(held_positions(held).any(axis=1), at)
+    assert not held_positions(q).any()
     coarse = 0.0126 * np.round(q / 0.0126)
-    assert held_samples(coarse).mean() < 0.001
+    assert not held_positions(coarse).any()
 
 
-@pytest.mark.parametrize(("count", "state"), [(14, "good"), (60, "doubtful")])
-def test_they_are_told_and_judged(arm, count, state) -> None:
+@pytest.mark.parametrize("count", [14, 60])
+def test_they_are_replaced_and_told(arm, count) -> None:
     q, qd, qdd = motion()
     X = arm.base_parameters(arm.VALUES)
     rng = np.random.default_rng(2)
     tau = arm.inverse_dynamics(q, qd, qdd, X) + 0.05 * rng.standard_normal(q.shape)
     record = runtime.Record(T, with_holds(q, count, 6)[0], tau)
-    found = runtime.plausibility(arm, record, study_from_mapping({}))
-    check = next(c for c in found.checks() if c.question == "Are the positions those of a motion?")
-    assert check.state == state
-    assert f"held the positions at {count} instants ({6 * count} of " in check.finding
-    assert "starts anew" not in check.remedy
+    result = runtime.identify(arm, record, study_from_mapping({}), plausible=True)
+    checks = {check.question: check for check in result.checklist.checks}
+    assert checks["Are the positions those of a motion?"].state == "good"
+    told = checks["Is every row a measurement?"]
+    assert told.state == "good"
+    assert f"{count} packets were held: {6 * count} of {len(T)} rows" in told.finding
 
 
 def test_the_reader_of_counts_takes_no_catch_up_for_lost_counts(arm) -> None:

@@ -121,11 +121,11 @@ def test_ends_of_a_record_leave_nothing(cutoff: float) -> None:
     robot = world.ROBOTS["planar"]
     body, move = world.Truth(robot, 5), world.fourier(robot, 5)
     record, model = record_of(move, body.torque(move)), emitted("planar")[0]
-    asked = study(robot, "fourier", signals={"lowpass": {"cutoff": cutoff}})
+    asked = study(signals={"lowpass": {"cutoff": cutoff}})
     fit = runtime.estimate(model, record, asked)
     assert fit.relative_error < 0.1
     assert Unseen(body, 5).errors(fit.names, fit.X)[0] < 0.05
-    three = study(robot, "fourier", signals={"lowpass": {"cutoff": cutoff}}, rows={"trim": 3})
+    three = study(signals={"lowpass": {"cutoff": cutoff}}, rows={"trim": 3})
     assert runtime.estimate(model, record, three).relative_error > 5 * fit.relative_error
 
 
@@ -183,7 +183,7 @@ def test_a_rotor_inertia_of_zero_is_physical_and_a_certain_negative_one_is_not()
     tau = own.torque(move)
     tau += world.noise(tau, 0.0, 0.005, 1_000_003)
     model, _ = emitted(robot.name)
-    asked = study(robot, "fourier")
+    asked = study()
     right = runtime.identify(model, record_of(move, tau), asked, physical=True)
     assert right.part("feasibility").judged.feasible
     tau[:, 2] -= 0.05 * move.qdd[:, 2]  # another rotor inertia, kg m^2
@@ -197,7 +197,7 @@ def test_physical_parameters_predict_the_other_half_with_the_weight_of_the_whole
     own, move = world.Truth(robot, 1_000_005), world.fourier(robot, 1_000_005)
     tau = own.torque(move)
     tau += world.noise(tau, 0.9, 0.03, 1_000_005)
-    result = runtime.identify(emitted(robot.name)[0], record_of(move, tau), study(robot, "fourier"))
+    result = runtime.identify(emitted(robot.name)[0], record_of(move, tau), study())
     assert "feasible" in result.validation[0].errors(), result.missing
 
 
@@ -228,9 +228,7 @@ def test_a_slow_right_study_is_told_no_cause(k: int) -> None:
     tau = simulated.torque(move)
     tau = tau + world.noise(tau, 0.9, 0.02, 7_000_000 + k)
     model, variants = emitted(robot.name)
-    judged = runtime.plausibility(
-        model, record_of(move, tau), study(robot, "slow"), variants=variants
-    )
+    judged = runtime.plausibility(model, record_of(move, tau), study(), variants=variants)
     assert not judged.named_causes and all(check.state != "no" for check in judged.checks())
 
 
@@ -258,8 +256,6 @@ def test_pulses_of_a_loop_stay_in_the_torques() -> None:
     record, errors = record_of(move, tau, told), []
     for extra in ({}, {"torque_median": 5}):
         settings = {"reader": "counts", "step": encoder.steps(robot).tolist(), **extra}
-        fit = runtime.estimate(
-            emitted("scara")[0], record, study(robot, "fourier", signals=settings)
-        )
+        fit = runtime.estimate(emitted("scara")[0], record, study(signals=settings))
         errors.append(Unseen(own, seed).errors(fit.names, fit.X)[0])
     assert errors[0] < 1.5 and errors[1] > 2.5 * errors[0]

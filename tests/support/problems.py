@@ -1,5 +1,6 @@
 """Settings that steps find of records alone, and states of bare positions, for tests that have no robot."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -45,7 +46,8 @@ def linear_system(rows, settings=None):
     return method.linear_system(rows, settings or EstimateSettings(), METHODS)
 
 
-def loop_of_records(model, records, study, simulator, **options):
-    """The closed loop of records, as a study reads them."""
+def loop_of_records(model, records, study, simulator, around=0.0, **options):
+    """The closed loop of records, as a study reads them, without rows `around` slow ones."""
+    study = replace(study, rows=replace(study.rows, around=around))
     whole = problem(model, records, study)
     return closed_loop(whole, whole.prepared, simulator, **options)

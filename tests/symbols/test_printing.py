@@ -26,7 +26,7 @@ from symgen.symbols.symbolic_model import SymbolicModel
 
 NAMES = """
 documentclass usepackage setlength oddsidemargin textwidth topmargin textheight parindent allowdisplaybreaks begin end section subsection par medskip hline
-Gamma sigma alpha theta gamma mu omega pi cos sin sqrt frac dot ddot operatorname mathbf mathit left right quad det max min
+Gamma sigma alpha theta vartheta gamma mu omega pi cos sin exp sqrt frac dot ddot operatorname mathbf mathit left right quad det max min
 """
 COMMANDS = {*NAMES.split(), ",", "_", ";", " ", "\\"} | {
     *[
@@ -327,6 +327,6 @@ def test_a_second_form_is_no_second_computation(monkeypatch) -> None:
 
 
 def test_letters_of_angles_with_ratios() -> None:
-    assert letter("C2o5x2") == ("C", "2/5·2") and letter("th5m2b") == ("theta'", "5-2")
+    assert letter("C2o5x2") == ("C", "2/5·2") and letter("th5m2b") == ("vartheta'", "5-2")
     assert latex_symbol("S2o5x2") == r"S_{2/5 \cdot 2}"
     assert {"th", "C"} <= {*families_of(["th2o5x2", "C2o5x2"])}

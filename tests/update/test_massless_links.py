@@ -74,7 +74,7 @@ def require_applied(path: Path, chi: dict[str, float] | None = None):
         estimate = exact(model, chi or other_values(model, 4) | {"FV1": 0.4, "Ia2": 0.1})
         applied = symgen.apply(estimate, path)
     assert {"record", "sum"} & {c.told_by for c in applied.changes}
-    assert any(c.sigma > 0 for c in applied.changes)
+    assert all((c.sigma > 0) == (c.told_by == "record") for c in applied.changes)
     out = applied.write(path.with_stem("new"))
     states = motion(2, 2, 0.4, 10)[1:]
     ours = model.inverse_dynamics(*states, estimate.X)

@@ -17,11 +17,12 @@ each form:
 As printed, (22) grows to hundreds of per cent where Table 3 says about ten; the increase relative
 to ||Y|| has the printed order of magnitude.
 
-The verdict of the chapter is "practically unbiased" if all %e and %e(rho) are below 1 %, "biased"
-if one of them is above 5 %, and "doubtful" between. Parameters whose own %sigma (11) is large do
-not decide; the result names the parameters that did. Section 4.1.4 calls the residual the best
-single indicator, because it covers the whole model: `residual_verdict` applies the same two limits
-to its increase alone.
+The verdict is "practically unbiased" if the %e (21) of all parameters asked for are below 1 %,
+"biased" if one of them is above 5 %, and "doubtful" between. Parameters whose own %sigma (11) is
+large do not decide; the result names the parameters that did. Section 4.1.4 of the chapter calls
+the residual (22) the best single indicator, because it covers the whole model: `residual_verdict`
+applies the same two limits to its increase. The residual hardly sees a parameter on which the
+torques depend little.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ from runtime.ground.table import Table, csv_text, notebook, number, percentage
 Array = np.ndarray
 
 MARKED = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"), (PURPLE, "D"), (SKY, "v"), ("#8C6D00", "P"))
-VERDICTS = "There are two verdicts. The rule as printed: an estimate is practically unbiased if the errors of all deciding parameters and %e(rho) are below 1 %, and biased if one is above 5 %. Section 4.1.4 of the chapter calls the residual the best single indicator, since it depends on the whole model: the last verdict applies the same limits only to the increase of its norm."
+VERDICTS = "The verdict is that of the parameters asked for, eq. (21): the estimate is practically unbiased if all of them change by less than 1 %, and biased if one changes by more than 5 %. Beside it stands the rule of section 4.1.4 of the chapter, eq. (22): the same limits for the increase of the residual, which hardly sees a parameter on which the torques depend little."
 
 SCHEMA = "symgen-cestac/1"
 """Kind and version of the JSON layout; `symgen schema --of cestac` prints its JSON Schema."""
@@ -107,7 +108,8 @@ class LevelResult:
     residual_verdict : str
         Verdict of `increase` alone.
     decided_by : mapping of float, %
-        Errors that decided the verdict, by name (rho for the residual), largest first.
+        Errors that decided the verdict, by name, largest first; where no parameter decides, that
+        of the residual, rho.
     runs_needed : int
         Number of runs that makes the intervals of the deciding parameters narrower than 1 % of
     X_LS.
@@ -198,28 +200,6 @@ class Cestac(Result, Part):
         finest_first = sorted(self.encoder_steps, key=lambda r: r.level.delta)
         fine = list(takewhile(lambda r: r.verdict == "unbiased", finest_first))
         return fine[-1].level if fine else None
-
-    @property
-    def finer_for_values(self) -> str:
-        """Sentence on a parameter that rounding changes while the residual hardly grows, or ""."""
-        apart = (
-            level
-            for level in self.levels
-            if level.residual_verdict == "unbiased" and level.verdict != "unbiased"
-        )
-        errors = (
-            {}
-            if (level := next(apart, None)) is None
-            else {name: e for name, e in level.decided_by.items() if name in self.names}
-        )
-        if level is None or not errors:
-            return ""
-        name = max(errors, key=errors.__getitem__)
-        return (
-            f" Single values need a finer step: at {level.level.label}, {name} changes by "
-            f"{errors[name]:.0f} %, but the residual grows by only "
-            f"{level.increase:.1f} % of the torques, because they depend little on {name}."
-        )
 
     @property
     def message(self) -> str:
@@ -342,8 +322,11 @@ class Cestac(Result, Part):
                 "increase of the norm in % of |Y|, own W",
                 *(number(r.increase_own, ".2f") for r in levels),
             ),
-            ("verdict of parameters and residual", *(r.verdict for r in levels)),
-            ("verdict of the increase (measured W) alone", *(r.residual_verdict for r in levels)),
+            ("verdict of the parameters, (21)", *(r.verdict for r in levels)),
+            (
+                "verdict of the residual, (22): increase, measured W",
+                *(r.residual_verdict for r in levels),
+            ),
             ("runs for intervals within 1 %", *(str(r.runs_needed) for r in levels)),
         ]
         return Table("Residual and verdict", ("reading", *(r.level.label for r in levels)), rows)
@@ -530,10 +513,9 @@ def level_result(
         relative_sigma = 100 * sigma / np.abs(mean)
     half = float(stdtrit(N - 1, (1 + LIMIT.STUDENT_PROBABILITY) / 2)) / np.sqrt(N)
     decisive = [reference.names.index(name) for name in deciding_names(reference)]
-    errors = {reference.names[i]: float(e[i]) for i in decisive} | {
-        "rho": _relative_change(rho, rho_ls)
-    }
-    verdict, decided_by = _verdict(errors)
+    errors = {reference.names[i]: float(e[i]) for i in decisive}
+    e_rho = _relative_change(rho, rho_ls)
+    verdict, decided_by = _verdict(errors or {"rho": e_rho})
     needed = runs_needed(float(spread[decisive].max(initial=0.0)))
     return LevelResult(
         level=level,
@@ -544,7 +526,7 @@ def level_result(
         e=e,
         half_width=half * sigma,
         half_width_percent=half * spread,
-        e_rho=errors["rho"],
+        e_rho=e_rho,
         e_rho_own=_relative_change(own, rho_ls),
         increase=100 * (rho - rho_ls) / norm_Y,
         increase_own=100 * (own - rho_ls) / norm_Y,

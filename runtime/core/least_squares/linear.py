@@ -61,8 +61,9 @@ class System:
         Factor of the weighted system, which is solved, with the same columns.
     scales : tuple of float, N m or N
         s_j of each joint, by which its rows are divided; 1 without weights.
-    whitener : ndarray, shape (n, n), or None
-        Multiplies the n rows of one instant in place of the scales.
+    row_covariance : ndarray, shape (n, n), or None
+        Covariance of the torques of one instant, by which its rows are whitened in place of the
+        scales.
     known_variance : bool
         Whether the rows of the weighted system have variance 1: then C = (W'W)^-1, else
         C = sigma_rho^2 (W'W)^-1.
@@ -78,7 +79,7 @@ class System:
     raw: Factor
     weighted: Factor
     scales: tuple[float, ...]
-    whitener: Array | None = None
+    row_covariance: Array | None = None
     known_variance: bool = False
     iterations: int = 0
     status: Status = "ok"
@@ -122,12 +123,17 @@ class System:
     def block_rows(self) -> Iterator[Array]:
         """Yield the weighted rows [W Y] of every block of time, shape (rows, b + 1)."""
         return self.observation.block_rows(
-            self.names, 1 / np.array(self.scales), self.block, self.whitener
+            self.names, 1 / np.array(self.scales), self.block, self.row_covariance
         )
 
-    def band_rows(self) -> Iterator[Array]:
-        """Yield the weighted rows [W Y] of every band (interval) of speed, shape (rows, b + 1)."""
-        return self.observation.band_rows(self.names, 1 / np.array(self.scales), self.whitener)
+    def band_rows(self, X: Array) -> Iterator[Iterator[Array]]:
+        """Yield the weighted rows [W Y] band by band, for each kind of band (`Observation.bands`).
+
+        Shape (rows, b + 1) each; the load is that of the parameters X.
+        """
+        return self.observation.band_rows(
+            self.names, 1 / np.array(self.scales), X, self.row_covariance
+        )
 
 
 def ordinary(
@@ -175,7 +181,7 @@ def assemble(
     sigma_rho, C = standard_deviations(system, fit)
     corrected = np.full(len(names), np.nan)  # as without redundancy
     if system.raw.rows > len(names):
-        corrected = corrected_deviations(system.block_rows(), system.band_rows(), fit.X, fit.T)
+        corrected = corrected_deviations(system.block_rows(), system.band_rows(fit.X), fit.X, fit.T)
     corrected[_undetermined(system, fit)] = np.nan
     norms, measured = system.norms(fit.X)
     share = 1 - fit.rank / system.raw.rows

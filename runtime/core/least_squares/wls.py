@@ -8,8 +8,9 @@ s_j is a standard deviation in N m. The setting `weights` chooses how it is comp
                 j alone, b_j = rank W_j. Exactly invariant under scaling of Y and W of one joint.
     iterated    s_j^2 = ||Y_j - W_j X||^2 / (N_j (1 - b/r)) from the common solution, repeated until
                 every s_j changes by less than 1e-3.
-    covariance  residuals E, shape (n, N), of ordinary least squares; Omega = E E'/(N - b/n); the n
-                rows of one instant are multiplied by L^-1, L L' = Omega.
+    covariance  residuals e of ordinary least squares; Omega_ij = sum e_i e_j/(N_ij - b/n) over the
+                N_ij instants with rows of both joints; the rows of one instant are multiplied by
+                L^-1, L L' = Omega of the joints that have a row at it.
 
 The chapter leaves weights open; Gautier (1997) and BIRDy use the first and the last.
 """
@@ -20,15 +21,13 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from scipy.linalg import LinAlgError, cholesky, solve_triangular
 
 from runtime.core.least_squares.estimate import Status
 from runtime.core.least_squares.linear import LinearOptions, System, ordinary
 from runtime.core.least_squares.solution import joint_scatter, solve
 from runtime.core.rows.factor import Factor, factor
-from runtime.core.rows.observation import Observation, whitened
+from runtime.core.rows.observation import Observation
 from runtime.core.study import EstimateSettings, Weights
-from runtime.ground.errors import SettingsError
 from runtime.ground.limits import LIMIT
 
 
@@ -122,35 +121,26 @@ def _iterated(start: System) -> System:
 
 
 def _covariance(start: System) -> System:
-    """Multiply the n rows of each sample by L^-1; L L' is the covariance of the joint residuals.
+    """Multiply the rows of each instant by L^-1; L L' is the covariance of the joint residuals.
 
     The weights of `start` are used if the residuals are linearly dependent.
     """
     observation, raw = start.observation, start.raw
-    n, N = observation.n, observation.rows[0]
-    same = set(observation.rows) == {N} and all(
-        np.array_equal(observation.t[:N], observation.t[observation.joint(j)]) for j in range(n)
-    )
-    if not same:
-        counts = ", ".join(map(str, observation.rows))
-        message = (
-            f"covariance needs rows of every joint at every instant; rows per joint are {counts}. "
-            "Use weights: joint, or rows.low_speed: 0"
-        )
-        raise SettingsError(message, path=("estimate", "weights"))
     W = observation.columns(raw.names).W
     fit = solve(raw, start.options.rank_tolerance)
-    E = (observation.Y - W @ fit.X).reshape(n, N)
-    Omega = E @ E.T / max(N - fit.rank / n, 1)
+    residual = np.append(observation.Y - W @ fit.X, 0.0)  # -1: no row
+    E, present = residual[observation.instants], (observation.instants >= 0).astype(float)
+    freedom = present.T @ present - fit.rank / observation.n
+    Omega = E.T @ E / np.maximum(freedom, 1)
+    A = np.column_stack([W, observation.Y])
     try:
-        whitener = solve_triangular(cholesky(Omega, lower=True), np.eye(n), lower=True)
-    except LinAlgError:
+        whole = observation.whitened(A, Omega)
+    except np.linalg.LinAlgError:
         message = (
             "The residuals of the joints are linearly dependent (an exact fit, or fewer "
             "instants than joints); weights by joint were used instead."
         )
         return replace(start, status="singular-weights", message=message)
-    whole = whitened(np.column_stack([W, observation.Y]), whitener)
     whole_factor = factor(whole[:, :-1], whole[:, -1], observation.rows, raw.names)
-    scales = tuple(np.sqrt(np.diag(Omega)).tolist())
-    return replace(start, weighted=whole_factor, scales=scales, whitener=whitener)
+    scales = tuple(np.sqrt(np.where(np.diag(Omega) > 0, np.diag(Omega), 1.0)).tolist())
+    return replace(start, weighted=whole_factor, scales=scales, row_covariance=Omega)

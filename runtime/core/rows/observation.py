@@ -29,7 +29,7 @@ BLOCKS = 50
 uncertain by 1/sqrt(2*50) = 10 %.
 """
 BANDS = 6
-"""Bands of speed, with equally many rows of each joint, that show errors of the friction model."""
+"""Bands of one quantity, with equally many rows of each joint, that show errors of the friction model."""
 SHORTEST = 5
 """Shortest default block of residuals, rows of one joint: 2/cutoff, the memory of the low-pass
 filter, at the rate of eq. (13).
@@ -80,8 +80,8 @@ class Observation:
         Sentences of the reader of counts about the encoders.
     rates : tuple of float, Hz
         Rows per second of each record; empty for an observation of one record.
-    speed : ndarray, shape (r,), rad/s or m/s, or None
-        Speed |qd_j| of the joint of each row; None if it is unknown.
+    motion : ndarray, shape (r, 2), or None
+        Position q_j and velocity qd_j of the joint of each row, SI; None if they are unknown.
     """
 
     W: Array
@@ -97,7 +97,7 @@ class Observation:
     closed_loop: LoopRows | None = None
     findings: tuple[str, ...] = ()
     rates: tuple[float, ...] = ()
-    speed: Array | None = None
+    motion: Array | None = None
 
     def __post_init__(self) -> None:
         r = sum(self.rows)
@@ -192,7 +192,7 @@ class Observation:
             record=self.record[mask],
             rows=rows,
             closed_loop=loop,
-            speed=None if self.speed is None else self.speed[mask],
+            motion=None if self.motion is None else self.motion[mask],
         )
 
     def between(self, t0: float | None, t1: float | None) -> Observation:
@@ -248,37 +248,83 @@ class Observation:
             np.unique(record * (interval.max() + 1) + interval, return_inverse=True)[1]
         )
 
-    def bands(self) -> Array:
-        """Return the number of the speed band of each row, shape (r,): each joint has BANDS bands.
+    def bands(self, load: Array) -> list[Array]:
+        """Return bands of rows by speed, load, position, and way since the last reversal.
 
-        The numbers start from 0. The bands of a joint have equally many rows. If the speed is
-        unknown or zero, all rows of the joint are in one band.
+        Each has the number of the band of each row, shape (r,), from 0; each joint has BANDS bands
+        with equally many rows. The list is empty if the motion of the joints is unknown.
+
+        load : torque of the joint of each row, shape (r,).
         """
+        if self.motion is None:
+            return []
+        q, qd = self.motion.T
+        return [self._bands(values) for values in (np.abs(qd), np.abs(load), q, self._ways())]
+
+    def _ways(self) -> Array:
+        """Compute the way of the joint of each row since its last reversal, rad or m, shape (r,)."""
+        assert self.motion is not None
+        q, qd = self.motion.T
+        new = np.diff(np.sign(qd), prepend=0.0) != 0
+        new[np.diff(self.record, prepend=-1) != 0] = True
+        new[[self.joint(j).start for j in range(self.n) if self.rows[j]]] = True
+        last = np.maximum.accumulate(np.where(new, np.arange(len(q)), 0))
+        return np.asarray(np.abs(q - q[last]))
+
+    def _bands(self, values: Array) -> Array:
+        """Number the bands of one quantity; a joint in which it is constant has one band."""
         band = np.zeros(len(self.Y), dtype=np.intp)
         for j in range(self.n):
             own = self.joint(j)
-            if self.speed is not None and self.speed[own].any():
-                order = np.argsort(self.speed[own], kind="stable")
-                band[own][order] = np.arange(len(order)) * BANDS // max(len(order), 1)
+            if np.ptp(values[own]) if self.rows[j] else 0.0:
+                order = np.argsort(values[own], kind="stable")
+                band[own][order] = np.arange(len(order)) * BANDS // len(order)
         return band
 
-    def band_rows(
-        self, names: Sequence[str], weights: Array, whitener: Array | None = None
-    ) -> Iterator[Array]:
-        """Yield the weighted rows of [W Y], shape (rows, b + 1), one band of speed after another.
+    @cached_property
+    def instants(self) -> Array:
+        """Number of the row of each joint at each instant, shape (instants, n); -1 if it has none."""
+        _, instant = np.unique(np.stack([self.record, self.t]), axis=1, return_inverse=True)
+        place = np.full((instant.max(initial=-1) + 1, self.n), -1)
+        place[instant.reshape(-1), self.joints] = np.arange(len(self.Y))
+        return place
 
-        The parameters are those of `block_rows`.
+    def whitened(self, A: Array, covariance: Array) -> Array:
+        """Multiply the rows of each instant in A, shape (r, c), by L^-1, so that they are independent.
+
+        L L' is the covariance of the torques of the joints that have rows at this instant, a part
+        of `covariance`, shape (n, n). LinAlgError if it is singular.
         """
-        return self._weighted_rows(names, weights, self.bands(), whitener)
+        white = np.empty_like(A)
+        patterns, pattern = np.unique(self.instants >= 0, axis=0, return_inverse=True)
+        for k, joints in enumerate(patterns):
+            rows = self.instants[pattern.reshape(-1) == k][:, joints]
+            L = np.linalg.cholesky(covariance[np.ix_(joints, joints)])
+            white[rows] = np.linalg.solve(L, A[rows])
+        return white
+
+    def band_rows(
+        self, names: Sequence[str], weights: Array, X: Array, covariance: Array | None = None
+    ) -> Iterator[Iterator[Array]]:
+        """Yield the weighted rows of [W Y], shape (rows, b + 1), one band after another.
+
+        One iterator for each kind of band (`bands`); the load is W X. The other parameters are
+        those of `block_rows`.
+        """
+        whole = np.zeros(len(self.names))
+        whole[column_numbers(names, self.names)] = X
+        load = self.W @ whole
+        for groups in self.bands(load):
+            yield self._weighted_rows(names, weights, groups, covariance)
 
     def _weighted_rows(
-        self, names: Sequence[str], weights: Array, groups: Array, whitener: Array | None
+        self, names: Sequence[str], weights: Array, groups: Array, covariance: Array | None
     ) -> Iterator[Array]:
         """Yield the weighted rows of [W Y] of each group; `groups` has the group of each row."""
         kept = column_numbers(names, self.names)
-        if whitener is not None:
+        if covariance is not None:
             A = np.column_stack([self.W[:, kept], self.Y])
-            yield from split_rows(whitened(A, whitener), groups)
+            yield from split_rows(self.whitened(A, covariance), groups)
             return
         row_weights = np.repeat(weights, self.rows)
         for rows in rows_by_block(groups):
@@ -286,7 +332,7 @@ class Observation:
             yield A * row_weights[rows, None]
 
     def block_rows(
-        self, names: Sequence[str], weights: Array, length: float, whitener: Array | None = None
+        self, names: Sequence[str], weights: Array, length: float, covariance: Array | None = None
     ) -> Iterator[Array]:
         """Yield the weighted rows of [W Y], shape (rows, b + 1), block of time by block of time.
 
@@ -301,11 +347,12 @@ class Observation:
             Factors by which the rows of each joint are multiplied.
         length : float, s
             Length of a block.
-        whitener : ndarray, shape (n, n), optional
-            Multiplies the n rows of one instant, in place of the weights.
+        covariance : ndarray, shape (n, n), optional
+            Covariance of the torques of one instant, by which rows are whitened in place of the
+            weights.
         """
-        if whitener is not None or self.block_factors is None or length != self.residual_block:
-            yield from self._weighted_rows(names, weights, self.blocks(length), whitener)
+        if covariance is not None or self.block_factors is None or length != self.residual_block:
+            yield from self._weighted_rows(names, weights, self.blocks(length), covariance)
         else:
             kept = column_numbers(names, self.names)
             for joints in self.block_factors:
@@ -335,17 +382,6 @@ def rows_by_block(blocks: Array) -> list[Array]:
     return np.split(order, np.flatnonzero(np.diff(blocks[order])) + 1)
 
 
-def whitened(A: Array, whitener: Array) -> Array:
-    """Multiply the n rows (one per joint) of each instant in A by the (n, n) matrix `whitener`.
-
-    A : shape (n*N, c), joint-major.
-    """
-    n = len(whitener)
-    return np.asarray(
-        np.einsum("ij,jNc->iNc", whitener, A.reshape(n, -1, A.shape[1])).reshape(A.shape)
-    )
-
-
 def halves(t0: float, t1: float) -> tuple[Window, Window]:
     """Split the time interval [t0, t1], s, into two halves that have no sample in common."""
     middle = (t0 + t1) / 2
@@ -364,7 +400,7 @@ def stack(observations: Sequence[Observation]) -> Observation:
     _require_same_columns(observations)
     n = observations[0].n
     rows = [(o, o.joint(j)) for j in range(n) for o in _numbered(observations)]
-    known = all(o.speed is not None for o in observations)
+    known = all(o.motion is not None for o in observations)
     return Observation(
         W=np.asfortranarray(_joined("W", rows)),
         Y=_joined("Y", rows),
@@ -378,7 +414,7 @@ def stack(observations: Sequence[Observation]) -> Observation:
         files=all_files([o.files for o in observations]),
         findings=tuple(dict.fromkeys(text for o in observations for text in o.findings)),
         rates=tuple(rate for o in observations for rate in (o.rates or (o.rate,))),
-        speed=_joined("speed", rows) if known else None,
+        motion=_joined("motion", rows) if known else None,
     )
 
 

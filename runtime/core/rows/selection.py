@@ -13,6 +13,7 @@ from math import ceil
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import minimum_filter1d
 
 from runtime.core.model import GeneratedModel
 from runtime.core.record import Record
@@ -152,11 +153,15 @@ def select_rows(
     usable = None if keep is None else _keep(keep, record)
     instants, number = kept + samples.start, np.arange(len(kept))
     mask = np.ones((record.n, len(kept)), dtype=bool)
-    dropped, slow = {}, per_joint(rows.low_speed, record.n, "rows.low_speed")[:, None]
+    dropped, slow = {}, per_joint(rows.slow, record.n, "rows.low_speed")[:, None]
+    speed = np.abs(qd)
+    if rows.around:
+        reach = 2 * round(rows.around * record.rate) + 1
+        speed = minimum_filter1d(speed, reach, axis=0, mode="nearest")
     for reason, allowed in (
         ("trim", (number >= trim) & (number < len(kept) - trim)),
         *([("torque", slow < UNMEASURED)] if slow.max() >= UNMEASURED else ()),
-        ("low_speed", np.abs(qd[instants].T) >= slow),
+        ("low_speed", slow <= speed[instants].T),
         ("mask", True if usable is None else usable[instants].T),
     ):
         before = mask.sum(axis=1)
