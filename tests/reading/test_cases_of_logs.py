@@ -37,7 +37,7 @@ def identified(*arguments: object) -> tuple[int, str, str]:
 
 
 def value(text: str, name: str) -> float:
-    found = re.search(rf"\b{name} +([-0-9.e]+) \+-", text)
+    found = re.search(rf"\b{name} +([-0-9.e]+) +\+-", text)
     assert found, text
     return float(found[1])
 
