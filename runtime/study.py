@@ -279,7 +279,7 @@ def _beyond_limits(
         return ""
     bounds = np.array([max(map(abs, limit)) for limit in limits])
     reached = np.max([np.abs(record.q).max(axis=0) for record in records], axis=0)
-    if not np.all(reached > BEYOND * bounds):
+    if not np.all((bounds > 0) & (reached > BEYOND * bounds)):
         return ""
     return (
         f"unit of the positions, which reach {reached.max():.3g} where the limits of the robot file "
