@@ -111,7 +111,7 @@ ONLY_IN = {  # library: files and folders that may import it
     "pint": ("runtime/reading/units.py",),
     "mujoco": ("symgen/description/mjcf.py",),
     "polars": ("runtime/reading/parquet.py",),
-    "h5py": ("runtime/reading/mat.py",),
+    "h5py": ("runtime/reading/hdf5.py", "runtime/reading/mat.py"),
     "rosbags": ("runtime/reading/bags.py",),
     "clarabel": ("runtime/physical/semidefinite.py",),
     "array_api_compat": ("generated/",),

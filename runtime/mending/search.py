@@ -9,13 +9,12 @@ wrong one may gain more. Where the error is small, only named causes are tried.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from runtime.ground.limits import limits
 from runtime.ground.progress import at
 from runtime.mending.gravity import tilted
 from runtime.mending.late import late_torques
-from runtime.mending.ratio import other_ratios
 from runtime.mending.reading import Reading, best_of
 from runtime.mending.reversed import reversed_torques
 from runtime.plausible.causes import CAUSES, Cause
@@ -126,8 +125,6 @@ def further(reading: Reading) -> tuple[list[Reading], tuple[Cause, ...]]:
         return [], ()
     trials = try_causes(baseline, reading.sides, reading.units)
     trials = [t for t in trials if t.cause.rate == 1 or simple_rate(t.cause.rate)]
-    ratios = [replace(t, gain=t.gain - TRIED.RATE_GAIN) for t in other_ratios(reading)]
-    trials = sorted([*trials, *ratios], key=lambda trial: -trial.gain)
     if case.robot_values is not None and case.robot_values.heavy:
         trials = [t for t in trials if t.cause.kind != "rate"]
     named = decisive(trials, baseline, case.noise_floor, None, reading.alone)

@@ -66,7 +66,8 @@ def identify(
     json: options.Json = False,
 ) -> None:
     """Identify the base parameters of ROBOT from RECORD, or from several records fitted together.
-    The exit code is 0 for the verdicts Yes and With care, 1 for No.
+    The exit code is 0 for the verdicts Yes and With care, 1 for No, and 1 if --suggest leaves
+    settings to be filled in.
     """
     with session.progress_lines(), session.results_in(output) as results:
         import runtime
