@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         plausibility,
         problem,
         read_record,
+        repair,
         simulate,
         static_poses,
     )
@@ -73,6 +74,7 @@ __all__ = [
     "plausibility",
     "problem",
     "read_record",
+    "repair",
     "report",
     "resample",
     "simulate",
@@ -93,6 +95,7 @@ _MODULES = {
         "plausibility",
         "problem",
         "read_record",
+        "repair",
         "simulate",
         "static_poses",
     ),

@@ -4,7 +4,7 @@
     READERS    Record, Signals -> States: signals.reader of a study (`runtime.core.signals.reader`)
     METHODS    Observation -> rows of a least squares -> their fit: estimate.method of a study
     EXTRAS     Identification -> Part: further analyses of the records
-    QUESTIONS  Identification -> Check: what the verdict asks, before the questions of the parts
+    QUESTIONS  Identification -> Check: what the verdict asks; a part asks its own
 
 Each call builds a Problem from model, records and study, prepares it by STEPS and passes it to one
 function of the package. A feature is one file and one line of a list.
@@ -46,7 +46,7 @@ from runtime.counts.encoder_advice import EncoderSteps
 from runtime.expected import ExpectedError
 from runtime.ground.arrays import kind_of, require_kind
 from runtime.ground.errors import InputError, SettingsError
-from runtime.ground.part import About
+from runtime.ground.settings import structure
 from runtime.ground.settings_errors import gone
 from runtime.late import Late, Listed, PartWhen, When
 from runtime.link_side import stated_sides, torques_of_links
@@ -55,14 +55,14 @@ from runtime.packets.packets import KIND as PACKETS
 from runtime.packets.packets import packets_once
 from runtime.payload.settings import LOADED
 from runtime.reading.formats import is_measured
-from runtime.reading.records import read_records
+from runtime.reading.records import columns_read, read_records
 from runtime.reading.settings import RecordSettings
 from runtime.rest import STATIC, poses_at_rest
 from runtime.speeds import recorded_speeds
 from runtime.study import Study, study_of, study_schema
 from runtime.threads import alone_each, single_threaded
 from runtime.verdict import questions
-from runtime.verdict.verdict import Ask, verdict
+from runtime.verdict.verdict import Ask, of_parts, verdict
 
 if TYPE_CHECKING:
     from runtime.advisor.advice import Advice
@@ -72,12 +72,17 @@ if TYPE_CHECKING:
     from runtime.excitation.result import Excitation
     from runtime.loop.result import Simulation
     from runtime.loop.simulation import Simulator
+    from runtime.mending.repair import Repair
     from runtime.payload.study import PayloadStudy
     from runtime.plausible.delay import Delay
     from runtime.plausible.plausibility import Plausibility
     from runtime.treatments import Ranking
 
 STEPS: list[Step] = [
+    When(
+        Late("runtime.mending.corrected:corrected_model"),
+        lambda p: getattr(p.settings, "robot", None) is not None,
+    ),
     stated_sides,
     When(
         Late("runtime.commands:commands_for_torques"),
@@ -177,17 +182,19 @@ EXTRAS: list[Extra] = [
     ),
 ]
 
-QUESTIONS: Mapping[About, list[Ask]] = {
-    "record": [questions.determined],
-    "prediction": [questions.total_error, questions.explained_by_joint, questions.predicted],
-    "values": [
-        questions.signs,
-        questions.certain,
-        questions.separate,
-        questions.conditioned,
-    ],
-}
-judged = partial(verdict, questions=QUESTIONS)
+RECORD_QUESTIONS: list[Ask] = [questions.determined, of_parts("record")]
+QUESTIONS: list[Ask] = [
+    questions.total_error,
+    questions.explained_by_joint,
+    of_parts("prediction"),
+    questions.predicted,
+    questions.signs,
+    questions.certain,
+    questions.separate,
+    questions.conditioned,
+    of_parts("values"),
+]
+judged = partial(verdict, on_record=RECORD_QUESTIONS, on_parameters=QUESTIONS)
 
 Records = Record | Sequence[Record]
 T = TypeVar("T")
@@ -722,6 +729,68 @@ def static_poses(
     return poses.static_poses(problem(model, records, study))
 
 
+@single_threaded
+def repair(
+    model: GeneratedModel,
+    records: Records,
+    study: Study | None = None,
+    *,
+    variants: GeneratedModel | None = None,
+    further: Sequence[Record] | None = None,
+    folder: str | Path | None = None,
+) -> Repair:
+    """Search the lines of a study that are wrong, several at once, and write the mended study.
+
+    They are searched on some blocks of the records, and judged on the others and on the validation
+    records. All changes are kept, or none.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+        An emitted module.
+    records : Record, or a sequence of them
+        Joint side, SI, as the study reads them.
+    study : Study, optional
+        Settings; default: Study().
+    variants : GeneratedModel, optional
+        The module of `symgen.variants`: gravity and the table of frames are corrected too.
+    further : sequence of Record, optional
+        Validation records; default: the records of study.validate.record.
+    folder : str or Path, optional
+        Folder to which file names of the study are relative.
+
+    Returns
+    -------
+    Repair
+        Changes with their errors, the new study and its records. If `study.robot` is changed, the
+        model of the new study is symgen.model(symgen.corrected(robot, study)).
+
+    Raises
+    ------
+    InputError
+        Broken records: gaps, jumps, cut torques, two publishers.
+    """
+    from runtime.mending import repair as repairing
+
+    study = require_study(study)
+    if further is None:
+        further = records_of(study.validate.record, model, study, folder=folder)
+    whole = problem(model, records, study, unseen=further)
+
+    def columns(settings: Mapping[str, Any]) -> tuple[Sequence[str], Sequence[str]]:
+        own = structure(RecordSettings, settings)
+        if own.files and not (own.columns.q and own.columns.tau):
+            named = columns_read(own, model, folder)
+            return named.q, named.tau
+        numbers = range(1, len(model.JOINTS) + 1)
+        q, tau = ([f"{key}{j}" for j in numbers] for key in ("q", "tau"))
+        return own.columns.q or q, own.columns.tau or tau
+
+    stated = study if study.record else replace(study, record=(RecordSettings(),))
+    given = list_records(records)
+    return repairing.repair(whole, stated, records=given, variants=variants, columns=columns)
+
+
 def extras(asked: Mapping[str, Mapping[str, Any]], attempted: bool = False) -> list[Extra]:
     """Select the analyses that follow an identification, with the options that the user requested.
 
@@ -847,6 +916,7 @@ __all__ = [
     "METHODS",
     "QUESTIONS",
     "READERS",
+    "RECORD_QUESTIONS",
     "STEPS",
     "InputError",
     "advise",
@@ -863,6 +933,7 @@ __all__ = [
     "payload",
     "plausibility",
     "problem",
+    "repair",
     "simulate",
     "static_poses",
 ]

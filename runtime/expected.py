@@ -14,18 +14,23 @@ torque errors of motions within the range of the robot.
     a       share of the accelerations that is an error of the encoder's steps
     D_0     D without accelerations
 
+    F a     torques of the laws that the model lacks, dX the change of X beside them
+            (`runtime.unmodelled`)
+
     expected^2 = tr(D K V K'D')/||D X||^2 + ||D (X - K chi_V)||^2/||D X||^2
-                 + (a/(1 + a))^2 ||(D - D_0) X||^2/||D X||^2
+                 + (a/(1 + a))^2 ||(D - D_0) X||^2/||D X||^2 + ||D dX + F a||^2/||D X||^2
 
 The first term is what the record leaves undetermined. The second is the difference between the fit
 and the joint estimate of record and values. The third is the amount by which the encoder steps make
-inertias too small (the encoder resolution of the record: `runtime.counts.encoder_advice`). Effects
-that the model lacks are included only as far as they are in the residuals of C.
+inertias too small (the encoder resolution of the record: `runtime.counts.encoder_advice`). The
+fourth is what the model lacks; the first two are then multiplied by the share of the squared error
+that the laws leave. Other effects that the model lacks are included only as far as they are in the
+residuals of C.
 
 The squared error of one record is a sum of b squares, a few of which are large: with
 M = K'D'D K V it is distributed as chi^2/nu with nu = tr(M)^2/tr(M^2) degrees of freedom. The
 interval of the expected error has the first two terms times quantiles of this distribution, and the
-third times STEPS_MOVE. If one direction is undetermined, nu is 1: 30 % expected may be 2 %.
+third times STEPS_MOVE, the fourth times LAWS_MOVE. If one direction is undetermined, nu is 1: 30 % expected may be 2 %.
 
 Reference: Satterthwaite (1946) for nu.
 """
@@ -52,11 +57,14 @@ from runtime.ground.check import Answer, Check, Question
 from runtime.ground.limits import LIMIT
 from runtime.ground.part import Part
 from runtime.physical.inertia import INERTIAL, PhysicalModel, physical_model
+from runtime.unmodelled import Lacking, depends, friction_columns, lacking_of
 
 EXPECTED_INTERVAL = (0.05, 0.95)
 """Probabilities of the ends of that interval. Measured: benchmarks/truth.md."""
 RANGE_ROUNDING = 1e-13
 """Eigenvalues of a scaled matrix that are rounding."""
+LAWS_MOVE = (0.6, 1.5)
+"""What the laws that the model lacks may do to predictions, over what they are expected to do: ends of the interval. Measured: benchmarks/verdicts.md."""
 REFERENCE_RANGE = (0.2, 0.8)
 """Amplitudes of the reference motion over half of the range of a joint. Measured: benchmarks/truth.md."""
 REFERENCE_SPEED = (0.1, 0.5)
@@ -140,12 +148,23 @@ class ExpectedError(Part):
             result.model_estimate,
             result.prepared,
             max(steps, default=0.0),
+            self.lacking,
         )
 
+    @cached_property
+    def unseen_error(self) -> float:
+        """Error on a part of the record that its other parts explain, %; nan if not computed."""
+        return unseen_error(self.result) if self.result.held_out_rows else float("nan")
+
+    @cached_property
+    def lacking(self) -> Lacking | None:
+        """Laws of load, position or time that the model lacks; None if nothing can be said."""
+        return lacking_of(self.result)
+
     def checks(self) -> tuple[Check, ...]:
-        """Return the check of the expected error of predicted torques, if this error is known."""
-        check = expected_off(self.expected)
-        return () if check is None else (check,)
+        """Return the questions on what the model lacks, and on the expected error if it is known."""
+        lacks = self.lacking and depends(self.lacking, self.result.model)
+        return tuple(check for check in (lacks, expected_off(self.expected)) if check)
 
 
 def expected_error(
@@ -154,6 +173,7 @@ def expected_error(
     fit: Estimate,
     records: Sequence[Prepared],
     steps: float = 0.0,
+    lacking: Lacking | None = None,
 ) -> Expected:
     """Compute the expected error of torques predicted for other motions, with its interval, %.
 
@@ -171,6 +191,8 @@ def expected_error(
     records : sequence of Prepared
     steps : float
         Share of the accelerations that is an error of the encoder's steps.
+    lacking : Lacking or None
+        Laws that the model lacks.
     """
     states = reference_states(model, records)
     if states is None or not has_channels(model, records):
@@ -185,33 +207,109 @@ def expected_error(
     X = np.array(
         [dict(zip(fit.names, fit.X, strict=True)).get(name, 0.0) for name in least_squares.names]
     )
-    ratio = least_squares.sigma_corrected / least_squares.sigma
-    wider = np.fmax(ratio, 1.0) * np.sqrt(unseen_by_blocks(system.observation, least_squares))
-    V = np.outer(wider, wider) * least_squares.covariance
-    near = least_squares.X
-    if dict(fit.details.get("options", {})).get("prior", "none") != "none":
-        physical = physical_model(model)
-        K, rows = physical.rows(least_squares.names), system.weighted
-        R = rows.R11 / (wider * (1.0 if system.known_variance else least_squares.sigma_rho))
-        near, V = with_values(physical, K, R, R @ least_squares.X)
-        D, still, X = D @ K, still @ K, np.linalg.lstsq(K, X, rcond=None)[0]
+    lost_part = 0.0 if lacking is None else lost(lacking, states, D, X, model, least_squares.names)
+    K, near, V = determined_by(model, system, least_squares, has_prior(fit))
+    D, still = D @ K, still @ K
+    if has_prior(fit):
+        X = np.linalg.lstsq(K, X, rcond=None)[0]
     A = D.reshape(-1, len(X))
     size = np.linalg.norm(A @ X)
     inertial = np.linalg.norm(A @ X - still.reshape(-1, len(X)) @ X) / size
-    M = A.T @ A @ V
-    spread = max(np.trace(M), 0.0)
-    nu = max(np.trace(M) ** 2 / np.sum(M * M.T), 1.0)
+    spread, nu = undetermined(A, V)
     open_part = (spread + np.sum((A @ (X - near)) ** 2)) / size**2
+    if lacking is not None:  # the laws no longer make the deviations larger
+        open_part *= lacking.left
     times = np.array([1.0, *(chi2.ppf(p, nu) / nu for p in EXPECTED_INTERVAL)])
+    lacks = np.array([1.0, *LAWS_MOVE]) * lost_part / size
     part = np.array([1.0, *STEPS_MOVE]) * inertial * steps / (1 + steps)
-    errors = 100 * np.sqrt(open_part * times + part**2)
+    errors = 100 * np.sqrt(open_part * times + part**2 + lacks**2)
     motions = (
         "motions over limits.q of the robot file at up to half of limits.qd"
         if limits_of(model)
-        else "motions over the range of this record at its speeds (the robot file has no limits)"
+        else "motions over the range of this record at its speeds (the robot file has no "
+        f"{missing_limits(model)})"
     )
     error, low, high = np.minimum(errors, LIMIT.LARGEST_EXPECTED).tolist()
     return Expected(error, low, high, motions)
+
+
+def has_prior(fit: Estimate) -> bool:
+    """Whether a fit uses the values of the robot file."""
+    return bool(dict(fit.details.get("options", {})).get("prior", "none") != "none")
+
+
+def determined_by(
+    model: GeneratedModel, system: System, least_squares: Estimate, prior: bool
+) -> tuple[Array, Array, Array]:
+    """Compute K, the parameters and their covariance V that rows determine, with or without values.
+
+    Without the values of the robot file (`prior`), K is the identity and the parameters are X, else
+    X = K chi and they are chi_V.
+    """
+    ratio = least_squares.sigma_corrected / least_squares.sigma
+    wider = np.fmax(ratio, 1.0) * np.sqrt(unseen_by_blocks(system.observation, least_squares))
+    if not prior:
+        V = np.outer(wider, wider) * least_squares.covariance
+        return np.eye(len(wider)), least_squares.X, V
+    physical = physical_model(model)
+    K, rows = physical.rows(least_squares.names), system.weighted
+    R = rows.R11 / (wider * (1.0 if system.known_variance else least_squares.sigma_rho))
+    return K, *with_values(physical, K, R, R @ least_squares.X)
+
+
+def undetermined(A: Array, V: Array) -> tuple[float, float]:
+    """Compute tr(A V A') and its degrees of freedom nu, for rows A of a regressor."""
+    M = A.T @ A @ V
+    trace = float(np.trace(M))
+    return max(trace, 0.0), max(trace**2 / float(np.sum(M * M.T)), 1.0)
+
+
+def unseen_error(result: Identification) -> float:
+    """Compute how far a part of the record may be off because the other parts do not tell, %.
+
+    The largest error that parameters from the other parts explain, in % of the torques of the part:
+    the upper limit of tr(W V W'), with W the rows of the part and V of the other parts, and the
+    error of the fit. It is inf if the other parts do not determine V.
+    """
+    observation, problem = result.observation, result.problem
+    most = 0.0
+    for rest, part in result.held_out_rows:
+        system = weighted_system(
+            observation.where(rest), "joint", problem.settings.estimate.columns
+        )
+        solution = system.solve()
+        if solution.rank < len(system.names):
+            return float("inf")
+        least_squares = assemble(system, solution)
+        K, _, V = determined_by(
+            result.model, system, least_squares, has_prior(result.model_estimate)
+        )
+        if not np.isfinite(V).all():
+            return float("inf")
+        at = [observation.names.index(name) for name in system.names]
+        spread, nu = undetermined(observation.W[np.ix_(part, at)] @ K, V)
+        upper = spread * chi2.ppf(EXPECTED_INTERVAL[1], nu) / nu
+        most = max(most, 100 * float(np.sqrt(upper) / np.linalg.norm(observation.Y[part])))
+    return float(np.hypot(most, result.model_estimate.relative_error))
+
+
+def lost(
+    lacking: Lacking,
+    states: tuple[Array, Array, Array],
+    D: Array,
+    X: Array,
+    model: GeneratedModel,
+    names: Sequence[str],
+) -> float:
+    """Compute ||D dX + F a|| in the states, with the laws that the model lacks.
+
+    D : shape (K, n, b), columns of the parameters X of the record.
+    """
+    q, qd, _ = states
+    left, load = D @ lacking.dX, D @ np.where(friction_columns(model, names), 0.0, X)
+    for law in lacking.laws:
+        left[:, law.j] += law.torque(q[:, law.j], qd[:, law.j], load[:, law.j])
+    return float(np.linalg.norm(left))
 
 
 def has_channels(model: GeneratedModel, records: Sequence[Prepared]) -> bool:
@@ -296,6 +394,13 @@ def limits_of(model: GeneratedModel) -> tuple[Array, Array] | None:
     span, speed = (np.asarray(limits.get(key, ()), dtype=float) for key in ("q", "qd"))
     known = span.shape == (n, 2) and speed.shape == (n,) and np.isfinite([*span.T, speed]).all()
     return (span, speed) if known else None
+
+
+def missing_limits(model: GeneratedModel) -> str:
+    """Name the limits that the robot file lacks: "limits", "limits.q" or "limits.qd"."""
+    limits = dict(getattr(model, "LIMITS", {}) or {})
+    lacking = [f"limits.{key}" for key in ("q", "qd") if not len(np.ravel(limits.get(key, ())))]
+    return lacking[0] if len(lacking) == 1 else "limits" if lacking else "finite limits"
 
 
 def reference_states(

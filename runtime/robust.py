@@ -168,9 +168,8 @@ def _fit_of_last_pass(start: Beginning, W: Array, fit: Robust) -> Fitted:
     A = np.column_stack(
         [W * rows[:, None] * bend, (observation.Y - W @ fit.X) * rows * fit.w / bend]
     )
-    blocks, bands = (
-        split_rows(A, groups) for groups in (observation.blocks(options.block), observation.bands())
-    )
+    blocks = split_rows(A, observation.blocks(options.block))
+    bands = (split_rows(A, groups) for groups in observation.bands(W @ fit.X))
     corrected = corrected_deviations(blocks, bands, np.zeros(b), fit.T / bend)
     shares = {
         label: float(np.mean(fit.w[observation.joint(j)] < DOWN_WEIGHTED))

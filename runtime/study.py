@@ -12,8 +12,8 @@ feature are in its folder: `settings.py`.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
-from dataclasses import field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,18 +23,25 @@ from pydantic_core import ArgsKwargs
 
 from runtime.core import study as chapter
 from runtime.core.model import GeneratedModel
+from runtime.core.record import Record
 from runtime.counts.settings import Signals
 from runtime.documents.files import settings_from_text, text_of
 from runtime.documents.yaml_text import yaml_text
 from runtime.excitation.settings import ExcitationSettings
 from runtime.ground.arrays import require_kind
-from runtime.ground.errors import InputError
+from runtime.ground.errors import InputError, first_line
 from runtime.ground.settings import Settings, structure, to_mapping
 from runtime.loop.settings import CestacSettings, Controller
+from runtime.mending.settings import Corrections
 from runtime.payload.settings import PayloadSettings
 from runtime.reading.datasets import DATASETS, dataset_study
 from runtime.reading.formats import endings, is_measured, read_table
-from runtime.reading.likely_columns import candidates, known_columns
+from runtime.reading.likely_columns import (
+    QUANTITIES,
+    candidates,
+    known_columns,
+    missing_joints,
+)
 from runtime.reading.records import read_records
 from runtime.reading.settings import (
     Records,
@@ -44,7 +51,9 @@ from runtime.reading.settings import (
     inherited,
     with_law,
 )
+from runtime.reading.units import likely_time_unit
 
+BEYOND = 2.0  # times the limits of the robot file: positions so large are no rad
 RARE_WRAPS = 0.05
 """Share of the steps between two samples that may be jumps of an angle by a full turn."""
 
@@ -76,6 +85,8 @@ class Study(chapter.Study, Recorded):
         Closed loop for simulation, IV and DIDIM.
     excitation : ExcitationSettings or None
         Search for an exciting motion.
+    robot : Corrections or None
+        Entries that replace those of the robot file.
     """
 
     signals: Signals = field(default_factory=Signals)
@@ -85,6 +96,7 @@ class Study(chapter.Study, Recorded):
     payload: PayloadSettings | None = None
     controller: Controller | None = None
     excitation: ExcitationSettings | None = None
+    robot: Corrections | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -173,46 +185,178 @@ def study_of(record: str | Path) -> tuple[Study, Path]:
     )
 
 
-def suggested(
-    study: Study, model: GeneratedModel, *, missing: bool = False
-) -> tuple[Study, list[str]]:
+@dataclass(frozen=True)
+class Suggestion:
+    """A study with the settings that its records need, as far as names and values show them.
+
+    Attributes
+    ----------
+    study : Study
+    sentences : tuple of str
+        One on each change, for a person to check.
+    unrecognised : mapping of str to str
+        What a person must fill in: a key of the study, and what is not recognised there, such as
+        "positions of joints 4 to 6". Empty: all records can be read.
+    candidates : mapping of str to tuple of str
+        Columns that may belong there, by key.
+    """
+
+    study: Study
+    sentences: tuple[str, ...] = ()
+    unrecognised: Mapping[str, str] = field(default_factory=dict)
+    candidates: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def text(self, destination: Path) -> str:
+        """Write study.yaml for a folder, with a line `# ?` for each setting to be filled in."""
+        text = study_text(self.study, destination, defaults=False)
+        for key, what in self.unrecognised.items():
+            listed = self.candidates.get(key, ())
+            text += f"# ? {key}: {what}{'; perhaps ' if listed else ''}{', '.join(listed)}\n"
+        return text
+
+
+def suggested(study: Study, model: GeneratedModel, *, missing: bool = False) -> Suggestion:
     """Correct the settings of a study until all its records can be read.
 
     An error in reading may name a remedy, which is then applied; angles that wrap at full turns are
-    unwrapped. Return the new study, and a sentence on each change. Remedies are guesses from names
-    and time stamps, so a person should check them.
+    unwrapped; time steps beyond `SLOWEST` are read in a smaller unit. Remedies are guesses from
+    names and time stamps, so a person should check them.
 
     missing : whether positions may be missing, as for a reader of counts.
 
     Raises
     ------
     InputError
-        An error that names no remedy, or whose remedy does not help.
+        A file that cannot be read at all.
     """
     sentences: list[str] = []
     while True:
         try:
-            read_records(study.record, model, missing=missing)
+            records = read_records(study.record, model, missing=missing)
         except InputError as e:
             text = f"{e}; suggested: record: {' '.join(yaml_text(e.remedy or {}).split())}"
             if not e.remedy or text in sentences:
-                raise
+                rest = _unfinished(study, model, sentences, e)
+                if rest.study == study or rest.unrecognised.keys() != {"record"}:
+                    return rest
+                sentences.append(f"{e}; suggested: the columns and units that the names show")
+                study = rest.study  # all is recognised: try again
+                continue
             sentences.append(text)
-            mapping = to_mapping(study)
-            for record in mapping["record"]:
-                for key, value in e.remedy.items():
-                    if isinstance(value, Mapping):
-                        value = {**(record[key] or {}), **value}
-                    record[key] = value
-            study = study_from_mapping(mapping)
-        else:
+            study = _with_settings(study, e.remedy)
+            continue
+        unit = likely_time_unit(records[0].t)
+        own = study.record[0]
+        if unit == "s" or own.units.t != "s" or own.rate is not None:
             break
+        sentences.append(
+            f"the time steps of {1 / records[0].rate:g} s are too long for seconds; "
+            f"suggested: record: {{units: {{t: {unit}}}}}"
+        )
+        study = _with_settings(study, {"units": {"t": unit}})
+    open_: dict[str, str] = {}
+    if beyond := _beyond_limits(study.record, records, model):
+        open_["record.units.q"] = beyond
+    if any(r.resample is not None and r.resample.method != "count" for r in study.record):
+        sentences.append(
+            f"the stamps are not uniform: positions and torques are interpolated at {records[0].rate:g} Hz; "
+            "if the samples are uniform and only their stamps are not, set record.resample.method: count"
+        )
     turns = [_starts_anew(one, model, missing) for one in study.record]
     if any(turns):
         sentences.append("positions start anew at full turns; suggested: record: {unwrap: true}")
         pairs = zip(study.record, turns, strict=True)
         study = replace(study, record=tuple(replace(r, unwrap=r.unwrap or t) for r, t in pairs))
-    return study, sentences
+    return Suggestion(study, tuple(sentences), open_)
+
+
+def _beyond_limits(
+    settings: Sequence[RecordSettings], records: Sequence[Record], model: GeneratedModel
+) -> str:
+    """Tell that no joint can be where the record has it, read as rad: degrees, or of motors.
+
+    The positions of every joint exceed the limits of the robot file more than `BEYOND` times; ""
+    otherwise.
+    """
+    limits = getattr(model, "LIMITS", {}).get("q", ())
+    if not limits or not all(limits) or any(one.units.q != "rad" for one in settings):
+        return ""
+    bounds = np.array([max(map(abs, limit)) for limit in limits])
+    reached = np.max([np.abs(record.q).max(axis=0) for record in records], axis=0)
+    if not np.all((bounds > 0) & (reached > BEYOND * bounds)):
+        return ""
+    return (
+        f"unit of the positions, which reach {reached.max():.3g} where the limits of the robot file "
+        f"are {bounds.max():.3g} rad (deg, or record.side: motor)"
+    )
+
+
+def _with_settings(study: Study, settings: Mapping[str, Any]) -> Study:
+    """Set keys of the section `record` in every record of a study."""
+    mapping = to_mapping(study)
+    for record in mapping["record"]:
+        for key, value in settings.items():
+            if isinstance(value, Mapping):
+                value = {**(record[key] or {}), **value}
+            record[key] = value
+    return study_from_mapping(mapping)
+
+
+def _unfinished(
+    study: Study, model: GeneratedModel, sentences: Sequence[str], error: InputError
+) -> Suggestion:
+    """Set what the column names of the first record show, and name the rest.
+
+    Raise `error` if the file has no columns that can be read.
+    """
+    own = study.record[0]
+    if not own.files:
+        raise error
+    try:
+        table = read_table(Path(own.files[0]), own.topic, own.decimal)
+    except InputError:
+        raise error from None
+    n = len(model.JOINTS)
+    labels = tuple(getattr(model, "LABELS", {}).values())
+    joints = labels if len(labels) == n else ("",) * n
+    open_: dict[str, str] = {}
+    if not own.columns.q or not own.columns.tau:
+        known = known_columns(table.columns, joints)
+        columns = {
+            key: names
+            for key, names in known.get("columns", {}).items()
+            if not getattr(own.columns, key)
+        }
+        if own.rate is not None:
+            columns.pop("t", None)
+        units = {key: unit for key, unit in known.get("units", {}).items() if key in columns}
+        study = _with_settings(study, {"columns": columns, "units": units})
+        for key, numbers in missing_joints(table.columns, joints, n).items():
+            if numbers and not getattr(own.columns, key):
+                of = "" if len(numbers) == n else f" of {_joints_text(numbers)}"
+                open_[f"record.columns.{key}"] = f"{QUANTITIES[key]}{of}"
+    timed = study.record[0].columns.t or {"t", "time"} & {*table.names}
+    if not timed and study.record[0].rate is None and table.joints is None:
+        open_["record.columns.t"] = "time, or the sampling rate in record.rate"
+    listed = candidates(table.columns, joints)
+    own = study.record[0]
+    taken = {own.columns.t, *own.columns.q, *own.columns.tau}
+    perhaps = {
+        f"record.columns.{key}": tuple(
+            [name for name in names or table.names if name not in taken][:8]
+        )
+        for key, names in listed.items()
+    }
+    if not open_:
+        open_["record"] = first_line(error)
+    return Suggestion(study, tuple(sentences), open_, perhaps)
+
+
+def _joints_text(numbers: Sequence[int]) -> str:
+    """Write joint numbers: "joint 2", "joints 4 to 6", "joints 1, 4"."""
+    if len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
+        return f"joints {numbers[0]} to {numbers[-1]}"
+    return f"joint{'s' if len(numbers) > 1 else ''} {', '.join(map(str, numbers))}"
 
 
 def _starts_anew(settings: RecordSettings, model: GeneratedModel, missing: bool) -> bool:
@@ -232,55 +376,37 @@ def _starts_anew(settings: RecordSettings, model: GeneratedModel, missing: bool)
     return bool(np.any(rare & (jumps > 5 * unwrapped.max(axis=0))))
 
 
-def draft(study: Study, model: GeneratedModel) -> str:
-    """Write a study file with gaps for the user to fill, from the column names of the first record.
-
-    `# ?` marks settings that the user must fill; candidates for a column follow the mark. The text
-    is "" if the file cannot be read.
-    """
-    settings = study.record[0]
-    if not settings.files:
-        return ""
-    try:
-        names = read_table(Path(settings.files[0]), settings.topic, settings.decimal).names
-    except InputError:
-        return ""
-    joints = tuple(getattr(model, "LABELS", {}).values())
-    known, open_ = known_columns(names, joints), candidates(names, joints)
-    columns = known.get("columns", {})
-    record = {"files": list(settings.files), **known}
-    if settings.decimal != ".":
-        record["decimal"] = settings.decimal
-    lines = [yaml_text({"symgen": 1, "record": record}).rstrip()]
-    for key, listed in open_.items():
-        if key not in columns:
-            lines.append(f"# ? record.columns.{key}: {', '.join(listed or names[:8])}")
-    return "\n".join([*lines, "# ? record: units, side (joint, motor), torque_constant"]) + "\n"
-
-
 def located(study: Study, folder: Path) -> Study:
     """Return a study whose file names are relative to the current folder instead of to `folder`."""
     return _with_files(study, lambda file: str(folder / file))
 
 
-def study_text(study: Study, destination: Path, *, defaults: bool = True) -> str:
+def study_text(
+    study: Study,
+    destination: Path,
+    *,
+    defaults: bool = True,
+    comments: Mapping[tuple[str | int, ...], str] | None = None,
+) -> str:
     """Write the text of study.yaml for the folder `destination`.
 
     File names are relative to that folder.
 
     defaults : True: every setting; False: only settings that differ from their default, and the
         units of each record.
+    comments : comments at the ends of lines, by the keys that lead to the line.
     """
     mapping = to_mapping(
         _with_files(study, lambda file: Path(os.path.relpath(file, destination)).as_posix())
     )
     if not defaults:
-        mapping = {"symgen": mapping["symgen"], **_differing(mapping, to_mapping(Study()))}
+        usual = to_mapping(Study(robot=study.robot and Corrections()))
+        mapping = {"symgen": mapping["symgen"], **_differing(mapping, usual)}
         usual = to_mapping(RecordSettings())
         mapping["record"] = [
             _differing(record, usual) | {"units": record["units"]} for record in mapping["record"]
         ]
-    return yaml_text(mapping)
+    return yaml_text(mapping, comments)
 
 
 def _differing(mapping: Mapping[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:

@@ -5,6 +5,7 @@
     symgen.certificate(base).valid                        # formulas proved, torques = Lagrange's
     symgen.apply("results", "arm.urdf").write("new.urdf") # identified values into your own file
     symgen.symbolic("tx40").inertia_matrix()              # any model as SymPy objects
+    symgen.corrected("arm.urdf", study)                   # the robot with the corrections of a study
     symgen.variants("arm.urdf")                           # module with the frame table as constants
 
 Names are imported when they are first used.
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from symgen.certify.requests import model
     from symgen.certify.variants import variants
     from symgen.description import Robot, load_robot, packaged_robots, parse_robot
+    from symgen.description.corrected import corrected
     from symgen.emit.generate import generate_module
     from symgen.regroup.reasons import Absorption, BaseDifference, absorptions, base_difference
     from symgen.regroup.regrouping import BaseParameter, Regrouping
@@ -43,6 +45,7 @@ __all__ = [
     "apply",
     "base_difference",
     "certificate",
+    "corrected",
     "generate_module",
     "load_robot",
     "model",
@@ -62,6 +65,7 @@ _HOME = {
         ("Absorption", "BaseDifference", "absorptions", "base_difference"), "symgen.regroup.reasons"
     ),
     "certificate": "symgen.certify.modules",
+    "corrected": "symgen.description.corrected",
     "model": "symgen.certify.requests",
     **dict.fromkeys(("SymbolicRobot", "symbolic"), "symgen.symbols.symbolic"),
     "Certificate": "symgen.certify.certificate",

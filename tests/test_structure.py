@@ -42,6 +42,7 @@ EDGES = {  # of runtime: a feature imports the ground, the core and itself; what
     "expected": {
         "counts": "the steps of an encoder are an error of predictions",
         "physical": "predictions are those of bodies that exist",
+        "unmodelled": "a torque that the model lacks is an error of predictions",
     },
     "friction": {"physical": "which base parameters are friction alone follows from the bodies"},
     "payload": {
@@ -57,6 +58,10 @@ EDGES = {  # of runtime: a feature imports the ground, the core and itself; what
         "loop": "the figure of a simulation is drawn from its samples",
     },
     "wrench": {"physical": "a wrench sees parameters of bodies that no joint torque depends on"},
+    "mending": {
+        "plausible": "causes are those of the check whether a study is right",
+        "reading": "messages of a second publisher are looked for in the record",
+    },
     "controller": {
         "loop": "the law of a controller has the settings of the loop that simulates it"
     },
@@ -91,6 +96,7 @@ ONLY_IN = {  # library: files and folders that may import it
         "runtime/reading/settings.py",
         "runtime/loop/",
         "runtime/excitation/",
+        "runtime/mending/",
         "runtime/study.py",
     ),
     "ruamel": ("symgen/description/", "symgen/cli/", "runtime/documents/yaml_text.py"),
@@ -105,7 +111,7 @@ ONLY_IN = {  # library: files and folders that may import it
     "pint": ("runtime/reading/units.py",),
     "mujoco": ("symgen/description/mjcf.py",),
     "polars": ("runtime/reading/parquet.py",),
-    "h5py": ("runtime/reading/mat.py",),
+    "h5py": ("runtime/reading/hdf5.py", "runtime/reading/mat.py"),
     "rosbags": ("runtime/reading/bags.py",),
     "clarabel": ("runtime/physical/semidefinite.py",),
     "array_api_compat": ("generated/",),

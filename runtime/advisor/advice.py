@@ -28,6 +28,8 @@ Array = np.ndarray
 
 LOWEST, HIGHEST = 0.03, 300.0  # %, of the axes of the figure
 LIMITS = (LIMIT.NEGLIGIBLE, LIMIT.BIASED)  # %e at which a step is sought
+POSES = "Not judged for poses at rest, which have no accelerations"
+"""What is said of the encoder where the records are poses."""
 ALL = "all"  # Label of the advice on all encoders alike
 
 
@@ -599,6 +601,8 @@ def answer(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer
     """
     if advice is None:
         ask = "ask with symgen report --encoder STEP, or symgen cestac --advise"
+        if steps == POSES:
+            return Answer("open", steps, "")
         if not steps:
             return Answer("open", "Not asked", ask)
         text = f"{steps}, which make {100 * share:.2g} % of the mean square of an acceleration"
@@ -643,6 +647,8 @@ class NoAdvice(Part):
 
     def checks(self) -> tuple[Check, ...]:
         """Return the check "Does the encoder resolve enough?" of the report, as a tuple."""
+        if self.result.problem.reader.at_rest:
+            return (answer(None, POSES),)
         simulated = self.result.problem.method.observe is not None
         return (answer(None, *(("", 0.0) if simulated else visible_steps(self.result))),)
 

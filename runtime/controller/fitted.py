@@ -445,7 +445,7 @@ def torque_of(record: Record, kd: Array, delay: float, saturation: Array) -> Arr
     """Compute the torque of the control law for a record, delayed by `delay` s, shape (N, n)."""
     tau = record.tau + kd * record.channels["law_v"] if np.any(kd) else record.tau
     cut = late(record.t, np.clip(tau, -saturation, saturation), np.nan_to_num(delay))
-    return np.clip(cut, -saturation, saturation)  # the spline may exceed the limit
+    return np.asarray(np.clip(cut, -saturation, saturation))  # the spline may exceed the limit
 
 
 def _apart(fit: Estimate, name: str) -> bool:

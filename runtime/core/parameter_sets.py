@@ -275,7 +275,7 @@ def held_out_validation(
         folds.append(cross_validation(problem, rest, {label: part}, choices, name=name))
     predictions = tuple(p for fold in folds for p in fold.predictions if not p.fitted)
     missing = tuple(text for fold in folds for text in fold.missing)
-    return CrossValidation(folds[0].joints, predictions, missing)
+    return CrossValidation(folds[0].joints, predictions, missing, folds=LIMIT.HELD_OUT_PARTS)
 
 
 def ranking_text(errors: Mapping[SetName, float], counts: Mapping[SetName, int], where: str) -> str:

@@ -178,7 +178,12 @@ def unseen_by_blocks(observation: Observation, fit: Estimate) -> float:
     joints = whiteness(direct_comparison(observation, fit), observation.rate)
     memory = [one.rows / one.effective_rows for one in joints]
     ratio = float(np.median(memory)) / observation.rate / (2 * observation.residual_block)
-    if not (np.isfinite(ratio) and ratio > 0):  # no residuals
+    return block_correlation(ratio)
+
+
+def block_correlation(ratio: float) -> float:
+    """Compute c of `unseen_by_blocks` from tau/L; 1 if there are no residuals."""
+    if not (np.isfinite(ratio) and ratio > 0):
         return 1.0
     return float(1 / (1 + ratio * np.expm1(-1 / ratio)))
 

@@ -17,7 +17,7 @@ from runtime.core.parameter_sets import SetDocument, SetName, Sets, ranking_text
 from runtime.core.problem import SIGNALS, Problem
 from runtime.core.provenance import record_names
 from runtime.core.record import UNNAMED, Record
-from runtime.core.rows.observation import Observation
+from runtime.core.rows.observation import Observation, halves
 from runtime.core.rows.prepared import Prepared
 from runtime.core.rows.selection import unused_joints
 from runtime.core.study import Study
@@ -251,12 +251,40 @@ class Identification:
         """
         return self.set_errors.get(self.model_columns, float("nan"))
 
+    @cached_property
+    def held_out_rows(self) -> tuple[tuple[Any, Any], ...]:
+        """Parts of the records that fits of other parts predict: rows of the fit and of the part.
+
+        Pairs of bool arrays of shape (r,); empty if separate records are predicted, or nothing is.
+        """
+        if not self.validation or self.by_records:
+            return ()
+        t, (first, *_) = self.observation.t, self.validation
+        if first.folds:
+            number = self.observation.equal_parts(first.folds)
+            return tuple((number != p, number == p) for p in np.unique(number))
+        windows = self.study.validate.split or halves(*self.observation.span)
+        inside = [
+            (t >= (-np.inf if a is None else a)) & (t <= (np.inf if b is None else b))
+            for a, b in windows
+        ]
+        return tuple((inside[0], part) for part in inside[1:])
+
+    @property
+    def unseen_error(self) -> float:
+        """Error on a part of the record that fits of other parts explain, %; nan if unknown."""
+        told = (part.unseen_error for part in self.parts)
+        return next((error for error in told if not np.isnan(error)), float("nan"))
+
     @property
     def negative(self) -> tuple[str, ...]:
         """Motor inertias and friction parameters that are certainly below zero.
 
-        They are taken from `model_estimate`.
+        They are taken from `model_estimate`. Sensors behind the gears measure neither, and are not
+        judged.
         """
+        if any(record.sides[1] == "link" for record in self.records):
+            return ()
         return negative_elements(self.model, self.model_estimate)
 
     @property
@@ -396,11 +424,19 @@ class Identification:
         )
         head = (
             f"{len(names)} of {len(self.estimate.names)} parameters ({self.model_columns}) by "
-            f"{fit.method}, +- 95 %"
+            f"{fit.method}, +- 95 %{self.of_intervals}"
         )
         head += f"; {more} more by --verbose" if more else ""
         head += f"; {unknown} smaller than their intervals by --verbose" if unknown else ""
         return "\n".join([head, *lines[:room], f"Unexplained by joint: {by_joint}"])
+
+    @property
+    def of_intervals(self) -> str:
+        """Words after "95 %": the condition of the intervals of an essential set, or their measure."""
+        known = self.problem.method.intervals
+        if self.model_columns == "essential":
+            return " if the others are zero"
+        return f", {known}" if known else ""
 
     def _lines(self, names: Sequence[str]) -> list[str]:
         """Write parameters with 95 % intervals and units, several parameters per line."""

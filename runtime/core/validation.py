@@ -116,13 +116,15 @@ class CrossValidation(Result):
     """Relative torque errors of every set of parameters on every part of the data.
 
     missing : sentences on the sets that could not be fitted. further : whether the predicted parts
-    are separate records.
+    are separate records. folds : number of equal parts of which each is predicted from the others;
+    0 if windows or records are predicted.
     """
 
     joints: tuple[str, ...]
     predictions: tuple[Prediction, ...]
     missing: tuple[str, ...] = ()
     further: bool = False
+    folds: int = 0
 
     def errors(self) -> dict[str, float]:
         """Return the relative error, %, of torques that each set of parameters predicts.

@@ -66,11 +66,15 @@ def yaml_values(text: str, *, file: str) -> tuple[Any, dict[Path, int]]:
         raise SettingsError(f"not YAML: {first_line(e)}", file=file) from None
 
 
-def yaml_text(mapping: Mapping[str, Any]) -> str:
+def yaml_text(mapping: Mapping[str, Any], comments: Mapping[Path, str] | None = None) -> str:
     """Write a mapping of plain values as YAML, with keys in their order.
 
     Lists of numbers are on one line.
+
+    comments : comment at the end of the line that has the key of each path.
     """
+    if comments:
+        return _commented(yaml_text(mapping), comments)
     yaml = _yaml()
     yaml.default_flow_style = None
     yaml.sort_base_mapping_type_on_output = False
@@ -78,6 +82,22 @@ def yaml_text(mapping: Mapping[str, Any]) -> str:
     stream = StringIO()
     yaml.dump(mapping, stream)
     return stream.getvalue()
+
+
+def _commented(text: str, comments: Mapping[Path, str]) -> str:
+    """Add comments at the ends of the lines of a YAML text, each at the line of its path.
+
+    A key whose line was joined to that of a mapping, {t: s, q: rad}, has its comment there.
+    """
+    _, numbers = yaml_values(text, file="study")
+    lines = text.split("\n")
+    told: dict[int, list[str]] = {}
+    for path, comment in comments.items():
+        places = (path[:k] for k in range(len(path), -1, -1) if path[:k] in numbers)
+        told.setdefault(numbers[next(places)] - 1, []).append(" ".join(comment.split()))
+    for number, said in told.items():
+        lines[number] += f"  # {'; '.join(said)}"
+    return "\n".join(lines)
 
 
 def _yaml() -> Any:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,9 @@ JITTER = 0.1  # sampling periods that stamps may be off the uniform grid where n
 SHOWN = 5e-5  # periods; a smaller jitter is not printed
 RATE_TOLERANCE = 1e-3
 """Between a stated rate and that of the stamps, beyond what the jitter of the two ends makes."""
+ROUNDED = 1e-3  # units; stamps so near to multiples of a decimal unit are rounded to it
+SHORTEST = 100  # samples of a piece whose rate is counted
+WHOLE = 0.9  # share of the samples that these pieces must have
 BRIDGED = 0.02  # s
 BRIDGED_PERIODS = 10.0
 """Gaps up to the longer of the two are bridged: by the bound 5 (w h)^4/384 of `resampled` a spline over 10 ms is right to 2e-3 at 10 Hz."""
@@ -100,8 +104,20 @@ def rate_of(stamps: Stamps, t: Array) -> float:
         regularity = time_stamps(t, file=stamps.file)
         message += f". In all: {regularity.to_text(stamps.row)}"
         if not regularity.regular or regularity.jitter > stamps.jitter:
+            counted = None if stamps.column is None else counted_rate(t)
             resample = remedy(regularity)
-            message += f". {remedy_text(t, regularity, arrays=stamps.column is None)}"
+            if counted is None:
+                message += f". {remedy_text(t, regularity, arrays=stamps.column is None)}"
+            else:
+                split = {"gaps": "split"} if regularity.gaps or regularity.resets else {}
+                resample = {**split, "method": "count", "rate": counted}
+                written = ", ".join(
+                    f"{key}: {value:g}" if key == "rate" else f"{key}: {value}"
+                    for key, value in resample.items()
+                )
+                off = regularity.repeats or regularity.jitter > stamps.jitter
+                rounded = f", with stamps rounded to {resolution(t):g} s" if off else ""
+                message += f". The samples are uniform at {counted:g} Hz{rounded}. Remedy: record.resample: {{{written}}}, which uses the samples as they are"
     raise InputError(
         message,
         file=stamps.file,
@@ -109,6 +125,48 @@ def rate_of(stamps: Stamps, t: Array) -> float:
         row=None if place is None else stamps.row(place),
         remedy=None if resample is None or stamps.column is None else {"resample": resample},
     )
+
+
+def resolution(t: Array) -> float:
+    """Return the coarsest decimal unit, 1 s ... 1e-6 s, of which all steps of t are multiples.
+
+    It is 0 if there is none: the stamps are not rounded.
+    """
+    for k in range(7):
+        multiples = (t - t[0]) * 10.0**k
+        if np.abs(multiples - np.round(multiples)).max() < ROUNDED:
+            return float(10.0**-k)
+    return 0.0
+
+
+def counted_rate(t: Array) -> float | None:
+    """Find the rate, Hz, of uniform samples whose stamps were rounded, or start anew; else None.
+
+        t_k = t_0 + k / rate + e_k,   |e_k| up to the resolution of the stamps, in each piece
+                                      between gaps and steps back
+
+    The rate is that of the least squares over all pieces, taken as a whole number of Hz where the
+    rounding of the stamps does not tell them apart. Nine tenths of the samples must be in pieces.
+    """
+    step = np.diff(t)
+    u, period = resolution(t), float(np.median(step[step > 0]))
+    cuts = [0, *(np.flatnonzero((step < 0) | (step > GAP * period * (1 + DIGITS))) + 1), len(t)]
+    pieces = [
+        (np.arange(b - a) - (b - a - 1) / 2, t[a:b] - t[a:b].mean())
+        for a, b in pairwise(cuts)
+        if b - a >= SHORTEST
+    ]
+    if sum(len(k) for k, _ in pieces) < WHOLE * len(t):
+        return None
+    square = sum(float(k @ k) for k, _ in pieces)
+    T = sum(float(k @ x) for k, x in pieces) / square
+    off = max(np.abs(x - T * k).max() for k, x in pieces)
+    if T <= 0 or off > max(u * (1 + DIGITS), JITTER * T):
+        return None
+    rate = 1 / T
+    uncertain = rate * max(u, JITTER * T) / max(float(np.ptp(x)) for _, x in pieces)
+    near = round(rate)
+    return float(near) if abs(near - rate) <= uncertain else float(f"{rate:.6g}")
 
 
 def remedy(stamps: TimeStamps) -> dict[str, Any]:

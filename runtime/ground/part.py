@@ -96,6 +96,11 @@ class Part:
         return float("nan")
 
     @property
+    def unseen_error(self) -> float:
+        """Error on a part of the record that fits of other parts explain, %; nan if unknown."""
+        return float("nan")
+
+    @property
     def records_differ(self) -> bool:
         """Whether the parameters of the records differ as if the robot had changed."""
         return False

@@ -266,7 +266,7 @@ def _alone(
             observation.t[rows],
             observation.record[rows],
             observation.rate,
-            speed=None if observation.speed is None else observation.speed[rows],
+            motion=None if observation.motion is None else observation.motion[rows],
         )
         factored = ordinary(of_joint, EstimateSettings(), LinearOptions())
         fit = assemble(factored, factored.solve())

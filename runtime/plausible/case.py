@@ -248,7 +248,13 @@ class Case:
         baseline = self.baseline or self._baseline(values=True)
         if not baseline.bodies.near_values:
             return None
-        return known_values(baseline, rotors=self.sides[1] != "link")
+        known = known_values(baseline, rotors=self.sides[1] != "link")
+        return known.without_inertia() if known and self.coarse else known
+
+    @property
+    def coarse(self) -> bool:
+        """Whether noise of the positions hides the accelerations, as steps of coarse encoders do."""
+        return bool(self.noise_floor > LIMIT.COARSE)
 
     @cached_property
     def noise_floor(self) -> float:

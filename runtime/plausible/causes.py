@@ -1132,6 +1132,20 @@ NUMBERS = (
         factor_words,
     ),
     Row(
+        "ratio",
+        joints,
+        "the gear ratio of joint {joint} is not the stated one: its position must be multiplied "
+        "by {factor}, its torque divided by it",
+        "check the gear ratio of joint {joint} (drives.ratio)",
+        lambda robot, item, xi: (
+            robot.positions(np.diag(robot.one(item["j"], np.exp(xi))))
+            | robot.torques(np.diag(robot.one(item["j"], np.exp(-xi))))
+        ),
+        "the gear ratio of joint {joint}",
+        1.2,
+        factor_words,
+    ),
+    Row(
         "offset",
         joints,
         "the torque of joint {joint} has a constant error of {offset}",

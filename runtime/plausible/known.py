@@ -7,6 +7,9 @@ by least squares for each joint: a_j = b_j = 1 if values, gear and sign are righ
 and dry friction are fitted whether the robot file has them or not, unless sensors behind the gears
 measure the torques. A part is left out if it is small or cannot be separated.
 
+Of a slide whose gravity force is constant, the offset of friction is left out instead, so that a_j
+is the ratio of the weights. No record shows a factor of this force: the mass hides it.
+
 A second question: are the measured torques really torques? Motor currents change in time as the
 computed torques do, but have another size.
 
@@ -21,12 +24,12 @@ gear. Drivers of some arms publish motor currents as effort.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from runtime.core.model import GeneratedModel, elements_of, is_axis, joint_labels
+from runtime.core.model import GeneratedModel, elements_of, is_axis, joint_labels, joint_units
 from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
 from runtime.ground.documents import Result
@@ -57,6 +60,8 @@ class KnownValues(Result):
         Relative error of the computed torque, with friction fitted and both ratios 1.
     complete : bool
         Whether every link has its ten values.
+    weight : ndarray, shape (n,)
+        Ratio of measured to computed weight of slides with a constant gravity force, else nan.
     """
 
     joints: tuple[str, ...]
@@ -64,6 +69,12 @@ class KnownValues(Result):
     inertia: Array
     error: Array
     complete: bool
+    weight: Array
+
+    def without_inertia(self) -> KnownValues:
+        """Leave out what needs accelerations: the ratios of inertia torques, and the errors."""
+        unknown = np.full(len(self.joints), np.nan)
+        return replace(self, inertia=unknown, error=unknown)
 
     def table(self) -> Table:
         """Tabulate, by joint, the ratios of measured to computed torque, and the relative error.
@@ -80,6 +91,14 @@ class KnownValues(Result):
                 "error of the values, %",
             ),
             [(j, number(g, ".2f"), number(a, ".2f"), number(e, ".1f")) for j, g, a, e in rows],
+        )
+
+    @property
+    def other_weights(self) -> Array:
+        """Whether the weight on each slide is far from that of the values, bool (n,)."""
+        low, high = LIMIT.WEIGHT_RATIOS
+        return np.asarray(
+            np.isfinite(self.weight) & ~((low <= self.weight) & (self.weight <= high))
         )
 
     @property
@@ -165,7 +184,8 @@ def known_values(baseline: Baseline, *, rotors: bool = True) -> KnownValues | No
         for k, name in enumerate(physical.standard)
         if elements_of(baseline.model).get(name, ("inertia",))[0] != "inertia"
     ]
-    ratios, errors = np.full((s.n, 2), np.nan), np.full(s.n, np.nan)
+    ratios, errors, weight = np.full((s.n, 2), np.nan), np.full(s.n, np.nan), np.full(s.n, np.nan)
+    slides = np.array(joint_units(baseline.model)) != "rad"
     for j in range(s.n):
         rows = mask[:, j] if mask[:, j].sum() >= 20 else np.ones(len(Y), dtype=bool)
         y = Y[rows, j]
@@ -176,6 +196,10 @@ def known_values(baseline: Baseline, *, rotors: bool = True) -> KnownValues | No
             v = s.qd[rows, j]
             friction = np.column_stack([friction, v, np.sign(v)])
         parts = np.column_stack([gravity[rows, j], (whole - gravity)[rows, j]])
+        force = parts[:, 0].mean()
+        if slides[j] and abs(force) > max(1e6 * np.ptp(parts[:, 0]), abs(y.mean()) / 10, 1e-9):
+            moving = np.column_stack([parts, s.qd[rows, j], np.sign(s.qd[rows, j])])
+            weight[j] = np.linalg.lstsq(moving, y, rcond=None)[0][0]
         left = parts - friction @ np.linalg.lstsq(friction, parts, rcond=None)[0]
         rest = y - friction @ np.linalg.lstsq(friction, y, rcond=None)[0]
         size = np.linalg.norm(left, axis=0)
@@ -186,7 +210,7 @@ def known_values(baseline: Baseline, *, rotors: bool = True) -> KnownValues | No
         if shown.any() and (shown.sum() == 1 or abs(left[:, 0] @ left[:, 1]) < 0.9 * size.prod()):
             ratios[j, shown] = np.linalg.lstsq(left[:, shown], rest, rcond=None)[0]
     joints = joint_labels(baseline.model)
-    return KnownValues(joints, ratios[:, 0], ratios[:, 1], errors, all(given))
+    return KnownValues(joints, ratios[:, 0], ratios[:, 1], errors, all(given), weight)
 
 
 def torque_unit(result: Identification) -> Doubt | None:

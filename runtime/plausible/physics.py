@@ -42,7 +42,8 @@ def not_asked(case: Case) -> Answer | None:
 @Question(
     "Can a physical robot explain the record?",
     "about the same error",
-    "a sign, an axis, a length or the order of the columns is wrong: see the alternatives below",
+    "a sign, an axis, a length or the order of the columns is wrong: check them in the robot file "
+    "and in record.columns",
 )
 def physics(case: Case) -> Answer | None:
     """Compare, for each joint, the torque error of a physical robot with that of free parameters.
@@ -163,7 +164,18 @@ def values(case: Case) -> Answer | None:
         )
     if off := case.robot_values.off:
         return Answer("doubtful", f"No: {'; '.join(off[:4])}")
+    if (other := case.robot_values.other_weights).any():
+        ratio = case.robot_values.weight[other][0]
+        return Answer(
+            "doubtful",
+            f"The weight on the slide of joint {case.joints(other)} is {ratio:.2g} times that of the "
+            "values; no record shows a factor of this force, because the mass hides it",
+            "check torque constant, ratio and unit of this joint, and the number of its motors; or "
+            "correct the masses of the robot file",
+        )
     ratios = [x for x in (*case.robot_values.gravity, *case.robot_values.inertia) if np.isfinite(x)]
+    if not ratios and case.coarse:
+        return Answer("open", "The positions are too coarse to judge inertia torques", "")
     if not ratios:
         return Answer(
             "good", "Gravity and inertia torques are too small compared with friction to judge"

@@ -217,7 +217,7 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
         )
     at("plausibility of the record")
     first = times(problem.records)
-    case = _case(problem, variants)
+    case = case_of(problem, variants)
     if isinstance(case, Check):
         return Plausibility((first, case))
     answers = {check: check(case) for check in CHECKS}
@@ -270,7 +270,7 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
     )
 
 
-def _case(problem: Problem, variants: GeneratedModel | None) -> Case | Check:
+def case_of(problem: Problem, variants: GeneratedModel | None) -> Case | Check:
     """Prepare the data for the checks; if this is impossible, return a Check with the reason."""
     model, study = problem.model, problem.settings
     own = [part for reading in problem.prepared for part in excerpts(reading)]

@@ -245,6 +245,23 @@ class Baseline:
             score += fit_of(self.standard(other), fit.X, self.N / 2, fit.penalty / 2).score
         return score
 
+    def held_out(self, cause: Cause) -> Array:
+        """Correct one possible error, and predict each half of the time by a fit of the other, %.
+
+        Returns the relative torque error of each joint, shape (n,); inf without a regressor.
+        """
+        rows = self.rows(cause)
+        if rows is None:
+            return np.full(self.samples.n, np.inf)
+        D, Y, mask = rows
+        second = (np.arange(len(Y)) >= len(Y) // 2)[:, None]
+        parts = [Grams.of(D, Y, mask & half, self.tau) for half in (~second, second)]
+        squares = [
+            fit_of(self.standard(other), self.fit(part).X, self.N / 2).errors ** 2
+            for part, other in (parts, parts[::-1])
+        ]
+        return np.asarray(np.sqrt(np.mean(squares, axis=0)))
+
     def beyond(self, V: Array) -> float:
         """Compute the largest share, of m given sets of torques, that no parameter values can
         explain.
@@ -447,7 +464,7 @@ def try_causes(
     trials = [*_of_causes(baseline, causes(robot)), *_of_numbers(baseline, robot)]
     priced = [
         replace(trial, gain=trial.gain - LIMIT.RATE_GAIN)
-        if trial.cause.kind in ("rate", "coupling", "offset", "scale")
+        if trial.cause.kind in ("rate", "coupling", "offset", "scale", "ratio")
         else trial
         for trial in trials
     ]
@@ -518,13 +535,13 @@ def _of_numbers(baseline: Baseline, robot: Robot) -> list[Trial]:
                 steps.append((gain, xi, row, change))
     steps.sort(key=lambda item: -item[0])
     for _, xi, row, number in steps[: LIMIT.NUMBERS_SEARCHED]:
-        trial = _search_number(baseline, row, number, xi)
+        trial = search_number(baseline, row, number, xi)
         if trial is not None:
             trials.append(trial)
     return trials
 
 
-def _search_number(baseline: Baseline, row: Row, change: Change, first: float) -> Trial | None:
+def search_number(baseline: Baseline, row: Row, change: Change, first: float) -> Trial | None:
     """Search the size xi of one possible error, such as a torque factor, that fits the record best.
 
     None if no size improves the fit enough. A few sizes are tried with the joint weights of the
@@ -588,8 +605,9 @@ def decisive(
 ) -> list[Trial]:
     """Select the corrections that explain the record decisively better than the study as given.
 
-    They must also predict better the rows that were not fitted. The best trial is first, then those
-    with a similar gain.
+    They must also predict better the rows that were not fitted, and lower the error of a joint in a
+    half of the record that was not fitted, unless they only bring the bodies nearer to the values.
+    The best trial is first, then those with a similar gain.
 
     floor : error of a joint, %, that noise of the positions alone may cause. A smaller error is no
         evidence for a cause. Nor is the distance from the robot file's values, if the floor is
@@ -599,7 +617,7 @@ def decisive(
         if its bodies differ from those of the file, for instance because a unit makes torques
         small.
     """
-    given, better = baseline.given, []
+    given, better, closer = baseline.given, [], set()
     for trial in trials:
         if trial.fit is not None and trial.gain >= LIMIT.DECISIVE:
             slower = trial.cause.kind == "rate"  # small accelerations undo what noise makes
@@ -617,6 +635,7 @@ def decisive(
             lost = trial.fit.errors - given.errors > LIMIT.LOST
             if (visible or nearer) and not lost.any():
                 better.append(trial)
+                closer |= {id(trial)} if nearer else set()
     if not better:
         return []
     least = (1 - LIMIT.GAIN_ALIKE) * better[0].gain
@@ -627,6 +646,7 @@ def decisive(
         for trial in alike[: LIMIT.ALTERNATIVES_NAMED]
         if before - baseline.unseen(trial.cause) > np.log(len(trials))
         and (other is None or helps(trial, baseline, other))
+        and (id(trial) in closer or falls(baseline, trial, alone))
     ]
     if named:  # of those that gain the same, a sign changes least
         same = LIMIT.GAIN_SAME * named[0].gain
@@ -642,8 +662,24 @@ def takes_away(given: Fit, fit: Fit) -> Array:
     """Whether the torque error of each joint is clearly smaller in `fit` than in `given`, bool
     (n,).
     """
-    ratio = given.errors / fit.errors.clip(0.1)
-    return np.asarray((ratio > LIMIT.VISIBLE) & (given.errors - fit.errors > 0.2))
+    return clearly_smaller(given.errors, fit.errors)
+
+
+def clearly_smaller(before: Array, after: Array) -> Array:
+    """Whether the error of each joint is clearly smaller after a correction, bool (n,); errors in %."""
+    return np.asarray((before / after.clip(0.1) > LIMIT.VISIBLE) & (before - after > 0.2))
+
+
+def falls(baseline: Baseline, trial: Trial, alone: Baseline | None) -> bool:
+    """Whether a correction clearly lowers the error of a joint in a half that it was not fitted to.
+
+    Bodies that differ from those of the file must do so without its values (`alone`).
+    """
+    assert trial.fit is not None
+    judge = alone if alone is not None and leaves_values(trial.fit, baseline) else baseline
+    causes = (unchanged_study(judge.samples.n), trial.cause)
+    before, after = (judge.held_out(cause) for cause in causes)
+    return bool(clearly_smaller(before, after).any())
 
 
 def leaves_values(fit: Fit, baseline: Baseline) -> bool:

@@ -18,8 +18,9 @@ from runtime.ground.errors import InputError
 from runtime.reading.likely_columns import likely_columns
 from runtime.reading.settings import BY_NAME, NONE, Columns, RecordSettings
 from runtime.reading.table import Array, Table
-from runtime.reading.units import COMMANDS, position_unit, torque_unit
+from runtime.reading.units import COMMANDS, likely_time_unit, position_unit, torque_unit
 
+TIMES = ("t", "time")  # names of a time that the settings do not name
 WORDS = {
     "q": ("q", "pos", "position"),
     "tau": ("tau", "torque", "effort"),
@@ -36,7 +37,7 @@ def column_names(
 ) -> Columns:
     """Find the names of the columns of a record: those in the settings, or else default names.
 
-    Default names are t, q1 ... qn, tau1 ... taun; in a bag, the joints of its messages.
+    Default names are t or time, q1 ... qn, tau1 ... taun; in a bag, the joints of its messages.
 
     Parameters
     ----------
@@ -50,8 +51,10 @@ def column_names(
     """
     given = settings.columns
     t = given.t
-    if t is None and settings.rate is None and "t" in first.names:
-        t = "t"
+    if t is None and settings.rate is None:
+        t = next((name for name in TIMES if name in first.names), None)
+        if t == "time" and settings.units.t == "s":
+            _require_seconds(first, t)
     q_ref: tuple[str, ...] = ()
     if given.q_ref:
         q_ref = _meant(first, "qr", "", given.q_ref, joints)
@@ -84,6 +87,18 @@ def column_names(
             f"{first.file} contains the torques and {last.file} the positions; in record.files, list the file of positions first"
         )
     return replace(given, t=t, q=q, tau=_of_motors(tau, motors), q_ref=q_ref)
+
+
+def _require_seconds(table: Table, name: str) -> None:
+    """Raise InputError if the steps of a time that the settings do not name are no seconds."""
+    unit = likely_time_unit(table.columns[name])
+    if unit != "s":
+        raise InputError(
+            f"the steps of this time are too long for seconds; set record.units.t: {unit}, or {name} in record.columns.t if they are seconds",
+            file=table.file,
+            column=name,
+            remedy={"columns": {"t": name}, "units": {"t": unit}},
+        )
 
 
 def _of_motors(names: tuple[str, ...], motors: Sequence[bool]) -> tuple[str, ...]:
@@ -129,7 +144,7 @@ def _numbered(quantity: str, table: Table, joints: Sequence[str]) -> tuple[str, 
         raise InputError(
             f"no columns {quantity}1, {quantity}2 ... among {', '.join(table.names)}; give the column names in a study file, record.columns.{quantity}",
             file=table.file,
-            remedy=likely_columns(table.names, joints),
+            remedy=likely_columns(table.columns, joints),
         )
     return tuple(name for _, name in numbered)
 

@@ -9,6 +9,8 @@ from pathlib import Path
 from runtime.ground.errors import InputError
 from runtime.reading.bags import digest_of, read_bag
 from runtime.reading.files import sha256_of
+from runtime.reading.hdf5 import read_hdf5
+from runtime.reading.json_lines import read_json_lines
 from runtime.reading.mat import read_mat
 from runtime.reading.numpy_files import read_npy, read_npz
 from runtime.reading.parquet import read_parquet
@@ -51,6 +53,8 @@ FORMATS = [
     Format("a file of one plain array", (".npy",), read_npy),
     Format("an archive of plain arrays", (".npz",), read_npz),
     Format("a Parquet file", (".parquet",), read_parquet, TABLES),
+    Format("an HDF5 file", (".h5", ".hdf5"), read_hdf5, TABLES),
+    Format("a file of JSON lines", (".jsonl", ".ndjson"), read_json_lines),
     Format("a MATLAB file", (".mat",), read_mat, TABLES),
     Format("a whole bag", (".bag", ".mcap", ".db3"), read_bag, BAGS, False, digest_of),
 ]

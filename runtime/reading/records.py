@@ -27,6 +27,7 @@ from runtime.ground.limits import LIMIT
 from runtime.reading.columns import Conversion, column_names, conversion, require_alike
 from runtime.reading.datasets import fetch
 from runtime.reading.formats import endings, read_table
+from runtime.reading.late_torques import delays_of, inside, on_time
 from runtime.reading.resampling import Stretch, resampled
 from runtime.reading.settings import NONE, Columns, RecordSettings, each_record
 from runtime.reading.table import Array, Table
@@ -118,9 +119,12 @@ def _pieces(
     )
     keys = [key for key in samples if key != "t"]
     pieces = len(stretches)
+    delay = delays_of(settings.delay, n)
     records = []
     for k, stretch in enumerate(stretches, start=1):
         piece = dict(zip(keys, stretch.signals, strict=True))
+        if delay is not None:
+            stretch, piece = _without_delay(stretch, piece, delay)
         if law is not None:
             piece = law.signals(stretch.t, piece, rate)
         channels = (*JOINT_CHANNELS, *columns.further, "law_v")
@@ -137,6 +141,29 @@ def _pieces(
         )
         records.append(record)
     return records
+
+
+def _without_delay(
+    stretch: Stretch, piece: Mapping[str, Array], delay: Array
+) -> tuple[Stretch, dict[str, Array]]:
+    """Shift the measured torques of one record to the instants of the positions."""
+    kept = inside(stretch.t, delay)
+    late = {key: on_time(stretch.t, piece[key], delay) for key in ("tau", "tau_ff") if key in piece}
+    shifted = {key: x[kept] for key, x in {**piece, **late}.items()}
+    return Stretch(stretch.t[kept], tuple(shifted.values())), shifted
+
+
+def columns_read(
+    settings: RecordSettings, model: GeneratedModel, folder: str | Path | None = None
+) -> Columns:
+    """Find the names of the columns that are read of the files of a record."""
+    tables = [
+        read_table(path, settings.topic, settings.decimal)
+        for path in record_files(settings, Path(folder or ""))
+    ]
+    first, last, _ = _places(settings, tables)
+    motors = [bool(x) for x in getattr(model, "LIMITS", {}).get("tau", ())]
+    return column_names(settings, first, last, _names_of(model), motors)
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from runtime.ground.arrays import real
-from runtime.ground.clock import GAP, TimeStamps, remedy_text, time_stamps
+from runtime.ground.clock import GAP, TimeStamps, remedy_text, resolution, time_stamps
 from runtime.ground.errors import InputError
 from runtime.ground.limits import LIMIT
 from runtime.ground.settings import structure
@@ -190,7 +190,7 @@ def _counted(t: Array, signals: Sequence[Array], rate: float, file: str) -> Stre
     """
     N = len(t)
     last = float(t[-1] - t[0])
-    if abs(last * rate - (N - 1)) > 1 + DRIFT * N:
+    if abs(last * rate - (N - 1)) > 1 + DRIFT * N + resolution(t) * rate:
         raise InputError(
             f"the {N} samples after t = {t[0]:g} s last {(N - 1) / rate:.6g} s at the rate "
             f"{rate:.6g} Hz, but {last:.6g} s by their time stamps: the rate is different, or "

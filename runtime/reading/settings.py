@@ -242,6 +242,8 @@ class RecordSettings(Settings):
         in A or V, and all values are in this unit.
     coupling : str
         Use the off-diagonal part of R for both, for position or torque alone, or for none.
+    delay : float or tuple of float, s
+        Time by which the torques are late against the positions; they are read so much later.
     jitter : float, sampling periods
         Largest difference of the time column from a uniform grid.
     dataset : str or None
@@ -279,6 +281,7 @@ class RecordSettings(Settings):
     counts_per_revolution: PerJoint[Real] | None = None
     torque_constant: PerJoint[Real] | Literal["none"] | None = None
     coupling: Literal["both", "position", "torque", "none"] = "both"
+    delay: PerJoint[Real] = 0.0
     jitter: Annotated[Positive, Field(lt=0.5)] = 0.1
     dataset: Text | None = None
     name: Text | None = None

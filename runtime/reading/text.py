@@ -1,7 +1,8 @@
 """Reading of text files with columns of numbers.
 
 Columns are separated by commas, semicolons, tabs or blanks. There is one header line or none, and
-`#` starts a comment. Decimals have a point, or a comma if the settings say so.
+`#` starts a comment. Decimals have a point, or a comma if the settings say so. The text is UTF-8, or
+UTF-16 if it starts with the bytes ff fe or fe ff.
 
 NumPy parses a file whose fields are all numbers. Other files are read field by field: a column with
 other texts raises an error only if it is used, with the first line of such a text.
@@ -26,6 +27,18 @@ from runtime.reading.table import WIDEST, Array, Options, Table
 
 CLOCK = re.compile(r"\d:\d\d|\d{4}-\d\d-\d\d")  # a time of day, a date
 UTF8 = "save it so (Excel: CSV UTF-8; elsewhere: iconv -f CP1252 -t UTF-8)"
+SIGNATURES = {  # first bytes of files that are no text
+    b"\x89PNG": "a picture (PNG), not a table",
+    b"\xff\xd8\xff": "a picture (JPEG), not a table",
+    b"GIF8": "a picture (GIF), not a table",
+    b"%PDF": "a PDF, not a table",
+    b"PK\x03\x04": "an Excel workbook or another zip archive; save the sheet as CSV UTF-8",
+    b"\xd0\xcf\x11\xe0": "an Excel workbook; save the sheet as CSV UTF-8",
+    b"\x89HDF": "an HDF5 file; give its name the ending .hdf5",
+    b"PAR1": "a Parquet file; give its name the ending .parquet",
+    b"SQLite format 3": "a database, perhaps a bag of ROS 2; give its name the ending .db3",
+}
+UTF16 = (b"\xff\xfe", b"\xfe\xff")  # first bytes of a text in UTF-16
 BLOCK = 2**18  # characters read at a time, and the rest of their last line
 Lines = Iterator[tuple[int, str]]  # number of a line, from 1, and what stands there
 
@@ -78,7 +91,8 @@ def _lines(path: Path) -> Lines:
     """Yield the lines of a text file that are neither empty nor comments, with their numbers."""
     number = 0
     try:
-        with opened(path) as stream, TextIOWrapper(stream, encoding="utf-8-sig") as text:
+        encoding = _encoding(path)
+        with opened(path) as stream, TextIOWrapper(stream, encoding=encoding) as text:
             while block := text.read(BLOCK) + text.readline():
                 lines = enumerate(block.removesuffix("\n").split("\n"), number + 1)
                 for number, line in lines:
@@ -88,8 +102,25 @@ def _lines(path: Path) -> Lines:
         raise _not_utf8(path) from None
 
 
+def _encoding(path: Path) -> str:
+    """Return the encoding of a text file: UTF-16 if it starts so, else UTF-8.
+
+    Raise InputError for a file whose first bytes are those of another kind of file.
+    """
+    with opened(path) as stream:
+        head = stream.read(16)
+    for first, what in SIGNATURES.items():
+        if head.startswith(first):
+            shown = head[:4].hex(" ")
+            raise InputError(f"not a text file: the first bytes, {shown}, are those of {what}", file=path.name)  # fmt: skip
+    return "utf-16" if head.startswith(UTF16) else "utf-8-sig"
+
+
 def _not_utf8(path: Path) -> InputError:
     """Make the error for a text file that is not UTF-8; it names the first wrong byte and line."""
+    if _encoding(path) == "utf-16":
+        message = "damaged text in UTF-16; save it as UTF-8"
+        return InputError(message, file=path.name)
     with opened(path) as stream:
         for number, line in enumerate(stream, 1):
             try:

@@ -18,8 +18,11 @@ from functools import cache
 from math import pi
 from typing import Any
 
+import numpy as np
+
 from runtime.ground.errors import InputError
 
+Array = np.ndarray
 Unit = tuple[str, float]  # kind and factor to the SI unit of its kind
 
 TABLE: dict[str, Unit] = {
@@ -78,6 +81,7 @@ EXAMPLES = {
 LARGEST = (
     1e5  # SI; units above are slips of the shift key: MA for mA, Grad (which is 1e9 rad) for deg
 )
+SLOWEST = 0.2  # s; a longer sampling period is read as one of a smaller unit
 LONGEST = 40  # characters
 FACTOR = r"[^\W\d]{1,24}(?:(?:\*\*|\^)-?[1-4])?"
 GRAMMAR = re.compile(rf"{FACTOR}(?:\s?[*/·]\s?{FACTOR}| {FACTOR}){{0,3}}")
@@ -103,6 +107,28 @@ def torque_unit(text: str) -> Unit:
 def time_unit(text: str) -> float:
     """Return the factor that converts a unit of time to s."""
     return _unit(text, TIMES)[1]
+
+
+def speed_unit(text: str) -> float:
+    """Return the factor that converts a unit of speed to rad/s or m/s."""
+    return _unit(text, SPEEDS)[1]
+
+
+def likely_time_unit(t: Array) -> str:
+    """Find the unit of time stamps by their size: s, ms, us or ns.
+
+    The sampling period of a record of a robot is between 0.2 ms and 0.2 s; the median step of the
+    stamps lies in this range in one of the four units.
+
+    t : ndarray, shape (N,), or an array of one column.
+    """
+    t = np.asarray(t, dtype=float).reshape(-1)
+    step = np.diff(t[np.isfinite(t)])
+    step = step[step > 0]
+    if not len(step):
+        return "s"
+    median = float(np.median(step))
+    return next((x for x in ("s", "ms", "us", "ns") if median * TABLE[x][1] <= SLOWEST), "s")
 
 
 def speed(value: Any) -> Any:

@@ -56,9 +56,10 @@ def parameter_section(result: Identification) -> Section:
         (symbol(name), *_with_interval(fit, name), unit(fit.units.get(name, "")))
         for name in fit.names
     ]
+    condition = ", ± 95 % if the others are zero" * (result.model_columns == "essential")
     table = Table(
         f"{len(fit.names)} of {len(result.estimate.names)} base parameters "
-        f"({result.model_columns}) by {fit.method}",
+        f"({result.model_columns}) by {fit.method}{condition}",
         ("parameter", "value", "± 95 %", "unit"),
         rows,
         sortable=True,

@@ -119,19 +119,20 @@ def predicted(result: Identification) -> Answer:
     """Check the relative error, %, of torques that the model predicts for data not fitted.
 
     The answer is "open" if there are no such data. If they are one part of the record, predicted
-    with parameters from the other part, which may not excite all parameters, the answer is good up
-    to the second limit, or up to the last limit if predictions of other motions are expected to be
-    good, and never "no".
+    with parameters from another part, which may not excite all parameters, the answer is good up to
+    the error that the deviations of these parameters explain (but not above the last limit), and
+    never "no".
     """
-    fit, error, expected = result.model_estimate, result.prediction_error, result.expected_error
+    fit, error = result.model_estimate, result.prediction_error
     halves = bool(result.validation) and not result.by_records
     levels = [
         min(max(times * fit.relative_error, least), most)
         for (times, least), most in zip(LIMIT.PREDICTION_ERROR, LIMIT.PREDICTION_MOST, strict=True)
     ]
     if halves:
-        sure = expected <= LIMIT.EXPECTED_ERROR
-        levels = [LIMIT.PREDICTION_MOST[1] if sure else levels[1], np.inf]
+        unknown = levels[0] < error and np.isnan(result.unseen_error)
+        explained = levels[1] if unknown else result.unseen_error if error > levels[0] else 0.0
+        levels = [min(max(levels[0], explained), LIMIT.PREDICTION_MOST[1]), np.inf]
     state: State = "open" if not np.isfinite(error) else state_of(error, *levels)
     remedy = "a longer or richer record"
     if "standard" not in fit.details:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
 from runtime.core.result import Identification
@@ -13,30 +13,33 @@ from runtime.ground.part import About
 
 LIMIT = limits(__package__)
 
-Ask: TypeAlias = Callable[[Identification], Check | None]
-"""A function that answers a question on an identification; None if it does not arise."""
+Ask: TypeAlias = Callable[[Identification], Sequence[Check] | Check | None]
+"""A function that answers one or several questions on an identification, or none that arises."""
 
 
-def verdict(result: Identification, questions: Mapping[About, Sequence[Ask]]) -> Checklist:
-    """Ask the questions on record, predictions and values, then those of the parts on the same.
+def of_parts(about: About) -> Ask:
+    """Make an Ask of the questions that the parts of an identification have about one subject."""
+    return lambda result: [c for part in result.parts if part.about == about for c in part.checks()]
 
-    If the record does not determine the parameters, only the questions on the record are asked.
-    """
 
-    def of_parts(about: About) -> list[Check]:
-        return [check for part in result.parts if part.about == about for check in part.checks()]
+def verdict(
+    result: Identification, on_record: Sequence[Ask], on_parameters: Sequence[Ask]
+) -> Checklist:
+    """Ask the questions on the record, then those on parameters that the record determines."""
 
-    record, checks, use = of_parts("record"), [], result.verdict
-    for about, asked in questions.items():
-        if about == "record" or result.determined:
-            checks += [ask(result) for ask in asked]
-            checks += record if about == "record" else of_parts(about)
-    small = result.model_estimate.relative_error <= LIMIT.TOTAL_ERROR[0]
+    def answers(questions: Sequence[Ask]) -> list[Check]:
+        given = [ask(result) for ask in questions]
+        return [
+            check for one in given for check in ([one] if isinstance(one, Check) else one or ())
+        ]
+
+    record = answers(on_record)
+    others = answers(on_parameters) if result.determined else []
+    use = result.verdict
+    small = result.determined and result.model_estimate.relative_error <= LIMIT.TOTAL_ERROR[0]
     if small and any(check.state == "no" for check in record):
         use += (
             " A small error does not prove that the values are right: wrong units, signs or sides "
             "may change the values instead."
         )
-    return Checklist(
-        tuple(check for check in checks if check is not None), use, result.expected_error
-    )
+    return Checklist((*record, *others), use, result.expected_error)

@@ -91,6 +91,7 @@ def cestac(
             estimate={"method": method},
             signals={"reader": reader},
         )
+        described = session.corrected(described, study)
         model = session.model_of(described, study=study)
         if study.cestac.place == "record":
             session.require_record(study, record[0])

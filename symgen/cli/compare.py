@@ -37,13 +37,14 @@ def compare(
         from runtime.ground.errors import InputError
 
         described = session.robot_of(robot, trust=trust, exact=exact)
-        model = session.model_of(described)
         if len(study) < 2:
             raise InputError(f"{study[0]}: one study; name two or more study files to compare")
         short = len({Path(one).stem for one in study}) == len(study)
         candidates = {
             Path(one).stem if short else one: session.study_of_arguments([one]) for one in study
         }
+        described = session.corrected(described, next(iter(candidates.values())))
+        model = session.model_of(described)
         ranking = runtime.compare(model, candidates, variants=session.variants_of(described))
         if results is not None:
             runtime.report(ranking, results)

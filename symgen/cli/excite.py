@@ -69,7 +69,7 @@ def excite(
         from runtime.ground.documents import json_text
         from runtime.parallel.processes import processes
 
-        model = session.model_of(session.robot_of(robot, trust=trust, exact=exact))
+        described = session.robot_of(robot, trust=trust, exact=exact)
         study = session.changed(
             session.study_of_arguments([record], recorded=False) if record else runtime.Study(),
             excitation={
@@ -81,6 +81,7 @@ def excite(
                 "seed": seed,
             },
         )
+        model = session.model_of(session.corrected(described, study))
         records = records_of(study.record, model, study)
         with session.progress_bar("starts") as progress, processes(workers) as own_map:
             seek: Any = partial(runtime.excite, map=own_map, progress=progress)

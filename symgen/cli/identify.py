@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from symgen.cli import options, session
+from symgen.cli import mended, options, session
 
 
 def identify(
@@ -55,11 +55,18 @@ def identify(
             help="Write a study file with the settings that the records need (columns guessed from their names, resampling, units), then identify with it."
         ),
     ] = None,
+    repair: Annotated[
+        Path | None,
+        typer.Option(
+            help="Search several errors of the study at once, judge them on rows that were not used, and write the mended study; then identify with it. The given files stay as they are."
+        ),
+    ] = None,
     at: options.At = None,
     json: options.Json = False,
 ) -> None:
     """Identify the base parameters of ROBOT from RECORD, or from several records fitted together.
-    The exit code is 0 for the verdicts Yes and With care, 1 for No.
+    The exit code is 0 for the verdicts Yes and With care, 1 for No, and 1 if --suggest leaves
+    settings to be filled in.
     """
     with session.progress_lines(), session.results_in(output) as results:
         import runtime
@@ -69,9 +76,16 @@ def identify(
         described = session.robot_of(robot, trust=trust, exact=exact)
         study = session.study_of_arguments(record)
         study = study if at is None else session.changed(study, payload={"at": at})
+        robot_file, described = described, session.corrected(described, study)
         model = session.model_of(described, study=study)
         study = study if suggest is None else session.suggested_study(study, model, suggest)
         records = records_of(study.record, model, study)
+        found = None
+        if repair is not None:
+            found, study = mended.mended_study(robot_file, study, records, repair)
+            described = session.corrected(robot_file, study)
+            model = session.model_of(described, study=study)
+            records = records_of(study.record, model, study)
         result = runtime.identify(
             model,
             records,
@@ -85,10 +99,11 @@ def identify(
         if results is not None:
             runtime.report(result, results)
         if json:
-            text = result.to_json()
+            text = mended.json_of(result, found)
         else:
             said = session.assumptions_of(described, records, study)
-            found = result.to_text() if verbose else result.brief(len(said))
-            text = "\n".join([found, *(f"assume: {line}" for line in said)])
+            printed = result.to_text() if verbose else result.brief(len(said))
+            printed = mended.with_repair(printed, result, found, [robot, *record], repair)
+            text = "\n".join([printed, *(f"assume: {line}" for line in said)])
         session.show(text, results, json=json, verdict=result.checklist)
     session.end(good=result.checklist.state != "no")

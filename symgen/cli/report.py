@@ -39,6 +39,7 @@ def report(
 
         described = session.robot_of(robot, trust=trust, exact=exact)
         study = session.changed(session.study_of_arguments(record), cestac={"side": side})
+        described = session.corrected(described, study)
         model = session.model_of(described, study=study)
         asked = session.changed(study, cestac={"delta": encoder}).cestac.delta
         records = records_of(study.record, model, study)

@@ -63,8 +63,9 @@ def reported_errors() -> Iterator[None]:
         raise typer.Exit(BROKEN_PIPE) from e
     except (InputError, SymgenError) as e:
         code = NEGATIVE if isinstance(e, CertificateError) else BAD_INPUT
-        likely = getattr(e, "remedy", None) and "; identify --suggest FILE writes a likely study"
-        fail(f"{e}{likely or ''}", lines=isinstance(e, DataUnavailableError), code=code)
+        likely = "; identify --suggest FILE writes a likely study"
+        likely = "" if getattr(e, "remedy", None) is None else likely
+        fail(f"{e}{likely}", lines=isinstance(e, DataUnavailableError), code=code)
     except OSError as e:
         fail(f"{e.filename or 'cannot print, or write a temporary file'}: {e.strerror or e}")
 
@@ -203,6 +204,17 @@ def model_of(robot: Robot | GeneratedModel, *, study: Study | None = None) -> Ge
     return load_model(symgen.model(robot, options=options))
 
 
+def corrected(robot: Robot | GeneratedModel, study: Study) -> Robot | GeneratedModel:
+    """Replace entries of a robot by those of the section `robot` of a study, if it has one.
+
+    A generated module stays as it is: the study is refused with it, unless it has the corrections.
+    """
+    from symgen.description import Robot
+    from symgen.description.corrected import corrected
+
+    return corrected(robot, study) if isinstance(robot, Robot) else robot
+
+
 def described_robot(source: str, at_values: bool = False, exact: bool = False) -> Robot:
     """Load a robot by its name or from a file; doubts about the robot are printed as notes.
 
@@ -299,30 +311,28 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
 def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
     """Correct the settings that prevent reading the records, and write the new study to `path`.
 
-    If this fails, write a draft of the study from the column names, if they show enough.
+    What names and values do not show is marked `# ?` in the file; the command then ends with code 1.
     """
     from runtime.compose import reader_of
     from runtime.ground.errors import InputError
     from runtime.reporting.result_files import write_all
-    from runtime.study import draft, study_text, suggested
+    from runtime.study import suggested
 
     if path.exists():
         raise InputError(
             "the file for --suggest exists already; choose another name", file=str(path)
         )
     folder = path.resolve().parent
-    try:
-        study, told = suggested(study, model, missing=reader_of(study.signals).missing)
-    except InputError as e:
-        if text := draft(study, model):
-            write_all(folder, {path.name: text})
-            hint = f"{path} has what the column names show; complete the lines marked # ?"
-            raise InputError(f"{e}; {hint}") from e
-        raise
-    write_all(folder, {path.name: study_text(study, folder, defaults=False)})
-    for text in (*told, f"suggested study: {path}; check this file before you trust the values"):
+    found = suggested(study, model, missing=reader_of(study.signals).missing)
+    write_all(folder, {path.name: found.text(folder)})
+    for text in found.sentences:
         say(text)
-    return study
+    if found.unrecognised:
+        say(f"{path} written; not recognised: {', '.join(found.unrecognised.values())}")
+        say(f"complete the lines marked # ?, then run symgen identify ROBOT {path}")
+        raise typer.Exit(NEGATIVE)
+    say(f"{path} written; check this file before you trust the values")
+    return found.study
 
 
 def require_record(study: Study, file: str) -> None:

@@ -42,8 +42,9 @@ def simulate(
         import runtime
         from runtime.ground.documents import json_text
 
-        model = session.model_of(session.robot_of(robot, trust=trust, exact=exact))
+        described = session.robot_of(robot, trust=trust, exact=exact)
         settings = session.study_of_arguments([study], recorded=False)
+        model = session.model_of(session.corrected(described, settings))
         if settings.controller is None:
             session.fail(
                 f"{study} has no section `controller`; add this section, with law, rate and reference "

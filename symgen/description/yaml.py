@@ -428,6 +428,12 @@ def tables_of(robot: Robot) -> dict[str, Any]:
     }
 
 
+def data_of(robot: Robot) -> dict[str, Any]:
+    """Return the data of a robot file that describes `robot`, of which `robot_of` makes it again."""
+    data: dict[str, Any] = _document(write_yaml(robot).encode(), {})
+    return data
+
+
 def write_yaml(robot: Robot, *, comments: Sequence[str] = ()) -> str:
     """Return the robot file of `robot` as text; `comments` are its first lines, after a #."""
     lines = [f"# {line}" for line in comments]

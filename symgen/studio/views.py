@@ -204,7 +204,7 @@ def preview(path: str, request: Mapping[str, Any]) -> dict[str, Any]:
     if t is not None:
         t = t * time_unit(request.get("unit") or "s")
     kept = extremes(np.nan_to_num(np.reshape(values, (len(values), N))), LIMIT.INSTANTS_SHOWN)
-    known = known_columns(opened.names, request["joints"])
+    known = known_columns(opened.columns, request["joints"])
     return {
         "names": names,
         "known": known | ({"decimal": mark} if mark != "." else {}),

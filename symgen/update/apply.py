@@ -225,6 +225,7 @@ def apply(
     warn_not_read(text.robot)
     result = _estimate(estimate)
     require_torques(result)
+    _require_own_robot(result, of)
     _require_same_joints(result, described, of)
     physical = physical_model(load_model(emitted(described)))
     names, X, lost = _determined_names(result, physical, of)
@@ -300,6 +301,19 @@ def _estimate(given: Any) -> Estimate:
             "or the path of estimate.json"
         )
     return given
+
+
+def _require_own_robot(result: Estimate, of: str) -> None:
+    """Raise DescriptionError if a study has corrected the robot of the estimate.
+
+    The hash of a corrected robot ends with a digest of the corrections (`symgen.corrected`).
+    """
+    if "+" in str(result.provenance.get("robot_sha256", "")):
+        raise DescriptionError(
+            "the study has corrected the robot (section `robot`), so that the values are not those "
+            f"of {of}; write the corrections into the robot file (of a URDF or MJCF: symgen convert "
+            "it to .yaml, and name that file by --robot), and identify again without the section"
+        )
 
 
 def _require_same_joints(result: Estimate, robot: Robot, of: str) -> None:

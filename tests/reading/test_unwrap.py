@@ -63,9 +63,9 @@ def test_proposed_where_positions_jump_by_turns(tmp_path: Path) -> None:
     record = RecordSettings(files=(str(wrapped(tmp_path / "a.csv", np.degrees(q))),))
     for columns in ("t,q1 [deg],q2 [deg],tau1,tau2", "time,q_1 [deg],q_2 [deg],tau_1,tau_2"):
         wrapped(tmp_path / "a.csv", np.degrees(q), columns)
-        study, sentences = suggested(replace(Study(), record=(record,)), planar_2r)
-        assert study.record[0].unwrap
-        assert "unwrap: true" in sentences[-1]
+        found = suggested(replace(Study(), record=(record,)), planar_2r)
+        assert found.study.record[0].unwrap
+        assert "unwrap: true" in found.sentences[-1]
 
 
 def test_not_proposed_for_fast_positions_in_a_wrong_unit(tmp_path: Path) -> None:
@@ -81,7 +81,7 @@ def test_not_proposed_for_fast_positions_in_a_wrong_unit(tmp_path: Path) -> None
     )
     study = replace(Study(), record=(RecordSettings(files=(str(path),)),))
     assert np.abs(np.diff(fast, axis=0)).max() > 5 * np.pi
-    assert not suggested(study, planar_2r)[0].record[0].unwrap
+    assert not suggested(study, planar_2r).study.record[0].unwrap
 
 
 def test_not_proposed_where_they_do_not(tmp_path: Path) -> None:
@@ -95,5 +95,5 @@ def test_not_proposed_where_they_do_not(tmp_path: Path) -> None:
         comments="",
     )
     study = replace(Study(), record=(RecordSettings(files=(str(path),)),))
-    found, sentences = suggested(study, planar_2r)
-    assert not found.record[0].unwrap and not sentences
+    found = suggested(study, planar_2r)
+    assert not found.study.record[0].unwrap and not found.sentences

@@ -178,6 +178,7 @@ def asked_about(estimate, unseen=5.0, *, every=None, halves=False, single=False,
             "by_records": not halves,
             "prediction_error": unseen,
             "expected_error": np.nan,
+            "unseen_error": np.nan,
             "negative": (),
             "parts": [Consistency(estimate, estimate), Asking("values", answer(None))],
             "study": SimpleNamespace(validate=SimpleNamespace(values=single)),
@@ -276,6 +277,14 @@ def test_half_a_record_is_good_up_to_the_second_limit():
     assert checked(fit(error=4.0), 9.0).state == "doubtful"
     assert checked(fit(error=4.0), 15.0, halves=True).state == "doubtful"
     assert checked(fit(error=4.0), 16.0).state == "no"
+
+
+def test_half_a_record_counts_unless_the_other_half_explains_it():
+    """6.5 % in one half where 1 % was fitted: a doubt, however small the expected error is."""
+    told = {"halves": True, "expected_error": 0.6}
+    assert checked(fit(error=1.0), 6.5, unseen_error=2.0, **told).state == "doubtful"
+    assert checked(fit(error=1.0), 6.5, unseen_error=7.0, **told).state == "good"
+    assert checked(fit(error=1.0), 15.5, unseen_error=99.0, **told).state == "doubtful"
 
 
 def test_negative_friction_is_not_for_use():

@@ -15,14 +15,16 @@ place (CR2) is exact for independent residuals and too small for correlated ones
 are used.
 
 Friction that the model lacks errs alike in every block of time, since each has the same strokes.
-So the rows of every joint are divided a second time, into bands of its speed |qd_j| with equally
-many rows. The jackknife over these bands leaves out slow or fast motion; few and unequal bands
-make it larger than (10) for independent residuals too, by diag(C_0)/diag(T T'):
+So the rows of every joint are divided again, into bands with equally many rows: bands of its speed
+|qd_j|, of its load |W_j X|, of its position q_j, and of its way since the last reversal, which
+shows hysteresis. The jackknife over the bands of speed leaves out slow or fast motion, and so on;
+few and unequal bands make it larger than (10) for independent residuals too, by
+diag(C_0)/diag(T T'):
 
     C_v = (K - 1)/K  sum_k u_k u_k',        C_0 = (K - 1)/K  sum_k T G_k (1 - G_k)^-1 T',
             v = diag(C_v) diag(T T')/diag(C_0)
 
-The corrected variance is diag(C_b), or v where v is larger by LIMIT.BANDS_SHOW.
+The corrected variance is diag(C_b), or the largest v where it is larger by LIMIT.BANDS_SHOW.
 
 References: Bell and McCaffrey (2002) for (1 - G_k); MacKinnon, Nielsen and Webb (2023), CV3, for
 the jackknife; Kunsch (1989) for drawn blocks.
@@ -57,28 +59,31 @@ def block_covariance(blocks: Iterable[Array], X: Array, T: Array) -> Array:
 
 
 def corrected_deviations(
-    blocks: Iterable[Array], bands: Iterable[Array], X: Array, T: Array
+    blocks: Iterable[Array], bands: Iterable[Iterable[Array]], X: Array, T: Array
 ) -> Array:
     """Compute standard deviations of X, shape (b,), corrected for slow noise and unmodelled
     friction.
 
-    They are from the jackknife over blocks of time, or over bands of speed where this one is
-    clearly larger. nan where only one block determines a parameter.
+    They are from the jackknife over blocks of time, or over one kind of bands where that is clearly
+    larger. nan where only one block determines a parameter.
 
     Parameters
     ----------
-    blocks, bands : iterable of ndarray, shape (rows, b + 1)
-        Rows [W Y] of every block of time, and of every band of speed, weighted as for the fit.
+    blocks : iterable of ndarray, shape (rows, b + 1)
+        Rows [W Y] of every block of time, weighted as for the fit.
+    bands : iterable of iterables of ndarray, shape (rows, b + 1)
+        Rows of every band, for each kind of bands.
     X, T
         As for `block_covariance`.
     """
-    by_time, by_speed = np.diag(block_covariance(blocks, X, T)), band_variances(bands, X, T)
-    larger = by_speed > LIMIT.BANDS_SHOW * by_time
-    return np.asarray(np.sqrt(np.where(larger, by_speed, by_time)))
+    by_time = np.diag(block_covariance(blocks, X, T))
+    by_bands = [band_variances(one, X, T) for one in bands]
+    most = np.max([np.zeros(len(T)), *by_bands], axis=0)
+    return np.asarray(np.sqrt(np.where(most > LIMIT.BANDS_SHOW * by_time, most, by_time)))
 
 
 def band_variances(bands: Iterable[Array], X: Array, T: Array) -> Array:
-    """Compute the variances of X, shape (b,), by a jackknife over bands (intervals) of joint speed.
+    """Compute the variances of X, shape (b,), by a jackknife over bands of one kind.
 
     They are v = diag(C_v) diag(T T')/diag(C_0), and about zero for one band. The parameters are
     those of `block_covariance`.

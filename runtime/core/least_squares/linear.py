@@ -126,10 +126,13 @@ class System:
             self.names, 1 / np.array(self.scales), self.block, self.row_covariance
         )
 
-    def band_rows(self) -> Iterator[Array]:
-        """Yield the weighted rows [W Y] of every band (interval) of speed, shape (rows, b + 1)."""
+    def band_rows(self, X: Array) -> Iterator[Iterator[Array]]:
+        """Yield the weighted rows [W Y] band by band, for each kind of band (`Observation.bands`).
+
+        Shape (rows, b + 1) each; the load is that of the parameters X.
+        """
         return self.observation.band_rows(
-            self.names, 1 / np.array(self.scales), self.row_covariance
+            self.names, 1 / np.array(self.scales), X, self.row_covariance
         )
 
 
@@ -178,7 +181,7 @@ def assemble(
     sigma_rho, C = standard_deviations(system, fit)
     corrected = np.full(len(names), np.nan)  # as without redundancy
     if system.raw.rows > len(names):
-        corrected = corrected_deviations(system.block_rows(), system.band_rows(), fit.X, fit.T)
+        corrected = corrected_deviations(system.block_rows(), system.band_rows(fit.X), fit.X, fit.T)
     corrected[_undetermined(system, fit)] = np.nan
     norms, measured = system.norms(fit.X)
     share = 1 - fit.rank / system.raw.rows

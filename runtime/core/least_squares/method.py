@@ -111,6 +111,8 @@ class Method:
     rounding : str
         Sentence of the method on a study that rounds recorded positions (CESTAC), with {method} for
         its name; "" for nothing to say.
+    intervals : str
+        What is known of its 95 % intervals if they do not hold 95 % of the true values; "" if they do.
     """
 
     options: type[Settings]
@@ -122,6 +124,7 @@ class Method:
     any_rank: bool = False
     physical: bool = False
     rounding: str = ""
+    intervals: str = ""
 
     @property
     def linear(self) -> bool:

@@ -29,7 +29,7 @@ BLOCKS = 50
 uncertain by 1/sqrt(2*50) = 10 %.
 """
 BANDS = 6
-"""Bands of speed, with equally many rows of each joint, that show errors of the friction model."""
+"""Bands of one quantity, with equally many rows of each joint, that show errors of the friction model."""
 SHORTEST = 5
 """Shortest default block of residuals, rows of one joint: 2/cutoff, the memory of the low-pass
 filter, at the rate of eq. (13).
@@ -80,8 +80,8 @@ class Observation:
         Sentences of the reader of counts about the encoders.
     rates : tuple of float, Hz
         Rows per second of each record; empty for an observation of one record.
-    speed : ndarray, shape (r,), rad/s or m/s, or None
-        Speed |qd_j| of the joint of each row; None if it is unknown.
+    motion : ndarray, shape (r, 2), or None
+        Position q_j and velocity qd_j of the joint of each row, SI; None if they are unknown.
     """
 
     W: Array
@@ -97,7 +97,7 @@ class Observation:
     closed_loop: LoopRows | None = None
     findings: tuple[str, ...] = ()
     rates: tuple[float, ...] = ()
-    speed: Array | None = None
+    motion: Array | None = None
 
     def __post_init__(self) -> None:
         r = sum(self.rows)
@@ -192,7 +192,7 @@ class Observation:
             record=self.record[mask],
             rows=rows,
             closed_loop=loop,
-            speed=None if self.speed is None else self.speed[mask],
+            motion=None if self.motion is None else self.motion[mask],
         )
 
     def between(self, t0: float | None, t1: float | None) -> Observation:
@@ -248,18 +248,37 @@ class Observation:
             np.unique(record * (interval.max() + 1) + interval, return_inverse=True)[1]
         )
 
-    def bands(self) -> Array:
-        """Return the number of the speed band of each row, shape (r,): each joint has BANDS bands.
+    def bands(self, load: Array) -> list[Array]:
+        """Return bands of rows by speed, load, position, and way since the last reversal.
 
-        The numbers start from 0. The bands of a joint have equally many rows. If the speed is
-        unknown or zero, all rows of the joint are in one band.
+        Each has the number of the band of each row, shape (r,), from 0; each joint has BANDS bands
+        with equally many rows. The list is empty if the motion of the joints is unknown.
+
+        load : torque of the joint of each row, shape (r,).
         """
+        if self.motion is None:
+            return []
+        q, qd = self.motion.T
+        return [self._bands(values) for values in (np.abs(qd), np.abs(load), q, self._ways())]
+
+    def _ways(self) -> Array:
+        """Compute the way of the joint of each row since its last reversal, rad or m, shape (r,)."""
+        assert self.motion is not None
+        q, qd = self.motion.T
+        new = np.diff(np.sign(qd), prepend=0.0) != 0
+        new[np.diff(self.record, prepend=-1) != 0] = True
+        new[[self.joint(j).start for j in range(self.n) if self.rows[j]]] = True
+        last = np.maximum.accumulate(np.where(new, np.arange(len(q)), 0))
+        return np.asarray(np.abs(q - q[last]))
+
+    def _bands(self, values: Array) -> Array:
+        """Number the bands of one quantity; a joint in which it is constant has one band."""
         band = np.zeros(len(self.Y), dtype=np.intp)
         for j in range(self.n):
             own = self.joint(j)
-            if self.speed is not None and self.speed[own].any():
-                order = np.argsort(self.speed[own], kind="stable")
-                band[own][order] = np.arange(len(order)) * BANDS // max(len(order), 1)
+            if np.ptp(values[own]) if self.rows[j] else 0.0:
+                order = np.argsort(values[own], kind="stable")
+                band[own][order] = np.arange(len(order)) * BANDS // len(order)
         return band
 
     @cached_property
@@ -285,13 +304,18 @@ class Observation:
         return white
 
     def band_rows(
-        self, names: Sequence[str], weights: Array, covariance: Array | None = None
-    ) -> Iterator[Array]:
-        """Yield the weighted rows of [W Y], shape (rows, b + 1), one band of speed after another.
+        self, names: Sequence[str], weights: Array, X: Array, covariance: Array | None = None
+    ) -> Iterator[Iterator[Array]]:
+        """Yield the weighted rows of [W Y], shape (rows, b + 1), one band after another.
 
-        The parameters are those of `block_rows`.
+        One iterator for each kind of band (`bands`); the load is W X. The other parameters are
+        those of `block_rows`.
         """
-        return self._weighted_rows(names, weights, self.bands(), covariance)
+        whole = np.zeros(len(self.names))
+        whole[column_numbers(names, self.names)] = X
+        load = self.W @ whole
+        for groups in self.bands(load):
+            yield self._weighted_rows(names, weights, groups, covariance)
 
     def _weighted_rows(
         self, names: Sequence[str], weights: Array, groups: Array, covariance: Array | None
@@ -376,7 +400,7 @@ def stack(observations: Sequence[Observation]) -> Observation:
     _require_same_columns(observations)
     n = observations[0].n
     rows = [(o, o.joint(j)) for j in range(n) for o in _numbered(observations)]
-    known = all(o.speed is not None for o in observations)
+    known = all(o.motion is not None for o in observations)
     return Observation(
         W=np.asfortranarray(_joined("W", rows)),
         Y=_joined("Y", rows),
@@ -390,7 +414,7 @@ def stack(observations: Sequence[Observation]) -> Observation:
         files=all_files([o.files for o in observations]),
         findings=tuple(dict.fromkeys(text for o in observations for text in o.findings)),
         rates=tuple(rate for o in observations for rate in (o.rates or (o.rate,))),
-        speed=_joined("speed", rows) if known else None,
+        motion=_joined("motion", rows) if known else None,
     )
 
 

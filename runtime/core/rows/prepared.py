@@ -192,7 +192,9 @@ def observation_of(
         settings=selection.settings,
         files=dict(files or {}),
         findings=states.findings,
-        speed=np.abs(window.qd[selection.kept][inside].T).ravel()[mask],
+        motion=np.stack(
+            [x[selection.kept][inside].T.ravel()[mask] for x in (window.q, window.qd)], 1
+        ),
     )
 
 

@@ -1,0 +1,108 @@
+"""The option --repair of `symgen identify`: write a mended study, and offer one without the option."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from shlex import join
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from runtime.core.model import GeneratedModel
+    from runtime.core.record import Record
+    from runtime.core.result import Identification
+    from runtime.mending.repair import Repair
+    from runtime.study import Study
+    from symgen.description import Robot
+
+AGREE = 1e-6
+"""Of the size of a signal: the written study reads the records as the search did."""
+
+
+def mended_study(
+    described: Robot | GeneratedModel,
+    study: Study,
+    records: Sequence[Record],
+    path: Path,
+) -> tuple[Repair, Study]:
+    """Repair a study, and write it to `path` if it changes; return the repair and the study.
+
+    described : the robot, as its file describes it.
+    """
+    import runtime
+    from runtime.compose import records_of
+    from runtime.ground.errors import InputError
+    from runtime.reporting.result_files import write_all
+    from runtime.study import study_text
+    from symgen.cli import session
+
+    if path.exists():
+        raise InputError(
+            "the file for --repair exists already; choose another name", file=str(path)
+        )
+    robot = session.corrected(described, study)
+    model = session.model_of(robot, study=study)
+    repair = runtime.repair(model, records, study, variants=session.variants_of(robot))
+    if not repair.kept:
+        return repair, study
+    model = session.model_of(session.corrected(described, repair.study), study=repair.study)
+    for read, meant in zip(
+        records_of(repair.study.record, model, repair.study), repair.records, strict=True
+    ):
+        if not (same(read.q, meant.q) and same(read.tau, meant.tau)):
+            raise InputError(
+                "the changes found are not those that the study would make; nothing is written; "
+                "make them by hand: " + "; ".join(change.line for change in repair.changes),
+                file=str(path),
+            )
+    folder = path.resolve().parent
+    text = study_text(repair.study, folder, defaults=False, comments=repair.comments)
+    write_all(folder, {path.name: text})
+    return repair, repair.study
+
+
+def same(a: Any, b: Any) -> bool:
+    """Whether two signals agree, up to rounding."""
+    import numpy as np
+
+    return a.shape == b.shape and bool(np.abs(a - b).max() <= AGREE * max(np.abs(b).max(), 1e-300))
+
+
+def with_repair(
+    text: str,
+    result: Identification,
+    repair: Repair | None,
+    arguments: Sequence[str],
+    path: Path | None,
+) -> str:
+    """Print a repair before the verdict, or offer one after it.
+
+    text : the printed result, which has the verdict.
+    repair : None if none was asked for.
+    arguments : robot and records of the command.
+    """
+    if repair is None:
+        verdict = result.checklist.to_text()
+        offer = offered(result, arguments)
+        return text.replace(verdict, f"{verdict}\n{offer}", 1) if offer else text
+    written = f"written to {path}" if repair.kept else "no study is written"
+    return f"{repair.to_text()}\n({written})\n\n{text}"
+
+
+def offered(result: Identification, arguments: Sequence[str]) -> str:
+    """Write the line that offers to repair the first cause; "" if no cause is named."""
+    part: Any = result.part("plausibility")
+    first = None if part is None else next(iter(part.named), None)
+    if first is None or first.fit is None:
+        return ""
+    command = join(["symgen", "identify", *arguments, "--repair", "repaired.yaml"])
+    return f"Repair: {first.cause.says} (computed gain {first.gain:.0f} nats): {command}"
+
+
+def json_of(result: Identification, repair: Repair | None) -> str:
+    """Write the result as JSON, with the entry `repair` if a repair was asked for."""
+    from runtime.ground.documents import json_text
+
+    if repair is None:
+        return result.to_json()
+    return json_text({**result.summary(), "repair": repair.summary()})
