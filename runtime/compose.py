@@ -28,6 +28,7 @@ from runtime.core.least_squares.linear import LinearOptions, ordinary
 from runtime.core.least_squares.method import Method
 from runtime.core.least_squares.wls import weighted
 from runtime.core.model import GeneratedModel, channels_of, require_emitted
+from runtime.core.moving_base import moved_base
 from runtime.core.problem import (
     RECORD_EXPECTED,
     Note,
@@ -83,6 +84,7 @@ STEPS: list[Step] = [
         Late("runtime.mending.corrected:corrected_model"),
         lambda p: getattr(p.settings, "robot", None) is not None,
     ),
+    moved_base,
     stated_sides,
     When(
         Late("runtime.commands:commands_for_torques"),

@@ -396,7 +396,10 @@ def regressor(F):
     p, rows, claim = F.p, F.move(), F.claim
     g = [-F.value(e) for e in claim["gravity"]]
     E3 = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    at = {0: (E3, [0] * 3, [0] * 3, [0] * 3, g, {})}  # R, P, w, wd, a, {joint: (z, P or None)}
+    w, wd = [0] * 3, [0] * 3
+    if moves(claim):  # at random, gravity in the acceleration
+        w, wd, g = ([random.randrange(p) for _ in E3] for _ in range(3))
+    at = {0: (E3, [0] * 3, w, wd, g, {})}  # R, P, w, wd, a, {joint: (z, P or None)}
     torque = {}
 
     def reduced(v):
@@ -543,6 +546,13 @@ def require(condition, text):
         raise SkipError(text)
 
 
+def moves(claim):
+    """Whether the base moves: its motion is an input."""
+    base = claim.get("base", "fixed")
+    require(base in ("fixed", "moving"), "the base is neither fixed nor moving")
+    return base == "moving"
+
+
 def well_formed(claim):
     """SkipError where the claim is none."""
     require(isinstance(claim, dict), "it is no object of keys")
@@ -553,6 +563,7 @@ def well_formed(claim):
     for key in lists:
         require(isinstance(claim[key], list), f"{key} is no list")
         require(len(claim[key]) <= 20 * MOST, f"{key} is too long")
+    moves(claim)
     require(claim["frames"] and claim["joints"] and len(claim["gravity"]) == 3, "no robot")
     require(all(type(p) is int and p > 1 for p in claim["primes"]), "a prime is a whole number")
     require(claim["valid"] is True and claim["failures"] == [], "it says itself that it fails")

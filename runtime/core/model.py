@@ -255,6 +255,10 @@ def require_no_channels(model: GeneratedModel, what: str) -> None:
 
     Such signals are called channels. what : name of the caller, which has no such signals.
     """
+    if getattr(model, "BASE", "fixed") != "fixed":
+        raise InputError(
+            f"{what} is not possible for {model.NAME}, whose base moves; use a model with base: fixed"
+        )
     if channels := channels_of(model):
         names = sorted({name for own in channels.values() for name in own})
         raise InputError(
@@ -424,12 +428,13 @@ def _check_store(model: GeneratedModel, b: int, n: int, label: str) -> None:
     N = 2
     rest = np.zeros((N, n))
     q = rest + getattr(model, "_START", rest[0])[:n]
+    states = (np.zeros((N, 9)),) * hasattr(model, "BASE") + (q, rest, rest)
     try:
         shape = np.shape(model.store(N))
         with np.errstate(all="ignore"):
             shapes = (
-                np.shape(model.regressor(q, rest, rest)),
-                np.shape(model.observation_matrix(q, rest, rest)),
+                np.shape(model.regressor(*states)),
+                np.shape(model.observation_matrix(*states)),
             )
     except Exception as e:  # whatever a broken file raises becomes one kind of error
         raise ModelError(

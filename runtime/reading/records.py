@@ -20,7 +20,8 @@ import numpy as np
 from runtime.controller.law import torque_law
 from runtime.core.missing import COUNTS, Missing, bridged
 from runtime.core.model import GeneratedModel, drives_of, joint_labels
-from runtime.core.record import JOINT_CHANNELS, Origin, Record, require_finite
+from runtime.core.record import JOINT_CHANNELS, WRENCH, Origin, Record, require_finite
+from runtime.core.signals.base import IMU, QUATERNION, continued
 from runtime.ground.clock import Stamps, rate_of, time_stamps
 from runtime.ground.errors import InputError, ModelError
 from runtime.ground.limits import LIMIT
@@ -84,7 +85,7 @@ def _pieces(
     first, last, other = _places(settings, tables)
     motors = [bool(x) for x in getattr(model, "LIMITS", {}).get("tau", ())]
     columns = column_names(settings, first, last, _names_of(model), motors)
-    signals = _signals(columns, first, last, other, missing)
+    signals = _signals(columns, settings.base.columns, first, last, other, missing)
     n = signals["q"].values.shape[1]
     _require_shapes(columns, signals, first, last)
     if model is not None and n != len(model.JOINTS):
@@ -127,7 +128,7 @@ def _pieces(
             stretch, piece = _without_delay(stretch, piece, delay)
         if law is not None:
             piece = law.signals(stretch.t, piece, rate)
-        channels = (*JOINT_CHANNELS, *columns.further, "law_v")
+        channels = (*JOINT_CHANNELS, *columns.further, *settings.base.columns, "law_v")
         record = Record(
             stretch.t,
             piece["q"],
@@ -183,7 +184,12 @@ class Signal:
 
 
 def _signals(
-    columns: Columns, first: Table, last: Table, other: Table, missing: bool
+    columns: Columns,
+    base: Mapping[str, tuple[str, ...]],
+    first: Table,
+    last: Table,
+    other: Table,
+    missing: bool,
 ) -> dict[str, Signal]:
     """Read the columns of a record, and return them by quantity, for instance "q" or "tau"."""
     places = {
@@ -195,7 +201,7 @@ def _signals(
         "tau": (last, _columns_of_joints(columns.tau)),
         "tau_ff": (last, columns.tau_ff),
         "tau_known": (other, _columns_of_joints(columns.tau_known)),
-        **{key: (first, names) for key, names in columns.further.items()},
+        **{key: (first, names) for key, names in (*columns.further.items(), *base.items())},
     }
     asked = {key: place for key, place in places.items() if place[1]}
     chosen = {
@@ -275,7 +281,11 @@ def _joint_side(
             values = side.torque(values)
         elif key == "tau_known":
             values = _spread(values, columns.tau_known)
-        elif key not in columns.channels:
+        elif key == IMU:
+            values = settings.base.of_sensor(values)
+        elif key == QUATERNION:
+            values = continued(values)  # before it is resampled
+        elif key.startswith(WRENCH) and key not in columns.channels:
             values = values * settings.scale.wrench
         signal.finite(values, largest=LIMIT.LARGEST_NUMBER)
         samples[key] = values

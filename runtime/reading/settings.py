@@ -10,10 +10,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, field_validator
 
 from runtime.core import study as chapter
 from runtime.core.record import WRENCH
+from runtime.core.signals.base import IMU, MOTION, POSITION, QUATERNION
 from runtime.ground.settings import (
     Flag,
     Many,
@@ -53,6 +55,7 @@ def _known(read: Callable[[str], Any]) -> AfterValidator:
     return AfterValidator(check)
 
 
+Array = np.ndarray
 NONE = "0"  # in place of a column: no such torque on this joint
 Names = Annotated[Many[Text], BeforeValidator(_one_by_one), AfterValidator(_distinct)]
 TimeUnit = Annotated[Text, _known(time_unit)]
@@ -143,6 +146,128 @@ class Columns(Settings):
         object.__setattr__(self, "qr", ())
 
 
+class Mounting(Settings):
+    """Place of a sensor on the base.
+
+    Attributes
+    ----------
+    position : tuple of three float, m
+        Place of the sensor in frame 0.
+    rotation : tuple of three float, rad
+        Roll, pitch and yaw of its axes in frame 0, R = Rz(yaw) Ry(pitch) Rx(roll).
+    """
+
+    position: tuple[Real, Real, Real] = (0.0, 0.0, 0.0)
+    rotation: tuple[Real, Real, Real] = (0.0, 0.0, 0.0)
+
+
+class BaseColumns(Settings):
+    """Columns of the motion of a base that moves, in the file of the positions, SI.
+
+    One of three forms: the nine signals; the pose of frame 0 in the world, in whose axes the robot
+    file gives gravity; or a gyroscope and an accelerometer. The filters are those of the joints.
+
+    Attributes
+    ----------
+    motion : tuple of nine str
+        Angular velocity w0 (rad/s), angular acceleration wd0 (rad/s**2), and acceleration a0 of the
+        origin of frame 0 minus gravity (m/s**2), in the axes of frame 0.
+    position : tuple of three str
+        Origin of frame 0 in the world, m.
+    quaternion : tuple of four str
+        Orientation of frame 0 in the world.
+    order : str
+        Order of the columns of the quaternion: wxyz or xyzw.
+    gyroscope : tuple of three str
+        Angular velocity of the base, in the axes of the sensor.
+    accelerometer : tuple of three str
+        Acceleration of the place of the sensor minus gravity, in its axes.
+    mounting : Mounting
+        Place and axes of the sensor in frame 0.
+    gyroscope_unit : str
+        rad/s or deg/s.
+    accelerometer_unit : str
+        m/s**2 or g (9.80665 m/s**2).
+    specific_force : bool
+        Whether the accelerometer reads + g along the upward axis at rest; false: - g.
+    """
+
+    motion: Names = ()
+    position: Names = ()
+    quaternion: Names = ()
+    order: Literal["wxyz", "xyzw"] = "wxyz"
+    gyroscope: Names = ()
+    accelerometer: Names = ()
+    mounting: Mounting = field(default_factory=Mounting)
+    gyroscope_unit: Literal["rad/s", "deg/s"] = "rad/s"
+    accelerometer_unit: Literal["m/s**2", "g"] = "m/s**2"
+    specific_force: Flag = True
+
+    def __post_init__(self) -> None:
+        require(
+            len(self.columns) <= 1 or {*self.columns} == {POSITION, QUATERNION},
+            "more than one form is given; give motion, or position and quaternion, or gyroscope and "
+            "accelerometer",
+            "motion",
+        )
+        require(
+            bool(self.gyroscope) == bool(self.accelerometer),
+            "gyroscope and accelerometer belong together; give both",
+            "gyroscope",
+        )
+        require(
+            bool(self.position) == bool(self.quaternion),
+            "position and quaternion belong together; give both",
+            "position",
+        )
+        for key, count in COUNTS_OF_BASE.items():
+            names = getattr(self, key)
+            require(
+                len(names) in (0, count), f"{len(names)} columns; expected {count} columns", key
+            )
+
+    @property
+    def columns(self) -> dict[str, tuple[str, ...]]:
+        """Columns by channel of the record; those of the quaternion with the scalar first."""
+        Q = (
+            self.quaternion
+            if self.order == "wxyz"
+            else (*self.quaternion[3:], *self.quaternion[:3])
+        )
+        imu = (*self.gyroscope, *self.accelerometer)
+        found = {MOTION: self.motion, POSITION: self.position, QUATERNION: Q, IMU: imu}
+        return {channel: names for channel, names in found.items() if names}
+
+    def of_sensor(self, values: Array) -> Array:
+        """Convert readings of gyroscope and accelerometer, (N, 6), to w0, f and r, (N, 9).
+
+        These are SI, in the axes of frame 0; r is the place of the sensor.
+        """
+        w, f = np.hsplit(values, 2)
+        w = np.deg2rad(w) if self.gyroscope_unit == "deg/s" else w
+        f = f * (STANDARD_GRAVITY if self.accelerometer_unit == "g" else 1.0)
+        f = f if self.specific_force else -f
+        R = _rotation(self.mounting.rotation)
+        r = np.broadcast_to(np.array(self.mounting.position), f.shape)
+        return np.hstack([w @ R.T, f @ R.T, r])
+
+
+COUNTS_OF_BASE = {"motion": 9, "position": 3, "quaternion": 4, "gyroscope": 3, "accelerometer": 3}
+STANDARD_GRAVITY = 9.80665  # m/s**2
+
+
+def _rotation(rpy: tuple[float, float, float]) -> Array:
+    """Return R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    (sr, sp, sy), (cr, cp, cy) = np.sin(rpy), np.cos(rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
 class Units(Settings):
     """Units of the columns of a record: one unit, such as deg, for all joints, or one per joint.
 
@@ -221,6 +346,8 @@ class RecordSettings(Settings):
         the known torques. Relative to the study file, or files of `dataset`.
     columns : Columns
         Names of the columns.
+    base : BaseColumns
+        Columns of the motion of the base, for a robot whose base moves.
     side : str
         motor (qm = R (q - offset), tau = R' u, by the drives of the robot), joint, or link: joint
         torques of sensors behind the gears, in which the drive has no part: inertia, viscous and
@@ -273,6 +400,7 @@ class RecordSettings(Settings):
 
     files: Many[Text] = ()
     columns: Columns = field(default_factory=Columns)
+    base: BaseColumns = field(default_factory=BaseColumns)
     side: Literal["motor", "joint", "link"] = "joint"
     torque_side: Literal["motor", "joint", "link"] | None = None
     rate: Positive | None = None

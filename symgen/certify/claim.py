@@ -35,6 +35,7 @@ def claim(regrouping: Regrouping, certificate: Certificate) -> dict[str, Any]:
             | {key: str(getattr(f, key)) for key in ENTRIES_OF_FRAMES}
             for f in robot.frames
         ],
+        **({"base": robot.base} if robot.base_moves else {}),
         "gravity": [str(e) for e in robot.gravity],
         "constants": dict(robot.constants),
         "joints": robot.joints,

@@ -14,7 +14,13 @@ both linear in the standard parameters chi. Since dTdot/dqd_i = dT/dq_i, Lagrang
     Gamma_i = d/dt dE/dqd_i - dE/dq_i + dU/dq_i
             = sum_j tr(dT_j/dq_i Sigma_j Tddot_j') - (g', 0) dT_j/dq_i Sigma_j e4
 
-CasADi gives dT/dq and Tddot. An element with parameter c acts along a motion s = G q, or has a
+CasADi gives dT/dq and Tddot. A base that moves has six more coordinates: the pose T_0 of frame 0
+in the world. Where T_0 = 1, with the products of poses T_0 T_j differentiated,
+
+    Tddot = T_0dd T_j + 2 T_0d T_jd + T_jdd,   T_0d = | hat(w0)  0 |   T_0dd = | hat(wd0) + hat(w0)^2  a0 |
+                                                      | 0        0 |           | 0                     0  |
+
+in place of T_jdd, with gravity in a0. An element with parameter c acts along a motion s = G q, or has a
 matrix B (B = G'G if it acts along s). It adds to Gamma
 
     c B qdd          inertia
@@ -189,11 +195,18 @@ class Lagrange:
         """Return the derivatives d0Tj/dq_i of all poses, shape (..., n, frames, 4, 4)."""
         return _matrices(self._floats("slopes", q))
 
-    def regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """Return the standard regressor D of Gamma = D chi, shape (..., n, p)."""
+    def regressor(self, q: Array, qd: Array, qdd: Array, base: Array | None = None) -> Array:
+        """Return the standard regressor D of Gamma = D chi, shape (..., n, p).
+
+        base : w0, wd0 and a0 of a base that moves, shape (..., 9); None: the base is fixed.
+        """
         robot, dT = self.robot, self.slopes(q)
         ddT = _matrices(self._floats("accelerations", q, qd, qdd))
-        ddT[..., :3, 3] -= [e.value(self.constants) for e in robot.gravity]
+        if base is None:
+            ddT[..., :3, 3] -= [e.value(self.constants) for e in robot.gravity]
+        else:
+            rate = np.einsum("...ifab,...i->...fab", dT, qd)
+            ddT = (ddT[..., 0, :, :, :] + _carried(self.poses(q), rate, base))[..., None, :, :, :]
         products = np.swapaxes(dT, -1, -2) @ ddT
         by_link = products.reshape(*products.shape[:-2], 16) @ LINK.reshape(-1, 16).T
         column = {name: k for k, name in enumerate(self.names)}
@@ -375,14 +388,35 @@ class Lagrange:
         s = np.linalg.svd(self._floats("loop_jacobian", x)[..., passive], compute_uv=False)
         return np.asarray(s[..., -1] / s[..., 0])
 
-    def actuated_regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
+    def actuated_regressor(
+        self, q: Array, qd: Array, qdd: Array, base: Array | None = None
+    ) -> Array:
         """Return the standard regressor D of the actuated joint torques D chi, (..., n_a, p).
 
         D = G' D_tree, with G = dq/dq_a and the regressor D_tree of the open tree. The arguments q,
-        qd, qdd of the actuated joints have shape (..., n_a), in the order of `robot.joints`.
+        qd, qdd of the actuated joints have shape (..., n_a), in the order of `robot.joints`; `base`
+        is that of `regressor`.
         """
-        *state, G = self.motion(q, qd, qdd)
-        return np.swapaxes(G, -1, -2) @ self.regressor(*state)
+        x, xd, xdd, G = self.motion(q, qd, qdd)
+        return np.swapaxes(G, -1, -2) @ self.regressor(x, xd, xdd, base)
+
+
+def _carried(T: Array, Td: Array, base: Array) -> Array:
+    """Return T_0dd T_j + 2 T_0d T_jd at T_0 = 1, shape (..., frames, 4, 4): what a base adds.
+
+    T, Td : poses of the frames j in frame 0, and their rates, shape (..., frames, 4, 4).
+    base : w0, wd0 and a0, shape (..., 9).
+    """
+    T0d, T0dd = np.zeros((2, *base.shape[:-1], 1, 4, 4))
+    T0d[..., 0, :3, :3] = W = _hat(base[..., :3])
+    T0dd[..., 0, :3, :3] = _hat(base[..., 3:6]) + W @ W
+    T0dd[..., 0, :3, 3] = base[..., 6:]
+    return np.asarray(T0dd @ T + 2 * T0d @ Td)
+
+
+def _hat(w: Array) -> Array:
+    """Return the matrix of the cross product w x, shape (..., 3, 3)."""
+    return np.asarray(np.cross(np.eye(3), w[..., None, :]))
 
 
 def _axial(W: Array) -> Array:
@@ -512,6 +546,8 @@ class Sample(NamedTuple):
         States of the actuated joints, in the order of `robot.joints`.
     D : ndarray, shape (N, n, p)
         Gamma = D chi at each state, chi in the order of `robot.parameters`.
+    base : ndarray, shape (N, 9), or None
+        Motion w0, wd0, a0 of a base that moves.
     """
 
     model: Lagrange
@@ -519,6 +555,7 @@ class Sample(NamedTuple):
     qd: Array
     qdd: Array
     D: Array
+    base: Array | None = None
 
     @property
     def W(self) -> Array:
@@ -573,18 +610,22 @@ def sampled(
     if in_time:
         model.vary(np.random.default_rng(seed + 1), states)
     state, D = np.empty((3, 0, n)), np.empty((0, n, len(robot.parameters)))
+    of_base, bases = np.random.default_rng(seed + 2), np.empty((0, 9))
     for _ in range(DRAWS):
         q, qd, qdd = (
             centre + reach * rng.uniform(-1, 1, (states, n)),
             *rng.standard_normal((2, states, n)),
         )
         qd[::2] /= leverage
-        block = model.actuated_regressor(q, qd, qdd)
+        base = of_base.standard_normal((states, 9)) if robot.base_moves else None
+        block = model.actuated_regressor(q, qd, qdd, base)
         closed = np.isfinite(block).all(axis=(1, 2))
         D = np.concatenate([D, block[closed]])[:states]
         state = np.concatenate([state, np.array([q, qd, qdd])[:, closed]], axis=1)[:, :states]
+        if base is not None:
+            bases = np.concatenate([bases, base[closed]])[:states]
         if len(D) == states:
-            return Sample(model, state[0], state[1], state[2], D)
+            return Sample(model, state[0], state[1], state[2], D, bases if len(bases) else None)
     if not robot.passive:
         raise DescriptionError(
             (

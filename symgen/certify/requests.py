@@ -24,13 +24,15 @@ from symgen.certify.importing import (
 )
 from symgen.description.bodies import impossible_links
 from symgen.description.expression import Expression
-from symgen.description.files import load_robot
+from symgen.description.files import load_robot, on_base
 from symgen.description.mounts import mounts
 from symgen.description.robot import Robot
 from symgen.version import VERSION
 
 
-def model(robot: str | Path | Robot, *, options: Sequence[str] = ()) -> ModuleType:
+def model(
+    robot: str | Path | Robot, *, options: Sequence[str] = (), base: str | None = None
+) -> ModuleType:
     """Derive, certify and import the Python module of a robot.
 
     A module that is already in the cache is neither derived nor certified again.
@@ -41,6 +43,8 @@ def model(robot: str | Path | Robot, *, options: Sequence[str] = ()) -> ModuleTy
         Name of a packaged robot, path of a robot file (.yaml, .par, .urdf, MJCF), or a Robot.
     options : sequence of str
         Names of functions on request, as for `symgen generate --with`.
+    base : str, optional
+        `moving` or `fixed`, as for `load_robot`.
 
     Returns
     -------
@@ -61,7 +65,8 @@ def model(robot: str | Path | Robot, *, options: Sequence[str] = ()) -> ModuleTy
 
         return certified_path(robot, options)
 
-    return module_of(robot if isinstance(robot, Robot) else load_robot(robot), options, derived)
+    robot = robot if isinstance(robot, Robot) else load_robot(robot)
+    return module_of(on_base(robot, base), options, derived)
 
 
 def module_of(robot: Robot, request: object, derived: Callable[[Robot], Path]) -> ModuleType:

@@ -375,7 +375,8 @@ def _derivative_error(module: ModuleType, witness: Witness) -> float:
     Return the larger of the two errors.
     """
     function = module.casadi(DERIVATIVES)
-    states = (witness.q[0], witness.qd[0], witness.qdd[0], witness.X)
+    base = () if witness.base is None else (witness.base[0],)
+    states = (*base, witness.q[0], witness.qd[0], witness.qdd[0], witness.X)
     *_, A, D = map(np.asarray, function(*states, *witness.keywords.values()))
     return max(
         difference(A, witness.A[0], np.abs(witness.A).max()),

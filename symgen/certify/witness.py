@@ -23,7 +23,7 @@ import numpy as np
 from symgen.derive.assembly import inertia_of
 from symgen.derive.exact import Array
 from symgen.derive.loops import close
-from symgen.derive.models import EMITTED, ON_REQUEST
+from symgen.derive.models import EMITTED, MODELS, ON_REQUEST
 from symgen.description.expression import ONE
 from symgen.description.robot import INERTIAL, Element, Robot, parameter
 from symgen.emit.header import one_sided_friction_that_absorbs
@@ -92,7 +92,7 @@ class Witness:
         self.regrouping, self.robot, self.options = regrouping, regrouping.robot, options
         fixed = fixed or {}
         sample, self.drawn = _sampled(regrouping, fixed)
-        self.model, self.constants = sample.model, sample.model.constants
+        self.base, self.model, self.constants = sample.base, sample.model, sample.model.constants
         absorbing = bool(one_sided_friction_that_absorbs(regrouping))
         self.q, self.qd, self.qdd = sample.q.copy(), sample.qd.copy(), sample.qdd.copy()
         if not absorbing:
@@ -107,7 +107,7 @@ class Witness:
                 self.chi[self.robot.parameters.index(name)] = value
             elif name in X:
                 self.chi[self.robot.parameters.index(X[name][0])] += value - X[name][1]
-        self.D = self.model.actuated_regressor(self.q, self.qd, self.qdd)
+        self.D = self.model.actuated_regressor(self.q, self.qd, self.qdd, self.base)
         self.x, self.xd, self.xdd, self.G = self.model.motion(self.q, self.qd, self.qdd)
         self.A = inertia_of(lambda qdd: self.torque(self.q, 0 * self.q, qdd), self.q)
         no_direct = np.linalg.matrix_rank(self.A).min() < self.q.shape[1] or self.robot.loaded
@@ -116,13 +116,19 @@ class Witness:
             *["forward_dynamics"] * bool(no_direct),
         }
 
-    def torque(self, q: Array, qd: Array, qdd: Array, chi: Array | None = None) -> Array:
+    def torque(
+        self, q: Array, qd: Array, qdd: Array, chi: Array | None = None, *, turning: bool = True
+    ) -> Array:
         """Compute the torques Gamma of the actuated joints, shape (..., n).
 
-        `chi` are the standard parameters. Default: the ones of the witness.
+        `chi` are the standard parameters. Default: the ones of the witness. `turning` : whether a
+        base that moves has its w0 and wd0, besides its a0.
         """
+        base = self.base
+        if base is not None and not turning:
+            base = np.concatenate([0 * base[:, :6], base[:, 6:]], axis=1)
         return np.asarray(
-            self.model.actuated_regressor(q, qd, qdd) @ (self.chi if chi is None else chi)
+            self.model.actuated_regressor(q, qd, qdd, base) @ (self.chi if chi is None else chi)
         )
 
     @property
@@ -179,8 +185,8 @@ class Witness:
 
     @cached_property
     def rest(self) -> Array:
-        """Torques Gamma at rest, qd = qdd = 0, shape (N, n)."""
-        return self.torque(self.q, 0 * self.q, 0 * self.q)
+        """Torques Gamma at rest, qd = qdd = 0, shape (N, n); on a base that does not turn."""
+        return self.torque(self.q, 0 * self.q, 0 * self.q, turning=False)
 
     @cached_property
     def H(self) -> Array:
@@ -207,17 +213,19 @@ class Witness:
             ]
 
         given = {"q": q, "qd": qd, "qdd": qdd, "tau": self.tau, "X": X}
+        given |= {} if self.base is None else {"base": self.base}
         given |= {"qdr": qdd, "qddr": self.tau / largest}
+        states = tuple(given[a] for a in MODELS["regressor"].on(self.robot).arguments)
         checks = {
             "base_parameters": [Check((self.chi,), X, size)],
             "regressor": [],  # its place, before what is stacked of it
             "observation_matrix": [
-                Check((q, qd, qdd), W, columns),
-                Check((q[0], qd[0], qdd[0]), self.own[0], columns),
+                Check(states, W, columns),
+                Check(tuple(x[0] for x in states), self.own[0], columns),
             ],
         }
         asked = [m for m in ON_REQUEST.values() if m.option in self.options]
-        for m in (*EMITTED.values(), *asked):
+        for m in (m.on(self.robot) for m in (*EMITTED.values(), *asked)):
             arguments, checks[m.name] = tuple(given[a] for a in m.arguments), []
             for j in (None, *(f.j for f in self.robot.frames)) if m.of_frames else (None,):
                 expected = self.value(m.name, j or self.robot.frames[-1].j)
@@ -246,7 +254,9 @@ class Witness:
             ]
         if not self.tied:  # more samples than a block of the NumPy module has
             rows = np.arange(BLOCKS) % N
-            checks["gravity"].append(Check((q[rows], X), self.rest[rows], largest))
+            arguments = tuple(given[a] for a in MODELS["gravity"].on(self.robot).states)
+            many = (*(x[rows] for x in arguments), X)
+            checks["gravity"].append(Check(many, self.rest[rows], largest))
         return {name: check for name, check in checks.items() if name not in self.left_out}
 
     def value(

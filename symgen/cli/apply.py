@@ -34,6 +34,7 @@ def apply(
         ),
     ] = None,
     exact: options.Exact = False,
+    base: options.Base = None,
     lock: options.Lock = None,
     chain: options.Chain = None,
     diff: Annotated[
@@ -63,7 +64,9 @@ def apply(
         if output is not None and output.exists() and not force:
             fail(f"{output} exists already; choose another name or add --force")
         locked = dict(assignment(text, "--lock") for text in lock or ())
-        applied = applied_to(results, model, robot=robot, lock=locked, chain=chain, exact=exact)
+        applied = applied_to(
+            results, model, robot=robot, lock=locked, chain=chain, exact=exact, base=base
+        )
         typer.echo(
             applied.to_json() if json else applied.diff() if diff else str(applied), nl=not json
         )

@@ -46,6 +46,7 @@ def cestac(
     advise: options.Advise = False,
     trust: options.Trust = False,
     exact: options.Exact = False,
+    base: options.Base = None,
     verbose: Annotated[
         bool,
         typer.Option(
@@ -74,7 +75,7 @@ def cestac(
         from runtime.parallel.checkpoint import Checkpoint
         from runtime.parallel.processes import processes
 
-        described = session.robot_of(robot, trust=trust, exact=exact)
+        described = session.robot_of(robot, trust=trust, exact=exact, base=base)
         study = session.changed(
             session.study_of_arguments(record, recorded=False),
             cestac={

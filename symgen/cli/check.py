@@ -16,6 +16,7 @@ def check(
     robot: options.RobotFile,
     at_values: options.AtValues = False,
     exact: options.Exact = False,
+    base: options.Base = None,
     verbose: Annotated[
         bool, typer.Option("--verbose", help="Print every check with its numbers.")
     ] = False,
@@ -38,7 +39,7 @@ def check(
         from symgen.certify.modules import certify
         from symgen.regroup.regrouping import regroup
 
-        regrouping = regroup(described_robot(robot, at_values, exact))
+        regrouping = regroup(described_robot(robot, at_values, exact, base))
         certificate = certify(regrouping)
         if claim is not None:
             text = dumps(claimed(regrouping, certificate), indent=1)

@@ -53,6 +53,7 @@ def generate(
     ] = "",
     at_values: options.AtValues = False,
     exact: options.Exact = False,
+    base: options.Base = None,
     check: Annotated[
         bool,
         typer.Option("--check", help="Write nothing; fail with a diff if a module is not current."),
@@ -66,7 +67,7 @@ def generate(
 
         targets = _among(TARGETS, "target", target)
         requested = _among(OPTIONS, "--with", with_) if with_ else ()
-        modules = emitted(robots, targets, requested, at_values=at_values, exact=exact)
+        modules = emitted(robots, targets, requested, at_values=at_values, exact=exact, base=base)
         if check:
             report_differences(output, modules)
         else:
@@ -91,6 +92,7 @@ def emitted(
     *,
     at_values: bool = False,
     exact: bool = False,
+    base: str | None = None,
 ) -> dict[str, str]:
     """Generate the modules of every robot and target; return their texts by file name.
 
@@ -102,9 +104,10 @@ def emitted(
 
     modules: dict[str, str] = {}
     for source in packaged_robots() if robots == ["all"] else robots:
-        robot = described_robot(source, at_values, exact)
+        robot = described_robot(source, at_values, exact, base)
         command = source if source in packaged_robots() else robot.file
         command += " --at-values" * at_values + " --exact" * exact
+        command += f" --base {base}" * bool(base)
         command += f" --with {','.join(requested)}" * bool(requested)
         files = certified_files(robot, targets=targets, command=command, options=requested)
         if modules.keys() & files.keys():

@@ -41,6 +41,7 @@ def identify(
     ] = True,
     trust: options.Trust = False,
     exact: options.Exact = False,
+    base: options.Base = None,
     verbose: Annotated[
         bool,
         typer.Option(
@@ -73,7 +74,7 @@ def identify(
         from runtime.compose import records_of
         from runtime.core.provenance import processor
 
-        described = session.robot_of(robot, trust=trust, exact=exact)
+        described = session.robot_of(robot, trust=trust, exact=exact, base=base)
         study = session.study_of_arguments(record)
         study = study if at is None else session.changed(study, payload={"at": at})
         robot_file, described = described, session.corrected(described, study)

@@ -45,6 +45,13 @@ Exact = Annotated[
         "1e-4 rad of a multiple of pi/12 is replaced by that multiple.",
     ),
 ]
+Base = Annotated[
+    Text,
+    typer.Option(
+        "--base",
+        help="fixed or moving: whether frame 0 stands, or is a body whose motion is measured. Default: that of the robot file.",
+    ),
+]
 Trust = Annotated[
     bool,
     typer.Option(

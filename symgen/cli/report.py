@@ -25,6 +25,7 @@ def report(
     side: options.Side = None,
     trust: options.Trust = False,
     exact: options.Exact = False,
+    base: options.Base = None,
     json: options.Json = False,
 ) -> None:
     """Identify ROBOT from RECORD, with friction, physical consistency and encoder resolution, and judge the result.
@@ -37,7 +38,7 @@ def report(
         from runtime.compose import assess, records_of
         from runtime.ground.documents import json_text
 
-        described = session.robot_of(robot, trust=trust, exact=exact)
+        described = session.robot_of(robot, trust=trust, exact=exact, base=base)
         study = session.changed(session.study_of_arguments(record), cestac={"side": side})
         described = session.corrected(described, study)
         model = session.model_of(described, study=study)

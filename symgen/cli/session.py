@@ -171,21 +171,27 @@ def end(*, good: bool) -> None:
         raise typer.Exit(NEGATIVE)
 
 
-def robot_of(source: str, *, trust: bool = False, exact: bool = False) -> Robot | GeneratedModel:
+def robot_of(
+    source: str, *, trust: bool = False, exact: bool = False, base: str | None = None
+) -> Robot | GeneratedModel:
     """Load the argument ROBOT of a command: a robot, or a generated module.
 
     trust : whether to run a module that was not emitted on this machine.
-    exact : as for `load_robot`.
+    exact, base : as for `load_robot`.
     """
     from runtime.core.model import load_model
     from runtime.reading.formats import is_measured
 
     path = Path(source)
     if path.suffix == ".py":
+        if base is not None:
+            fail(
+                f"{source} is a generated module, whose base is that of its robot file; leave out --base"
+            )
         return load_model(path, trust=trust)
     if path.is_file() and is_measured(path):
         fail(f"{source} is a measured file; the robot comes first, then the record")
-    return described_robot(source, exact=exact)
+    return described_robot(source, exact=exact, base=base)
 
 
 def model_of(robot: Robot | GeneratedModel, *, study: Study | None = None) -> GeneratedModel:
@@ -215,7 +221,9 @@ def corrected(robot: Robot | GeneratedModel, study: Study) -> Robot | GeneratedM
     return corrected(robot, study) if isinstance(robot, Robot) else robot
 
 
-def described_robot(source: str, at_values: bool = False, exact: bool = False) -> Robot:
+def described_robot(
+    source: str, at_values: bool = False, exact: bool = False, base: str | None = None
+) -> Robot:
     """Load a robot by its name or from a file; doubts about the robot are printed as notes.
 
     at_values : whether to replace its constants by their values.
@@ -228,7 +236,7 @@ def described_robot(source: str, at_values: bool = False, exact: bool = False) -
     from symgen.description.distal import frames_text
     from symgen.description.values import at_values as with_values
 
-    robot = load_robot(source, exact=exact)
+    robot = load_robot(source, exact=exact, base=base)
     for sentence in filter(None, (*doubts(robot), frames_text(robot))):
         warnings.warn(sentence, RobotFileWarning, stacklevel=1)
     return with_values(robot) if at_values else robot

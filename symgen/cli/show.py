@@ -72,6 +72,7 @@ def show(
     ] = "text",
     at_values: options.AtValues = False,
     exact: options.Exact = False,
+    base: options.Base = None,
     only: Annotated[
         str | None, typer.Option(help="Print only the formula of this base parameter, e.g. XX2R.")
     ] = None,
@@ -132,7 +133,7 @@ def show(
         if given:
             fail(message)
     with reported_errors():
-        described = described_robot(robot, at_values, exact)
+        described = described_robot(robot, at_values, exact, base)
         if model is not None:
             typer.echo(model_text(described, model, kind, asked, at_values))
         else:

@@ -51,6 +51,8 @@ def array(entries: Any) -> Vector:
     return made
 
 
+BASE = ("W", "WP", "VP")
+"""Families of the motion of a moving base, in the order of the argument `base`."""
 ZERO3, E3 = array((0, 0, 0)), array((0, 0, 1))
 IDENTITY = array(((1, 0, 0), (0, 1, 0), (0, 0, 1)))
 
@@ -122,6 +124,22 @@ class GraphAlgebra:
     def parameter(self, name: str) -> Scalar:
         """Return the node of a standard or base parameter."""
         return self.graph.symbol(Symbol("parameter", name), fixed=True)
+
+    @property
+    def base_motion(self) -> tuple[str, ...]:
+        """Names of the motion of a moving base: W10, W20, W30, WP10 .. WP30, VP10 .. VP30.
+
+        They are w0 (rad/s), wd0 (rad/s**2) and a0 (m/s**2): angular velocity and acceleration of
+        frame 0, and the acceleration of O_0 minus gravity, in the axes of frame 0. A fixed base has
+        none.
+        """
+        families = BASE if self.robot.base_moves else ()
+        return tuple(self.named(family, k, 0) for family in families for k in (1, 2, 3))
+
+    def base(self, family: str) -> Vector:
+        """Return the nodes of w0 (family W), wd0 (WP) or a0 (VP) of a moving base."""
+        names = (self.named(family, k, 0) for k in (1, 2, 3))
+        return array([self.graph.symbol(Symbol("base", name)) for name in names])
 
     def gravity(self, axis: int) -> Scalar:
         """Return the node of one component of the negative gravity vector in frame 0, m/s**2, or

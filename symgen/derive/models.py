@@ -30,12 +30,14 @@ from symgen.derive.loop_equations import LoopSystem, loop_system
 from symgen.derive.regressor import element_names
 from symgen.derive.rewrite import Input, Inputs, Rewrite
 from symgen.description.expression import ONE, ZERO
-from symgen.description.robot import Element
+from symgen.description.robot import Element, Robot
 from symgen.errors import SymgenError
 
 Place = tuple[int, ...]
 LOOP_RESIDUALS = 6  # of a loop: three of position, three of orientation
 
+READ, UNDEFINED, RELATIVE = "read", "undefined", "relative"
+"""What the motion of a moving base is for a model: an argument, without meaning, or zero."""
 TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")  # of an origin, and the angular velocity
 
 
@@ -139,6 +141,10 @@ class Model(NamedTuple):
         Option of `symgen generate --with` that adds it; empty if it is always generated.
     latex : str
         The letter in LaTeX; default: `letter` in bold.
+    base : str
+        What a moving base changes: READ if the model takes the motion of the base as its first
+        argument, UNDEFINED if it has no meaning there, RELATIVE if it is that of frame 0 at rest
+        and without gravity.
     """
 
     name: str
@@ -163,6 +169,27 @@ class Model(NamedTuple):
     case_of: str = ""
     option: str = ""
     latex: str = ""
+    base: str = RELATIVE
+
+    def on(self, robot: Robot) -> Model:
+        """Return the model of a robot: on a moving base, its first argument may be `base`.
+
+        Raises SymgenError for a model that has no meaning on a moving base.
+        """
+        if not self.defined_on(robot):
+            raise SymgenError(
+                f"{robot.name}: the model {self.name} has no meaning on a moving base; leave it out, "
+                "or write base: fixed"
+            )
+        return (
+            self._replace(arguments=("base", *self.arguments))
+            if robot.base_moves and self.base == READ
+            else self
+        )
+
+    def defined_on(self, robot: Robot) -> bool:
+        """Whether the model has a meaning on the base of the robot."""
+        return not (robot.base_moves and self.base == UNDEFINED)
 
     @property
     def summary(self) -> str:
@@ -301,7 +328,19 @@ def _without(
 
 
 def _weightless(d: Derivation) -> dict[Symbol, Input]:
-    return {Symbol("gravity", str(k)): ZERO for k in range(3)}
+    return {Symbol("gravity", str(k)): ZERO for k in range(3)} | _at_rest(d)
+
+
+def _at_rest(d: Derivation, *families: str) -> dict[Symbol, Input]:
+    """Return replacements of inputs that set the motion of a moving base to zero.
+
+    families : those that are set to zero, among W, WP and VP; default: all.
+    """
+    return {
+        Symbol("base", name): ZERO
+        for name in d.algebra.base_motion
+        if not families or name.rstrip("0123456789_") in families
+    }
 
 
 # --- torques ---
@@ -320,7 +359,7 @@ def _bias(d: Derivation, r: Request) -> Iterator[Case]:
 
 
 def _gravity(d: Derivation, r: Request) -> Iterator[Case]:
-    yield Case(_torques(d), _still(d, "qd", "qdd"))
+    yield Case(_torques(d), _still(d, "qd", "qdd") | _at_rest(d, "W", "WP"))
 
 
 def _friction(d: Derivation, r: Request) -> Iterator[Case]:
@@ -469,7 +508,7 @@ def _twist(d: Derivation, r: Request, linear: Vector, angular: Vector) -> list[E
 
 def _velocity(d: Derivation, r: Request) -> Iterator[Case]:
     v, w = origin_velocities(d.motion)[r.of], d.motion.link[r.of].w
-    yield Case(_twist(d, r, v, w))
+    yield Case(_twist(d, r, v, w), _at_rest(d))
 
 
 def _acceleration(d: Derivation, r: Request) -> Iterator[Case]:
@@ -521,12 +560,12 @@ MODELS = {
     for model in (
         Model(
             "regressor", "D", ("q", "qd", "qdd"), ("joints", "parameters"), "Gamma by X",
-            "D of Gamma = D X", _regressor, result="D", by_columns=True,
+            "D of Gamma = D X", _regressor, result="D", by_columns=True, base=READ,
         ),
         Model(
             "inverse_dynamics", "GAM", ("q", "qd", "qdd", "X"), ("joints",), TORQUE,
             "joint torques Gamma = A qdd + C qd + Q + friction", _inverse_dynamics, result="GAM",
-            page=7, latex=r"\Gamma",
+            page=7, latex=r"\Gamma", base=READ,
         ),
         Model(
             "inertia_matrix", "A", ("q", "X"), ("joints", "joints"), INERTIA,
@@ -537,19 +576,19 @@ MODELS = {
         Model(
             "bias", "H", ("q", "qd", "X"), ("joints",), TORQUE,
             "Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset", _bias,
-            result="GAM", page=6, case_of="inverse_dynamics",
+            result="GAM", page=6, case_of="inverse_dynamics", base=READ,
         ),
         Model(
             "gravity", "Q", ("q", "X"), ("joints",), TORQUE,
             "Gamma at rest without friction: gravity, offset and springs "
-            "(a base parameter may mix them)", _gravity, result="GAM", page=5,
+            "(a base parameter may mix them)", _gravity, result="GAM", page=5, base=READ,
         ),
         Model(
             "forward_dynamics", "QDP", ("q", "qd", "tau", "X"), ("joints",), "rad/s**2 | m/s**2",
             "qdd = A(q)**-1 (tau - bias)", None, result="qdd", composed="quotient",
             latex=r"\det \mathbf{A} \; \ddot{q}",
             denominator="det A",
-            instead="A qdd = Gamma - H, with the equations of inertia_matrix and bias",
+            instead="A qdd = Gamma - H, with the equations of inertia_matrix and bias", base=READ,
         ),
         Model(
             "frame_poses", "T", ("q",), ("frames", "pose", "pose"), "1, m",
@@ -591,27 +630,29 @@ MODELS = {
             "coriolis", "C", ("q", "qd", "X"), ("joints", "joints"), "N*m*s/rad | N*s/m",
             "C(q, qd) of Coriolis and centrifugal torques C qd, with Christoffel symbols: "
             "Ad - 2C is skew symmetric", _coriolis, page=4, result="C", option="coriolis",
+            base=UNDEFINED,
         ),
         Model(
             "slotine_li_regressor", "Y", ("q", "qd", "qdr", "qddr"), ("joints", "parameters"),
             "Gamma by X",
             "Y of Y X = A qddr + C qdr + Q + friction(qd), reference rates qdr and accelerations "
             "qddr", _of_columns(slotine_li), result="Y", symbolic=False, option="slotine_li",
+            base=UNDEFINED,
         ),
         Model(
             "momentum_regressor", "PI", ("q", "qd"), ("joints", "parameters"),
             "generalised momentum by X", "columns of p = A qd", _momentum_regressor, result="PI",
-            symbolic=False, option="momentum",
+            symbolic=False, option="momentum", base=UNDEFINED,
         ),
         Model(
             "momentum_rate_regressor", "PIP", ("q", "qd"), ("joints", "parameters"), "Gamma by X",
             "columns of dp/dt - Gamma = C' qd - Q - friction", _of_columns(momentum_rate),
-            result="PIP", symbolic=False, option="momentum",
+            result="PIP", symbolic=False, option="momentum", base=UNDEFINED,
         ),
         Model(
             "energy_regressor", "EU", ("q", "qd"), ("energies", "parameters"), "J by X",
             "columns of the kinetic and of the potential energy", _energy_regressor, result="EU",
-            symbolic=False, option="energy",
+            symbolic=False, option="energy", base=UNDEFINED,
         ),
         Model(
             "base_wrench_regressor", "WB", ("q", "qd", "qdd"), ("wrench", "standard parameters"),
@@ -619,7 +660,7 @@ MODELS = {
             "columns of force and moment about the origin of frame 0, in frame 0, by which the "
             "base moves the links; of the standard parameters, more of which act here than on the "
             "joints", _base_wrench_regressor, result="WB", symbolic=False,
-            option="base_wrench_regressor",
+            option="base_wrench_regressor", base=UNDEFINED,
         ),
         Model(
             "friction", "F", ("q", "qd", "X"), ("joints",), TORQUE,
@@ -627,12 +668,12 @@ MODELS = {
         ),
         Model(
             "kinetic_energy", "E", ("q", "qd", "X"), (), "J",
-            "kinetic energy, actuators included", _kinetic_energy,
+            "kinetic energy, actuators included", _kinetic_energy, base=UNDEFINED,
         ),
         Model(
             "potential_energy", "U", ("q", "X"), (), "J",
             "potential energy of gravity, springs and offset: dU/dq = Q", _potential_energy,
-            up_to_a_constant=True,
+            up_to_a_constant=True, base=UNDEFINED,
         ),
         Model(
             "base_parameters", "X", ("standard",), ("parameters",), "see UNITS",

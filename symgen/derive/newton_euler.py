@@ -8,7 +8,7 @@ Link j, frame j, i = ant(j), a_j the acceleration of O_j minus gravity, U = skew
     F_j  = M_j a_j + U_j MS_j ,     N_j = J_j wd_j + w_j x (J_j w_j) + MS_j x a_j
     f_j  = F_j + sum_k jRk f_k ,    n_j = N_j + sum_k (jRk n_k + P_jk x jRk f_k)
 
-with k over the frames mounted on frame j. N_j is written in product form (see `moment`): with base
+with k over the frames mounted on frame j. A moving base has measured w_0, wd_0 and a_0. N_j is written in product form (see `moment`): with base
 parameters, YY = MZ = M = 0 for most links, and many products disappear.
 
 W. Khalil, J.-F. Kleinfinger, ICRA 1986; Khalil and Dombre, Modeling, Identification and Control of
@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-from symgen.derive.algebra import ZERO3, Matrix, Scalar, Vector, array, cross, dot, is_zero
+from symgen.derive.algebra import BASE, ZERO3, Matrix, Scalar, Vector, array, cross, dot, is_zero
 from symgen.derive.geometry import Geometry
 from symgen.description.expression import Expression
 from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, REVOLUTE, parameter
@@ -88,7 +88,10 @@ class Motion:
             self.link[f.j] = self._link(f.j)
 
     def _base(self) -> LinkMotion:
-        """Return the motion of the base: at rest, but accelerated by minus gravity."""
+        """Return the motion of the base: at rest, but accelerated by minus gravity; or measured."""
+        if self.robot.base_moves:
+            w, wd, a = map(self.algebra.base, BASE)
+            return LinkMotion(w, wd, *self._products(w, wd, 0), a)
         x, y, z = (self.algebra.gravity(axis) for axis in range(3))
         return REST if is_zero((x, y, z)) else REST._replace(a=array((x, y, z)))
 

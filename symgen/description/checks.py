@@ -30,6 +30,7 @@ from symgen.description.parts import (
 )
 from symgen.errors import DescriptionError
 
+OF_BASE = re.compile(r"(base|(W|WP|VP)[123]_?0)\Z")  # the motion of a base that moves
 FULL_TURN = 2 * math.pi  # rad: a larger constant in an angle, pi aside, was meant in degrees
 
 
@@ -57,6 +58,7 @@ def _problems(robot: Any) -> Iterator[Problem]:
         yield from _check_element(e, robot)
     yield from check_channels(robot)
     yield from _check_loops(robot)
+    yield from _check_base(robot)
     yield from _check_drives(robot)
     yield from _check_limits(robot)
     for key, names in (("assume", sorted(robot.assume)), ("values", robot.values)):
@@ -117,6 +119,32 @@ def _check_tree(frames: Sequence[Frame], massless: Collection[int]) -> Iterator[
         "the robot has no actuated joint; set mu: 1 (actuated) for a revolute or prismatic joint",
         ("frames",),
     )
+
+
+def _check_base(robot: Any) -> Iterator[Problem]:
+    """Check that a base that moves is of a kind with models, outside every loop and its names."""
+    yield (
+        robot.base == "free",
+        "base: free, with the six rows of the wrench on the base, has no models yet; write base: "
+        "moving, whose rows are the joints alone",
+        ("base",),
+    )
+    if not robot.base_moves:
+        return
+    for loop in robot.loops:
+        yield (
+            not robot.root(loop),
+            f"the loop of frames {loop.cut} and {loop.twin} closes through frame 0, so that the base "
+            "cannot move; write base: fixed or, if the moving body itself carries both branches, "
+            "mount them on a fixed frame (sigma: 2) of frame 0",
+            ("base",),
+        )
+    for name in filter(OF_BASE.match, robot.constants):
+        yield (
+            True,
+            f"constants: {name} is an input of a robot whose base moves; rename the constant",
+            ("constants", name),
+        )
 
 
 def _check_geometry(robot: Any) -> Iterator[Problem]:

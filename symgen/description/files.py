@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from symgen.description.yaml import parse_robot, write_yaml
 from symgen.errors import DescriptionError
 
 TREES = (".urdf", ".xml", ".mjcf")  # suffixes of the formats of links and joints by name
+BASES = ("fixed", "moving", "free")
 WRITTEN = (".yaml", ".yml", ".urdf")  # suffixes of the formats that are written
 MAX_BYTES = 10_000_000  # no format reads more; each has a limit of its own below
 
@@ -41,7 +43,9 @@ def packaged_robots() -> tuple[str, ...]:
     )
 
 
-def load_robot(source: str | Path, *, keep_fixed: bool = False, exact: bool = False) -> Robot:
+def load_robot(
+    source: str | Path, *, keep_fixed: bool = False, exact: bool = False, base: str | None = None
+) -> Robot:
     """Read a robot file, or a packaged robot by its name.
 
     Parameters
@@ -56,6 +60,9 @@ def load_robot(source: str | Path, *, keep_fixed: bool = False, exact: bool = Fa
         For a URDF, MJCF or `.par` file: whether angles stay as written, which a calibrated robot
         needs. Otherwise, an angle within 1e-4 rad of a multiple of pi/12 becomes this multiple, and
         an AngleWarning names the largest change, if it exceeds 1e-9 rad.
+    base : str, optional
+        `moving`: frame 0 is a body whose motion is measured; `fixed`: it stands. Default: that of
+        the file.
 
     Returns
     -------
@@ -68,7 +75,16 @@ def load_robot(source: str | Path, *, keep_fixed: bool = False, exact: bool = Fa
     DescriptionError
         The file cannot be read or describes no robot; the message names file and line.
     """
-    return read_robot(source, keep_fixed=keep_fixed, exact=exact)[0]
+    return on_base(read_robot(source, keep_fixed=keep_fixed, exact=exact)[0], base)
+
+
+def on_base(robot: Robot, base: str | None) -> Robot:
+    """Return the robot with a fixed or moving base; None leaves that of the file."""
+    if base is None:
+        return robot
+    if base not in BASES:
+        raise DescriptionError(f"base {base!r:.40}; expected {' or '.join(BASES)}")
+    return replace(robot, base=base)  # type: ignore[arg-type]  # checked
 
 
 def read_robot(

@@ -24,7 +24,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import fields
 from functools import cached_property, partial
 from types import MappingProxyType
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 from pydantic.dataclasses import dataclass
@@ -209,6 +209,15 @@ class Robot:
             )
         ),
     ] = Field(default={})
+    base: Annotated[
+        Literal["fixed", "moving", "free"],
+        Field(
+            description=(
+                "fixed, or moving: frame 0 is a body whose motion is measured, and the rows are "
+                "the joints alone"
+            )
+        ),
+    ] = "fixed"
     angles: Annotated[str, *UNWRITTEN] = ""  # how those of a foreign file were read
     # of links whose inertia no body can have: the frame, and what is wrong
     impossible: Annotated[tuple[tuple[int, str], ...], *UNWRITTEN] = ()
@@ -272,6 +281,11 @@ class Robot:
     @cached_property
     def _by_number(self) -> dict[int, Frame]:
         return {f.j: f for f in self.frames}
+
+    @property
+    def base_moves(self) -> bool:
+        """Whether frame 0 is a body whose motion is an input of the models."""
+        return self.base != "fixed"
 
     @cached_property
     def moving(self) -> tuple[int, ...]:

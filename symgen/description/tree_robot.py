@@ -29,9 +29,9 @@ import keyword
 import math
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -366,15 +366,11 @@ def robot_of_tree(
     The notes list which joint is which q, which link is which kept frame, and what was not read.
     Raises DescriptionError, with the line of the wrong joint, if the tree describes no robot.
     """
-    if free := [joint for joint in tree.joints if joint.kind == FREE_TYPE]:
-        raise DescriptionError(
-            f"free joint {free[0].name!r}: the base of a robot must be fixed; to fix this joint "
-            f"at its pose in the file: symgen convert --lock {free[0].name}=0",
-            line=free[0].line,
-        )
+    free = any(joint.kind == FREE_TYPE for joint in tree.joints)
+    tree = on_its_base(tree)
     table = placed(tree, keep_fixed=keep_fixed)
     try:
-        robot = _robot(table, file, sha256)
+        robot = _robot(table, file, sha256, base="moving" if free else "fixed")
     except DescriptionError as error:
         key = str((*error.path, "", "")[1]).removeprefix("q")
         joint = table.joint.get(int(key)) if key.isdigit() and error.line is None else None
@@ -389,11 +385,46 @@ def robot_of_tree(
     return robot, (*legends, *tree.notes, *table.notes)
 
 
+def on_its_base(tree: Tree) -> Tree:
+    """Return the tree that stands on the link of its free joint: frame 0 of a base that moves.
+
+    A tree without a free joint is not changed.
+
+    Raises DescriptionError unless the one free joint carries all other joints that move.
+    """
+    free = [joint for joint in tree.joints if joint.kind == FREE_TYPE]
+    if not free:
+        return tree
+    base = free[0]
+    inside = {base.child}
+    for _ in tree.joints:
+        inside |= {joint.child for joint in tree.joints if joint.parent in inside}
+    outside = [j for j in tree.joints if j.child not in inside and j.kind != FIXED_TYPE]
+    if others := [*free[1:], *(j for j in outside if j is not base)]:
+        raise DescriptionError(
+            f"free joint {base.name!r} does not carry joint {others[0].name!r}, but only the joint "
+            "below all others may be free; to fix a free joint at its pose in the file: symgen "
+            f"convert --lock {base.name}=0",
+            line=base.line,
+        )
+    note = (
+        f"free joint {base.name!a:.60}: read as base: moving, whose rows are the joints alone; "
+        f"symgen convert --lock {base.name}=0 fixes it"
+    )
+    return replace(
+        tree,
+        links={name: x for name, x in tree.links.items() if name in inside},
+        joints=tuple(joint for joint in tree.joints if joint.parent in inside),
+        root=base.child,
+        notes=(*tree.notes, note),
+    )
+
+
 def _legend(what: str, names: dict[str, str]) -> str:
     return f"{what}: " + ", ".join(f"{name} = {of_file!a:.60}" for name, of_file in names.items())
 
 
-def _robot(table: Table, file: str, sha256: str) -> Robot:
+def _robot(table: Table, file: str, sha256: str, base: Literal["fixed", "moving"]) -> Robot:
     constraints = _constraints(table)
     actuated = [j for j in table.joint if j not in constraints]
     if not actuated:
@@ -418,6 +449,7 @@ def _robot(table: Table, file: str, sha256: str) -> Robot:
         limits=_limits(table, actuated),
         values=values,
         labels=_labels(table),
+        base=base,
         angles=table.tree.angles,
         impossible=tuple(
             (j, own.wrong)

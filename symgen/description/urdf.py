@@ -518,6 +518,8 @@ def _losses(robot: Robot, values: Mapping[str, float]) -> tuple[str, ...]:
         notes.append(f"values without a place in a URDF, left out: {', '.join(dropped)}")
     if unknown := [name for name in lost if name not in values]:
         notes.append(f"parameters without a place or value: {', '.join(unknown)}")
+    if robot.base_moves:
+        notes.append("base: moving, which --base moving gives when the file is read")
     notes.append("constants as numbers, frames as placements: formulas are not carried")
     gravity = tuple(e.value(robot.constants) for e in robot.gravity)
     if gravity[:2] != (0.0, 0.0) or gravity[2] >= 0:

@@ -398,6 +398,7 @@ def tables_of(robot: Robot) -> dict[str, Any]:
         "name": robot.name,
         "title": json.dumps(robot.title, ensure_ascii=False) if robot.title else "",
         "source": json.dumps(robot.source, ensure_ascii=False) if robot.source else "",
+        "base": robot.base if robot.base_moves else "",
         "gravity": robot.gravity,
         "constants": robot.constants,
         "frames": {

@@ -12,7 +12,7 @@ from symgen.derive.graph import SYM, Node
 from symgen.derive.models import Entry
 from symgen.description.naming import Namespace
 from symgen.emit.printers import Language, Section, Text, under_titles
-from symgen.emit.spec import STATES, Function, ModuleSpec
+from symgen.emit.spec import BASE, STATES, Function, ModuleSpec
 
 
 class Block(NamedTuple):
@@ -99,14 +99,14 @@ class FunctionPrinter:
     def motion(self) -> tuple[Section, ...]:
         """Lines that come first in all functions: the states, and the motion of the links."""
         nodes = {n.index: n for f in self.functions for n in f.nodes}
-        return self._sections({*STATES, self.rates}, [*nodes.values()], self.shared)
+        return self._sections({*BASE, *STATES, self.rates}, [*nodes.values()], self.shared)
 
     def block(self, f: Function) -> Block:
         """Write one function as source text, without the lines that all functions share."""
         spec = self.spec
         states, reads_X = f.model.states, ["X"] if f.model.reads_X else []
         if spec.tied and not f.model.of_loops:
-            states = ("q", "qd", "qdd", self.rates)
+            states = (*BASE * ("base" in states), "q", "qd", "qdd", self.rates)
         used = {n.value.name for n in f.nodes if n.op == SYM}
         constants = [c for c in spec.regrouping.constants if c in used]
         constants.sort(key=spec.robot.channels.__contains__)
@@ -130,10 +130,10 @@ class FunctionPrinter:
         """
         spec = self.spec
         joints, independent = spec.robot.joints, spec.derivation.closure.independent
-        items = {s: [f"{letter}{j}" for j in independent] for s, letter in STATES.items()}
-        items[self.rates] = [
-            spec.derivation.algebra.named("G", u, i) for u in spec.tied for i in joints
-        ]
+        (base,), algebra = BASE, spec.derivation.algebra
+        items: dict[str, Sequence[str]] = {base: algebra.base_motion}
+        items |= {s: [f"{letter}{j}" for j in independent] for s, letter in STATES.items()}
+        items[self.rates] = [algebra.named("G", u, i) for u in spec.tied for i in joints]
         items["X"] = list(spec.regrouping.names)
         called = {str(n.value): self.text.called[n.index] for n in read if n.op == SYM}
         inputs: list[str] = []

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from symgen.derive.loops import close
 from symgen.description.robot import Robot
 from symgen.emit import c_target, python_target
 from symgen.emit.c_target import C
 from symgen.emit.printers import PYTHON, Language
 from symgen.emit.spec import ModuleSpec, module_spec, spec_of
 from symgen.emit.targets import TARGETS
+from symgen.errors import SymgenError
 from symgen.regroup.regrouping import Regrouping
 
 
@@ -65,6 +67,17 @@ def generate_files(
     dict
         {file name: text}. The same robot file and the same version give the same bytes.
     """
+    refused = [name for name in targets if not TARGETS[name].on_moving_base]
+    if robot.base_moves and (refused or close(robot).tied):
+        wanted = (
+            f"the target {refused[0]} has no models of"
+            if refused
+            else "loops that are closed by iteration are not possible on"
+        )
+        raise SymgenError(
+            f"{robot.name}: {wanted} a base that moves; use the targets numpy, casadi or xp, with "
+            "passive joints that have formulas, or base: fixed"
+        )
     spec: ModuleSpec = (
         spec_of(robot, tuple(options)) if regrouping is None else module_spec(regrouping, options)
     )

@@ -36,7 +36,11 @@ def header(spec: ModuleSpec, texts: Mapping[str, Text], formulas: bool) -> list[
         "Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS",
         *(f"    {line}" for line in frame_table(robot)),
         *(wrap_text(f"Angles      {robot.angles}", "") if robot.angles else ()),
-        *line_of("Gravity", f"acceleration ({gravity}) in frame 0, m/s**2"),
+        *(
+            line_of("Base", "moves; gravity is a part of its measured acceleration a0")
+            if robot.base_moves
+            else line_of("Gravity", f"acceleration ({gravity}) in frame 0, m/s**2")
+        ),
         *line_of(
             "Torques",
             "delivered by the actuators, so friction enters with a plus: "
@@ -260,6 +264,7 @@ def tables(spec: ModuleSpec) -> list[str]:
         f"NAME = {robot.name!r}",
         f"SOURCE_SHA256 = {robot.sha256!r}",
         f"JOINTS = {robot.joints!r}",
+        *_base(robot),
         *([f"PASSIVE = {robot.passive!r}"] if robot.passive else []),
         *(literal("LABELS", dict(robot.labels)) if robot.labels else []),
         *literal("CONSTANTS", dict(regrouping.constants)),
@@ -271,6 +276,14 @@ def tables(spec: ModuleSpec) -> list[str]:
         *units,
         *_structure(spec),
     ]
+
+
+def _base(robot: Robot) -> list[str]:
+    """Write the kind of a base that moves, and gravity in the axes of the world, m/s**2."""
+    if not robot.base_moves:
+        return []
+    gravity = tuple(e.value(robot.constants) for e in robot.gravity)
+    return [f"BASE = {robot.base!r}", f"GRAVITY = {gravity!r}"]
 
 
 def data(spec: ModuleSpec) -> list[str]:

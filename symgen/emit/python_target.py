@@ -21,7 +21,7 @@ from symgen.emit.blocks import Block, FunctionPrinter
 from symgen.emit.header import data, header, literal, packed, plain, tables, wrap_text
 from symgen.emit.printers import PYTHON, Section
 from symgen.emit.render import WIDTH, laid_out
-from symgen.emit.spec import SHARING, Function, ModuleSpec
+from symgen.emit.spec import BASE, SHARING, Function, ModuleSpec
 from symgen.regroup.regrouping import Regrouping, sign_conditions
 from symgen.version import VERSION
 
@@ -39,7 +39,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
     free = regrouping.constants
     blocks, motion = _blocks(spec)
     models = {
-        name: m
+        name: m.on(robot)
         for name, m in (EMITTED | ON_REQUEST).items()
         if (name in spec.functions or not m.option)
         and not (name == "forward_dynamics" and robot.loaded)
@@ -87,6 +87,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
             "listed": further_arguments,
             "keywords": "".join(f", {c}={c}" for c in free),
             "channels": robot.channels,
+            "base": robot.base_moves,
             "tied": spec.tied,
             "passive": robot.passive,
             "size": BLOCK,
@@ -155,9 +156,10 @@ def _laid_out(spec: ModuleSpec, block: Block, indent: int = 4) -> dict[str, obje
     sections = [*block.sections, *results, Section("Constants", tuple(constant))]
     states = block.arguments[: len(block.arguments) - len(block.constants) - f.model.reads_X]
     k, rates = spec.sizes["k"], spec.sizes["m"] * spec.sizes["n"]
-    rows = f"{', '.join(states[:3])} ({k}, N)" + f" and {states[-1]} ({rates}, N)" * (
-        len(states) > 3
-    )
+    base = states[:1] == BASE
+    joints = states[base:]
+    rows = "base (9, N) and " * base + f"{', '.join(joints[:3])} ({k}, N)"
+    rows += f" and {joints[-1]} ({rates}, N)" * (len(joints) > 3)
     return {
         "states": ", ".join(["xp", *states]),
         "result": block.result,

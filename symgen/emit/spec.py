@@ -23,6 +23,8 @@ from symgen.regroup.regrouping import Regrouping, regroup
 
 STATES = {"q": "q", "qd": "QP", "qdd": "QDP", "qdr": "QPR", "qddr": "QDPR"}
 """Argument: family of its components."""
+BASE = ("base",)
+"""The argument before the others of a robot whose base moves, (N, 9): w0, wd0 and a0."""
 
 
 @dataclass(frozen=True)
@@ -200,7 +202,8 @@ def function(
     request adds nodes to its derivation, so it has one of its own: its operations do not depend on
     what was asked before.
     """
-    robot, model, request = regrouping.robot, MODELS[name], _request(regrouping, only)
+    robot, request = regrouping.robot, _request(regrouping, only)
+    model = MODELS[name].on(robot)
     d = derived(robot, close) if model.option else derive(robot)
     shape = shape_of(model, d, tuple(request.parameters.values()))
     return Function(model, model.values(d, request, graph), shape)

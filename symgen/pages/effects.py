@@ -120,7 +120,7 @@ class Reasons:
     """
 
     def __init__(self, robot: Robot) -> None:
-        self.robot = robot
+        self.robot, self.base_moves = robot, robot.base_moves
         d = derive(robot)
         self.w = {j: link.w for j, link in d.motion.link.items()}
         self.v = origin_velocities(d.motion)
@@ -136,6 +136,8 @@ class Reasons:
 
         family : name of the parameter without its number, such as XX.
         """
+        if self.base_moves:
+            return "no joint feels it, whatever the motion of the base"
         if family == "M":
             return (
                 f"the energy of a mass at the origin of frame {j} is the same in every motion"

@@ -73,12 +73,13 @@ def float_regressor(robot: Robot, names: Sequence[str]) -> Array:
         count = states_for(robot, names)
         if any(e.is_own for e in robot.elements):  # which bend and jump
             count *= 6
-        states = rng.uniform(-1, 1, (3, len(robot.moving), count))
+        drawn = rng.uniform(-1, 1, (3, len(robot.moving), count))
         if any(e.is_own for e in robot.elements):
-            states[0] *= np.pi
-            states[1] *= 10 ** rng.uniform(*DECADES, states[1].shape)
-        q, qd, qdd = (dict(zip(robot.moving, x, strict=True)) for x in states)
-        floats = Floats(robot, states_of(q=q, qd=qd, qdd=qdd), _in_time(robot, rng, count))
+            drawn[0] *= np.pi
+            drawn[1] *= 10 ** rng.uniform(*DECADES, drawn[1].shape)
+        q, qd, qdd = (dict(zip(robot.moving, x, strict=True)) for x in drawn)
+        states = states_of(q=q, qd=qd, qdd=qdd) | _base_motion(robot, rng, count)
+        floats = Floats(robot, states, _in_time(robot, rng, count))
         return sampled_columns(floats, names, count).reshape(-1, len(names))
     system, count = loop_system(robot), 3 * len(names) // len(robot.joints) + 10
     blocks: list[Array] = []
@@ -167,8 +168,15 @@ def _columns_near_start(
         for k, i in enumerate(robot.joints)
     }
     states = states_of(q=joints(q), qd=joints(qd), qdd=joints(qdd)) | rate
+    states |= _base_motion(robot, rng, len(q))
     floats = Floats(robot, states, _in_time(robot, rng, len(q)))
     return sampled_columns(floats, names, len(q))
+
+
+def _base_motion(robot: Robot, rng: np.random.Generator, count: int) -> dict[Symbol, Array]:
+    """Draw random motions of a base that moves, one per state."""
+    names = derive(robot).algebra.base_motion
+    return {Symbol("base", name): rng.uniform(-1, 1, count) for name in names}
 
 
 def _in_time(robot: Robot, rng: np.random.Generator, count: int) -> Any:

@@ -548,7 +548,7 @@ def shown_models(regrouping: Regrouping) -> tuple[list[ShownModel], list[str]]:
     models = [
         SymbolicModel(model, source, request, None, EXPANDED)
         for model in sorted(SYMBOLIC.values(), key=lambda model: model.page)
-        if model.page
+        if model.page and model.defined_on(robot)
     ]
     return [*filter(None, map(shown_model, models))], passive_notes(models[0])
 

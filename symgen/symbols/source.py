@@ -94,6 +94,9 @@ class Source:
             for j in self.robot.moving:
                 if (name := f"{letter}{j}") in self.given:
                     inputs[Symbol(kind, name)] = self.given[name]
+        for name in GraphAlgebra(self.robot).base_motion:
+            if name in self.given:
+                inputs[Symbol("base", name)] = self.given[name]
         for own, name in self.own.items():
             if name in self.given:
                 inputs[Symbol("parameter", own)] = self.given[name]
@@ -177,6 +180,7 @@ def _parsed(
     A text is parsed by the grammar of robot files.
     """
     moving = [f"{state}{j}" for state in ("q", "QP", "QDP") for j in robot.moving]
+    moving += GraphAlgebra(robot).base_motion
     known = [*robot.constants, *moving, *parameters]
     result = {}
     for symbol, value in values.items():

@@ -115,7 +115,7 @@ class SymbolicRobot:
         if asked not in self._models:
             request = self.source.request(of, frame)
             self._models[asked] = SymbolicModel(
-                SYMBOLIC[name], self.source, request, asked[-1], self.limit
+                SYMBOLIC[name].on(robot), self.source, request, asked[-1], self.limit
             )
         return self._models[asked]
 

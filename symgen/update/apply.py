@@ -25,7 +25,7 @@ from runtime.core.model import load_model
 from runtime.documents.estimates import load_whole_estimate
 from runtime.physical.inertia import PhysicalModel, physical_model
 from symgen.certify.requests import model as emitted
-from symgen.description.files import content_of, read_robot, warn_not_read
+from symgen.description.files import content_of, on_base, read_robot, warn_not_read
 from symgen.description.robot import Robot, one_joint_parameters, parameter
 from symgen.description.tree import Array, TreePart
 from symgen.errors import DescriptionError
@@ -192,6 +192,7 @@ def apply(
     lock: Mapping[str, float] | None = None,
     chain: tuple[str, str] | None = None,
     exact: bool = False,
+    base: str | None = None,
 ) -> Applied:
     """Return the text of a URDF or MJCF file with identified values in it; no file is written yet.
 
@@ -208,6 +209,8 @@ def apply(
         perhaps with other elements or drives.
     lock, chain, exact
         As in `read_robot`, with the same values as when the robot was identified or converted.
+    base : str, optional
+        As in `load_robot`, with the same value as when the robot was identified.
 
     Raises
     ------
@@ -221,6 +224,7 @@ def apply(
     described, of = (
         (text.robot, text.file) if robot is None else (read_robot(robot)[0], Path(robot).name)
     )
+    described = on_base(described, base)
     require_same_frames(text, described, of)
     warn_not_read(text.robot)
     result = _estimate(estimate)

@@ -38,7 +38,14 @@ from symgen.description.tree import (
     part_of,
     ten_of,
 )
-from symgen.description.tree_robot import JOINT_TERMS, Table, parse_tree, placed, robot_of_tree
+from symgen.description.tree_robot import (
+    JOINT_TERMS,
+    Table,
+    on_its_base,
+    parse_tree,
+    placed,
+    robot_of_tree,
+)
 from symgen.description.xml_text import XmlElement, read_elements
 from symgen.errors import DescriptionError
 from symgen.update.xml_edits import XmlEdits, numbers, same
@@ -462,7 +469,7 @@ def read_text(content: bytes, path: Path, exact: bool, part: TreePart) -> RobotT
         whole = parse_tree(content, path.name, exact=exact)
         attributes = URDF if suffix == ".urdf" else MJCF
         tree = part_of(whole, part)
-        robot = robot_of_tree(tree, path.name, "")[0]
+        robot, tree = robot_of_tree(tree, path.name, "")[0], on_its_base(tree)
         places = Places(content, whole, attributes)
         return RobotText(path.name, tree, placed(tree), robot, places)
 

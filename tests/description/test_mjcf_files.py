@@ -42,7 +42,7 @@ WORLD = "<worldbody>"
 WRONG = [  # what is replaced, by what, line of the error, words of the message
     ("<mujoco model", "<robot model", 7, "mismatched tag"),
     (WORLD, "<worldbody><freejoint/>", 2, "MuJoCo refuses"),
-    ('<joint name="s" axis="0 0 1"/>', '<freejoint name="s"/>', 3, "free joint 's'"),
+    ('<joint name="e" axis="0 1 0"/>', '<freejoint name="e"/>', 4, "MuJoCo refuses"),
     ('<joint name="e" axis="0 1 0"/>', '<joint name="e" type="ball"/>', 4, "ball joint 'e'"),
     (WORLD, '<include file="/etc/passwd"/><worldbody>', 2, "<include> is not read"),
     (WORLD, '<worldbody><body><include file="../../x.xml"/></body>', 2, "<include> is not read"),

@@ -26,6 +26,7 @@ from runtime.core.record import JOINT_CHANNELS, Record
 from runtime.core.rows.observation import Observation, stack
 from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import Selection, certain_rows, nothing_left, select_rows
+from runtime.core.signals.base import base_motion
 from runtime.core.signals.decimation import decimate
 from runtime.core.signals.filters import States, median_filtered
 from runtime.core.signals.reader import Reader
@@ -72,9 +73,13 @@ class Prepared:
 
     @property
     def channels(self) -> dict[str, Array]:
-        """Recorded signals with one column, such as a temperature, by name, shape (N,) each."""
-        given = self.record.channels.items()
-        return {c: x[:, 0] for c, x in given if c not in JOINT_CHANNELS and x.shape[1] == 1}
+        """Recorded signals with one column, such as a temperature, by name, shape (N,) each.
+
+        The motion of a base that moves is among them, filtered.
+        """
+        given = self.record.channels
+        own = {c: x[:, 0] for c, x in given.items() if c not in JOINT_CHANNELS and x.shape[1] == 1}
+        return own | base_motion(given, self.record.rate, self.study.signals)
 
     @cached_property
     def selection(self) -> Selection:
