@@ -214,10 +214,12 @@ def with_sign(result: Identification) -> tuple[Array, Array]:
 def lacking_of(result: Identification) -> Lacking | None:
     """Find the laws that the model lacks, from the rows of an identification.
 
-    None if the method is not linear, the parameters are not determined, or nothing moves.
+    None if the method is not linear, the parameters are not determined, nothing moves, or the model
+    does not tell which of its parameters are friction.
     """
     observation, fit, model = result.observation, result.estimate, result.model
     known = result.determined and result.usable and observation.motion is not None
+    known = known and hasattr(model, "ELEMENTS")
     if not known or not result.problem.method.linear or result.problem.reader.at_rest:
         return None
     assert observation.motion is not None

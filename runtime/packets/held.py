@@ -29,9 +29,10 @@ def held_positions(q: Array) -> Array:
     q : positions, shape (N, n).
     """
     evidence = np.stack([_evidence(x) for x in q.T], axis=1)
-    held = evidence > LIMIT.HELD_NOISE**2
+    by_chance = LIMIT.HELD_NOISE + np.log(len(q))  # the more rows, the more repeat by chance
+    held = evidence > by_chance
     same = np.append(False, (q[1:] == q[:-1]).all(axis=1))
-    held[same & (evidence.sum(axis=1) > LIMIT.HELD_NOISE**2)] = True
+    held[same & (evidence.sum(axis=1) > by_chance)] = True
     return np.asarray(held)
 
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
 import numpy as np
 import planar_arm
 import pytest
 
-from runtime.compose import estimate, identify, problem
+import symgen
+from runtime.compose import estimate, identify, problem, read_record
 from runtime.core.record import Record
 from runtime.ground.errors import InputError
 from runtime.packets.held import held_positions
@@ -16,6 +20,8 @@ from runtime.study import study_from_mapping
 RATE = 500.0  # Hz
 STEP = 2 * np.pi / 65536  # rad
 STUDY = study_from_mapping({})
+DATA = os.environ.get("SYMGEN_DATA") or Path(__file__).resolve().parents[3] / "shared" / "data"
+CASE = Path(DATA).parent / "cases5" / "held_rows"
 
 
 @pytest.fixture(scope="module")
@@ -148,3 +154,18 @@ def test_right_records_stay_as_they_are(arm, step, torque_step, slow, stands) ->
     record = Record(t, q, tau, rate=RATE)
     whole = problem(arm, record, STUDY)
     assert whole.noted("packets") is None and whole.records[0] is record
+
+
+def test_the_shared_case_is_read_at_the_rate_of_its_bus() -> None:
+    if not CASE.is_dir() and not os.environ.get("SYMGEN_REQUIRE_DATA"):
+        pytest.skip(f"{CASE} is not there")
+    model = symgen.model(CASE / "two.urdf")
+    record = read_record(CASE / "log.csv.gz")
+    result = identify(model, record, STUDY, plausible=True)
+    assert result.checklist.answer == "Yes, as far as judged", result.checklist.doubt
+    told = result.problem.noted("packets").text
+    assert "change once in 10 rows" in told and "20 Hz; 5400 of 6000 rows" in told
+    fit = result.model_estimate
+    sigma = dict(zip(fit.names, fit.sigma_corrected, strict=True))
+    for name, true in {"ZZ1R": 0.1887, "MX1R": 0.540, "ZZ2": 0.0180, "MX2": 0.100}.items():
+        assert abs(fit[name] - true) < min(1.96 * sigma[name], 0.05 * true), name

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import os
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import planar_arm
 import pytest
 
 import runtime
+import symgen
 from runtime.plausible.registers import kinks_at_zero, register_bit
 
 QUESTION = "Do the torques have their sign?"
+DATA = os.environ.get("SYMGEN_DATA") or Path(__file__).resolve().parents[3] / "shared" / "data"
+CASE = Path(DATA).parent / "cases5" / "sign_bit"
 
 
 @pytest.fixture(scope="module")
@@ -60,3 +67,33 @@ def test_torques_above_zero_are_no_magnitudes(arm, seed, step) -> None:
         x = step * np.round(x / step) if step else x
         for own in x.T:
             assert register_bit(own) is None and kinks_at_zero(own, planar_arm.RATE) < 4
+
+
+@pytest.mark.parametrize(
+    ("file", "told"),
+    [
+        ("log.yaml", "-(raw - 1024)"),
+        ("remedy.yaml", "-(raw - 1024)"),
+        ("magnitudes.csv.gz", "it is a magnitude"),
+    ],
+)
+def test_the_shared_case_is_told_and_right_once_it_is_decoded(file, told) -> None:
+    if not CASE.is_dir() and not os.environ.get("SYMGEN_REQUIRE_DATA"):
+        pytest.skip(f"{CASE} is not there")
+    model = symgen.model(CASE / "two.urdf")
+    study = runtime.load_study(CASE / file) if file.endswith(".yaml") else runtime.Study()
+    record = runtime.read_record(CASE / file, model)
+    checklist = runtime.identify(model, record, study, plausible=True).checklist
+    assert checklist.answer == "No"
+    assert QUESTION in checklist.doubt and told in checklist.doubt
+    if file != "log.yaml":
+        return
+    scale = np.array([0.009, 0.004])
+    raw = np.round(record.tau / scale)
+    decoded = replace(record, tau=scale * np.where(raw < 1024, raw, -(raw - 1024)))
+    result = runtime.identify(model, decoded, study, plausible=True)
+    assert result.checklist.answer.startswith("Yes"), result.checklist.doubt
+    fit = result.model_estimate
+    sigma = dict(zip(fit.names, fit.sigma_corrected, strict=True))
+    for name, true in {"MX1R": 0.540, "MX2": 0.100, "OFFSET1": 0.0, "OFFSET2": 0.0}.items():
+        assert abs(fit[name] - true) < 1.96 * sigma[name] + 0.01, name
