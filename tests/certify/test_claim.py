@@ -295,7 +295,7 @@ NOT_JUDGED = {
             "CAB: {along: 2, torque: exp(q), unit: N*m}",
             "SPR: {along: 2, torque: exp(q + 1), unit: N*m}",
         ],
-        "exp",
+        "numeric",  # exp(q + 1) = e*exp(q): e is no number of the field
     ),
     "an argument that stops": (
         ["CAB: {along: 2, torque: exp(q + abs(q)), unit: N*m}"],
