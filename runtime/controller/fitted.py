@@ -250,7 +250,8 @@ def law_estimate(problem: Problem, law: Law, saturation: Array) -> LawEstimate:
         torques = replace(torques, saturation=np.where(lost, np.inf, saturation))
         kd = _best(torques, gains, False, [np.where(lost, 0.0, kd)], delay, cuts)[0]
         fit = torques.fit(gains, False, kd, delay)
-    sigma = dict(zip(fit.names, np.fmax(fit.sigma, fit.sigma_corrected), strict=True))
+    both = torques.fit(gains, bool(gains and np.isfinite(late_by[0])), kd, delay)
+    sigma = dict(zip(both.names, np.fmax(both.sigma, both.sigma_corrected), strict=True))
     sigmas = np.array([sigma.get(f"KD{j}", np.nan) for j in labels])
     kd = np.where(np.isfinite(sigmas), kd, np.nan)
     text = _text(labels, kd, sigmas, late_by, law)

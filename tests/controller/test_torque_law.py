@@ -248,7 +248,10 @@ def test_the_saturation_is_in_force_where_kd_is_found(tmp_path, moving):
         study = written(
             tmp_path,
             log,
-            controller={"law": {"kp": KP.tolist(), "kd": kd}, "torque": {"saturation": list(cut)}},
+            controller={
+                "law": {"kp": KP.tolist(), "kd": kd, "delay": 0},
+                "torque": {"saturation": list(cut)},
+            },
             signals={"median": 1, "lowpass": {"cutoff": 40}},
         )
         result = identified(study)
