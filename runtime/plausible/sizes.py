@@ -182,11 +182,12 @@ def torques(case: Case) -> Answer:
     limits = np.where(limits > 0, limits, np.inf)  # a joint without a motor reaches none
     largest = np.abs(case.samples.tau).max(axis=0)
     if (out := largest > 1.5 * limits).any():
+        times = float((largest / limits).max())
         text = (
             f"{case.reaching(largest, joint_torque_units(case.model), out)}, up to "
-            f"{(largest / limits).max():.3g} times the limits"
+            f"{times:.3g} times the limits"
         )
-        return Answer("no", text)
+        return Answer("no", text, explains=1 - 1 / times)  # the rest is within the limits
     share = 100 * float((largest / limits).max())
     if share < 1:
         return Answer("doubtful", f"The torques reach {share:.2g} % of limits.tau at most")
