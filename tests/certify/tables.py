@@ -43,6 +43,11 @@ def _right(module: ModuleType, name: str, witness: Witness) -> bool:
         case "FORMULAS":
             own = {*value} <= {*witness.regrouping.names}  # type: ignore[misc]
             return own and formulas_hold(value.items(), witness)  # type: ignore[union-attr]
+        case "BASE_VALUES":  # by the printed formulas, at the values of the file
+            known = {**dict.fromkeys(witness.robot.parameters, 0.0), **witness.robot.values}
+            own = {**known, **evaluated(module.FORMULAS.items(), {**known, **constants})}
+            right = [own[name] for name in witness.regrouping.names]
+            return bool(np.allclose(value, right, rtol=EVALUATED_TWICE, atol=0))
         case "HEADER":
             lines = (module.__doc__ or "").partition("Base parameters")[2].splitlines()
             names = witness.regrouping.names
