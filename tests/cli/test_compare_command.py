@@ -194,4 +194,7 @@ def test_one_call_finds_the_best_of_the_measured_arm(tmp_path):
         and first["unseen_by_set"]["feasible"] <= 7.4
         and second["unseen_by_set"]["feasible"] <= 10.8
     )
-    assert (second["state"], third["state"]) == ("no", "no")  # without the counterbalance, a law lacks
+    assert (second["state"], third["state"]) == (
+        "no",
+        "no",
+    )  # without the counterbalance, a law lacks
