@@ -117,15 +117,17 @@ class Lacking:
 
 @Question(
     "Does the error depend on load, position or time?",
-    f"what does takes less than {LIMIT.LAW_SHARE:g} % of the torque of a joint",
+    f"what does takes less than {LIMIT.LAW_SHARE:g} % of the torque of a joint, or less than "
+    f"{LIMIT.LAW_TAKES:g} % of its error",
 )
 def depends(lacking: Lacking, model: GeneratedModel) -> Answer:
     """Ask whether a law of load, position or time is found that the model lacks."""
     labels, names = joint_labels(model), model.JOINTS
-    large = [law for law in lacking.laws if law.percent >= LIMIT.LAW_SHARE]
+    gain = lacking.before - lacking.after
+    clear = 100 * gain >= LIMIT.LAW_TAKES * lacking.before
+    large = [law for law in lacking.laws if law.percent >= LIMIT.LAW_SHARE and clear[law.j]]
     if not large:
         return Answer("good", "No clear dependence is found")
-    gain = lacking.before - lacking.after
     law = max(large, key=lambda law: gain[law.j])
     alike = [names[one.j] for one in (law, *large) if one.kind == law.kind]
     unit = "N*m" if joint_units(model)[law.j] == "rad" else "N"
