@@ -44,7 +44,11 @@ def rows_at_rest(problem: Problem) -> Problem:
 
     This is a step of the preparation of a problem, and says in one sentence what is left out.
     """
-    whole = with_speeds(problem, np.zeros(len(problem.model.JOINTS)))
+    try:
+        whole = with_speeds(problem, np.zeros(len(problem.model.JOINTS)))
+    except InputError:  # the reader refuses the record as it is, which CESTAC rounds first
+        rows = replace(problem.settings.rows, low_speed=0.0)
+        return problem.changed(settings=replace(problem.settings, rows=rows))
     speeds, share = resting(whole)
     if not speeds.any():
         return whole

@@ -48,4 +48,5 @@ def test_figures_of_the_page(model):
     differences = measured.observed(model, measured.go2_study(cutoff=20, velocity="differences"))
     recorded = measured.observed(model, measured.go2_study(cutoff=20))
     errors = [measured.left_out(model, x).mean() for x in (recorded, differences)]
-    assert errors[0] < 0.9 * errors[1] and np.isfinite(errors).all()
+    # Differences suffered from repeated packets, which are left out now: .92 of their error, not .9.
+    assert errors[0] < 0.95 * errors[1] and np.isfinite(errors).all()

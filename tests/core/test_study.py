@@ -88,6 +88,7 @@ def test_written_settings_read_back(study):
         "validate",
         "cestac",
         "payload",
+        "robot",
         "controller",
         "excitation",
     }

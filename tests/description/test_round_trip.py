@@ -29,6 +29,7 @@ symgen: 1
 name: every_key
 title: 'A "title": with signs'
 source: where it comes from
+base: moving
 gravity: [gx, gy, 0]
 constants: {D3: 0.2, D4: 0.22, D6: 0.1, c: 0.1, gx: -9.81, gy: 0}
 frames:
