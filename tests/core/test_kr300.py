@@ -184,7 +184,7 @@ def test_one_call_finds_the_best_treatment(robot):
     )
     assert "known torques subtracted: up to" in "".join(best.remarks)
     agreement = best.part("homogeneity")
-    assert not agreement.agree and agreement.disagreements[0].record == "B"
+    assert agreement.agree  # within deviations that include friction of load and position
     with pytest.raises(InputError, match="no validation record"):
         runtime.compare(model, {"a": (careful, A, ()), "b": (careful, A, B)})
     with pytest.raises(InputError, match=r"set the same validate"):
