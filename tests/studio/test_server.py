@@ -374,7 +374,7 @@ def test_what_a_classic_table_cannot_have_is_one_sentence(
 
 def test_an_angle_that_is_rounded_is_no_warning(studio: Any) -> None:
     joint = '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
-    origin = '<origin rpy="1.5707963269 0 0"/><limit effort="1" velocity="1"/></joint>'
+    origin = '<origin rpy="1.57079634 0 0"/><limit effort="1" velocity="1"/></joint>'
     urdf = f'<robot name="arm"><link name="a"/><link name="b"/>{joint}{origin}</robot>'
     studio.upload("robot", "arm.urdf", urdf.encode())
     text = studio.get("robot").text
