@@ -47,7 +47,6 @@ from runtime.counts.encoder_advice import EncoderSteps
 from runtime.expected import ExpectedError
 from runtime.ground.arrays import kind_of, require_kind
 from runtime.ground.errors import InputError, SettingsError
-from runtime.ground.settings import structure
 from runtime.ground.settings_errors import gone
 from runtime.late import Late, Listed, PartWhen, When
 from runtime.link_side import stated_sides, torques_of_links
@@ -56,7 +55,7 @@ from runtime.packets.packets import KIND as PACKETS
 from runtime.packets.packets import packets_once
 from runtime.payload.settings import LOADED
 from runtime.reading.formats import is_measured
-from runtime.reading.records import columns_read, read_records
+from runtime.reading.records import read_records
 from runtime.reading.settings import RecordSettings
 from runtime.rest import STATIC, poses_at_rest
 from runtime.speeds import recorded_speeds
@@ -778,19 +777,9 @@ def repair(
     if further is None:
         further = records_of(study.validate.record, model, study, folder=folder)
     whole = problem(model, records, study, unseen=further)
-
-    def columns(settings: Mapping[str, Any]) -> tuple[Sequence[str], Sequence[str]]:
-        own = structure(RecordSettings, settings)
-        if own.files and not (own.columns.q and own.columns.tau):
-            named = columns_read(own, model, folder)
-            return named.q, named.tau
-        numbers = range(1, len(model.JOINTS) + 1)
-        q, tau = ([f"{key}{j}" for j in numbers] for key in ("q", "tau"))
-        return own.columns.q or q, own.columns.tau or tau
-
     stated = study if study.record else replace(study, record=(RecordSettings(),))
     given = list_records(records)
-    return repairing.repair(whole, stated, records=given, variants=variants, columns=columns)
+    return repairing.repair(whole, stated, records=given, variants=variants, folder=folder)
 
 
 def extras(asked: Mapping[str, Mapping[str, Any]], attempted: bool = False) -> list[Extra]:

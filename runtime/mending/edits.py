@@ -13,17 +13,24 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from runtime.core.drives import Drives
+from runtime.core.model import GeneratedModel
+from runtime.ground.settings import structure
 from runtime.plausible.causes import ENTRY, GRAVITY, Cause
+from runtime.reading.records import columns_read
+from runtime.reading.settings import RecordSettings
 from runtime.reading.units import position_unit, torque_unit
 
 Array = np.ndarray
 Lines = dict[str, Any]
 """A study, or a section of it, as plain values."""
+Columns = Callable[[Lines], tuple[Sequence[str], Sequence[str]]]
+"""Names of the columns q and tau of a record, from its settings."""
 
 BEFORE_S = {1e3: "ms", 1e6: "us", 1e9: "ns"}
 """Units of time that are read as s, by the factor on the sampling rate that corrects them."""
@@ -47,8 +54,7 @@ class Place:
         Sampling rate of the records as they were read.
     timed : bool
         Whether time stamps give this rate.
-    columns : function of the settings of a record
-        Returns the names of its columns q and tau.
+    columns : Columns
     """
 
     joints: tuple[int, ...]
@@ -56,12 +62,30 @@ class Place:
     drives: Drives | None
     rate: float
     timed: bool
-    columns: Callable[[Mapping[str, Any]], tuple[Sequence[str], Sequence[str]]]
+    columns: Columns
 
     @property
     def n(self) -> int:
         """Number of joints."""
         return len(self.joints)
+
+
+def columns_in(model: GeneratedModel, folder: str | Path | None) -> Columns:
+    """Make the function that names the columns of a record: as stated, as its files have them, or q1 ...
+
+    folder : that of the files of the study.
+    """
+
+    def columns(record: Lines) -> tuple[Sequence[str], Sequence[str]]:
+        own = structure(RecordSettings, record)
+        if own.files and not (own.columns.q and own.columns.tau):
+            named = columns_read(own, model, folder)
+            return named.q, named.tau
+        numbers = range(1, len(model.JOINTS) + 1)
+        q, tau = ([f"{key}{j}" for j in numbers] for key in ("q", "tau"))
+        return own.columns.q or q, own.columns.tau or tau
+
+    return columns
 
 
 def records_in(study: Lines) -> Iterator[Lines]:

@@ -10,8 +10,9 @@ values of the robot file speak for is a guess. It is kept as a whole or not at a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from time import process_time
 from typing import Any
 
@@ -26,7 +27,7 @@ from runtime.ground.errors import InputError
 from runtime.ground.limits import limits
 from runtime.ground.progress import at
 from runtime.ground.settings import structure, to_mapping
-from runtime.mending.edits import Lines, Place, differences
+from runtime.mending.edits import Columns, Lines, Place, columns_in, differences
 from runtime.mending.reading import Data, Reading, record_of, set_aside
 from runtime.mending.search import Found, further, search
 from runtime.plausible.case import Case
@@ -41,7 +42,6 @@ LIMIT = limits(__package__)
 Array = np.ndarray
 BY_VALUES = ("unit", "side")
 """Kinds of causes that the values of the robot file alone may show: they fit no number."""
-Columns = Callable[[Mapping[str, Any]], tuple[Sequence[str], Sequence[str]]]
 
 
 @dataclass(frozen=True)
@@ -187,7 +187,7 @@ def repair(
     *,
     records: Sequence[Record],
     variants: Any,
-    columns: Columns,
+    folder: str | Path | None = None,
 ) -> Repair:
     """Search the lines of a study that are wrong, and write the study in which they are right.
 
@@ -201,8 +201,8 @@ def repair(
         As they were read, before any preparation step.
     variants : GeneratedModel or None
         The module of `symgen.variants`; without it, no entry of the robot file is corrected.
-    columns : function of the settings of a record
-        Returns the names of its columns q and tau.
+    folder : str, Path or None
+        That of the files of the study.
 
     Raises
     ------
@@ -211,6 +211,7 @@ def repair(
     """
     case = _case(problem, variants)
     lines = to_mapping(study)
+    columns = columns_in(problem.model, folder)
     data = data_of(case, problem, lines, columns, records[0].rate)
     start = Reading.given(data, lines)
     if start.baseline is None:

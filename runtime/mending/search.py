@@ -18,13 +18,9 @@ from runtime.mending.late import late_torques
 from runtime.mending.reading import Reading, best_of
 from runtime.mending.reversed import reversed_torques
 from runtime.plausible.causes import CAUSES, Cause
-from runtime.plausible.trials import decisive, leaves_values, try_causes
+from runtime.plausible.trials import DEAR, decisive, leaves_values, try_causes
 
 LIMIT, TRIED = limits(__package__), limits("runtime.plausible")
-
-
-DEAR = ("rate", "coupling", "offset", "scale", "ratio")
-"""Kinds whose gain `try_causes` lowers by RATE_GAIN; the score of a reading has its own price."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +134,8 @@ def further(reading: Reading) -> tuple[list[Reading], tuple[Cause, ...]]:
             for t in trials
             if id(t.cause) not in chosen
             and t.fit is not None
-            and t.gain + TRIED.RATE_GAIN * (t.cause.kind in DEAR) > LIMIT.STEP_GAIN
+            and t.gain + TRIED.RATE_GAIN * (t.cause.kind in DEAR)
+            > LIMIT.STEP_GAIN  # has its own price
             and not leaves_values(t.fit, baseline)
         ]
         if case.noise_floor > TRIED.NOISY:  # small accelerations undo what noise makes

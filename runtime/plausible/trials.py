@@ -53,6 +53,8 @@ from runtime.plausible.causes import (
 from runtime.plausible.samples import Samples, moving
 
 LIMIT = limits(__package__)
+DEAR = ("rate", "coupling", "offset", "scale", "ratio")
+"""Kinds of causes that give the parameters more freedom: they must gain LIMIT.RATE_GAIN more."""
 
 Array = np.ndarray
 Change = Callable[[float], Cause]
@@ -456,16 +458,13 @@ def try_causes(
 ) -> list[Trial]:
     """Try every possible error of the study (cause), and return the fits, the best first.
 
-    A wrong sampling rate, coupling, scale of a position or constant torque must gain
-    LIMIT.RATE_GAIN more than the others, because it gives the parameters more freedom.
+    The gain of kinds in DEAR is lowered by LIMIT.RATE_GAIN.
     """
     model, variants, samples = baseline.model, baseline.variants, baseline.samples
     robot = Robot(model, variants, sides, samples, slow_friction(baseline), column_units)
     trials = [*_of_causes(baseline, causes(robot)), *_of_numbers(baseline, robot)]
     priced = [
-        replace(trial, gain=trial.gain - LIMIT.RATE_GAIN)
-        if trial.cause.kind in ("rate", "coupling", "offset", "scale", "ratio")
-        else trial
+        replace(trial, gain=trial.gain - LIMIT.RATE_GAIN) if trial.cause.kind in DEAR else trial
         for trial in trials
     ]
     return sorted(priced, key=lambda trial: -trial.gain)
@@ -535,13 +534,13 @@ def _of_numbers(baseline: Baseline, robot: Robot) -> list[Trial]:
                 steps.append((gain, xi, row, change))
     steps.sort(key=lambda item: -item[0])
     for _, xi, row, number in steps[: LIMIT.NUMBERS_SEARCHED]:
-        trial = search_number(baseline, row, number, xi)
+        trial = _search_number(baseline, row, number, xi)
         if trial is not None:
             trials.append(trial)
     return trials
 
 
-def search_number(baseline: Baseline, row: Row, change: Change, first: float) -> Trial | None:
+def _search_number(baseline: Baseline, row: Row, change: Change, first: float) -> Trial | None:
     """Search the size xi of one possible error, such as a torque factor, that fits the record best.
 
     None if no size improves the fit enough. A few sizes are tried with the joint weights of the

@@ -199,20 +199,19 @@ class Pages:
         record = self.folder.measured("record")
         if name not in VIEWS or (name == "preview" and not record):
             raise InputError("no such view")
-        of_run = name in ("series", "changes")
-        path = (
-            self.folder.path / record if name == "preview" else Path() if of_run else self._source()
-        )
         given: Any = self.server.before if name == "formulas" else asked
         if name == "preview":
+            path = self.folder.path / record
             shown = await self.server.robot()
             (settings, *_) = self.folder.study().get("record") or [{}]
             joints = tuple(filter(None, shown.get("labels", ())))
             given = asked | {"joints": joints, "topic": settings.get("topic")}
-        if name in ("series", "changes"):
+        elif name in ("series", "changes"):
             run = self.folder.run(asked.get("run", ""))
-            path = self.folder.robot_of(run.name) or path
+            path = self.folder.robot_of(run.name) or self._source()
             given = {"run": str(run), "record": asked.get("record", "")}
+        else:
+            path = self._source()
         value = await self.server.view(getattr(views, name), str(path), given)
         if name in ("preview", "series", "changes"):
             return JSONResponse(value)

@@ -97,7 +97,7 @@ class Server:
         shown = await self.view(views.robot, str(path), draft)
         if draft and path is not None and "figure" not in shown:  # the last whole robot is drawn
             last = await self.view(views.robot, str(path), "")
-            shown = shown | {key: last[key] for key in ("figure",) if key in last}
+            shown = shown | ({"figure": last["figure"]} if "figure" in last else {})
         own = "" if path is None or path.suffix != ".yaml" else self.folder.read(path.name)
         return {**shown, "text": draft or own or shown.get("text", "")}
 

@@ -119,7 +119,8 @@ def listening_at(folder: Path, port: int, *, renew: bool) -> tuple[str, socket.s
             raise
         listening = socket.create_server(("127.0.0.1", 0))
     own = listening.getsockname()[1]
-    if not (last and own not in (last, port)):  # where the port is another server's, its file stays
+    borrowed = bool(last) and own not in (last, port)  # the port of the file is another server's
+    if not borrowed:
         path.unlink(missing_ok=True)
         with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
             json.dump({"port": own, "token": token}, file)
