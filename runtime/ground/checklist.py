@@ -49,7 +49,7 @@ class Checklist(Result):
 
     @property
     def worst(self) -> Check | None:
-        """The first check with the worst answer; None if all answered checks are good."""
+        """The check to name first, of the worst answers mostly; None if all answered checks are good."""
         return worst_of(self.checks)
 
     @property
