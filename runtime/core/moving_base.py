@@ -18,8 +18,16 @@ import numpy as np
 
 from runtime.core.model import GeneratedModel
 from runtime.core.problem import Problem
-from runtime.core.record import WRENCH, Record
-from runtime.core.signals.base import GRAVITY, IMU, INPUTS, MOTION, POSITION, QUATERNION
+from runtime.core.record import (
+    BASE_GRAVITY,
+    BASE_IMU,
+    BASE_MOTION,
+    BASE_POSITION,
+    BASE_QUATERNION,
+    WRENCH,
+    Record,
+)
+from runtime.core.signals.base import INPUTS
 from runtime.ground.errors import InputError
 
 Array = np.ndarray
@@ -82,7 +90,7 @@ def moved_base(problem: Problem) -> Problem:
     moves = getattr(model, "BASE", "fixed") == "moving"
     for record in records:
         _require_motion(model, record, moves)
-        if problem.reader.at_rest and {POSITION, IMU} & {*record.channels}:
+        if problem.reader.at_rest and {BASE_POSITION, BASE_IMU} & {*record.channels}:
             raise InputError(
                 "poses at rest have no rates of the base; give record.base: {motion: [...]}",
                 file=record.file,
@@ -103,7 +111,7 @@ def moved_base(problem: Problem) -> Problem:
 
 
 def _require_motion(model: GeneratedModel, record: Record, moves: bool) -> None:
-    given = {MOTION, POSITION, IMU} & {*record.channels}
+    given = {BASE_MOTION, BASE_POSITION, BASE_IMU} & {*record.channels}
     if moves and not given:
         raise InputError(
             f"the base of {model.NAME} moves, but the record does not say how; give record.base: "
@@ -117,15 +125,15 @@ def _require_motion(model: GeneratedModel, record: Record, moves: bool) -> None:
             "--base moving (symgen.model(ROBOT, base='moving')), or remove record.base",
             file=record.file,
         )
-    widths = {MOTION: 9, POSITION: 3, QUATERNION: 4, IMU: 9}
+    widths = {BASE_MOTION: 9, BASE_POSITION: 3, BASE_QUATERNION: 4, BASE_IMU: 9}
     for name, width in widths.items():
         if name in record.channels and record.channels[name].shape[1] != width:
             raise InputError(
                 f"{name} has {record.channels[name].shape[1]} columns; expected {width}",
                 file=record.file,
             )
-    if POSITION in given:
-        Q = record.channels.get(QUATERNION)
+    if BASE_POSITION in given:
+        Q = record.channels.get(BASE_QUATERNION)
         if Q is None:
             raise InputError(
                 "record.base has a position, but no quaternion; give both", file=record.file
@@ -141,7 +149,7 @@ def _require_motion(model: GeneratedModel, record: Record, moves: bool) -> None:
 
 
 def _with_gravity(record: Record, g: tuple[float, float, float]) -> Record:
-    if POSITION not in record.channels:
+    if BASE_POSITION not in record.channels:
         return record
     gravity = np.broadcast_to(np.array(g), (len(record), 3))
-    return replace(record, channels={**record.channels, GRAVITY: gravity})
+    return replace(record, channels={**record.channels, BASE_GRAVITY: gravity})

@@ -27,6 +27,12 @@ WRENCH = "wrench"
 """Beginning of the channels that are wrenches, before the number of the frame."""
 JOINT_CHANNELS = ("q_r", "qd", "qd_ref", "tau_ff")
 """Channels with one column per joint."""
+BASE_MOTION, BASE_POSITION, BASE_QUATERNION = "base_motion", "base_position", "base_quaternion"
+"""Channels of a record: w0, wd0, a0 (N, 9); p (N, 3), m; Q (N, 4), scalar first."""
+BASE_IMU = "base_imu"
+"""Channel with w0 (rad/s), f (m/s**2) and r (m) in the axes of frame 0, (N, 9)."""
+BASE_GRAVITY = "base_gravity"
+"""Channel with the acceleration of gravity in the axes of the world, (N, 3), m/s**2."""
 
 UNNAMED = "record"
 """Name of a record that was given none."""

@@ -8,7 +8,6 @@ by cubic interpolation between the samples. Samples without a torque at an end a
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from runtime.ground.errors import InputError
 
@@ -40,6 +39,8 @@ def inside(t: Array, delay: Array) -> slice:
 
 def on_time(t: Array, tau: Array, delay: Array) -> Array:
     """Read torques, shape (N, n), at the instants t + delay, s, joint by joint."""
+    from scipy.interpolate import CubicSpline  # 60 ms, where it is used
+
     return np.stack(
         [
             CubicSpline(t, own)(np.clip(t + late, t[0], t[-1]))

@@ -20,8 +20,16 @@ import numpy as np
 from runtime.controller.law import torque_law
 from runtime.core.missing import COUNTS, Missing, bridged
 from runtime.core.model import GeneratedModel, drives_of, joint_labels
-from runtime.core.record import JOINT_CHANNELS, WRENCH, Origin, Record, require_finite
-from runtime.core.signals.base import IMU, QUATERNION, continued
+from runtime.core.quaternions import continued
+from runtime.core.record import (
+    BASE_IMU,
+    BASE_QUATERNION,
+    JOINT_CHANNELS,
+    WRENCH,
+    Origin,
+    Record,
+    require_finite,
+)
 from runtime.ground.clock import Stamps, rate_of, time_stamps
 from runtime.ground.errors import InputError, ModelError
 from runtime.ground.limits import LIMIT
@@ -281,9 +289,9 @@ def _joint_side(
             values = side.torque(values)
         elif key == "tau_known":
             values = _spread(values, columns.tau_known)
-        elif key == IMU:
+        elif key == BASE_IMU:
             values = settings.base.of_sensor(values)
-        elif key == QUATERNION:
+        elif key == BASE_QUATERNION:
             values = continued(values)  # before it is resampled
         elif key.startswith(WRENCH) and key not in columns.channels:
             values = values * settings.scale.wrench

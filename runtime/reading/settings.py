@@ -14,8 +14,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, field_validator
 
 from runtime.core import study as chapter
-from runtime.core.record import WRENCH
-from runtime.core.signals.base import IMU, MOTION, POSITION, QUATERNION
+from runtime.core.record import BASE_IMU, BASE_MOTION, BASE_POSITION, BASE_QUATERNION, WRENCH
 from runtime.ground.settings import (
     Flag,
     Many,
@@ -205,7 +204,7 @@ class BaseColumns(Settings):
 
     def __post_init__(self) -> None:
         require(
-            len(self.columns) <= 1 or {*self.columns} == {POSITION, QUATERNION},
+            len(self.columns) <= 1 or {*self.columns} == {BASE_POSITION, BASE_QUATERNION},
             "more than one form is given; give motion, or position and quaternion, or gyroscope and "
             "accelerometer",
             "motion",
@@ -235,7 +234,12 @@ class BaseColumns(Settings):
             else (*self.quaternion[3:], *self.quaternion[:3])
         )
         imu = (*self.gyroscope, *self.accelerometer)
-        found = {MOTION: self.motion, POSITION: self.position, QUATERNION: Q, IMU: imu}
+        found = {
+            BASE_MOTION: self.motion,
+            BASE_POSITION: self.position,
+            BASE_QUATERNION: Q,
+            BASE_IMU: imu,
+        }
         return {channel: names for channel, names in found.items() if names}
 
     def of_sensor(self, values: Array) -> Array:

@@ -11,7 +11,8 @@ import pytest
 import runtime
 import symgen
 from oracles.urdf_robots import ur5
-from runtime.core.signals.base import INPUTS, base_motion, of_pose
+from runtime.core.quaternions import motion_of_pose
+from runtime.core.signals.base import INPUTS, base_motion
 from runtime.core.study import Signals
 from runtime.ground.errors import InputError, SettingsError
 from symgen.description.tree_robot import read_tree
@@ -103,8 +104,8 @@ def test_the_rates_of_a_quaternion_do_not_feel_its_length():
     udd = rng.normal(size=(1, 4))
     udd -= (udd @ u.T + ud @ ud.T) * u
     r, rd, rdd, a = 1.1, 0.3, -0.7, rng.normal(size=(1, 3))
-    unit = of_pose(a, u, ud, udd)
-    other = of_pose(a, r * u, rd * u + r * ud, rdd * u + 2 * rd * ud + r * udd)
+    unit = motion_of_pose(a, u, ud, udd)
+    other = motion_of_pose(a, r * u, rd * u + r * ud, rdd * u + 2 * rd * ud + r * udd)
     np.testing.assert_allclose(other, unit, atol=1e-12)
     R = pin.Quaternion(*u[0]).matrix()
     np.testing.assert_allclose(unit[0, 6:], R.T @ a[0], atol=1e-12)

@@ -23,6 +23,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from runtime.core.quaternions import continued, motion_of_pose
+from runtime.core.record import (
+    BASE_GRAVITY,
+    BASE_IMU,
+    BASE_MOTION,
+    BASE_POSITION,
+    BASE_QUATERNION,
+)
 from runtime.core.signals.filters import (
     derivative,
     filtered_states,
@@ -33,12 +41,6 @@ from runtime.core.study import Signals
 
 Array = np.ndarray
 
-MOTION, POSITION, QUATERNION = "base_motion", "base_position", "base_quaternion"
-"""Channels of a record: w0, wd0, a0 (N, 9); p (N, 3), m; Q (N, 4), scalar first."""
-IMU = "base_imu"
-"""Channel with w0 (rad/s), f (m/s**2) and r (m) in the axes of frame 0, (N, 9)."""
-GRAVITY = "base_gravity"
-"""Channel with the acceleration of gravity in the axes of the world, (N, 3), m/s**2."""
 INPUTS = tuple(f"{family}{k}0" for family in ("W", "WP", "VP") for k in (1, 2, 3))
 """Names of the components of w0, wd0 and a0."""
 
@@ -48,17 +50,19 @@ def base_motion(channels: Mapping[str, Array], rate: float, signals: Signals) ->
 
     channels : signals of the record.   rate : Hz.   signals : filters.
     """
-    if MOTION in channels:
-        x = _filtered(channels[MOTION], rate, signals)
-    elif IMU in channels:
-        w, f = np.hsplit(_filtered(channels[IMU][:, :6], rate, signals), 2)
-        wd, r = derivative(w, rate, signals.ends), channels[IMU][:, 6:]
+    if BASE_MOTION in channels:
+        x = _filtered(channels[BASE_MOTION], rate, signals)
+    elif BASE_IMU in channels:
+        w, f = np.hsplit(_filtered(channels[BASE_IMU][:, :6], rate, signals), 2)
+        wd, r = derivative(w, rate, signals.ends), channels[BASE_IMU][:, 6:]
         x = np.hstack([w, wd, f - np.cross(wd, r) - np.cross(w, np.cross(w, r))])
-    elif POSITION in channels:
-        p = filtered_states(channels[POSITION], rate, signals)
-        unit = channels[QUATERNION] / np.linalg.norm(channels[QUATERNION], axis=1, keepdims=True)
+    elif BASE_POSITION in channels:
+        p = filtered_states(channels[BASE_POSITION], rate, signals)
+        unit = channels[BASE_QUATERNION] / np.linalg.norm(
+            channels[BASE_QUATERNION], axis=1, keepdims=True
+        )
         Q = filtered_states(continued(unit), rate, signals)
-        x = of_pose(p.qdd - channels[GRAVITY], Q.q, Q.qd, Q.qdd)
+        x = motion_of_pose(p.qdd - channels[BASE_GRAVITY], Q.q, Q.qd, Q.qdd)
     else:
         return {}
     return dict(zip(INPUTS, x.T, strict=True))
@@ -71,30 +75,3 @@ def _filtered(x: Array, rate: float, signals: Signals) -> Array:
         if low is not None and state in low.on:
             x = lowpass_filtered(x, rate, low)
     return x
-
-
-def continued(Q: Array) -> Array:
-    """Return the quaternions Q, shape (N, 4), with signs that make them continuous."""
-    turned = np.where(np.einsum("tk,tk->t", Q[1:], Q[:-1]) < 0, -1.0, 1.0)
-    return np.asarray(Q * np.concatenate([[1.0], np.cumprod(turned)])[:, None])
-
-
-def of_pose(a: Array, Q: Array, Qd: Array, Qdd: Array) -> Array:
-    """Compute w0, wd0 and a0, shape (N, 9).
-
-    a : pdd - g in the axes of the world, shape (N, 3), m/s**2.   Q : quaternions of about unit
-    length, scalar first, with their derivatives, shape (N, 4).
-    """
-    r2 = np.einsum("tk,tk->t", Q, Q)[:, None]
-    w = 2 * _vector_of_product(Q, Qd) / r2
-    shrinking = 2 * np.einsum("tk,tk->t", Q, Qd)[:, None] / r2
-    wd = 2 * _vector_of_product(Q, Qdd) / r2 - shrinking * w
-    s, v = Q[:, :1], Q[:, 1:]
-    turned = a - 2 * (s * np.cross(v, a) - np.cross(v, np.cross(v, a))) / r2  # R' a
-    return np.hstack([w, wd, turned])
-
-
-def _vector_of_product(Q: Array, P: Array) -> Array:
-    """Return the vector part of the product Q* P of quaternions, shape (N, 3)."""
-    s, v = Q[:, :1], Q[:, 1:]
-    return np.asarray(s * P[:, 1:] - P[:, :1] * v - np.cross(v, P[:, 1:]))
