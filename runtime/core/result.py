@@ -351,14 +351,23 @@ class Identification:
         """Warnings on single joints and from further analyses; correlations are left out.
 
         Joints are named that have no rows, that have negative friction or motor inertia, or that
-        lost their parameters in the elimination.
+        lost their parameters in the elimination. A cause of negative values is guessed only where
+        the checks have found none.
         """
         by_law = any(record.origin.by_law for record in self.records)
+        worst = self.checklist.worst
+        cause = (
+            ""
+            if worst and worst.state == "no" and not worst.outcome
+            else (
+                f": {'kd of the law is larger than that of the drive, or ' * by_law}a sign of "
+                "the joint is wrong (ratio, torque constant or column), or its coupling, "
+                "unit or frame"
+            )
+        )  # one cause is enough
         signs = (
             f"{', '.join(self.negative)} below zero, but friction and motor inertia cannot be "
-            f"negative: {'kd of the law is larger than that of the drive, or ' * by_law}a sign of "
-            "the joint is wrong (ratio, torque constant or column), or its coupling, "
-            "unit or frame."
+            f"negative{cause}."
         )
         lost = lost_joints(self.estimate, self.model_estimate)
         joints = joint_labels(self.model)

@@ -157,6 +157,7 @@ def predicted(result: Identification) -> Answer:
     f"not below zero by {LIMIT.CERTAIN_SIGN:g} deviations",
     "check the sign of ratio, torque constant and columns of this joint, then its coupling, units "
     "and frame; then identify again",
+    outcome=True,
 )
 def signs(result: Identification) -> Answer:
     """Check that no friction parameter and no motor inertia is certainly below zero.

@@ -13,6 +13,7 @@ from typing import Any
 from symgen.derive.closure import Closure
 from symgen.derive.names import FAMILIES, families_of
 from symgen.derive.regressor import element_names, unit
+from symgen.description.distal import frames_text
 from symgen.description.element import TRANSMITTED
 from symgen.description.robot import FIXED, KINDS, Element, Robot
 from symgen.emit.printers import Text
@@ -59,6 +60,8 @@ def header(spec: ModuleSpec, texts: Mapping[str, Text], formulas: bool) -> list[
             for text in loop_lines(robot, spec.derivation.closure)
             for line in line_of("Loop", text)
         ),
+        *(line_of("Values", text) if (text := frames_text(robot)) else ()),
+        *(line_of("Not read", "; ".join(robot.not_read)) if robot.not_read else ()),
         "",
         f"Base parameters, {len(regrouping)} of {len(robot.parameters)}; Gautier and Khalil (1990)",
         *wrap_text(regrouping.method, "    "),

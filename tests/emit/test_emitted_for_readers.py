@@ -7,6 +7,7 @@ from __future__ import annotations
 import ctypes
 import re
 import subprocess
+from dataclasses import replace
 from types import ModuleType
 from typing import Any
 
@@ -43,6 +44,21 @@ def test_results_stand_under_their_heading_alone() -> None:
     """A step names one value; entries of A and T are assigned at the end."""
     text = generate_module(load_robot("tx40"))
     assert not re.search(r"^ +\w+ = [AT]\[", text, re.MULTILINE)
+
+
+@pytest.mark.parametrize("target", ["numpy", "c"])
+def test_the_head_says_what_was_not_read_and_whose_values_differ(target: str) -> None:
+    robot = load_robot("planar_2r")
+    texts = [
+        *generate_files(robot, targets=(target,)).values(),
+        *generate_files(
+            replace(robot, distal=2, not_read=("forces of a fluid",)), targets=(target,)
+        ).values(),
+    ]
+    plain, told = [" ".join(text.split()) for text in texts[:: len(texts) // 2][:2]]
+    assert "Not read" not in plain and "classic table" not in plain
+    assert "Not read forces of a fluid" in told
+    assert "Values parameters are in Khalil's frames" in told and "has another number there" in told
 
 
 def test_signs_are_called_signs() -> None:
