@@ -96,7 +96,9 @@ def main() -> None:
     command("convert", "planar_2r", "planar.urdf")
     command("apply", "found", "planar.urdf", "--help")
     command("cestac", "planar_2r", "run.csv", "-o", "steps", "--delta", "1e-6", "--runs", "5")
-    command("report", "planar_2r", "run.csv", "-o", "report", "--help")
+    command("report", "planar_2r", "run.csv", "-o", "report", code=1)
+    if "<svg" not in Path("report/report.html").read_text(encoding="utf-8"):
+        sys.exit("report/report.html has no figure")
     command("simulate", "emps", "loop.yaml", "-o", "loop")
     command("datasets")
     command("schema")
