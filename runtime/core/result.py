@@ -351,34 +351,31 @@ class Identification:
         """Warnings on single joints and from further analyses; correlations are left out.
 
         Joints are named that have no rows, that have negative friction or motor inertia, or that
-        lost their parameters in the elimination. A cause of negative values is guessed only where
-        the checks have found none.
+        lost their parameters in the elimination.
         """
-        by_law = any(record.origin.by_law for record in self.records)
-        worst = self.checklist.worst
-        cause = (
-            ""
-            if worst and worst.state == "no" and not worst.outcome
-            else (
-                f": {'kd of the law is larger than that of the drive, or ' * by_law}a sign of "
-                "the joint is wrong (ratio, torque constant or column), or its coupling, "
-                "unit or frame"
-            )
-        )  # one cause is enough
-        signs = (
-            f"{', '.join(self.negative)} below zero, but friction and motor inertia cannot be "
-            f"negative{cause}."
-        )
         lost = lost_joints(self.estimate, self.model_estimate)
         joints = joint_labels(self.model)
         unused = unused_joints(self.observation.rows, self.observation.dropped, joints)
         sentences = (
             unused,
-            signs if self.negative else "",
+            self._negative_text() if self.negative else "",
             f"{lost}." if lost else "",
             *(sentence for part in self.parts for sentence in part.warnings()),
         )
         return tuple(sentence for sentence in sentences if sentence)
+
+    def _negative_text(self) -> str:
+        """Name what is below zero; guess its cause only where the checks have found none."""
+        text = f"{', '.join(self.negative)} below zero, but friction and motor inertia cannot be negative"
+        worst = self.checklist.worst
+        if worst is not None and worst.state == "no" and not worst.outcome:
+            return f"{text}."
+        by_law = any(record.origin.by_law for record in self.records)
+        return (
+            f"{text}: {'kd of the law is larger than that of the drive, or ' * by_law}a sign of "
+            "the joint is wrong (ratio, torque constant or column), or its coupling, "
+            "unit or frame."
+        )
 
     def __str__(self) -> str:
         return self.brief()
