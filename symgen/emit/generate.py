@@ -68,6 +68,11 @@ def generate_files(
         {file name: text}. The same robot file and the same version give the same bytes.
     """
     refused = [name for name in targets if not TARGETS[name].on_moving_base]
+    if robot.base_is_free and refused:
+        raise SymgenError(
+            f"{robot.name}: the target {refused[0]} has no models of a free base, which is emitted "
+            "in Python; use the targets numpy, casadi or xp, or base: moving"
+        )
     if robot.base_moves and (refused or close(robot).tied):
         wanted = (
             f"the target {refused[0]} has no models of"
