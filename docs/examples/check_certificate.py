@@ -36,6 +36,7 @@ INERTIAL = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 
 KINDS = ("inertia", "viscous", "coulomb", "stiffness", "offset", "column")
 LONGEST, MOST, POWER = 2000, 300, 64  # characters of an expression, entries of a list, an exponent
+BASE_ROWS = ("FX0", "FY0", "FZ0", "NX0", "NY0", "NZ0")
 FRAME = ("gamma", "b", "alpha", "d", "theta", "r")
 SIMPLE = ("sin", "cos")
 LAWS = (*SIMPLE, "sign", "abs", "exp", "tanh")
@@ -396,8 +397,8 @@ def regressor(F):
     p, rows, claim = F.p, F.move(), F.claim
     g = [-F.value(e) for e in claim["gravity"]]
     E3 = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    w, wd = [0] * 3, [0] * 3
-    if moves(claim):  # at random, gravity in the acceleration
+    w, wd, free = [0] * 3, [0] * 3, base_of(claim) == "free"
+    if base_of(claim) != "fixed":  # at random, gravity in the acceleration
         w, wd, g = ([random.randrange(p) for _ in E3] for _ in range(3))
     at = {0: (E3, [0] * 3, w, wd, g, {})}  # R, P, w, wd, a, {joint: (z, P or None)}
     torque = {}
@@ -405,25 +406,10 @@ def regressor(F):
     def reduced(v):
         return [x % p for x in v]
 
-    for f in claim["frames"]:
-        R, P, w, wd, a, axes = at[f["ant"]]
-        for angle, shift, axis in (("gamma", "b", 2), ("alpha", "d", 0), ("theta", "r", 2)):
-            A, step = screw(F, F.angle(parsed(f[angle]), None), F.value(f[shift]), axis)
-            P = reduced(add(P, [dot(row, step) for row in R]))
-            R = [reduced(row) for row in product(R, A)]
-        z, j, sigma = [row[2] for row in R], f["j"], f["sigma"]
-        lever = add(P, times(-1, at[f["ant"]][1]))
-        a = add(a, cross(wd, lever), cross(w, cross(w, lever)))
-        if sigma == 0:
-            spin = times(F.qd[j], z)
-            wd = add(wd, times(F.qdd[j], z), cross(w, spin))
-            w = add(w, spin)
-        elif sigma == 1:
-            a = add(a, cross(w, times(2 * F.qd[j], z)), times(F.qdd[j], z))
-        w, wd, a = reduced(w), reduced(wd), reduced(a)
-        axes = axes if sigma == 2 else {**axes, j: (z, P if sigma == 0 else None)}
-        at[j] = R, P, w, wd, a, axes
-        for k, name in enumerate(INERTIAL if f["link"] else ()):
+    def of_link(j):
+        """The columns of a link by the wrench that moves it, in frame 0."""
+        R, P, w, wd, a, axes = at[j]
+        for k, name in enumerate(INERTIAL):
             force, moment = [0] * 3, [0] * 3
             if name == "M":
                 force = a
@@ -445,15 +431,41 @@ def regressor(F):
                 else dot(z, force)
                 for i, (z, o) in axes.items()
             }
+            if free:
+                wrench = (*force, *add(moment, cross(P, force)))
+                torque[f"{name}{j}"] |= dict(zip(BASE_ROWS, wrench, strict=True))
+
+    if free:
+        of_link(0)
+    for f in claim["frames"]:
+        R, P, w, wd, a, axes = at[f["ant"]]
+        for angle, shift, axis in (("gamma", "b", 2), ("alpha", "d", 0), ("theta", "r", 2)):
+            A, step = screw(F, F.angle(parsed(f[angle]), None), F.value(f[shift]), axis)
+            P = reduced(add(P, [dot(row, step) for row in R]))
+            R = [reduced(row) for row in product(R, A)]
+        z, j, sigma = [row[2] for row in R], f["j"], f["sigma"]
+        lever = add(P, times(-1, at[f["ant"]][1]))
+        a = add(a, cross(wd, lever), cross(w, cross(w, lever)))
+        if sigma == 0:
+            spin = times(F.qd[j], z)
+            wd = add(wd, times(F.qdd[j], z), cross(w, spin))
+            w = add(w, spin)
+        elif sigma == 1:
+            a = add(a, cross(w, times(2 * F.qd[j], z)), times(F.qdd[j], z))
+        w, wd, a = reduced(w), reduced(wd), reduced(a)
+        axes = axes if sigma == 2 else {**axes, j: (z, P if sigma == 0 else None)}
+        at[j] = R, P, w, wd, a, axes
+        if f["link"]:
+            of_link(j)
     for cut, twin in claim["loops"]:
         if at[cut][:2] != at[twin][:2]:
             raise RefutedError(f"frames {cut} and {twin} do not coincide")
     torque |= elements(F, rows)
     total = {}
     for name, by_joint in torque.items():
-        total[name] = dict.fromkeys(claim["joints"], 0)
+        total[name] = dict.fromkeys(rows_of(claim), 0)
         for j, x in by_joint.items():
-            for i, n in rows[j].items():
+            for i, n in ({j: 1} if j in BASE_ROWS else rows[j]).items():
                 total[name][i] = (total[name][i] + n * x) % p
     return total
 
@@ -546,11 +558,16 @@ def require(condition, text):
         raise SkipError(text)
 
 
-def moves(claim):
-    """Whether the base moves: its motion is an input."""
+def base_of(claim):
+    """Whether the base is fixed, moves (its motion is an input), or is free (its wrench is a row)."""
     base = claim.get("base", "fixed")
-    require(base in ("fixed", "moving"), "the base is neither fixed nor moving")
-    return base == "moving"
+    require(base in ("fixed", "moving", "free"), "the base is neither fixed, moving nor free")
+    return base
+
+
+def rows_of(claim):
+    """The rows of the torques: of a free base, then the joints."""
+    return [*(BASE_ROWS if base_of(claim) == "free" else ()), *claim["joints"]]
 
 
 def well_formed(claim):
@@ -563,7 +580,7 @@ def well_formed(claim):
     for key in lists:
         require(isinstance(claim[key], list), f"{key} is no list")
         require(len(claim[key]) <= 20 * MOST, f"{key} is too long")
-    moves(claim)
+    base_of(claim)
     require(claim["frames"] and claim["joints"] and len(claim["gravity"]) == 3, "no robot")
     require(all(type(p) is int and p > 1 for p in claim["primes"]), "a prime is a whole number")
     require(claim["valid"] is True and claim["failures"] == [], "it says itself that it fails")
@@ -639,7 +656,8 @@ def element(e, moving, constants):
 
 def parameters(claim):
     """Names of the standard parameters of a robot, by its links and elements, each of them once."""
-    of_links = [f"{name}{f['j']}" for f in claim["frames"] if f["link"] for name in INERTIAL]
+    links = [0] * (base_of(claim) == "free") + [f["j"] for f in claim["frames"] if f["link"]]
+    of_links = [f"{name}{j}" for j in links for name in INERTIAL]
     keys = [(e["family"], key) for e in claim["elements"] for key in {**e["along"], **e["form"]}]
     names = [*of_links, *(f"{family}{key}" for family, key in keys)]
     twice = {name for name in names if names.count(name) > 1}
@@ -664,16 +682,17 @@ def check(claim):
     hidden = set(own_names)
     for p in (prime(), prime()):
         F = Field(claim, p)
-        states = [regressor(F) for _ in range(2 * len(base) // len(claim["joints"]) + 15)]
+        rows = rows_of(claim)
+        states = [regressor(F) for _ in range(2 * len(base) // len(rows) + 15)]
         independent(F)
-        W = [[D[name][i] for name in own] for D in states for i in claim["joints"]]
+        W = [[D[name][i] for name in own] for D in states for i in rows]
         if (found := rank(W, p)) != len(base):
             wrong.add(f"the rank is {found}, not {len(base)}")
         K = [{name: F.value(c) for name, c in b["coefficients"].items()} for b in base]
         for name in sorted(own_names):
             of_base = [(o, k[name]) for o, k in zip(own, K, strict=True) if k.get(name)]
             for D in states:
-                for i in claim["joints"]:
+                for i in rows:
                     if D[name][i] % p:
                         hidden.discard(name)
                     if (D[name][i] - sum(D[o][i] * x for o, x in of_base)) % p:

@@ -209,7 +209,7 @@ class Witness:
     @cached_property
     def unforced(self) -> Array:
         """Torques Gamma without accelerations, shape (N, n): H, of a free base at wd0 = a0 = 0."""
-        if not self.robot.base_is_free:
+        if self.base is None or not self.robot.base_is_free:
             return self.H
         base = self.base * (np.arange(9) < 3)
         return np.asarray(
@@ -219,8 +219,9 @@ class Witness:
     @property
     def accelerations(self) -> Array:
         """Accelerations qdd, shape (N, n); of a free base wd0, a0, qdd, shape (N, 6 + n)."""
-        free = self.robot.base_is_free
-        return np.hstack([self.base[:, 3:], self.qdd]) if free else self.qdd
+        if self.base is None or not self.robot.base_is_free:
+            return self.qdd
+        return np.hstack([self.base[:, 3:], self.qdd])
 
     def of_rows(self, accelerations: Array) -> Array:
         """Reorder wd0, a0, qdd of a free base to a0, wd0, qdd, the order of its rows; shape (..., n)."""

@@ -184,7 +184,9 @@ class CompositeLinks:
         XX, XY, XZ, YY, YZ, ZZ = self.JP[0]
         J = ((XX, XY, XZ), (XY, YY, YZ), (XZ, YZ, ZZ))
         wrenches = [(e * self.MP[0], cross(self.MSP[0], e)) for e in IDENTITY]
-        wrenches += [(cross(e, self.MSP[0]), J[k]) for k, e in enumerate(IDENTITY)]
+        wrenches += [
+            (cross(e, self.MSP[0]), row) for e, row in zip(IDENTITY, array(J), strict=True)
+        ]
         return {
             (i, k): x
             for k, (E, NE) in zip(BASE_ROWS, wrenches, strict=True)

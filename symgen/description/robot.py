@@ -230,6 +230,8 @@ class Robot:
     not_read: Annotated[tuple[str, ...], *UNWRITTEN] = ()
     # of a foreign file, on which a load is mounted: name, link, pose in its frame (`mounts`)
     mounts: Annotated[tuple[tuple[str, int, Any], ...], *UNWRITTEN] = ()
+    # parameters of link 0 in a foreign file, which a free base has
+    of_base: Annotated[Mapping[str, float], *UNWRITTEN] = Field(default={})
     distal: Annotated[int, *UNWRITTEN] = 0  # rows of a classic table in the file; 0: Khalil's
     file: Annotated[str, *UNWRITTEN] = ""
     sha256: Annotated[str, *UNWRITTEN] = ""
@@ -238,7 +240,7 @@ class Robot:
         if "q" in self.limits:  # one number: to either side
             q = ((-x, x) if isinstance(x, int | float) else x for x in self.limits["q"])
             object.__setattr__(self, "limits", {**self.limits, "q": tuple(q)})
-        for name in ("constants", "constraints", "limits", "values", "labels"):
+        for name in ("constants", "constraints", "limits", "values", "labels", "of_base"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
         for name, kind in (
             ("elements", tuple),
