@@ -136,7 +136,9 @@ FOREIGN = {
     "comment that closes": lambda text: (
         f"/* Certificate by symgen {VERSION} */ int foreign = 1;\n/* {END}\n{without_certificate(text)}"
     ),
-    "word in a certificate": lambda text: text.replace(f"{VERSION}: formulas", f"{VERSION}: foreign", 1),
+    "word in a certificate": lambda text: text.replace(
+        f"{VERSION}: formulas", f"{VERSION}: foreign", 1
+    ),
     "one more line": lambda text: text.replace("sha256 of all", "foreign\nsha256 of all", 1),
     "another digest": lambda text: re.sub(r"(these lines: )\w{64}", rf"\g<1>{64 * '0'}", text),
     "no certificate": without_certificate,
