@@ -75,12 +75,8 @@ class MotionLimits:
         The range of positions shrinks about its middle.
         """
         middle, half = (self.lower + self.upper) / 2, (1 - share) * (self.upper - self.lower) / 2
-        return MotionLimits(
-            middle - half,
-            middle + half,
-            *((1 - share) * x for x in (self.qd, self.qdd, self.tau)),
-            assumed=self.assumed,
-        )
+        qd, qdd, tau = ((1 - share) * x for x in (self.qd, self.qdd, self.tau))
+        return MotionLimits(middle - half, middle + half, qd, qdd, tau, self.assumed)
 
 
 @dataclass(frozen=True)
