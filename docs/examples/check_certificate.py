@@ -325,7 +325,7 @@ class Field:
             self.circle = {a: x for a, x in self.circle.items() if a not in self.of_joints}
             self.q = {j: random.randrange(self.p) for j in (*joints, *tied)}
             self.values |= {f"q{j}": x for j, x in self.q.items()}
-            if all([self.closed(*loop) for loop in self.order]):
+            if all(self.closed(*loop) for loop in self.order):
                 break
         else:
             raise NotJudgedError(f"no closed state of joints {tied}")
