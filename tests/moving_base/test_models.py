@@ -16,6 +16,7 @@ from certify.text_faults import code_lines, turned_sign
 from typer.testing import CliRunner
 
 import symgen
+from oracles.free_flyer import free_flyer
 from oracles.urdf_robots import NAMED, panda, random_tree, ur5
 from symgen.certify.certificate import certify_formulas
 from symgen.certify.claim import claim
@@ -32,6 +33,7 @@ from symgen.description.tree_robot import read_tree
 from symgen.description.urdf import write_urdf
 from symgen.description.yaml import write_yaml
 from symgen.emit.generate import generate_files
+from symgen.emit.targets import TARGETS
 from symgen.errors import DescriptionError, SymgenError
 from symgen.pages.page import robot_page
 from symgen.regroup.regrouping import BaseParameter, regroup
@@ -101,32 +103,6 @@ def standard(module):
     return dict.fromkeys(module.STANDARD_PARAMETERS, 0.0) | dict(module.VALUES)
 
 
-def states_of_pinocchio(module, text, notes, samples=20):
-    """Random base, q, qd, qdd, and torques of a free-flyer: force, moment, joints, (N, 6 + n)."""
-    model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
-    data, rng = model.createData(), np.random.default_rng(0)
-    names = dict(re.findall(r"q(\d+) = '([^']*)'", notes[0]))
-    joints = [model.joints[model.getJointId(names[str(j)])] for j in module.JOINTS]
-    q, qd, qdd = rng.uniform(-2, 2, (3, samples, len(joints)))
-    base, expected = np.empty((samples, 9)), np.empty((samples, 6 + len(joints)))
-    for k in range(samples):
-        Q, v, a = (
-            pin.randomConfiguration(model, -np.ones(model.nq), np.ones(model.nq)),
-            *rng.normal(size=(2, model.nv)),
-        )
-        for i, joint in enumerate(joints):
-            given = [q[k, i]] if joint.nq == 1 else [np.cos(q[k, i]), np.sin(q[k, i])]
-            Q[joint.idx_q : joint.idx_q + joint.nq] = given
-            v[joint.idx_v], a[joint.idx_v] = qd[k, i], qdd[k, i]
-        R = pin.Quaternion(Q[3:7]).matrix()
-        # spatial acceleration to that of the origin, minus gravity
-        a0 = a[:3] + np.cross(v[3:6], v[:3]) - R.T @ model.gravity.linear
-        base[k] = [*v[3:6], *a[3:6], *a0]
-        tau = pin.rnea(model, data, Q, v, a)
-        expected[k] = [*tau[:6], *(tau[joint.idx_v] for joint in joints)]
-    return base, q, qd, qdd, expected
-
-
 def links_alone(module):
     """Standard parameters without those of friction and rotors, which pinocchio's recursion lacks."""
     return {name: x * (name not in module.ELEMENTS) for name, x in standard(module).items()}
@@ -137,10 +113,11 @@ def links_alone(module):
 def test_torques_are_those_of_pinocchio_with_a_free_flyer(text, base):
     robot, notes = read_tree(text.encode(), "arm.urdf", exact=True)
     module = module_of(robot, base)
-    of_base, q, qd, qdd, expected = states_of_pinocchio(module, text, notes)
     X = module.base_parameters(links_alone(module))
+    names = dict(re.findall(r"q(\d+) = '([^']*)'", notes[0]))
+    joints = [names[str(j)] for j in module.JOINTS]
+    of_base, q, qd, qdd, expected, _ = free_flyer(text, joints, 20, wrench=base == "free")
     found = module.inverse_dynamics(of_base, q, qd, qdd, X)
-    expected = expected[:, -found.shape[1] :]
     assert np.abs(found - expected).max() < TOLERANCE * np.abs(expected).max()
     assert found.shape[1] == len(module.JOINTS) + 6 * (base == "free")
 
@@ -151,7 +128,9 @@ def test_a_humanoid_and_its_accelerations():
     robot, notes = read_tree(text.encode(), "humanoid.urdf", exact=True)
     module = module_of(robot, "free")
     assert len(module.JOINTS) == 24
-    base, q, qd, qdd, expected = states_of_pinocchio(module, text, notes)
+    names = dict(re.findall(r"q(\d+) = '([^']*)'", notes[0]))
+    joints = [names[str(j)] for j in module.JOINTS]
+    base, q, qd, qdd, expected, _ = free_flyer(text, joints, 20, wrench=True)
     X = module.base_parameters(links_alone(module))
     found = module.inverse_dynamics(base, q, qd, qdd, X)
     assert np.abs(found - expected).max() < TOLERANCE * np.abs(expected).max()
@@ -325,16 +304,21 @@ def test_a_claim_is_verified_by_a_script_that_shares_no_code(tmp_path, base, ran
     assert "refuted" in verdict()
 
 
-def test_what_has_no_models_is_refused_in_one_sentence():
+def test_what_has_no_models_is_refused_in_one_sentence(monkeypatch):
     robot = load_robot("tx40", base="moving")
-    with pytest.raises(SymgenError, match="target c has no models of a base that moves"):
-        generate_files(robot, targets=("c",))
+    monkeypatch.setitem(TARGETS, "c", TARGETS["c"]._replace(bases=("fixed",)))
+    with pytest.raises(
+        SymgenError, match="target c has no models of a robot with base: moving; use"
+    ):
+        generate_files(robot, targets=("numpy", "c"))
     with pytest.raises(SymgenError, match="coriolis has no meaning on a moving base"):
         generate_files(robot, options=("coriolis",))
     with pytest.raises(SymgenError, match="kinetic_energy has no meaning"):
         symgen.symbolic(robot).model("kinetic_energy")
     free = load_robot("tx40", base="free")
-    with pytest.raises(SymgenError, match="no models of a free base, which is emitted in Python"):
+    with pytest.raises(
+        SymgenError, match="target c has no models of a robot with base: free; use numpy"
+    ):
         generate_files(free, targets=("c",))
     with pytest.raises(SymgenError, match="the direct model of tx40, whose base is free"):
         symgen.symbolic(free).forward_dynamics()
