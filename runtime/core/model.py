@@ -386,7 +386,7 @@ def joint_units(model: GeneratedModel) -> tuple[str, ...]:
         return cast(tuple[str, ...], stated)
     units, elements = getattr(model, "UNITS", {}), getattr(model, "ELEMENTS", {})
     result = []
-    for row, joint in enumerate(model.JOINTS):
+    for row, joint in enumerate(model.JOINTS, start=len(base_rows(model))):
         acting = [name for k, name in enumerate(model.BASE_PARAMETERS) if model.STRUCTURE[k, row]]
         own = {
             units.get(name, "")
