@@ -38,12 +38,12 @@ Array = np.ndarray
 class Lines(NamedTuple):
     """Power spectra of the acceleration of one record.
 
-    count : samples. rate : Hz.
+    samples : number. rate : Hz.
     power : frequencies, shape (m,), Hz, power of the motion and of the noise, shape (m, n) each;
         None for a record that is too short, or that lacks positions.
     """
 
-    count: int
+    samples: int
     rate: float
     power: tuple[Array, Array, Array] | None
 
@@ -91,11 +91,11 @@ def chosen_cutoff(lines: Sequence[Lines], signals: Signals, counts: bool = False
     """Choose one cut-off frequency for records of known spectra, as `cutoff` does."""
     low, parts = signals.lowpass or Lowpass(), []
     highest = LIMIT.HIGHEST_CUTOFF * min((one.rate for one in lines), default=np.inf)
-    long = [one for one in lines if one.count > LIMIT.FEWEST_LINES]
+    long = [one for one in lines if one.samples > LIMIT.FEWEST_LINES]
     read = [(one.rate, *one.power) for one in long if one.power is not None]
     if len(read) < len(long) or not read:
         return Choice(min(CHAPTER_CUTOFF, highest), "the value of the chapter", False)
-    lowest = max(LIMIT.LOWEST_CUTOFF, *(LIMIT.CUTOFF_PERIODS * x.rate / x.count for x in long))
+    lowest = max(LIMIT.LOWEST_CUTOFF, *(LIMIT.CUTOFF_PERIODS * x.rate / x.samples for x in long))
     grid = np.geomspace(min(lowest, highest), highest, LIMIT.CUTOFF_GRID)
     for rate, f, motion, noise in read:
         G = _gain(f, rate, low, grid)
