@@ -427,7 +427,8 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
 
             A closed mechanism has one struct with all its states.
             """
-            named = dict(zip(MODELS[f].arguments, check.arguments, strict=True))
+            model = MODELS[f].on(witness.robot)
+            named = dict(zip(model.arguments, check.arguments, strict=True))
             if closed is not None:
                 named = {"s": closed} | {x: a for x, a in named.items() if x not in STATE_NAMES}
             return [*(_flat(a[k] if a.ndim > 1 else a) for a in named.values()), constants]

@@ -21,6 +21,10 @@ from symgen.emit.render import WIDTH
 from symgen.emit.spec import ModuleSpec
 from symgen.regroup.regrouping import Regrouping
 
+BASE_MOTION = (
+    "w0 (rad/s), wd0 (rad/s**2) and a0 (m/s**2): angular velocity and acceleration of frame 0, and "
+    "the acceleration of its origin minus gravity, in the axes of frame 0"
+)
 COLUMNS = ("j", "ant", "mu", "sigma", "gamma", "b", "alpha", "d", "theta", "r")
 
 

@@ -16,6 +16,7 @@ from certify.text_faults import code_lines, turned_sign
 from typer.testing import CliRunner
 
 import symgen
+from oracles.free_flyer import free_flyer
 from oracles.urdf_robots import NAMED, panda, random_tree, ur5
 from symgen.certify.certificate import certify_formulas
 from symgen.certify.claim import claim
@@ -29,6 +30,7 @@ from symgen.description.tree import TreePart
 from symgen.description.tree_robot import read_tree
 from symgen.description.yaml import write_yaml
 from symgen.emit.generate import generate_files
+from symgen.emit.targets import TARGETS
 from symgen.errors import DescriptionError, SymgenError
 from symgen.regroup.regrouping import BaseParameter, regroup
 
@@ -69,30 +71,11 @@ def standard(module):
 def test_torques_are_those_of_pinocchio_with_a_free_flyer(text):
     robot, notes = read_tree(text.encode(), "arm.urdf", exact=True)
     module = module_of(robot)
-    model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
-    data, rng = model.createData(), np.random.default_rng(0)
     names = dict(re.findall(r"q(\d+) = '([^']*)'", notes[0]))
-    joints = [model.joints[model.getJointId(names[str(j)])] for j in module.JOINTS]
     inertial = inertial_names(robot)  # pinocchio's recursion has no friction
     chi = {name: x * (name in inertial) for name, x in standard(module).items()}
     X = module.base_parameters(chi)
-    q, qd, qdd = rng.uniform(-2, 2, (3, 20, len(joints)))
-    base, expected = np.empty((20, 9)), np.empty_like(q)
-    for k in range(20):
-        Q, v, a = (
-            pin.randomConfiguration(model, -np.ones(model.nq), np.ones(model.nq)),
-            *rng.normal(size=(2, model.nv)),
-        )
-        for i, joint in enumerate(joints):
-            given = [q[k, i]] if joint.nq == 1 else [np.cos(q[k, i]), np.sin(q[k, i])]
-            Q[joint.idx_q : joint.idx_q + joint.nq] = given
-            v[joint.idx_v], a[joint.idx_v] = qd[k, i], qdd[k, i]
-        R = pin.Quaternion(Q[3:7]).matrix()
-        # spatial acceleration to that of the origin, minus gravity
-        a0 = a[:3] + np.cross(v[3:6], v[:3]) - R.T @ model.gravity.linear
-        base[k] = [*v[3:6], *a[3:6], *a0]
-        tau = pin.rnea(model, data, Q, v, a)
-        expected[k] = [tau[joint.idx_v] for joint in joints]
+    base, q, qd, qdd, expected, _ = free_flyer(text, [names[str(j)] for j in module.JOINTS], 20)
     found = module.inverse_dynamics(base, q, qd, qdd, X)
     assert np.abs(found - expected).max() < TOLERANCE * np.abs(expected).max()
 
@@ -221,10 +204,13 @@ def test_a_claim_is_verified_by_a_script_that_shares_no_code(tmp_path):
     assert "refuted" in verdict()
 
 
-def test_what_has_no_models_is_refused_in_one_sentence():
+def test_what_has_no_models_is_refused_in_one_sentence(monkeypatch):
     robot = load_robot("tx40", base="moving")
-    with pytest.raises(SymgenError, match="target c has no models of a base that moves"):
-        generate_files(robot, targets=("c",))
+    monkeypatch.setitem(TARGETS, "c", TARGETS["c"]._replace(bases=("fixed",)))
+    with pytest.raises(
+        SymgenError, match="target c has no models of a robot with base: moving; use"
+    ):
+        generate_files(robot, targets=("numpy", "c"))
     with pytest.raises(SymgenError, match="coriolis has no meaning on a moving base"):
         generate_files(robot, options=("coriolis",))
     with pytest.raises(SymgenError, match="kinetic_energy has no meaning"):
