@@ -62,9 +62,7 @@ def with_axes(record: Record, wrenches: Sequence[Array], tau: Array | None = Non
     )
 
 
-def settings_of_axes(
-    settings: Study, n: int, axes: int, torques: bool, methods: Methods
-) -> Study:
+def settings_of_axes(settings: Study, n: int, axes: int, torques: bool, methods: Methods) -> Study:
     """Return the settings of n joints with so many axes of wrenches after them.
 
     Without measured torques, joints give no rows. If the method is ols, it becomes wls with a

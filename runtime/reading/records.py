@@ -95,8 +95,8 @@ def _pieces(
     columns = column_names(settings, first, last, _names_of(model), motors)
     if columns.flies and getattr(model, "BASE", "fixed") == "fixed":
         raise InputError(
-            "record.columns.wrench: none is for a robot whose base is free; remove it, or use "
-            "--base free",
+            "record.columns.wrench: none says that the robot flies, but its base is fixed; remove "
+            "it, or use --base free",
             file=", ".join(hashes),
         )
     signals = _signals(columns, settings.base.columns, first, last, other, missing)
