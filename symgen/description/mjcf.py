@@ -684,15 +684,13 @@ def _loops(growing: _Growing, tree: Tree, rounded: bool) -> tuple[TreeLoop, ...]
             name += "_"
         ends = [int(model.eq_obj1id[e]), int(model.eq_obj2id[e])]
         if int(model.eq_objtype[e]) == SITE:
-            own = [
-                _pose(model.site_pos[s], model.site_quat[s]) if kind == WELD
-                else _pose(model.site_pos[s], UPRIGHT)
-                for s in ends
-            ]
-            ends = [int(model.site_bodyid[s]) for s in ends]
-            (first, P), (second, Q) = (
-                (link, X @ at) for (link, X), at in zip(map(growing.place.get, ends), own, strict=True)
-            )
+            links, frames = [], []
+            for site in ends:
+                link, X = growing.place[int(model.site_bodyid[site])]
+                turned = model.site_quat[site] if kind == WELD else UPRIGHT
+                links.append(link)
+                frames.append(X @ _pose(model.site_pos[site], turned))
+            (first, second), (P, Q) = links, frames
         else:
             (first, X), (second, Y) = (growing.place[b] for b in ends)
             if kind == CONNECT:

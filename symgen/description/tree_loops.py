@@ -89,8 +89,10 @@ def cut_open(tree: Tree) -> tuple[Tree, tuple[Cut, ...]]:
         _require_links(tree, loop)
         joints = _around(tree, *loop.links)
         if not any(joint.kind != FIXED_TYPE for joint in joints):
-            held = f"loop {loop.name!a:.60} joins two links that do not move relative to each other"
-            tree = replace(tree, notes=(*tree.notes, f"{held}: left out"))
+            note = f"loop {loop.name!a:.60}: its links do not move relative to each other: left out"
+            if loop.joint:
+                note = f"loop {loop.name!a:.60} holds joint {loop.joint.name!a:.60}"
+            tree = replace(tree, notes=(*tree.notes, note))
             continue
         tree, cut = _cut(tree, loop, joints)
         cuts.append(cut)

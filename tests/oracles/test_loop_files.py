@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from campaign import FULL, sampled
+from campaign import FULL
+from support.loop_files import KINDS, ClosedMuJoCo, random_file
 
 from oracles.test_urdf_agrees import legend, loaded
-from support.loop_files import KINDS, ClosedMuJoCo, random_file
 from symgen.description.robot import PRISMATIC
 from symgen.description.tree_robot import read_tree
 

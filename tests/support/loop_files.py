@@ -14,8 +14,8 @@ import mujoco
 import numpy as np
 
 Array = np.ndarray
-SITE = mujoco.mjtObj.mjOBJ_SITE
-WELD = mujoco.mjtEq.mjEQ_WELD
+SITE = int(mujoco.mjtObj.mjOBJ_SITE)
+CONNECT, WELD = int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)
 
 
 class ClosedMuJoCo:
@@ -57,23 +57,26 @@ class ClosedMuJoCo:
                 dq = np.zeros(self.model.nv)
                 dq[self.passive] = -np.linalg.lstsq(J[:, self.passive], error, rcond=1e-8)[0]
                 mujoco.mj_integratePos(self.model, q, dq, 1)
-                if np.abs(error).max() < 1e-13:
+                if np.abs(error).max(initial=0.0) < 1e-13:
                     break
         self._at(q)
         n = self.data.ne
-        return q if np.abs(self.data.efc_pos[:n]).max() < 1e-12 else None
+        return q if np.abs(self.data.efc_pos[:n]).max(initial=0.0) < 1e-12 else None
 
     def _rows(self, qd: Array) -> tuple[Array, Array]:
         """Jacobian of the constraints, and Jd qd, at the state of `data`."""
         model, data = self.model, self.data
         rows, curved = [], []
         for e in range(model.neq):
-            kind = model.eq_type[e]
-            if kind in (mujoco.mjtEq.mjEQ_JOINT, mujoco.mjtEq.mjEQ_TENDON):
+            kind = int(model.eq_type[e])
+            if kind not in (CONNECT, WELD):  # linear
+                linear = np.flatnonzero(data.efc_id[: data.ne] == e)
+                rows.append(data.efc_J.reshape(-1, model.nv)[linear].copy())
+                curved.append(np.zeros(len(linear)))
                 continue
             ends = []
             for k, place in enumerate((model.eq_obj1id[e], model.eq_obj2id[e])):
-                if model.eq_objtype[e] == SITE:
+                if int(model.eq_objtype[e]) == SITE:
                     body, point = model.site_bodyid[place], data.site_xpos[place]
                 else:
                     own = model.eq_data[e][3 * k : 3 * k + 3] * (kind != WELD)
@@ -93,6 +96,20 @@ class ClosedMuJoCo:
             rows.append((J - K)[use])
             curved.append(((D - E) @ qd)[use])
         return np.vstack(rows), np.concatenate(curved)
+
+    def regularity(self) -> float:
+        """Smallest singular value of the passive joints' Jacobian at the pose of the file."""
+        self._at(self.start)
+        J = self._rows(np.zeros(self.model.nv))[0][:, self.passive]
+        return float(np.linalg.svd(J, compute_uv=False)[len(self.passive) - 1])
+
+    def mobility(self) -> tuple[int, int]:
+        """Degrees of freedom at the pose of the file: with driven joints free, and held."""
+        self._at(self.start)
+        J = self._rows(np.zeros(self.model.nv))[0]
+        rank = np.linalg.matrix_rank
+        held = rank(J[:, self.passive], tol=1e-8) if self.passive else 0
+        return self.model.nv - rank(J, tol=1e-8), len(self.passive) - held
 
     def torque(self, q: Array, qd_a: Array, qdd_a: Array) -> Array:
         """Torques of the driven joints at a configuration that closes the loops."""
@@ -171,6 +188,7 @@ class Body:
             yield from held.all()
 
 
+REGULAR = 0.05  # m per rad: less is near a dead point
 KINDS = (
     "four-bar",
     "five-bar",
@@ -188,8 +206,18 @@ KINDS = (
 
 
 def random_file(kind: str, seed: int) -> tuple[str, list[str]]:
-    """The text of a random MJCF of a kind, and the names of the joints that are not passive."""
-    rng = np.random.default_rng([91, KINDS.index(kind), seed])
+    """The text of a random MJCF of a kind, away from dead points, and the names of the joints that
+    are not passive.
+    """
+    for k in range(200):
+        text, driven = _drawn(kind, np.random.default_rng([91, KINDS.index(kind), seed, k]))
+        oracle = ClosedMuJoCo(text, driven)
+        if oracle.regularity() > REGULAR:
+            return text, driven
+    raise AssertionError(kind)
+
+
+def _drawn(kind: str, rng: np.random.Generator) -> tuple[str, list[str]]:
     x, y, z = np.eye(3)
 
     def near(*point):
@@ -207,7 +235,7 @@ def random_file(kind: str, seed: int) -> tuple[str, list[str]]:
         return name, "slide", axis, at, ref, more
 
     A, B, C, D = near(0, 0, 0), near(0.1, 0.02, 0.25), near(0.6, 0.05, 0.4), near(0.5, 0.03, 0)
-    tie, driven = "connect", ["crank"]
+    driven = ["crank"]
     rest: list[str] = []
     planar = kind.removeprefix("welded ")
     if planar in ("four-bar", "parallelogram", "four-bar on a turret"):
@@ -247,12 +275,18 @@ def random_file(kind: str, seed: int) -> tuple[str, list[str]]:
         rocker = Body(rng, "rocker", D, hinge("rocker", d, D))
         roots, ends, point = [crank, rocker], ("rod", "rocker"), C
     elif planar == "ankle":
-        foot = Body(rng, "foot", [0, 0, 0], hinge("pitch", y, [0, 0, 0]), hinge("roll", x, [0, 0, 0]))
+        foot = Body(
+            rng, "foot", [0, 0, 0], hinge("pitch", y, [0, 0, 0]), hinge("roll", x, [0, 0, 0])
+        )
         roots, ties = [foot], []
         for side, name in ((1, "l"), (-1, "r")):
             at, tip = near(0, 0.05 * side, 0.3), near(-0.07, 0.05 * side, 0.3)
-            rod = Body(rng, f"rod_{name}", tip, hinge(f"u1{name}", y, tip), hinge(f"u2{name}", x, tip))
-            roots.append(Body(rng, f"crank_{name}", at, hinge(f"m{name}", y, at, False), held=[rod]))
+            rod = Body(
+                rng, f"rod_{name}", tip, hinge(f"u1{name}", y, tip), hinge(f"u2{name}", x, tip)
+            )
+            roots.append(
+                Body(rng, f"crank_{name}", at, hinge(f"m{name}", y, at, False), held=[rod])
+            )
             ties.append((f"rod_{name}", "foot", near(-0.08, 0.05 * side, 0.02)))
         driven = ["ml", "mr"]
     if kind == "welded hand":
@@ -286,7 +320,9 @@ def random_file(kind: str, seed: int) -> tuple[str, list[str]]:
                     text = text[:head] + site + text[head:]
                 equality += f'<connect name="c{k}" site1="s{k}{one}" site2="s{k}{other}"/>'
             else:
-                equality += f'<connect name="c{k}" body1="{one}" body2="{other}" anchor="{anchor}"/>'
+                equality += (
+                    f'<connect name="c{k}" body1="{one}" body2="{other}" anchor="{anchor}"/>'
+                )
         else:
             equality += f'<weld name="c{k}" body1="{one}" body2="{other}" anchor="0.1 0.2 0.3"/>'
     text = text.replace('type="free"', "FREE")
