@@ -44,9 +44,10 @@ class ClosedMuJoCo:
 
     def closed(self, q_a: Array, q: Array) -> Array | None:
         """qpos with the driven joints at q_a and all others moved, by small steps from q, so that
-        MuJoCo's constraints have no error; None if they have.
+        MuJoCo's constraints have no error; None if they have, or if a joint went FAR, into another
+        assembly mode.
         """
-        q, begin = q.copy(), q[self.driven].copy()
+        q, begin, first = q.copy(), q[self.driven].copy(), q
         for step in np.linspace(0, 1, 21):
             q[self.driven] = begin + step * (q_a - begin)
             for _ in range(30):
@@ -60,8 +61,8 @@ class ClosedMuJoCo:
                 if np.abs(error).max(initial=0.0) < 1e-13:
                     break
         self._at(q)
-        n = self.data.ne
-        return q if np.abs(self.data.efc_pos[:n]).max(initial=0.0) < 1e-12 else None
+        error = np.abs(self.data.efc_pos[: self.data.ne]).max(initial=0.0)
+        return q if error < 1e-12 and np.abs(q - first).max() < FAR else None
 
     def _rows(self, qd: Array) -> tuple[Array, Array]:
         """Jacobian of the constraints, and Jd qd, at the state of `data`."""
@@ -188,6 +189,7 @@ class Body:
             yield from held.all()
 
 
+FAR = 1.0  # rad or m
 REGULAR = 0.05  # m per rad: less is near a dead point
 KINDS = (
     "four-bar",
