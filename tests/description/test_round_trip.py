@@ -21,6 +21,7 @@ READ_FROM_OTHERS = (
     "bodies",
     "not_read",
     "mounts",
+    "of_base",
     "distal",
     "file",
     "sha256",
