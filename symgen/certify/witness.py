@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from symgen.derive.assembly import inertia_of
 from symgen.derive.exact import Array
 from symgen.derive.loops import close
 from symgen.derive.models import EMITTED, MODELS, ON_REQUEST
@@ -109,7 +108,7 @@ class Witness:
                 self.chi[self.robot.parameters.index(X[name][0])] += value - X[name][1]
         self.D = self.model.actuated_regressor(self.q, self.qd, self.qdd, self.base)
         self.x, self.xd, self.xdd, self.G = self.model.motion(self.q, self.qd, self.qdd)
-        self.A = inertia_of(lambda qdd: self.torque(self.q, 0 * self.q, qdd), self.q)
+        self.A = self.G.swapaxes(1, 2) @ self.model.inertia_matrix(self.x, self.chi) @ self.G
         no_direct = np.linalg.matrix_rank(self.A).min() < self.q.shape[1] or self.robot.loaded
         self.left_out = {
             *["gravity"] * absorbing,
