@@ -1,7 +1,6 @@
 """Robot files of large trees, for measurements and tests: chains, humanoids, arms with hands.
 
-    from trees import TREES
-    robot = parse_robot(TREES["humanoid"](30), file="humanoid30.yaml")
+    parse_robot(TREES["humanoid"](30), file="humanoid30.yaml")
 
 Every tree has as many moving joints as asked for, axes at right angles in turn, its own lengths,
 and viscous and Coulomb friction at every joint. The shapes are

@@ -219,7 +219,10 @@ class Lagrange:
             ddT[..., :3, 3] -= [e.value(self.constants) for e in robot.gravity]
         else:
             rate = np.zeros_like(ddT)
-            np.add.at(rate, (..., frame, slice(None), slice(None)), dT * qd[..., joint, None, None])
+            for i in range(np.shape(qd)[-1]):
+                rate[..., frame[joint == i], :, :] += (
+                    dT[..., joint == i, :, :] * np.asarray(qd)[..., i, None, None, None]
+                )
             ddT = ddT + _carried(self.poses(q), rate, base)
         products = np.swapaxes(dT, -1, -2) @ ddT[..., frame, :, :]
         by_link = products.reshape(*products.shape[:-2], 16) @ LINK.reshape(-1, 16).T
