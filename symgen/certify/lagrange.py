@@ -20,7 +20,9 @@ in the world. Where T_0 = 1, with the products of poses T_0 T_j differentiated,
     Tddot = T_0dd T_j + 2 T_0d T_jd + T_jdd,   T_0d = | hat(w0)  0 |   T_0dd = | hat(wd0) + hat(w0)^2  a0 |
                                                       | 0        0 |           | 0                     0  |
 
-in place of T_jdd, with gravity in a0. An element with parameter c acts along a motion s = G q, or has a
+in place of T_jdd, with gravity in a0. The rows of a free base are Lagrange's equations of these
+coordinates: the poses have the derivatives G_i T_j, with G_i = dT_0/dx_i for a shift x_i of frame 0
+along its axes, then for a turn about them, and link 0 has T_j = 1. An element with parameter c acts along a motion s = G q, or has a
 matrix B (B = G'G if it acts along s). It adds to Gamma
 
     c B qdd          inertia
@@ -212,28 +214,40 @@ class Lagrange:
         """Return the standard regressor D of Gamma = D chi, shape (..., n, p).
 
         base : w0, wd0 and a0 of a base that moves, shape (..., 9); None: the base is fixed.
+
+        A free base has six rows more, before the joints: D has the shape (..., 6 + n, p).
         """
         robot, dT, (joint, frame, _) = self.robot, self._moving(q), self._moves
         ddT = _matrices(self._floats("accelerations", q, qd, qdd))[..., 0, :, :, :]
+        links, rows = [f.j for f in robot.frames], np.shape(q)[-1]
         if base is None:
             ddT[..., :3, 3] -= [e.value(self.constants) for e in robot.gravity]
         else:
-            rate = np.zeros_like(ddT)
-            for i in range(np.shape(qd)[-1]):
-                rate[..., frame[joint == i], :, :] += (
-                    dT[..., joint == i, :, :] * np.asarray(qd)[..., i, None, None, None]
+            T, rate = self.poses(q), np.zeros_like(ddT)
+            for i in range(rows):
+                own = joint == i
+                rate[..., frame[own], :, :] += dT[..., own, :, :] * qd[..., i, None, None, None]
+            if robot.base_is_free:
+                links, rows, zero = [0, *links], 6 + rows, np.zeros((4, 4))
+                T, rate, ddT = (
+                    _with_link_0(x, own) for x, own in ((T, np.eye(4)), (rate, zero), (ddT, zero))
                 )
-            ddT = ddT + _carried(self.poses(q), rate, base)
+                of_base = SHIFTS_AND_TURNS @ T[..., None, :, :, :]
+                of_base = of_base.reshape(*T.shape[:-3], 6 * len(links), 4, 4)
+                dT = np.concatenate([of_base, dT], axis=-3)
+                joint = np.concatenate([np.repeat(np.arange(6), len(links)), 6 + joint])
+                frame = np.concatenate([np.tile(np.arange(len(links)), 6), 1 + frame])
+            ddT = ddT + _carried(T, rate, base)
         products = np.swapaxes(dT, -1, -2) @ ddT[..., frame, :, :]
         by_link = products.reshape(*products.shape[:-2], 16) @ LINK.reshape(-1, 16).T
         column = {name: k for k, name in enumerate(self.names)}
-        D = np.zeros((*np.broadcast_shapes(*map(np.shape, (q, qd, qdd))), len(self.names)))
-        first = np.array([column.get(parameter(INERTIAL[0], f.j), -1) for f in robot.frames])
+        D = np.zeros((*by_link.shape[:-2], rows, len(self.names)))
+        first = np.array([column.get(parameter(INERTIAL[0], j), -1) for j in links])
         has = first[frame] >= 0
         columns = first[frame[has], None] + np.arange(len(INERTIAL))
         D[..., joint[has, None], columns] = by_link[..., has, :]
         for name in self._elements:
-            D[..., column[name]] = self._element(name, q, qd, qdd)
+            D[..., -q.shape[-1] :, column[name]] = self._element(name, q, qd, qdd)
         return D
 
     def _element(self, name: str, q: Array, qd: Array, qdd: Array) -> Array:
@@ -426,12 +440,16 @@ class Lagrange:
     ) -> Array:
         """Return the standard regressor D of the actuated joint torques D chi, (..., n_a, p).
 
+        The six rows of a free base come before the joints.
+
         D = G' D_tree, with G = dq/dq_a and the regressor D_tree of the open tree. The arguments q,
         qd, qdd of the actuated joints have shape (..., n_a), in the order of `robot.joints`; `base`
         is that of `regressor`.
         """
         x, xd, xdd, G = self.motion(q, qd, qdd)
-        return np.swapaxes(G, -1, -2) @ self.regressor(x, xd, xdd, base)
+        D, n = self.regressor(x, xd, xdd, base), x.shape[-1]
+        joints = np.swapaxes(G, -1, -2) @ D[..., -n:, :]
+        return np.concatenate([D[..., :-n, :], joints], axis=-2)
 
 
 def _carried(T: Array, Td: Array, base: Array) -> Array:
@@ -445,6 +463,21 @@ def _carried(T: Array, Td: Array, base: Array) -> Array:
     T0dd[..., 0, :3, :3] = _hat(base[..., 3:6]) + W @ W
     T0dd[..., 0, :3, 3] = base[..., 6:]
     return np.asarray(T0dd @ T + 2 * T0d @ Td)
+
+
+def _with_link_0(of_frames: Array, own: Array) -> Array:
+    """Put the matrix `own` of link 0 before those of the frames, shape (..., 1 + frames, 4, 4)."""
+    own = np.broadcast_to(own, (*of_frames.shape[:-3], 1, 4, 4))
+    return np.concatenate([own, of_frames], axis=-3)
+
+
+def _generators() -> Array:
+    """Return dT_0/dx_i at T_0 = 1, shape (6, 1, 4, 4): three shifts, then three turns."""
+    G = np.zeros((6, 1, 4, 4))
+    for k in range(3):
+        G[k, 0, k, 3] = 1
+        G[3 + k, 0, :3, :3] = _hat(np.eye(3)[k])
+    return G
 
 
 def _hat(w: Array) -> Array:
@@ -478,6 +511,9 @@ def _moves(slopes: SX) -> Moves:
     row, joint = (np.array(x, dtype=int) for x in slopes.sparsity().get_triplet())
     pairs, of = np.unique(joint * slopes.shape[0] + row // 16, return_inverse=True)
     return Moves(pairs // slopes.shape[0], pairs % slopes.shape[0], of * 16 + row % 16)
+
+
+SHIFTS_AND_TURNS = _generators()
 
 
 @lru_cache(maxsize=8)
@@ -603,7 +639,7 @@ class Sample(NamedTuple):
         Dynamics by energies.
     q, qd, qdd : ndarray, shape (N, n), SI and rad
         States of the actuated joints, in the order of `robot.joints`.
-    D : ndarray, shape (N, n, p)
+    D : ndarray, shape (N, n, p), or (N, 6 + n, p) of a free base
         Gamma = D chi at each state, chi in the order of `robot.parameters`.
     base : ndarray, shape (N, 9), or None
         Motion w0, wd0, a0 of a base that moves.
@@ -668,7 +704,7 @@ def sampled(
     n, leverage = len(robot.joints), _leverage(robot, model.constants)
     if in_time:
         model.vary(np.random.default_rng(seed + 1), states)
-    state, D = np.empty((3, 0, n)), np.empty((0, n, len(robot.parameters)))
+    state, D = np.empty((3, 0, n)), np.empty((0, len(robot.rows), len(robot.parameters)))
     of_base, bases = np.random.default_rng(seed + 2), np.empty((0, 9))
     for _ in range(DRAWS):
         q, qd, qdd = (
