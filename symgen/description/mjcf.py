@@ -488,10 +488,11 @@ def _body(growing: _Growing, b: int) -> None:
         growing.bare |= {child} if child != name else set()
         link = child
     M, inertia = float(model.body_mass[b]), np.diag(model.body_inertia[b])
-    has = M > 0 or inertia.any()
-    growing.links[name] = (
-        Inertial(M, pose @ _pose(model.body_ipos[b], model.body_iquat[b]), inertia) if has else None
-    )
+    if M > 0 or inertia.any():
+        own = pose @ _pose(model.body_ipos[b], model.body_iquat[b])
+        growing.links[name] = Inertial(M, own, inertia, what)
+    else:
+        growing.links[name] = None
     growing.place[b] = (link, pose)
 
 

@@ -40,14 +40,16 @@ class Inertial:
         Frame at the centre of mass, in the link frame.
     I : ndarray, shape (3, 3), kg m^2
         Tensor elements about the centre of mass, in that frame.
+    name : str
+        Name of the link in the file, with its line.
     wrong : str
-        Name of the link in the file, and the reason why no body has this inertia; "" if a body can
-        have this inertia.
+        The reason why no body has this inertia; "" if a body can have it.
     """
 
     M: float
     pose: Array
     I: Array
+    name: str = ""
     wrong: str = ""
 
 

@@ -55,6 +55,7 @@ from symgen.description.tree import (
     FREE_TYPE,
     WHOLE_TREE,
     Array,
+    Inertial,
     Joint,
     Tree,
     TreePart,
@@ -433,6 +434,8 @@ def _robot(table: Table, file: str, sha256: str, base: Literal["fixed", "free"])
         )
     frames = tuple(Frame(**{**vars(f), "mu": int(f.j in actuated)}) for f in table.frames)
     values, massless = _values(table, actuated)
+    links = [(j, table.tree.links[name]) for j, body in table.bodies.items() for name in body.links]
+    bodies = [(j, own) for j, own in links if own is not None]
     of_base = _of_base(table) if values else {}
     gravity, constants = _gravity(table.tree.gravity)
     return Robot(
@@ -453,17 +456,22 @@ def _robot(table: Table, file: str, sha256: str, base: Literal["fixed", "free"])
         labels=_labels(table),
         base=base,
         angles=table.tree.angles,
-        impossible=tuple(
-            (j, own.wrong)
-            for j, body in table.bodies.items()
-            for own in map(table.tree.links.__getitem__, body.links)
-            if own is not None and own.wrong
-        ),
+        impossible=tuple((j, f"{own.name}: {own.wrong}") for j, own in bodies if own.wrong),
+        bodies=tuple((j, *_about_centre(own)) for j, own in bodies),
         not_read=table.tree.not_read,
         mounts=_mounts(table),
         file=file,
         sha256=sha256,
     )
+
+
+def _about_centre(own: Inertial) -> tuple[str, float, tuple[float, ...], Any]:
+    """Return name, mass, centre of mass from the origin of the link, and tensor about this centre.
+
+    Both have the axes of the inertial frame of the link.
+    """
+    c = own.pose[:3, :3].T @ own.pose[:3, 3]
+    return own.name, own.M, tuple(map(float, c)), rows_of(own.I)
 
 
 def _mounts(table: Table) -> tuple[tuple[str, int, Any], ...]:
