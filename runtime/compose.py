@@ -39,7 +39,7 @@ from runtime.core.problem import (
     prepared,
 )
 from runtime.core.problem import estimate_of as estimate_by
-from runtime.core.record import WRENCH, Record
+from runtime.core.record import BASE_IMU, WRENCH, Record
 from runtime.core.rows.observation import Observation
 from runtime.core.signals.reader import LOWPASS, Reader
 from runtime.core.study import EstimateSettings, Signals
@@ -133,6 +133,10 @@ EXTRAS: list[Extra] = [
     PartWhen(
         Late("runtime.packets.packets:packets_told"),
         lambda r: r.problem.noted(PACKETS) is not None,
+    ),
+    PartWhen(
+        Late("runtime.sensor_axes:sensor_axes"),
+        lambda r: any(BASE_IMU in record.channels for record in r.records),
     ),
     PartWhen(Late("runtime.plausible.known:torque_unit"), lambda r: bool(r.model.VALUES)),
     PartWhen(

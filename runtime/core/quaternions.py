@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 Array = np.ndarray
+UPRIGHT = 1e-9  # cosine of a pitch at which roll and yaw are about one axis
 
 
 def continued(Q: Array) -> Array:
@@ -35,3 +36,24 @@ def _vector_of_product(Q: Array, P: Array) -> Array:
     """Return the vector part of the product Q* P of quaternions, shape (N, 3)."""
     s, v = Q[:, :1], Q[:, 1:]
     return np.asarray(s * P[:, 1:] - P[:, :1] * v - np.cross(v, P[:, 1:]))
+
+
+def rotation_of(rpy: tuple[float, float, float]) -> Array:
+    """Return R = Rz(yaw) Ry(pitch) Rx(roll), shape (3, 3), of roll, pitch and yaw, rad."""
+    (sr, sp, sy), (cr, cp, cy) = np.sin(rpy), np.cos(rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def roll_pitch_yaw(R: Array) -> tuple[float, float, float]:
+    """Return roll, pitch and yaw, rad, of a rotation; roll 0 where the pitch is pi/2 or -pi/2."""
+    level = float(np.hypot(R[0, 0], R[1, 0]))
+    pitch = float(np.arctan2(-R[2, 0], level))
+    if level < UPRIGHT:
+        return 0.0, pitch, float(np.arctan2(-R[0, 1], R[1, 1]))
+    return float(np.arctan2(R[2, 1], R[2, 2])), pitch, float(np.arctan2(R[1, 0], R[0, 0]))

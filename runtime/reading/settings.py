@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, field_validator
 
 from runtime.core import study as chapter
+from runtime.core.quaternions import rotation_of
 from runtime.core.record import BASE_IMU, BASE_MOTION, BASE_POSITION, BASE_QUATERNION, WRENCH
 from runtime.ground.settings import (
     Flag,
@@ -261,25 +262,13 @@ class BaseColumns(Settings):
         w = np.deg2rad(w) if self.gyroscope_unit == "deg/s" else w
         f = f * (STANDARD_GRAVITY if self.accelerometer_unit == "g" else 1.0)
         f = f if self.specific_force else -f
-        R = _rotation(self.mounting.rotation)
+        R = rotation_of(self.mounting.rotation)
         r = np.broadcast_to(np.array(self.mounting.position), f.shape)
         return np.hstack([w @ R.T, f @ R.T, r])
 
 
 COUNTS_OF_BASE = {"motion": 9, "position": 3, "quaternion": 4, "gyroscope": 3, "accelerometer": 3}
 STANDARD_GRAVITY = 9.80665  # m/s**2
-
-
-def _rotation(rpy: tuple[float, float, float]) -> Array:
-    """Return R = Rz(yaw) Ry(pitch) Rx(roll)."""
-    (sr, sp, sy), (cr, cp, cy) = np.sin(rpy), np.cos(rpy)
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
 
 
 class Units(Settings):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pinocchio as pin
@@ -15,6 +17,7 @@ from oracles.urdf_robots import ur5
 from runtime.compose import problem
 from runtime.core.problem import observe_rows
 from runtime.ground.errors import InputError
+from runtime.sensor_axes import sensor_axes
 from symgen.description.tree_robot import read_tree
 
 RATE, SECONDS = 200.0, 12.0
@@ -233,3 +236,36 @@ def test_identified_values_of_link_0_are_written_into_the_file(case, tmp_path: P
     found = dict(zip(module.BASE_PARAMETERS, X, strict=True))
     assert abs(found["M0R"] - truth["M0R"]) < 0.01 * truth["M0R"]
     assert "M0" in after.values
+
+
+@pytest.mark.parametrize(
+    ("rpy", "sign", "unit", "told"),
+    [
+        ((np.pi / 2, 0, 0), 1, 1, "mounting.rotation: [1.571, 0, 0]"),
+        ((0, np.pi / 2, np.pi), 1, 9.80665, "accelerometer_unit: g"),
+        ((0, 0, 0), -1, 1, "{specific_force: false}"),
+        ((0, 0, 0), 1, 1, None),
+    ],
+)
+def test_a_sensor_that_is_mounted_or_read_otherwise_is_told(case, rpy, sign, unit, told):
+    """Readings in the axes of a turned sensor, taken as those of frame 0: the verdict names the turn."""
+    _, module, _, (t, q, tau, base) = case
+    w, _, a0 = np.hsplit(base, 3)
+    R = pin.rpy.rpyToMatrix(*rpy)
+    imu = np.hstack([w @ R, sign * a0 @ R / unit, 0 * w])
+    record = runtime.Record(t, q, tau[:, 6:], channels={"base_imu": imu, "wrench0": tau[:, :6]})
+    prepared = problem(module, record)
+    result = SimpleNamespace(
+        problem=prepared, model=prepared.model, estimate=runtime.estimate(module, record)
+    )
+    doubt = sensor_axes(result)
+    if told is None:
+        assert doubt is None
+        return
+    assert told in doubt.sentence
+    turned_back = re.search(r"rotation: \[(.*?)\]", doubt.sentence)
+    if any(rpy):
+        found = pin.rpy.rpyToMatrix(*map(float, turned_back[1].split(",")))
+        np.testing.assert_allclose(found, R, atol=1e-3)
+    else:
+        assert turned_back is None
