@@ -141,7 +141,7 @@ def _table(folder: Path) -> dict[str, Row]:
         "apply": (
             symgen.apply,
             {"estimate": "none", "model": "none.urdf"},
-            dict.fromkeys(("estimate", "model", "robot", "lock", "chain", "exact", "base"), set()),
+            {key: set() for key in ("estimate", "model", "robot", "lock", "chain", "exact", "base")},
         ),
         "load_model": (
             runtime.load_model,
@@ -152,7 +152,7 @@ def _table(folder: Path) -> dict[str, Row]:
         "read_record": (
             runtime.read_record,
             {"path": "none.csv"},
-            dict.fromkeys(("path", "model", "folder", "missing"), set()),
+            {key: set() for key in ("path", "model", "folder", "missing")},
         ),
         "report": (
             runtime.report,
@@ -180,7 +180,7 @@ def _table(folder: Path) -> dict[str, Row]:
         "simulate": (
             runtime.simulate,
             {"model": MODEL, "study": STUDY},
-            dict.fromkeys(("model", "study", "folder", "ideal", "name"), set()),
+            {key: set() for key in ("model", "study", "folder", "ideal", "name")},
         ),
         "compare": (
             runtime.compare,

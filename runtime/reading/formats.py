@@ -117,7 +117,8 @@ def endings(*, packed: bool | None = None) -> tuple[str, ...]:
 
 def is_measured(path: Path) -> bool:
     """Whether a path is a folder (perhaps a ROS 2 bag) or has the ending of a measured file."""
-    return os.path.isdir(path) or any(suffix.lower() in endings() for suffix in path.suffixes)
+    folder = os.path.isdir(path)  # noqa: PTH112 (a name of any length)
+    return folder or any(suffix.lower() in endings() for suffix in path.suffixes)
 
 
 def format_of(path: Path) -> Format:

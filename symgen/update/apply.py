@@ -231,6 +231,7 @@ def apply(
     text = read_text(content, path, exact, part)
     described = on_base(text.robot if robot is None else robot_of(robot), base)
     of = text.file if robot is None else described.file or described.name
+    text = text.on(described.base)
     require_same_frames(text, described, of)
     warn_not_read(text.robot)
     result = _estimate(estimate)
@@ -270,7 +271,7 @@ def apply(
         writing, edits = Writing(text, closest, own, _root(result, names)), XmlEdits(content)
         rows = [*writing.links(edits), *writing.joints(edits)]
         new = edits.edited()
-        writing.require_read_back(read_text(new, path, exact, part))
+        writing.require_read_back(read_text(new, path, exact, part).on(described.base))
     except DescriptionError as error:
         again = FEASIBLE if error.message.startswith(NONE) and result.method != "feasible" else ""
         raise DescriptionError(
