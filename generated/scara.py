@@ -74,7 +74,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: b73d8f953f7e62c34846a268e0a94b0cf1414db01a9820895117351d39a8bd54
+sha256 of all but these lines: 3f1d378795169d4fe1eb95df9e1292815cef2c6749fff388c7b510ac0bfa3c33
 """
 
 import numpy as np
@@ -356,7 +356,7 @@ class _Symbols:
     def solve(self, A, b):
         """A = L diag(d) L', L unit lower triangular; A symmetric positive definite."""
         n = len(JOINTS)
-        L, d, x = self.package.SX.eye(n), [A[j, j] for j in range(n)], self.rows(b)
+        L, d, x = self.package.SX.eye(n), [A[j, j] for j in range(n)], self.rows(b, n)
         for j in range(n):
             for k in range(j):
                 d[j] -= L[j, k]**2*d[k]

@@ -89,7 +89,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 04b2ce8eede85a5bdbd9bec8fa4f24618c3660b12f26c75a62c4a6af531c5ba9
+sha256 of all but these lines: aadf14d8eb715b225925e5f43bc53ec477bc32bc66b38cd4c5d3790b4ad73e5a
 """
 
 import numpy as np
@@ -406,7 +406,7 @@ class _Symbols:
     def solve(self, A, b):
         """A = L diag(d) L', L unit lower triangular; A symmetric positive definite."""
         n = len(JOINTS)
-        L, d, x = self.package.SX.eye(n), [A[j, j] for j in range(n)], self.rows(b)
+        L, d, x = self.package.SX.eye(n), [A[j, j] for j in range(n)], self.rows(b, n)
         for j in range(n):
             for k in range(j):
                 d[j] -= L[j, k]**2*d[k]
