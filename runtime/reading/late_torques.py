@@ -1,4 +1,4 @@
-"""Torques that were recorded late: they are read at the instants of the positions.
+"""Signals that were recorded late, torques or the motion of a base, at the instants of the positions.
 
     tau'_j(t) = tau_j(t + delay_j)
 
@@ -24,21 +24,24 @@ def delays_of(delay: float | tuple[float, ...] | None, n: int) -> Array | None:
     return np.broadcast_to(given, (n,)) if given.any() else None
 
 
-def inside(t: Array, delay: Array) -> slice:
-    """Select the samples of which every torque was recorded; InputError if none is left."""
+def inside(t: Array, delay: Array, key: str = "record.delay") -> slice:
+    """Select the samples of which every torque was recorded; InputError if none is left.
+
+    key : name of the delay in the study.
+    """
     period = (t[-1] - t[0]) / (len(t) - 1)
     first = int(np.ceil(max(0.0, -float(delay.min())) / period - 1e-9))
     last = len(t) - int(np.ceil(max(0.0, float(delay.max())) / period - 1e-9))
     if last - first < 2:
         raise InputError(
-            f"record.delay is {delay.max():g} s, but the record lasts {t[-1] - t[0]:g} s; correct "
+            f"{key} is {delay.max():g} s, but the record lasts {t[-1] - t[0]:g} s; correct "
             "the delay, which is in s"
         )
     return slice(first, last)
 
 
 def on_time(t: Array, tau: Array, delay: Array) -> Array:
-    """Read torques, shape (N, n), at the instants t + delay, s, joint by joint."""
+    """Read signals tau, shape (N, n), at the instants t + delay, s, column by column."""
     from scipy.interpolate import CubicSpline  # 60 ms, where it is used
 
     return np.stack(

@@ -135,11 +135,19 @@ def _pieces(
     keys = [key for key in samples if key != "t"]
     pieces = len(stretches)
     delay = delays_of(settings.delay, n)
+    late_base = {
+        key: np.full(samples[key].shape[1], settings.base.delay)
+        for key in settings.base.columns
+        if settings.base.delay
+    }
     records = []
     for k, stretch in enumerate(stretches, start=1):
         piece = dict(zip(keys, stretch.signals, strict=True))
         if delay is not None:
-            stretch, piece = _without_delay(stretch, piece, delay)
+            late = dict.fromkeys(("tau", "tau_ff"), delay)
+            stretch, piece = _without_delay(stretch, piece, late)
+        if late_base:
+            stretch, piece = _without_delay(stretch, piece, late_base, "record.base.delay")
         if law is not None:
             piece = law.signals(stretch.t, piece, rate)
         channels = (*JOINT_CHANNELS, *columns.further, *settings.base.columns, "law_v")
@@ -161,11 +169,21 @@ def _pieces(
 
 
 def _without_delay(
-    stretch: Stretch, piece: Mapping[str, Array], delay: Array
+    stretch: Stretch,
+    piece: Mapping[str, Array],
+    delays: Mapping[str, Array],
+    key: str = "record.delay",
 ) -> tuple[Stretch, dict[str, Array]]:
-    """Shift the measured torques of one record to the instants of the positions."""
-    kept = inside(stretch.t, delay)
-    late = {key: on_time(stretch.t, piece[key], delay) for key in ("tau", "tau_ff") if key in piece}
+    """Shift late signals of one record to the instants of the positions.
+
+    delays : those of the columns of each late signal, s.   key : their name in the study.
+    """
+    kept = inside(stretch.t, np.concatenate([*delays.values()]), key)
+    late = {
+        name: on_time(stretch.t, piece[name], delay)
+        for name, delay in delays.items()
+        if name in piece
+    }
     shifted = {key: x[kept] for key, x in {**piece, **late}.items()}
     return Stretch(stretch.t[kept], tuple(shifted.values())), shifted
 

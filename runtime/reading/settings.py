@@ -200,6 +200,8 @@ class BaseColumns(Settings):
         m/s**2 or g (9.80665 m/s**2).
     specific_force : bool
         Whether the accelerometer reads + g along the upward axis at rest; false: - g.
+    delay : float, s
+        Time by which the signals of the base were recorded later than the positions of the joints.
     """
 
     motion: Names = ()
@@ -212,6 +214,7 @@ class BaseColumns(Settings):
     gyroscope_unit: Literal["rad/s", "deg/s"] = "rad/s"
     accelerometer_unit: Literal["m/s**2", "g"] = "m/s**2"
     specific_force: Flag = True
+    delay: Real = 0.0
 
     def __post_init__(self) -> None:
         require(

@@ -213,6 +213,16 @@ def test_a_study_names_wrenches_or_flight(case, tmp_path: Path):
         record = runtime.read_record(file, module)
         np.testing.assert_allclose(record.channels["wrench0"], expected)
         np.testing.assert_allclose(record.tau, tau[:400, 6:])
+    late = np.sin(3 * (t - 0.02))  # as logged 20 ms late
+    table[:, 13] = late[:400]
+    np.savetxt(tmp_path / "arm.csv", table, delimiter=",", header=",".join(head), comments="")
+    text = text.replace("{motion:", "{delay: 0.02, motion:").replace("WRENCH", "none")
+    file.write_text(text, encoding="utf-8")
+    record = runtime.read_record(file, module)
+    assert len(record) == 396
+    np.testing.assert_allclose(
+        record.channels["base_motion"][:, 0], np.sin(3 * record.t), atol=1e-6
+    )
     with pytest.raises(InputError, match="says that the robot flies, but its base is fixed"):
         runtime.read_record(file, symgen.model("tx40"))
 
