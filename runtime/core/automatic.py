@@ -6,7 +6,7 @@ record that is too short or does not move, and is the highest for a record that 
 
 Contacts shake a robot at all frequencies. Near the cut-off, the filter takes part of this motion from
 W and not from Y, which biases the parameters. So `decimate.factor: auto` keeps every third row of eq.
-(13) where contacts are measured: rows of frequencies at which the filter is 1.
+(13) where contacts are measured, if enough are left: rows of frequencies at which the filter is 1.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ from runtime.ground.limits import LIMIT
 
 FEWER = 3
 """Rows of eq. (13) of which one is kept where contacts shake the robot."""
+ROWS_PER_PARAMETER = 20
+"""Rows of a parameter that are kept at least, as far as eq. (13) keeps them."""
 NAMED = 3
 """Records with the same cut-off that are named; more are counted."""
 
@@ -86,7 +88,10 @@ def _below_the_filter(problem: Problem) -> Problem:
         decimation_factor(study_of_record(problem.settings, record).signals, record.rate)
         for record in records or problem.unseen
     ]
-    decimate = replace(how, factor=FEWER * max(factors, default=1))
+    rows = sum(len(record) * record.n for record in records)
+    most = int(rows / (ROWS_PER_PARAMETER * len(problem.model.BASE_PARAMETERS)))
+    factor = max(factors, default=1)
+    decimate = replace(how, factor=max(factor, min(FEWER * factor, most)))
     settings = replace(problem.settings, signals=replace(signals, decimate=decimate))
     return problem.changed(settings=settings)
 
