@@ -14,7 +14,7 @@ from symgen.derive.doubts import nearly_round
 from symgen.description.robot import Robot
 from symgen.description.values import WITHIN
 from symgen.emit.generate import generate_files
-from symgen.emit.targets import TARGETS
+from symgen.emit.targets import target_of
 from symgen.errors import CertificateError
 from symgen.regroup.regrouping import Regrouping, regroup
 from symgen.time_limit import limited
@@ -42,14 +42,14 @@ def certify(
         The loops close in too few random states.
     """
     robot = regrouping.robot
-    target = {t.file.format(robot.name): name for name, t in reversed(TARGETS.items())}
     with limited(f"the certificate of {robot.name}"):
         certificate = certify_formulas(regrouping)
     with limited(f"the derivation of {robot.name}"):
         files = generate_files(robot, regrouping=regrouping) if files is None else files
         witness = Witness(regrouping, options=options)
         texts = {
-            file: text_check(file, text, target[file], witness) for file, text in files.items()
+            file: text_check(file, text, target_of(file), witness, files)
+            for file, text in files.items()
         }
     certificate = replace(certificate, texts=texts)
     unsaid = not certificate.valid and not certificate.failures
