@@ -1,6 +1,6 @@
 """EMPS, one prismatic axis: base parameters, regressor, dynamics.
 
-GENERATED from emps.yaml, sha256 819142f28b57, by symgen 0.4.0.
+GENERATED from emps.yaml, sha256 819142f28b57, by symgen 0.5.0.
 Do not edit; symgen generate emps
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -46,13 +46,13 @@ Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX
             last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
 CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 
-Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.5.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 1e-16; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 9a1526060374714a58dcfc04138f3a8953f0b5009b6de98f371a78ef2849fbb5
+sha256 of all but these lines: ed15f7d7f8b63a29107c2d00b444295b9a618ed5d0fdd295776179770302a2b3
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """EMPS, one prismatic axis, asymmetric friction: base parameters, regressor, dynamics.
 
-GENERATED from emps_asymmetric.yaml, sha256 bca2b7106ba8, by symgen 0.4.0.
+GENERATED from emps_asymmetric.yaml, sha256 bca2b7106ba8, by symgen 0.5.0.
 Do not edit; symgen generate emps_asymmetric
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -47,13 +47,13 @@ Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX
             last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
 CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 
-Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.5.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 1e-16; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 71d9047b1f8f99fd7c299bbe375b17f94047fc48eb4d026fbeb643ea010e8420
+sha256 of all but these lines: 411010ab698318a7a248006945f40248c77d661f6f58daacaf20110280ab2feb
 """
 
 import numpy as np

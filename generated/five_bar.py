@@ -1,7 +1,7 @@
 """Planar five-bar linkage, 2 actuated joints, general closed loop: base parameters, regressor,
     dynamics.
 
-GENERATED from five_bar.yaml, sha256 2b4cc8e44743, by symgen 0.4.0.
+GENERATED from five_bar.yaml, sha256 2b4cc8e44743, by symgen 0.5.0.
 Do not edit; symgen generate five_bar
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -72,12 +72,12 @@ Arguments   q, qd, qdd, tau of shape (N, 2), or (2,) for one state: results then
             X of shape (17,) in the order of BASE_PARAMETERS; constants of the robot by keyword
 Arrays      NumPy's, float64: joints that only the closure equations tie are found by iteration
 
-Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.5.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 8e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints, elements
 at random states, parameters and random constants agree with Lagrange's equations and products of
 frames to 1e-09, on NumPy's arrays.
-sha256 of all but these lines: 25d204f8f16411658d342fab3e5ac446890e62f5c4b4a60604b8ad0153fa63ff
+sha256 of all but these lines: 0870cabcf0b738294a620ecfdcfba1ad60667f8a1c54779c1d77e7706363052c
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """Planar four-bar linkage, 1 actuated joint, general closed loop: base parameters, regressor,
     dynamics.
 
-GENERATED from four_bar.yaml, sha256 431dceb45593, by symgen 0.4.0.
+GENERATED from four_bar.yaml, sha256 431dceb45593, by symgen 0.5.0.
 Do not edit; symgen generate four_bar
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -70,12 +70,12 @@ Arguments   q, qd, qdd, tau of shape (N, 1), or (1,) for one state: results then
             X of shape (11,) in the order of BASE_PARAMETERS; constants of the robot by keyword
 Arrays      NumPy's, float64: joints that only the closure equations tie are found by iteration
 
-Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.5.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 6e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints, elements
 at random states, parameters and random constants agree with Lagrange's equations and products of
 frames to 1e-09, on NumPy's arrays.
-sha256 of all but these lines: f9c8c7155b6b5b020c74b8f14c3d80ee21f26a08990496eabf6b7556ee84dbda
+sha256 of all but these lines: 888123e5bd0146169d90d4bd8dd2f6971be6ecf94a00ce6c8c931421fdaaf939
 """
 
 import numpy as np

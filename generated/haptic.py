@@ -1,7 +1,7 @@
 """Upper branch of the CEA LIST haptic interface, 3 actuated joints, parallelogram and double
     parallelogram: base parameters, regressor, dynamics.
 
-GENERATED from haptic.yaml, sha256 905194db7b3b, by symgen 0.4.0.
+GENERATED from haptic.yaml, sha256 905194db7b3b, by symgen 0.5.0.
 Do not edit; symgen generate haptic
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -84,13 +84,13 @@ Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX
             last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
 CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 
-Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.5.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 8e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 80ea1c5149fd3a65f784f79730ef76c0732f5b1204677789aec9f464448add41
+sha256 of all but these lines: 7f0056770a02e00bcb8c5c8da23407312185df282f86d2e645d84ff51fb160bb
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """Franka Emika Panda, 7 revolute joints: base parameters, regressor, dynamics.
 
-GENERATED from panda.yaml, sha256 69d8ce994a1a, by symgen 0.4.0.
+GENERATED from panda.yaml, sha256 69d8ce994a1a, by symgen 0.5.0.
 Do not edit; symgen generate panda
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -75,13 +75,13 @@ Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX
             last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
 CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 
-Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.5.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 1e-14; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 4eae6f9626c35108eaa1b8e4b06a17817f0631731197617a1e4c3ec21bd6b67b
+sha256 of all but these lines: e29377ddd0f53c9ebcbde73ee333178566ef773c793952d5d30012a83f41eefe
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """Planar arm, 2 revolute joints, vertical plane: base parameters, regressor, dynamics.
 
-GENERATED from planar_2r.yaml, sha256 42ca3cd332bb, by symgen 0.4.0.
+GENERATED from planar_2r.yaml, sha256 42ca3cd332bb, by symgen 0.5.0.
 Do not edit; symgen generate planar_2r
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -62,13 +62,13 @@ Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX
             last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
 CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 
-Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.5.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 1e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: bc044b3aa6271763d1554d0af9a28588a6191ef9b3ff1ddfefe421fb48eb28ab
+sha256 of all but these lines: 90b640751e1744295db18c9fc9a865e59036e795ed3d3c0cf2db72b0bb3eef24
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """Unimation PUMA 560, 6 revolute joints: base parameters, regressor, dynamics.
 
-GENERATED from puma560.yaml, sha256 01eccfddc5c5, by symgen 0.4.0.
+GENERATED from puma560.yaml, sha256 01eccfddc5c5, by symgen 0.5.0.
 Do not edit; symgen generate puma560
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -75,13 +75,13 @@ Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX
             last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
 CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 
-Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.5.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 9e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: b5fe89b0526fa8c41418195fe07cefd99e11ddfae9c88e502feeb3351cdb2dfe
+sha256 of all but these lines: 8b0e5c2d77a8cb560c0c48a810070fb1096e028827d2a6ffea53402b6785a75a
 """
 
 import numpy as np

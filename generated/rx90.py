@@ -1,6 +1,6 @@
 """Stäubli RX-90, 6 revolute joints: base parameters, regressor, dynamics.
 
-GENERATED from rx90.yaml, sha256 7e24e40e8e70, by symgen 0.4.0.
+GENERATED from rx90.yaml, sha256 7e24e40e8e70, by symgen 0.5.0.
 Do not edit; symgen generate rx90
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -75,13 +75,13 @@ Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX
             last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
 CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 
-Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.5.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 8e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 8e2245d55e32ff66402f9c96dac675fbea16d7de5f91df00ad4ea4dcc62f3296
+sha256 of all but these lines: f5a9b3837debe361797e01c40b8575ff511002a84ed99cadd49436de7ee6d7a6
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """SCARA with joints RRRP: base parameters, regressor, dynamics.
 
-GENERATED from scara.yaml, sha256 de085ba960d7, by symgen 0.4.0.
+GENERATED from scara.yaml, sha256 de085ba960d7, by symgen 0.5.0.
 Do not edit; symgen generate scara
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -68,13 +68,13 @@ Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX
             last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
 CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 
-Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.5.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 4e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 982097e30a71b825e21ee40e9d78b45d48bfc149e9dc74f31eddafea169a4d7d
+sha256 of all but these lines: 8696ffffd5e04ea0950ad4cef8df0b272281ae3b85ba196341b89b7d916a4eae
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """SR400, 6 actuated joints, one parallelogram: base parameters, regressor, dynamics.
 
-GENERATED from sr400.yaml, sha256 52f8fa1fb7bc, by symgen 0.4.0.
+GENERATED from sr400.yaml, sha256 52f8fa1fb7bc, by symgen 0.5.0.
 Do not edit; symgen generate sr400
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -83,13 +83,13 @@ Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX
             last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
 CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 
-Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.5.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 1e-14; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 6776c17516cd783300f7e45e8e119826ccc2f0d7502f415d1dd2ac1f129ce863
+sha256 of all but these lines: 0a3b46be0ad9d691dea788a1f2a534ce3118091d482987b099ca00b20a153e31
 """
 
 import numpy as np

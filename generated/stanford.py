@@ -1,6 +1,6 @@
 """Stanford arm, 5 revolute joints and prismatic joint 3: base parameters, regressor, dynamics.
 
-GENERATED from stanford.yaml, sha256 123dd30dfd2b, by symgen 0.4.0.
+GENERATED from stanford.yaml, sha256 123dd30dfd2b, by symgen 0.5.0.
 Do not edit; symgen generate stanford
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -73,13 +73,13 @@ Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX
             last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
 CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 
-Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.5.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 7e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: e61d83bf626014be89ff3d30e568d41eb38d117f5cc0e80cda0273c39c4d15a5
+sha256 of all but these lines: dcbf4cde1381a5e1f6c9fbe3af746ac9fac6fd073f48d22ecec4f5981ce42a50
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """Tree of two branches, 7 joints, one of them prismatic, and a fixed tool: base parameters,
     regressor, dynamics.
 
-GENERATED from two_branch.yaml, sha256 22ecb3e74d7c, by symgen 0.4.0.
+GENERATED from two_branch.yaml, sha256 22ecb3e74d7c, by symgen 0.5.0.
 Do not edit; symgen generate two_branch
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -80,13 +80,13 @@ Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX
             last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
 CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 
-Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.5.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 5e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 778f71629490e614b8bc56f4bb7148e432ac374ca596ad3d4eb9610ab3280ef3
+sha256 of all but these lines: 2849be8f9282a38cdaf2f3487a7918665c5ca2270672bae85f996690ee2e43b1
 """
 
 import numpy as np

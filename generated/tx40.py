@@ -1,6 +1,6 @@
 """Stäubli TX40, 6 revolute joints: base parameters, regressor, dynamics.
 
-GENERATED from tx40.yaml, sha256 1cd8e9c50efa, by symgen 0.4.0.
+GENERATED from tx40.yaml, sha256 1cd8e9c50efa, by symgen 0.5.0.
 Do not edit; symgen generate tx40
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -78,13 +78,13 @@ Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX
             last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
 CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 
-Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.5.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 8e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: fd5c95aa61317afe330e579b08d321a8510e2fc83c2b4a496ef2684e10ef9f2b
+sha256 of all but these lines: 0c062262e85dbe7a75097c391803315d10f2e78256e4ca305da752472e0801f6
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """Stäubli TX40, 6 revolute joints, Table 1 as printed: base parameters, regressor, dynamics.
 
-GENERATED from tx40_table1.yaml, sha256 06118b19e6c7, by symgen 0.4.0.
+GENERATED from tx40_table1.yaml, sha256 06118b19e6c7, by symgen 0.5.0.
 Do not edit; symgen generate tx40_table1
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -75,13 +75,13 @@ Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX
             last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
 CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 
-Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.5.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 8e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: d80b817f0f6e1f05caa511ea85192004abeda5f5d6de53a4a794e18b5fe05b55
+sha256 of all but these lines: 147879ade59512eb52b5fb22fc979d260b360827af0d8e69ff75e214a02d7664
 """
 
 import numpy as np

@@ -1,3 +1,3 @@
 """The version of symgen, which the header of every emitted module contains."""
 
-VERSION = "0.4.0"
+VERSION = "0.5.0"

@@ -183,7 +183,7 @@ def room(module: str) -> float:
             if "demo" in ROOMS[package]
             else len(ROOMS[package]) + 1
         )
-    first = rest.partition(".")[0]
+    first = "cli" if rest == "__main__" else rest.partition(".")[0]  # python -m symgen
     return ROOMS[package].index(first) + 1 if first in ROOMS[package] else 0
 
 

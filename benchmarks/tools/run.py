@@ -68,6 +68,9 @@ class Tool:
 SYMGEN = (f"{ROOT}[mjcf]",)
 TOOLS = {
     "symgen": Tool("symgen", "tool_symgen", "symgen", SYMGEN),
+    "symgen-default": Tool(
+        "symgen, default settings", "tool_symgen", "symgen", SYMGEN, "defaults", cutoffs=(20.0,)
+    ),
     "symgen-ls": Tool("symgen, least squares", "tool_symgen", "symgen", SYMGEN, "least_squares"),
     "figaroh": Tool(
         "figaroh 1.0.2", "tool_figaroh", "figaroh", ("figaroh==1.0.2",), options=(0.0, 1e-4, 1e-3)

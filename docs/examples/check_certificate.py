@@ -16,8 +16,9 @@ those of LAWS. sin and cos are of sums of whole multiples of joints and constant
 pi, and numbers; sign and abs of the coordinate of the law or of its rate; exp and tanh of arguments
 that are linearly independent of each other and of 1, so that their values are independent of
 each other and of the state (J. Ax, On Schanuel's conjectures, Annals of Mathematics 93, 1971).
-Not judged are numeric coefficients, joints that only closure equations tie, roots, and columns that
-are energies.
+A loop that ties two parallel revolute joints by closure equations is closed by a square root
+modulo p, its rates by linear equations. Not judged are other loops of this kind, laws along the
+joints that they tie, numeric coefficients, roots, and columns that are energies.
 """
 
 import ast
@@ -39,6 +40,7 @@ LONGEST, MOST, POWER = 2000, 300, 64  # characters of an expression, entries of 
 FRAME = ("gamma", "b", "alpha", "d", "theta", "r")
 SIMPLE = ("sin", "cos")
 LAWS = (*SIMPLE, "sign", "abs", "exp", "tanh")
+TRIES = 64  # random states until one has a square root modulo p, as every second one
 CHARACTERS = re.compile(r"[A-Za-z0-9_ .+*/()-]*")
 NUMBER = re.compile(r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,2})?")
 OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow)
@@ -185,6 +187,15 @@ class Field:
         self.claim, self.p, self.circle, self.values = claim, p, {}, {}
         self.sign, self.exponentials, self.arguments = {}, {}, []
         self.passive = {int(j): linear(parsed(e)) for j, e in claim["passive"].items()}
+        free = {f"q{j}" for j in (*claim["joints"], *claim["tied"])}
+        self.of_joints = free | {f"q{j}" for j in self.passive}
+        self.along = {  # {joint: {actuated or tied: n}}
+            j: {int(a[1:]): residue(n, p) for a, n in angle.items() if a in free}
+            for j, angle in self.passive.items()
+        }
+        tied = {*claim["tied"]}
+        self.loose = tied | {j for j, row in self.along.items() if tied & {*row}}
+        self.order = order(claim, self.along)
 
     def point(self, atom):
         while atom not in self.circle:
@@ -309,30 +320,106 @@ class Field:
 
     def move(self):
         """A random state: points and values of all joints, their rates; {joint: {actuated: n}}."""
-        names = {f"q{j}" for j in self.claim["joints"]}
-        of_joints = names | {f"q{j}" for j in self.passive}
-        self.circle = {a: x for a, x in self.circle.items() if a not in of_joints}
-        rows = {j: {j: 1} for j in self.claim["joints"]}
-        self.q, self.qd, self.qdd = ({j: random.randrange(self.p) for j in rows} for _ in range(3))
-        self.values |= {f"q{j}": x for j, x in self.q.items()}
-        for j, angle in self.passive.items():
-            n = {a: x.numerator * pow(x.denominator, -1, self.p) for a, x in angle.items()}
-            rows[j] = {int(a[1:]): x for a, x in n.items() if a in names}
-            rest = sum(
-                x * (1 if a == 1 else self.value(str(a))) for a, x in n.items() if a not in names
-            )
-            self.q[j] = sum(x * self.q[i] for i, x in rows[j].items()) + rest
-            self.values[f"q{j}"] = self.q[j]
-            for rate in (self.qd, self.qdd):
-                rate[j] = sum(x * rate[i] for i, x in rows[j].items())
-            try:
-                self.circle[f"q{j}"] = self.cos_sin(angle)
-            except NotJudgedError:
-                self.circle[f"q{j}"] = None
+        joints, tied = self.claim["joints"], self.claim["tied"]
+        for _ in range(TRIES):
+            self.circle = {a: x for a, x in self.circle.items() if a not in self.of_joints}
+            self.q = {j: random.randrange(self.p) for j in (*joints, *tied)}
+            self.values |= {f"q{j}": x for j, x in self.q.items()}
+            if all(self.closed(*loop) for loop in self.order):
+                break
+        else:
+            raise NotJudgedError(f"no closed state of joints {tied}")
+        self.follow()
+        rows = {j: {j: 1} for j in joints}
+        qd, qdd = ({j: random.randrange(self.p) for j in joints} for _ in range(2))
+        self.rates(qd, qdd)
+        if tied:
+            columns = {j: self.drift({}, {j: 1}) for j in (*joints, *tied)}
+            of_tied = [columns[j] for j in tied]
+            by_joint = {i: solved(of_tied, columns[i], self.p) for i in joints}
+            rows |= {j: {i: x[k] for i, x in by_joint.items()} for k, j in enumerate(tied)}
+            for rate in (qd, qdd):
+                rate |= {j: sum(x * rate[i] for i, x in rows[j].items()) for j in tied}
+            rest = solved(of_tied, self.drift(qd, qdd), self.p)
+            self.rates(qd, qdd | {j: qdd[j] + x for j, x in zip(tied, rest, strict=True)})
+        for j, row in self.along.items():
+            rows[j] = {
+                i: sum(x * rows[k].get(i, 0) for k, x in row.items()) % self.p
+                for i in joints
+                if any(i in rows[k] for k in row)
+            }
         self.values |= {f"qd{j}": x for j, x in self.qd.items()}
         self.sign, self.exponentials = {}, {}
         self.arguments.append({})
         return rows
+
+    def follow(self):
+        """Positions of the joints that follow others by linear equations."""
+        for j, angle in self.passive.items():
+            self.q[j] = sum(
+                residue(n, self.p) * (1 if a == 1 else self.value(str(a))) for a, n in angle.items()
+            )
+            self.values[f"q{j}"] = self.q[j]
+            try:
+                self.circle[f"q{j}"] = self.cos_sin(angle)
+            except NotJudgedError:
+                self.circle[f"q{j}"] = None
+
+    def rates(self, qd, qdd):
+        """Set the rates of all joints from those of the actuated and tied ones."""
+        rest = dict.fromkeys((*self.claim["joints"], *self.claim["tied"]), 0)
+        self.qd, self.qdd = {**rest, **qd}, {**rest, **qdd}
+        for rate in (self.qd, self.qdd):
+            rate |= {j: sum(x * rate[i] for i, x in row.items()) for j, row in self.along.items()}
+
+    def drift(self, qd, qdd):
+        """How much the ends of all loops accelerate away from each other."""
+        self.rates(qd, qdd)
+        at = motion(self, [0] * 3, [0] * 3, [0] * 3)
+        return [x for cut, twin in self.claim["loops"] for x in gap(at[twin][4], at[cut][4])]
+
+    def apart(self, cut, twin, **points):
+        """How far the ends of a loop are apart, with joints at points of the circle."""
+        self.circle |= points
+        self.follow()
+        at = motion(self, [0] * 3, [0] * 3, [0] * 3)
+        return gap(at[twin][1], at[cut][1])
+
+    def closed(self, cut, twin, a, b):
+        """Close a loop by its joints a and b; False where this state has no root modulo p.
+
+        The ends are apart by A + R V, where A and V depend on joint b, and R turns about the axis
+        of a. They meet where |A|^2 = |V|^2, which is linear in cosine and sine of b, and R V = -A.
+        """
+        p, half = self.p, pow(2, -1, self.p)
+        self.rates({}, {})
+
+        def parts(point):
+            ahead, behind, aside = (
+                self.apart(cut, twin, **{a: x, b: point}) for x in ((1, 0), (-1, 0), (0, 1))
+            )
+            A = [(x + y) * half % p for x, y in zip(ahead, behind, strict=True)]
+            return A, gap(A, ahead), gap(A, aside)
+
+        def excess(point):
+            A, V, _ = parts(point)
+            return dot(V, V) - dot(A, A)
+
+        ahead, behind, aside = map(excess, ((1, 0), (-1, 0), (0, 1)))
+        h = (ahead + behind) * half
+        f, g = ahead - h, aside - h
+        square = (f * f + g * g - h * h) % p
+        root = pow(square, (p + 1) // 4, p)  # p = 3 mod 4
+        if root * root % p != square or (f * f + g * g) % p == 0:
+            return False
+        root, below = random.choice((root, -root)), pow(f * f + g * g, -1, p)
+        point = (g * root - h * f) * below % p, (-f * root - h * g) * below % p
+        A, V, W = parts(point)
+        below = pow(dot(V, V), -1, p)
+        points = {a: (-dot(A, V) * below % p, -dot(A, W) * below % p), b: point}
+        if any(x % p for x in self.apart(cut, twin, **points)):
+            raise NotJudgedError(f"the closure of frames {cut} and {twin}")
+        return True
 
     def signs(self, actuated, row, sign):
         """Signs of position and rate along a row, (0, 0) where no actuated joint moves it.
@@ -391,21 +478,63 @@ def screw(F, angle, shift, axis):
     return A, [shift if k == axis else 0 for k in range(3)]
 
 
-def regressor(F):
-    """{parameter: {actuated joint: column}} at a random state."""
-    p, rows, claim = F.p, F.move(), F.claim
-    g = [-F.value(e) for e in claim["gravity"]]
+def residue(x, p):
+    """A fraction modulo p."""
+    return x.numerator * pow(x.denominator, -1, p) % p
+
+
+def gap(u, v):
+    return add(v, times(-1, u))
+
+
+def solved(columns, b, p):
+    """x with sum x_k columns_k = -b modulo p; NotJudgedError unless there is one alone."""
+    rows = [[*row, -y] for *row, y in zip(*columns, b, strict=True)]
+    for k in range(len(columns)):
+        pivot = next((row for row in rows[k:] if row[k] % p), None)
+        if pivot is None:
+            raise NotJudgedError("a state in which the loops leave joints free")
+        rows.remove(pivot)
+        pivot = [x * pow(pivot[k], -1, p) % p for x in pivot]
+        rows = [[(x - row[k] * y) % p for x, y in zip(row, pivot, strict=True)] for row in rows]
+        rows.insert(k, pivot)
+    if any(row[-1] for row in rows[len(columns) :]):
+        raise NotJudgedError("loops that do not stay closed")
+    return [row[-1] for row in rows[: len(columns)]]
+
+
+def order(claim, along):
+    """(cut, twin, a, b) of the loops that tie two joints each, in an order that closes them."""
+    frames = {f["j"]: f for f in claim["frames"]}
+    waiting, known, found = [*claim["loops"]], {*claim["joints"]}, []
+    while len(known) < len({*claim["joints"], *claim["tied"]}):
+        for loop in waiting:
+            path, joints = [*loop], set()
+            while path:
+                if path[-1] and frames[path[-1]]["sigma"] != 2:
+                    joints |= {path[-1], *along.get(path[-1], ())}
+                path.append(frames[path.pop()]["ant"]) if path[-1] else path.pop()
+            tied = sorted(joints & {*claim["tied"]} - known)
+            if len(tied) == 2 and all(frames[j]["sigma"] == 0 for j in tied):
+                break
+        else:
+            raise NotJudgedError(f"closure equations that tie joints {claim['tied']}")
+        waiting.remove(loop)
+        known |= {*tied}
+        found.append((*loop, *(f"q{j}" for j in tied)))
+    return found
+
+
+def motion(F, w, wd, g):
+    """{frame: (R, P, w, wd, a, {joint: (z, P or None)})} from the motion of frame 0."""
+    p = F.p
     E3 = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    w, wd = [0] * 3, [0] * 3
-    if moves(claim):  # at random, gravity in the acceleration
-        w, wd, g = ([random.randrange(p) for _ in E3] for _ in range(3))
-    at = {0: (E3, [0] * 3, w, wd, g, {})}  # R, P, w, wd, a, {joint: (z, P or None)}
-    torque = {}
+    at = {0: (E3, [0] * 3, w, wd, g, {})}
 
     def reduced(v):
         return [x % p for x in v]
 
-    for f in claim["frames"]:
+    for f in F.claim["frames"]:
         R, P, w, wd, a, axes = at[f["ant"]]
         for angle, shift, axis in (("gamma", "b", 2), ("alpha", "d", 0), ("theta", "r", 2)):
             A, step = screw(F, F.angle(parsed(f[angle]), None), F.value(f[shift]), axis)
@@ -423,6 +552,19 @@ def regressor(F):
         w, wd, a = reduced(w), reduced(wd), reduced(a)
         axes = axes if sigma == 2 else {**axes, j: (z, P if sigma == 0 else None)}
         at[j] = R, P, w, wd, a, axes
+    return at
+
+
+def regressor(F):
+    """{parameter: {actuated joint: column}} at a random state."""
+    p, rows, claim = F.p, F.move(), F.claim
+    w, wd, g = [0] * 3, [0] * 3, [-F.value(e) for e in claim["gravity"]]
+    if moves(claim):  # at random, gravity in the acceleration
+        w, wd, g = ([random.randrange(p) for _ in g] for _ in range(3))
+    at, torque = motion(F, w, wd, g), {}
+    for f in claim["frames"]:
+        j = f["j"]
+        R, P, w, wd, a, axes = at[j]
         for k, name in enumerate(INERTIAL if f["link"] else ()):
             force, moment = [0] * 3, [0] * 3
             if name == "M":
@@ -469,7 +611,10 @@ def elements(F, rows):
             for j, x in G.items():
                 for i, n in rows[j].items():
                     actuated[i] = (actuated.get(i, 0) + x * n) % p
-            signs = F.signs(actuated, row, e["signs"][key])
+            loose = bool(F.loose & {*G})
+            if loose and (e["kind"] in ("coulomb", "stiffness", "column") or e["when"]):
+                raise NotJudgedError(f"{e['family']}{key} along joints that closure equations tie")
+            signs = (0, 0) if loose else F.signs(actuated, row, e["signs"][key])
             force = signs[1] if e["kind"] == "coulomb" else 1
             if e["kind"] in state:
                 force = sum(x * state[e["kind"]][j] for j, x in G.items())
@@ -487,6 +632,8 @@ def elements(F, rows):
             by_joint = torque.setdefault(f"{e['family']}{key}", {})
             for place, x in form.items():
                 i, j = map(int, place.split(","))
+                if e["kind"] == "stiffness" and {i, j} & F.loose:
+                    raise NotJudgedError(f"{e['family']}{key} in a form of tied joints")
                 by_joint[i] = (by_joint.get(i, 0) + F.value(x) * state[e["kind"]][j]) % p
     return torque
 
@@ -535,8 +682,8 @@ def is_prime(n):
 
 
 def prime():
-    """A random prime of 61 bits."""
-    while not is_prime(n := random.randrange(2**60 + 1, 2**61, 2)):
+    """A random prime of 61 bits, 3 mod 4: then x**((p + 1)/4) is the root of a square x."""
+    while not is_prime(n := random.randrange(2**60 + 3, 2**61, 4)):
         pass
     return n
 
@@ -590,12 +737,12 @@ def well_formed(claim):
         seen.add(f["j"])
     given = [*claim["joints"], *numbers(claim["passive"]), *claim["tied"]]
     require(sorted(given) == sorted(moving), "joints are not those of the frames")
-    require(not claim["tied"], f"only closure equations tie joints {claim['tied']}")
     for pair in claim["loops"]:
         require(len(pair) == 2 and {*pair} <= seen - {0}, "a loop of frames that are none")
-    actuated = {f"q{j}" for j in claim["joints"]}
+    require(not (claim["tied"] and moves(claim)), "a base that moves, with a loop")
+    free = {f"q{j}" for j in (*claim["joints"], *claim["tied"])}
     for text in claim["passive"].values():
-        known(text, constants | actuated)
+        known(text, constants | free)
     for text in [
         *claim["gravity"],
         *(c for b in claim["base_parameters"] for c in b["coefficients"].values()),

@@ -36,7 +36,7 @@ from runtime.core.model import GeneratedModel, is_axis, joint_labels
 from runtime.core.problem import Problem
 from runtime.core.record import Record
 from runtime.core.rows.observation import LoopRows, Observation, stack
-from runtime.core.rows.prepared import Prepared, observation_of, stacked
+from runtime.core.rows.prepared import Prepared, observation_of, stacked, study_of_record
 from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import Selection, certain_rows, select_rows
 from runtime.core.signals.filters import States, decimated
@@ -302,7 +302,7 @@ def closed_loop(
         selection = select_rows(
             record,
             speed,
-            study.signals,
+            study_of_record(study, record).signals,
             study.rows,
             keep=_usable(simulator, record),
         )

@@ -74,10 +74,15 @@ class Change(Result):
         return f"{'.'.join(keys)}: {_shown(self.after)}"
 
     @property
+    def was(self) -> str:
+        """The value before, on one line."""
+        return _shown(self.before)
+
+    @property
     def comment(self) -> str:
         """Comment on the line: what was there, why it changes, and what it explains."""
         return (
-            f"was {_shown(self.before)}: {self.says}; rows that were not used: "
+            f"was {self.was}: {self.says}; rows that were not used: "
             f"{self.error_without:.2g} % without this line, {self.error_with:.2g} % with it"
         )
 

@@ -15,9 +15,6 @@ if TYPE_CHECKING:
     from runtime.study import Study
     from symgen.description import Robot
 
-AGREE = 1e-6
-"""Of the size of a signal: the written study reads the records as the search did."""
-
 
 def mended_study(
     described: Robot | GeneratedModel,
@@ -29,43 +26,19 @@ def mended_study(
 
     described : the robot, as its file describes it.
     """
-    import runtime
-    from runtime.compose import records_of
     from runtime.ground.errors import InputError
     from runtime.reporting.result_files import write_all
-    from runtime.study import study_text
-    from symgen.cli import session
+    from symgen.update.mended import mended
 
     if path.exists():
         raise InputError(
             "the file for --repair exists already; choose another name", file=str(path)
         )
-    robot = session.corrected(described, study)
-    model = session.model_of(robot, study=study)
-    repair = runtime.repair(model, records, study, variants=session.variants_of(robot))
-    if not repair.kept:
-        return repair, study
-    model = session.model_of(session.corrected(described, repair.study), study=repair.study)
-    for read, meant in zip(
-        records_of(repair.study.record, model, repair.study), repair.records, strict=True
-    ):
-        if not (same(read.q, meant.q) and same(read.tau, meant.tau)):
-            raise InputError(
-                "the changes found are not those that the study would make; nothing is written; "
-                "make them by hand: " + "; ".join(change.line for change in repair.changes),
-                file=str(path),
-            )
     folder = path.resolve().parent
-    text = study_text(repair.study, folder, defaults=False, comments=repair.comments)
-    write_all(folder, {path.name: text})
+    repair, text = mended(described, study, records, folder)
+    if text:
+        write_all(folder, {path.name: text})
     return repair, repair.study
-
-
-def same(a: Any, b: Any) -> bool:
-    """Whether two signals agree, up to rounding."""
-    import numpy as np
-
-    return a.shape == b.shape and bool(np.abs(a - b).max() <= AGREE * max(np.abs(b).max(), 1e-300))
 
 
 def with_repair(

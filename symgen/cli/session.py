@@ -18,6 +18,10 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import typer
 
+from symgen.update.models import corrected as corrected
+from symgen.update.models import model_of as model_of
+from symgen.update.models import variants_of as variants_of
+
 if TYPE_CHECKING:
     from runtime.core.model import GeneratedModel
     from runtime.parallel.checkpoint import Checkpoint
@@ -194,33 +198,6 @@ def robot_of(
     return described_robot(source, exact=exact, base=base)
 
 
-def model_of(robot: Robot | GeneratedModel, *, study: Study | None = None) -> GeneratedModel:
-    """Return the model of a robot (see `robot_of`); a generated module is its own model.
-
-    study : if its records name wrenches, the model has the columns of force sensors.
-    """
-    import symgen
-    from runtime.core.model import load_model
-    from symgen.description import Robot
-
-    if not isinstance(robot, Robot):
-        return robot
-    records = () if study is None else study.record
-    options = ("base_wrench_regressor",) * any(record.columns.wrench for record in records)
-    return load_model(symgen.model(robot, options=options))
-
-
-def corrected(robot: Robot | GeneratedModel, study: Study) -> Robot | GeneratedModel:
-    """Replace entries of a robot by those of the section `robot` of a study, if it has one.
-
-    A generated module stays as it is: the study is refused with it, unless it has the corrections.
-    """
-    from symgen.description import Robot
-    from symgen.description.corrected import corrected
-
-    return corrected(robot, study) if isinstance(robot, Robot) else robot
-
-
 def described_robot(
     source: str, at_values: bool = False, exact: bool = False, base: str | None = None
 ) -> Robot:
@@ -240,18 +217,6 @@ def described_robot(
     for sentence in filter(None, (*doubts(robot), frames_text(robot))):
         warnings.warn(sentence, RobotFileWarning, stacklevel=1)
     return with_values(robot) if at_values else robot
-
-
-def variants_of(robot: Robot | GeneratedModel) -> GeneratedModel | None:
-    """Load the model of a robot as a module in which the frame table can be changed.
-
-    None for a generated module, which has no robot file.
-    """
-    import symgen
-    from runtime.core.model import load_model
-    from symgen.description import Robot
-
-    return load_model(symgen.variants(robot)) if isinstance(robot, Robot) else None
 
 
 def assumptions_of(robot: Robot | GeneratedModel, records: Any, study: Study) -> list[str]:

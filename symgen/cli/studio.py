@@ -15,6 +15,7 @@ WATCHED = "from symgen.studio.child import watched; watched(); "
 PROGRAMS = {
     "symgen": "from symgen.cli.main import main; main()",
     "check": "from symgen.studio.views import check; check()",
+    "repair": "from symgen.studio.views import mend; mend()",
 }
 
 

@@ -40,6 +40,8 @@ class Job:
         Name of its task on the page; among commands with the same title only the last counts.
     words : tuple of str
         The command line.
+    terminal : str
+        What does the same in a terminal, if the command is one of the studio alone.
     result : str
         Name of the file that it writes in the work folder; the command failed if the file is
         missing.
@@ -62,6 +64,7 @@ class Job:
     words: tuple[str, ...]
     result: str
     run: str = ""
+    terminal: str = ""
     state: str = WAITING
     code: int | None = None
     progress: str = ""
@@ -72,8 +75,8 @@ class Job:
 
     @property
     def command(self) -> str:
-        """The command line, quoted for a terminal."""
-        return shlex.join(self.words)
+        """The command line that does the same in a terminal."""
+        return self.terminal or shlex.join(self.words)
 
     @property
     def task(self) -> str:
@@ -130,7 +133,9 @@ class Jobs:
         self.all: list[Job] = []
         self.wake = asyncio.Event()
 
-    def add(self, title: str, words: Sequence[str], result: str, *, run: str = "") -> None:
+    def add(
+        self, title: str, words: Sequence[str], result: str, *, run: str = "", terminal: str = ""
+    ) -> None:
         """Queue a command; a waiting or running command with the same title is cancelled."""
         for job in self.all:
             if job.title == title:
@@ -140,7 +145,7 @@ class Jobs:
                 f"{MOST_COMMANDS} commands are waiting already; cancel some commands, or wait"
             )
         number = self.all[-1].number + 1 if self.all else 1
-        self.all.append(Job(number, title, tuple(words), result, run))
+        self.all.append(Job(number, title, tuple(words), result, run, terminal))
         self.wake.set()
         self.changed()
 

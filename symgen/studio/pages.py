@@ -76,6 +76,7 @@ class Pages:
         acts: tuple[Handler, ...] = (
             *(self._packaged, self._edit, self._undo, self._prove, self._study, self._check),
             *(self._solve, self._cancel, self._dismiss, self._apply, self._earlier_record),
+            *(self._repair, self._unrepair),
         )
         posts = {f"/do/{act.__name__[1:]}": self._posted(act) for act in acts}
         return [
@@ -138,6 +139,7 @@ class Pages:
             units=table.UNITS_OF_CELLS,
             left_out=self.server.left_out,
             digest=folder.digest,
+            work=shlex.quote(str(folder.path)),
             undo=bool(folder.kept("robot")),
             redo=bool(folder.kept("undone")),
             file=folder.robot.name if folder.robot else "",
@@ -154,6 +156,8 @@ class Pages:
             findings=findings,
             stale=not self._is_checked(),
             checked=self.jobs.last("check of the record"),
+            repair=self._repaired(),
+            repairing=self.jobs.last("repair"),
             methods=ESTIMATORS,
             jobs=self.jobs.shown,
             now=time.monotonic(),
@@ -215,7 +219,9 @@ class Pages:
         value = await self.server.view(getattr(views, name), str(path), given)
         if name in ("preview", "series", "changes"):
             return JSONResponse(value)
-        return page(name, value=value, asked=asked, file=path.name)
+        return page(
+            name, value=value, asked=asked, file=path.name, work=shlex.quote(str(self.folder.path))
+        )
 
     async def _file(self, request: Request) -> Response:
         """Answer with a file of the work folder or of one run; HTML pages open in a sandbox."""
@@ -332,8 +338,31 @@ class Pages:
         return self._source().name, "study.yaml"
 
     async def _check(self, form: dict[str, str]) -> str:
-        words = ("check", *self._command(), "check.json")
-        self.jobs.add("check of the record", words, "check.json")
+        self._of_the_study("check of the record", "check")
+        return "findings"
+
+    async def _repair(self, form: dict[str, str]) -> str:
+        self._of_the_study("repair", "repair", "--repair", "repaired.yaml")
+        return "findings"
+
+    def _of_the_study(self, title: str, program: str, *options: str) -> None:
+        """Queue a program of the studio that reads robot and study, and writes a file of its name."""
+        robot, study = self._command()
+        terminal = shlex.join(("symgen", "identify", robot, study, *options))
+        result = f"{program}.json"
+        self.jobs.add(title, (program, robot, study, result), result, terminal=terminal)
+
+    def _repaired(self) -> dict[str, Any]:
+        """Return what the last repair has changed, or tried; {} if robot or study are others now."""
+        told = json_of(self.folder.path / "repair.json")
+        now = views.digest_of(self.folder.robot or Path(), self.folder.path / "study.yaml")
+        return told if told.get("of") == now else {}
+
+    async def _unrepair(self, form: dict[str, str]) -> str:
+        """Write the study before the last repair again."""
+        if not (told := self._repaired()).get("kept"):
+            raise InputError("the study has been changed since the repair; edit it on Record")
+        self.folder.write("study.yaml", told["before"])
         return "findings"
 
     async def _solve(self, form: dict[str, str]) -> str:

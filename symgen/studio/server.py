@@ -17,6 +17,7 @@ from starlette.responses import HTMLResponse, Response
 from symgen.studio import child, views
 from symgen.studio.folder import DRAFT, WorkFolder
 from symgen.studio.jobs import Jobs
+from symgen.studio.words import on_page
 
 VIEW_PATIENCE = 60.0  # s that a page waits for a view
 REMEMBERED = 30  # views
@@ -30,6 +31,7 @@ PAGE_TEMPLATES = Environment(
     trim_blocks=True,
     lstrip_blocks=True,
 )
+PAGE_TEMPLATES.filters["on_page"] = on_page
 
 
 class Server:

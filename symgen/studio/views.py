@@ -32,6 +32,9 @@ from symgen.description.files import write_robot
 from symgen.errors import SymgenError
 from symgen.pages.page import figure
 from symgen.studio.table import cells_of, degrees
+from symgen.studio.words import on_page
+from symgen.update.mended import mended
+from symgen.update.models import corrected, model_of, variants_of
 
 FIRST_ROWS = 5  # first ones that are shown
 NAMES_LISTED = 200  # columns that are listed
@@ -51,10 +54,11 @@ def answered(view: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, Any
                 value = view(*args)
             except (SymgenError, InputError, OSError, MemoryError, ArithmeticError) as e:
                 text = getattr(e, "message", "") or str(e) or type(e).__name__
-                return {"error": text, "path": list(map(str, getattr(e, "path", ())))}
+                return {"error": on_page(text), "path": list(map(str, getattr(e, "path", ())))}
         angles = [str(w.message) for w in caught if issubclass(w.category, AngleWarning)]
         others = [str(w.message) for w in caught if not issubclass(w.category, AngleWarning)]
-        return value | {"remarks": angles, "notes": others + value.get("notes", [])}
+        notes = [on_page(note) for note in [*others, *value.get("notes", [])]]
+        return value | {"remarks": [*map(on_page, angles)], "notes": notes}
 
     return shown
 
@@ -263,7 +267,8 @@ def changes(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     from runtime.documents.estimates import load_used_set
     from runtime.reporting.parameters import FILE_NOTE, cad_values, file_columns
 
-    loaded = runtime.load_model(symgen.model(path))
+    study = runtime.load_study(Path(request["run"]) / "study.yaml")
+    loaded = model_of(corrected(symgen.load_robot(path), study), study=study)
     fit, used = load_used_set(Path(request["run"]) / "estimate.json")
     if fit.provenance.get("robot_sha256") != loaded.SOURCE_SHA256:
         return {
@@ -287,8 +292,8 @@ def _read(path: str, study_file: Path, asked: str | None = None) -> tuple[Any, .
     from runtime.compose import records_of
     from runtime.study import located
 
-    model = runtime.load_model(symgen.model(path))
     study = located(runtime.load_study(study_file), study_file.parent)
+    model = model_of(corrected(symgen.load_robot(path), study), study=study)
     named = {
         f"{k + 1}: {', '.join(Path(f).name for f in part.files) or part.dataset}, {use}": part
         for use, settings in (("fitted", study.record), ("validation", study.validate.record))
@@ -309,7 +314,7 @@ def findings(robot_file: str, study_file: str) -> dict[str, Any]:
 
     of = digest_of(Path(robot_file), Path(study_file))
     loaded, study, records, _ = _read(robot_file, Path(study_file))
-    variants = runtime.load_model(symgen.variants(robot_file))
+    variants = variants_of(corrected(symgen.load_robot(robot_file), study))
     judged = runtime.plausibility(loaded, records, study, variants=variants)
     rank, shares = 0, {}
     with suppress(InputError, np.linalg.LinAlgError):
@@ -326,13 +331,58 @@ def findings(robot_file: str, study_file: str) -> dict[str, Any]:
     }
 
 
-def check() -> None:
-    """Check a robot and a study named on the command line, and write the findings to a file.
+@answered
+def repair(robot_file: str, study_file: str) -> dict[str, Any]:
+    """Search the errors of the study, and write the mended study over it; list what has changed.
 
-    The arguments are ROBOT STUDY FILE. If there is an error, print one line and exit with code 2.
+    The list has the text of the study before, so that it can come back. If the study or the robot
+    has been changed meanwhile, nothing is written.
+    """
+    from runtime.compose import records_of
+    from runtime.study import located
+
+    paths = Path(robot_file), Path(study_file)
+    before, of = paths[1].read_text(encoding="utf-8"), digest_of(*paths)
+    described = symgen.load_robot(robot_file)
+    study = located(runtime.load_study(paths[1]), Path())
+    model = model_of(corrected(described, study), study=study)
+    found, text = mended(described, study, records_of(study.record, model, study), Path())
+    if digest_of(*paths) != of:
+        raise InputError("robot or study have been changed during the repair; repair again")
+    if text:
+        write_all(Path(), {paths[1].name: text})
+    changes = [
+        {
+            "line": change.line,
+            "was": change.was,
+            "says": change.says,
+            "without": change.error_without,
+            "with": change.error_with,
+        }
+        for change in found.changes
+    ]
+    told = ("kept", "reason", "apart", "equivalent", "candidates")
+    summary = {key: found.summary()[key] for key in told}
+    return summary | {"of": digest_of(*paths), "changes": changes, "before": before, "after": text}
+
+
+def check() -> None:
+    """Check the robot and the study named on the command line, and write the findings to a file."""
+    _written(findings)
+
+
+def mend() -> None:
+    """Repair the study named on the command line, and write what has changed to a file."""
+    _written(repair)
+
+
+def _written(view: Callable[..., dict[str, Any]]) -> None:
+    """Compute a view of ROBOT and STUDY and write it to FILE; these are the arguments.
+
+    If there is an error, print one line and exit with code 2.
     """
     robot_file, study_file, target = sys.argv[1:4]
-    value = findings(robot_file, study_file)
+    value = view(robot_file, study_file)
     if "error" in value:
         print(f"error: {value['error']}", file=sys.stderr)
         sys.exit(2)

@@ -167,11 +167,11 @@ def with_dependent_laws() -> Iterator[tuple[str, Claim]]:
 ROBOTS = ("planar_2r", "scara", "two_branch", "sr400", "stanford")
 
 
-def edited(count: int, seed: int) -> Iterator[tuple[str, Claim]]:
+def edited(count: int, seed: int, robots: Sequence[str] = ROBOTS) -> Iterator[tuple[str, Claim]]:
     """Edits of every field that make a true claim false; robots and edits take turns."""
     rng = random.Random(seed)
     for k in range(count):
-        name = ROBOTS[k % len(ROBOTS)]
+        name = robots[k % len(robots)]
         edit = EDITS[k % len(EDITS)]
         forged = json.loads(packaged(name))
         what = edit(forged, rng)

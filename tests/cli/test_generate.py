@@ -17,6 +17,7 @@ from symgen.cli.generate import emitted
 from symgen.cli.main import app
 from symgen.description import packaged_robots, skeleton
 from symgen.emit.targets import TARGETS
+from symgen.version import VERSION
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 
@@ -129,13 +130,15 @@ def test_check_shows_what_changed_and_writes_nothing(tmp_path):
 END = "sha256 of all but these lines: " + 64 * "0"
 FOREIGN = {
     "coding cookie": lambda text: (
-        "# Certificate by symgen 0.4.0 coding: raw_unicode_escape \\u000aprint('foreign')\\u000a#\n"
+        f"# Certificate by symgen {VERSION} coding: raw_unicode_escape \\u000aprint('foreign')\\u000a#\n"
         f"# {END}\n{without_certificate(text)}"
     ),
     "comment that closes": lambda text: (
-        f"/* Certificate by symgen 0.4.0 */ int foreign = 1;\n/* {END}\n{without_certificate(text)}"
+        f"/* Certificate by symgen {VERSION} */ int foreign = 1;\n/* {END}\n{without_certificate(text)}"
     ),
-    "word in a certificate": lambda text: text.replace("0.4.0: formulas", "0.4.0: foreign", 1),
+    "word in a certificate": lambda text: text.replace(
+        f"{VERSION}: formulas", f"{VERSION}: foreign", 1
+    ),
     "one more line": lambda text: text.replace("sha256 of all", "foreign\nsha256 of all", 1),
     "another digest": lambda text: re.sub(r"(these lines: )\w{64}", rf"\g<1>{64 * '0'}", text),
     "no certificate": without_certificate,

@@ -52,3 +52,10 @@ def test_the_installed_entry_point_ends_without_traceback():
         and result.stderr.startswith("error: ")
         and "Traceback" not in result.stderr
     )
+
+
+def test_python_runs_the_command_where_the_shell_does_not_find_it():
+    said = subprocess.run(
+        [sys.executable, "-m", "symgen", "--version"], capture_output=True, text=True, check=True
+    )
+    assert said.stdout.strip() == f"symgen {VERSION}"

@@ -16,15 +16,14 @@ from browser import Browser, started_browser
 from hang import HANG
 from starlette.testclient import TestClient
 
+from symgen.cli.studio import PROGRAMS as TEXTS
+from symgen.cli.studio import WATCHED
 from symgen.studio import folder, server, serving
 from symgen.studio.child import ViewProcess
 
-COMMAND = "from symgen.cli.main import main; main()"
+PROGRAMS = {name: [sys.executable, "-P", "-c", WATCHED + text] for name, text in TEXTS.items()}
+COMMAND = TEXTS["symgen"]
 PATIENT = f"from symgen.studio import server; server.VIEW_PATIENCE = {HANG}; "  # on a busy machine
-PROGRAMS = {
-    "symgen": [sys.executable, "-P", "-c", "from symgen.studio.child import watched; watched(); " + COMMAND],
-    "check": [sys.executable, "-P", "-c", "from symgen.studio.child import watched; watched(); from symgen.studio.views import check; check()"],
-}  # fmt: skip
 PORT = 8123
 OWN = f"http://127.0.0.1:{PORT}"
 

@@ -235,6 +235,10 @@ const one = (selector, of = document) => of.querySelector(selector), all = (sele
     if (target.matches("form[hx-get]")) resultOf(target).replaceChildren();
   });
 
+  const open = new Set(); // what was unfolded stays so when its part of the page comes anew
+  document.addEventListener("toggle", ({ target }) => target.id && target.isConnected && open[target.open ? "add" : "delete"](target.id), true);
+  document.addEventListener("htmx:afterSwap", () => { for (const id of open) if (document.getElementById(id)) document.getElementById(id).open = true; });
+
   let typed = [];
   document.addEventListener("htmx:beforeSwap", ({ detail }) => {
     if (detail.isError) detail.swapOverride = "innerHTML"; // the box of messages stays, however the request would swap
@@ -259,7 +263,7 @@ const one = (selector, of = document) => of.querySelector(selector), all = (sele
   document.addEventListener("click", async (event) => {
     const button = event.target.closest("[data-copy], [data-download]");
     if (!button) return;
-    const source = one(button.dataset.copy || button.dataset.download), before = button.textContent;
+    const name = button.dataset.copy || button.dataset.download, source = name === "next" ? button.parentElement.nextElementSibling : one(name), before = button.textContent;
     if (button.dataset.download) {
       const href = URL.createObjectURL(new Blob([source.textContent]));
       node("a", { href, download: button.dataset.name }).click();

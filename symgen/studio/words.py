@@ -1,0 +1,35 @@
+"""Name in messages the place of the page that does what a command of the terminal does.
+
+Messages of the library name commands and options; on a page, a reader looks for a button.
+"""
+
+from __future__ import annotations
+
+import re
+
+PLACES = {
+    "; identify --suggest FILE writes a likely study": "",
+    "identify says why": "Solve says why",
+    "symgen report, or symgen identify --physical": "physical consistency on Solve",
+    "ask with symgen report --encoder STEP, or symgen cestac --advise": "ask for it on Solve",
+    "symgen report --encoder STEP (with --side motor for an encoder on the motor)": "CESTAC on Solve",
+    "symgen cestac --rounding phase --delta STEP": "CESTAC on Solve, with this step",
+    "symgen cestac without --advise": "CESTAC on Solve",
+    "symgen cestac --advise": "the advisor on Solve",
+    "(--friction)": "(friction curves on Solve)",
+    "(--method feasible)": "(feasible on Solve)",
+    " with --lock": " fixed",
+    "symgen identify then builds": "Solve then builds",
+    "--base moving (symgen.model(ROBOT, base='moving'))": "--base moving in a terminal",
+    "; exact=True or --exact keeps them": "; --exact in a terminal keeps them",
+}
+"""What messages say, and what a page says instead."""
+ELSEWHERE = re.compile(r"(?<!terminal: )symgen (?=excite|convert|show)")
+"""Commands that no page has."""
+
+
+def on_page(text: str) -> str:
+    """Return a message as a page says it; other texts stay as they are."""
+    for words, place in PLACES.items():
+        text = text.replace(words, place)
+    return ELSEWHERE.sub("in a terminal: symgen ", text)
