@@ -125,6 +125,8 @@ class TextCheck:
         if self.not_run:
             return self.not_run
         uses = ", ".join(self.uses)
+        if {*self.errors} == {MODEL}:
+            return f"names and values are those of the robot file, {uses}"
         return (
             f"{', '.join(self.errors)} at random states, parameters and {self.constants} agree with "
             f"Lagrange's equations and products of frames to {TOLERANCE:g}"
@@ -435,9 +437,7 @@ def octave_check(
     except call_octave.OctaveError as failure:
         error, message = float("inf"), str(failure)
     raised = {name: message} if message else {}
-    return TextCheck(
-        target, key, {name: error}, witness.drawn, (), (IN_OCTAVE,), raised=raised
-    )
+    return TextCheck(target, key, {name: error}, witness.drawn, (), (IN_OCTAVE,), raised=raised)
 
 
 def _octave_error(

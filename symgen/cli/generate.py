@@ -36,7 +36,8 @@ def generate(
         typer.Option(
             help="What to generate; separate several by commas, as in numpy,c. Choices: "
             + ", ".join(
-                f"{name} ({t.language}, {t.file.format('NAME', '*')})" for name, t in TARGETS.items()
+                f"{name} ({t.language}, {t.file.format('NAME', '*')})"
+                for name, t in TARGETS.items()
             )
             + "."
         ),

@@ -208,7 +208,9 @@ class _Robot:
             if varying
             else "",
             f"base (N, {MOTION}): {BASE_MOTION}" if BASE[0] in states else "",
-            f"X: base parameters, in the order of {self.robot.name}_{MODEL}" if "X" in arguments else "",
+            f"X: base parameters, in the order of {self.robot.name}_{MODEL}"
+            if "X" in arguments
+            else "",
             f"constants: {', '.join(self.free)}, a row"
             + ", or a row for each sample" * varying
             + "; default: the values of the robot file"
@@ -236,7 +238,7 @@ class _Robot:
             return f"{result}(:, {', '.join(str(i + 1) for i in k) or 1})"
 
         preset = tuple(f"{entry(place)} = {_number(x)};" for place, x in f.preset)
-        used = {n.value.name for n in f.nodes if n.op == SYM and n.value.kind == "constant"}
+        used = {n.value.name for n in f.nodes if n.op == SYM}
         about = f"{model.summary} Shape {tuple_of(('N', *shape))}; {f.cost}."
         if model.name == "regressor":
             about += f" reshape({result}, [], {shape[-1]}) is W of Y = W X + rho, rows joint-major."
@@ -405,7 +407,7 @@ class _Robot:
             "  base_parameters and standard_parameters: the order of X and of the standard parameters",
             "  constants, constant_values: names and values of the constants of the robot file",
             "  standard_values, X: values of the robot file; NaN, and an empty X, where it has none",
-            *header(self.spec, texts, formulas=True),
+            *_narrowed(header(self.spec, texts, formulas=True)),
         )
         return File(MODEL, (MODEL,), (), about, (Section("Names and values", lines),))
 
@@ -441,6 +443,28 @@ def _wrapped(text: str) -> list[str]:
     indent = text[: len(text) - len(text.lstrip())]
     more = indent + "    "
     return wrap(text, WIDTH - 2, subsequent_indent=more, break_long_words=False) or [""]
+
+
+def _narrowed(lines: Iterable[str]) -> list[str]:
+    """Move the ends of lines that are too long for a comment to the start of the next line.
+
+    A line that is indented further than the first of its text goes on with that text.
+    """
+    made: list[str] = []
+    rest, first = "", 0
+    for line in lines:
+        indent = len(line) - len(line.lstrip())
+        if rest and indent <= first:
+            made.append(" " * (first + 4) + rest)
+            rest = ""
+        if rest:
+            line = f"{' ' * indent}{rest} {line.lstrip()}"
+        else:
+            first = indent
+        kept, *more = _wrapped(line)
+        made.append(kept)
+        rest = " ".join(x.strip() for x in more)
+    return [*made, " " * (first + 4) + rest] if rest else made
 
 
 def _number(x: float) -> str:
