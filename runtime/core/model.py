@@ -192,11 +192,11 @@ def checked_model(module: ModuleType) -> GeneratedModel:
             ),
             file=label,
         )
-    structure = np.asarray(model.STRUCTURE)
-    if structure.shape != (b, n) or structure.dtype != np.bool_:
+    structure, rows = np.asarray(model.STRUCTURE), n + len(base_rows(model))
+    if structure.shape != (b, rows) or structure.dtype != np.bool_:
         raise ModelError(
             (
-                f"STRUCTURE is {structure.dtype} {structure.shape}; expected bool {(b, n)}, base "
+                f"STRUCTURE is {structure.dtype} {structure.shape}; expected bool {(b, rows)}, base "
                 "parameters by joints; generate the module again"
             ),
             file=label,
@@ -209,6 +209,15 @@ def checked_model(module: ModuleType) -> GeneratedModel:
         )
     _check_store(model, b, n, label)
     return model
+
+
+def base_rows(model: GeneratedModel) -> tuple[str, ...]:
+    """Return the names of the rows that an emitted model has before its joints: of a free base.
+
+    They are the force on frame 0, then the moment about its origin, in its axes.
+    """
+    free = getattr(model, "BASE", "fixed") == "free"
+    return ("FX0", "FY0", "FZ0", "NX0", "NY0", "NZ0") if free else ()
 
 
 def require(model: GeneratedModel, *functions: str) -> None:
@@ -442,6 +451,7 @@ def _check_store(model: GeneratedModel, b: int, n: int, label: str) -> None:
             "the module again",
             file=label,
         ) from e
+    n += len(base_rows(model))
     if shape != (b, n, N):
         raise ModelError(f"store({N}) has shape {shape}; expected {(b, n, N)}", file=label)
     if shapes != ((N, n, b), (n * N, b)):

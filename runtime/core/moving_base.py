@@ -84,9 +84,15 @@ def moved_base(problem: Problem) -> Problem:
     ------
     InputError
         A record without the motion of the base of such a robot, or with that of a fixed base; a
-        quaternion that is not of unit length; a pose of the base with poses at rest; force sensors.
+        quaternion that is not of unit length; a pose of the base with poses at rest; force sensors;
+        a free base.
     """
     model, records = problem.model, (*problem.records, *problem.unseen)
+    if getattr(model, "BASE", "fixed") == "free":
+        raise InputError(
+            f"records of a free base are not read yet; use --base moving for {model.NAME}, whose "
+            "rows are the joints alone"
+        )
     moves = getattr(model, "BASE", "fixed") == "moving"
     for record in records:
         _require_motion(model, record, moves)

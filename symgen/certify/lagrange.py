@@ -20,7 +20,9 @@ in the world. Where T_0 = 1, with the products of poses T_0 T_j differentiated,
     Tddot = T_0dd T_j + 2 T_0d T_jd + T_jdd,   T_0d = | hat(w0)  0 |   T_0dd = | hat(wd0) + hat(w0)^2  a0 |
                                                       | 0        0 |           | 0                     0  |
 
-in place of T_jdd, with gravity in a0. An element with parameter c acts along a motion s = G q, or has a
+in place of T_jdd, with gravity in a0. The rows of a free base are Lagrange's equations of these
+coordinates: the poses have the derivatives G_i T_j, with G_i = dT_0/dx_i for a shift x_i of frame 0
+along its axes, then for a turn about them, and link 0 has T_j = 1. An element with parameter c acts along a motion s = G q, or has a
 matrix B (B = G'G if it acts along s). It adds to Gamma
 
     c B qdd          inertia
@@ -199,23 +201,32 @@ class Lagrange:
         """Return the standard regressor D of Gamma = D chi, shape (..., n, p).
 
         base : w0, wd0 and a0 of a base that moves, shape (..., 9); None: the base is fixed.
+
+        A free base has six rows more, before the joints: D has the shape (..., 6 + n, p).
         """
         robot, dT = self.robot, self.slopes(q)
         ddT = _matrices(self._floats("accelerations", q, qd, qdd))
+        first_frame = 1
         if base is None:
             ddT[..., :3, 3] -= [e.value(self.constants) for e in robot.gravity]
         else:
-            rate = np.einsum("...ifab,...i->...fab", dT, qd)
-            ddT = (ddT[..., 0, :, :, :] + _carried(self.poses(q), rate, base))[..., None, :, :, :]
+            T, rate = self.poses(q), np.einsum("...ifab,...i->...fab", dT, qd)
+            ddT = ddT[..., 0, :, :, :]
+            if robot.base_is_free:
+                first_frame, zero = 0, np.zeros((4, 4))
+                T = _with_link_0(T, np.eye(4))
+                rate, ddT, dT = (_with_link_0(x, zero) for x in (rate, ddT, dT))
+                dT = np.concatenate([SHIFTS_AND_TURNS @ T[..., None, :, :, :], dT], axis=-4)
+            ddT = (ddT + _carried(T, rate, base))[..., None, :, :, :]
         products = np.swapaxes(dT, -1, -2) @ ddT
         by_link = products.reshape(*products.shape[:-2], 16) @ LINK.reshape(-1, 16).T
         column = {name: k for k, name in enumerate(self.names)}
         D = np.zeros((*by_link.shape[:-2], len(self.names)))
         for j in robot.links:
             first = column[parameter(INERTIAL[0], j)]
-            D[..., first : first + len(INERTIAL)] = by_link[..., j - 1, :]
+            D[..., first : first + len(INERTIAL)] = by_link[..., j - first_frame, :]
         for name in self._elements:
-            D[..., column[name]] = self._element(name, q, qd, qdd)
+            D[..., -q.shape[-1] :, column[name]] = self._element(name, q, qd, qdd)
         return D
 
     def _element(self, name: str, q: Array, qd: Array, qdd: Array) -> Array:
@@ -393,12 +404,16 @@ class Lagrange:
     ) -> Array:
         """Return the standard regressor D of the actuated joint torques D chi, (..., n_a, p).
 
+        The six rows of a free base come before the joints.
+
         D = G' D_tree, with G = dq/dq_a and the regressor D_tree of the open tree. The arguments q,
         qd, qdd of the actuated joints have shape (..., n_a), in the order of `robot.joints`; `base`
         is that of `regressor`.
         """
         x, xd, xdd, G = self.motion(q, qd, qdd)
-        return np.swapaxes(G, -1, -2) @ self.regressor(x, xd, xdd, base)
+        D, n = self.regressor(x, xd, xdd, base), x.shape[-1]
+        joints = np.swapaxes(G, -1, -2) @ D[..., -n:, :]
+        return np.concatenate([D[..., :-n, :], joints], axis=-2)
 
 
 def _carried(T: Array, Td: Array, base: Array) -> Array:
@@ -414,6 +429,21 @@ def _carried(T: Array, Td: Array, base: Array) -> Array:
     return np.asarray(T0dd @ T + 2 * T0d @ Td)
 
 
+def _with_link_0(of_frames: Array, own: Array) -> Array:
+    """Put the matrix `own` of link 0 before those of the frames, shape (..., 1 + frames, 4, 4)."""
+    own = np.broadcast_to(own, (*of_frames.shape[:-3], 1, 4, 4))
+    return np.concatenate([own, of_frames], axis=-3)
+
+
+def _generators() -> Array:
+    """Return dT_0/dx_i at T_0 = 1, shape (6, 1, 4, 4): three shifts, then three turns."""
+    G = np.zeros((6, 1, 4, 4))
+    for k in range(3):
+        G[k, 0, k, 3] = 1
+        G[3 + k, 0, :3, :3] = _hat(np.eye(3)[k])
+    return G
+
+
 def _hat(w: Array) -> Array:
     """Return the matrix of the cross product w x, shape (..., 3, 3)."""
     return np.asarray(np.cross(np.eye(3), w[..., None, :]))
@@ -422,6 +452,9 @@ def _hat(w: Array) -> Array:
 def _axial(W: Array) -> Array:
     """Return the vector w, shape (..., 3), of a skew-symmetric matrix W = hat(w)."""
     return np.stack([W[..., 2, 1], W[..., 0, 2], W[..., 1, 0]], axis=-1)
+
+
+SHIFTS_AND_TURNS = _generators()
 
 
 @lru_cache(maxsize=8)
@@ -544,7 +577,7 @@ class Sample(NamedTuple):
         Dynamics by energies.
     q, qd, qdd : ndarray, shape (N, n), SI and rad
         States of the actuated joints, in the order of `robot.joints`.
-    D : ndarray, shape (N, n, p)
+    D : ndarray, shape (N, n, p), or (N, 6 + n, p) of a free base
         Gamma = D chi at each state, chi in the order of `robot.parameters`.
     base : ndarray, shape (N, 9), or None
         Motion w0, wd0, a0 of a base that moves.
@@ -609,7 +642,7 @@ def sampled(
     n, leverage = len(robot.joints), _leverage(robot, model.constants)
     if in_time:
         model.vary(np.random.default_rng(seed + 1), states)
-    state, D = np.empty((3, 0, n)), np.empty((0, n, len(robot.parameters)))
+    state, D = np.empty((3, 0, n)), np.empty((0, len(robot.rows), len(robot.parameters)))
     of_base, bases = np.random.default_rng(seed + 2), np.empty((0, 9))
     for _ in range(DRAWS):
         q, qd, qdd = (

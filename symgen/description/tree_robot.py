@@ -370,7 +370,7 @@ def robot_of_tree(
     tree = on_its_base(tree)
     table = placed(tree, keep_fixed=keep_fixed)
     try:
-        robot = _robot(table, file, sha256, base="moving" if free else "fixed")
+        robot = _robot(table, file, sha256, base="free" if free else "fixed")
     except DescriptionError as error:
         key = str((*error.path, "", "")[1]).removeprefix("q")
         joint = table.joint.get(int(key)) if key.isdigit() and error.line is None else None
@@ -386,7 +386,7 @@ def robot_of_tree(
 
 
 def on_its_base(tree: Tree) -> Tree:
-    """Return the tree that stands on the link of its free joint: frame 0 of a base that moves.
+    """Return the tree that stands on the link of its free joint: frame 0 of a free base.
 
     A tree without a free joint is not changed.
 
@@ -408,8 +408,8 @@ def on_its_base(tree: Tree) -> Tree:
             line=base.line,
         )
     note = (
-        f"free joint {base.name!a:.60}: read as base: moving, whose rows are the joints alone; "
-        f"symgen convert --lock {base.name}=0 fixes it"
+        f"free joint {base.name!a:.60}: read as base: free, with six rows of the wrench on it; "
+        f"--base moving leaves the joints alone, symgen convert --lock {base.name}=0 fixes it"
     )
     return replace(
         tree,
@@ -424,7 +424,7 @@ def _legend(what: str, names: dict[str, str]) -> str:
     return f"{what}: " + ", ".join(f"{name} = {of_file!a:.60}" for name, of_file in names.items())
 
 
-def _robot(table: Table, file: str, sha256: str, base: Literal["fixed", "moving"]) -> Robot:
+def _robot(table: Table, file: str, sha256: str, base: Literal["fixed", "free"]) -> Robot:
     constraints = _constraints(table)
     actuated = [j for j in table.joint if j not in constraints]
     if not actuated:
@@ -433,6 +433,7 @@ def _robot(table: Table, file: str, sha256: str, base: Literal["fixed", "moving"
         )
     frames = tuple(Frame(**{**vars(f), "mu": int(f.j in actuated)}) for f in table.frames)
     values, massless = _values(table, actuated)
+    of_base = _of_base(table) if values else {}
     gravity, constants = _gravity(table.tree.gravity)
     return Robot(
         name=_identifier(table.tree.name or file.rpartition(".")[0]),
@@ -447,7 +448,8 @@ def _robot(table: Table, file: str, sha256: str, base: Literal["fixed", "moving"
         constraints=constraints,
         massless=massless,
         limits=_limits(table, actuated),
-        values=values,
+        values=(of_base if base == "free" else {}) | values,
+        of_base=of_base,
         labels=_labels(table),
         base=base,
         angles=table.tree.angles,
@@ -596,6 +598,12 @@ def _values(table: Table, actuated: list[int]) -> tuple[dict[str, float], frozen
             for j in _keys(table, family, value, actuated)
         }
     return values, massless
+
+
+def _of_base(table: Table) -> dict[str, float]:
+    """Return the inertial parameters of link 0 by name."""
+    standard = _standard(table, table.bodies[0])
+    return {parameter(p, 0): x for p, x in zip(INERTIAL, standard, strict=True)}
 
 
 def _standard(table: Table, body: Body) -> Array:

@@ -88,6 +88,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
             "keywords": "".join(f", {c}={c}" for c in free),
             "channels": robot.channels,
             "base": robot.base_moves,
+            "free": robot.base_is_free,
             "tied": spec.tied,
             "passive": robot.passive,
             "size": BLOCK,

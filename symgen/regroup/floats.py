@@ -81,7 +81,7 @@ def float_regressor(robot: Robot, names: Sequence[str]) -> Array:
         states = states_of(q=q, qd=qd, qdd=qdd) | _base_motion(robot, rng, count)
         floats = Floats(robot, states, _in_time(robot, rng, count))
         return sampled_columns(floats, names, count).reshape(-1, len(names))
-    system, count = loop_system(robot), 3 * len(names) // len(robot.joints) + 10
+    system, count = loop_system(robot), 3 * len(names) // len(robot.rows) + 10
     blocks: list[Array] = []
     closed = tried = 0
     while closed < count:
@@ -97,13 +97,13 @@ def float_regressor(robot: Robot, names: Sequence[str]) -> Array:
 
 
 def sampled_columns(floats: Floats, names: Sequence[str], count: int) -> Array:
-    """Compute the regressor columns `names` at given states, shape (actuated joints, count, names).
+    """Compute the regressor columns `names` at given states, shape (rows, count, names).
 
     `count` is the number of states. A column that is not finite raises DescriptionError.
     """
     robot = floats.robot
     D = derive(robot).columns
-    entries = [D[name].get(j, 0) for j in robot.joints for name in names]
+    entries = [D[name].get(j, 0) for j in robot.rows for name in names]
     with np.errstate(all="ignore"):  # of laws, which are judged here
         values = [
             np.broadcast_to(np.asarray(x, dtype=float), count) for x in interpret(entries, floats)
@@ -124,7 +124,7 @@ def sampled_columns(floats: Floats, names: Sequence[str], count: int) -> Array:
             + "; write a law that is finite everywhere, such as sqrt(max(1 - q, 0))",
             path=("columns", own.family) if own else (),
         )
-    return np.stack(values).reshape(len(robot.joints), len(names), count).swapaxes(1, 2)
+    return np.stack(values).reshape(len(robot.rows), len(names), count).swapaxes(1, 2)
 
 
 def _columns_near_start(

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from symgen.description.fields import located
-from symgen.description.files import TREES
+from symgen.description.files import TREES, on_base
 from symgen.description.mjcf import DEEPEST, ORIENTATION
 from symgen.description.robot import FIXED, Robot
 from symgen.description.tree import (
@@ -429,6 +429,10 @@ class RobotText:
     table: Table
     robot: Robot
     places: Places
+
+    def on(self, base: str) -> RobotText:
+        """Return the text as that of a robot with this base, whose link 0 may have parameters."""
+        return replace(self, robot=on_base(self.robot, base))
 
     @property
     def links(self) -> list[FileLink]:

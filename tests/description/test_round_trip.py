@@ -20,6 +20,7 @@ READ_FROM_OTHERS = (
     "impossible",
     "not_read",
     "mounts",
+    "of_base",
     "distal",
     "file",
     "sha256",
