@@ -103,11 +103,12 @@ def octave() -> str | None:
     return os.environ.get("OCTAVE") or next(filter(None, map(shutil.which, PROGRAMS)), None)
 
 
-def called(texts: Mapping[str, str], calls: Sequence[Call]) -> list[list[Array] | OctaveError]:
-    """Call functions of the files `texts`; return the results of each call, or its error.
+def called(texts: Mapping[str, str], calls: Sequence[Call]) -> list[list[Array]]:
+    """Call functions of the files `texts`, and return the results of each call.
 
     A struct becomes the list of its names and values, a cell of words one text; texts are arrays of
-    the codes of their characters. OctaveError is raised if Octave ends or takes too long.
+    the codes of their characters. OctaveError is raised if a function fails, and if Octave ends or
+    takes too long.
     """
     with TemporaryDirectory(prefix="symgen-", ignore_cleanup_errors=True) as name:
         folder = Path(name)
@@ -119,8 +120,8 @@ def called(texts: Mapping[str, str], calls: Sequence[Call]) -> list[list[Array] 
             job += [x for argument in call.arguments for x in _packed(argument)]
         np.array(job, dtype=float).tofile(folder / CALLS)
         _process().run(folder)
-        numbers = np.fromfile(folder / RESULTS)
-    results: list[list[Array] | OctaveError] = []
+        numbers = np.frombuffer((folder / RESULTS).read_bytes())
+    results: list[list[Array]] = []
     place = 0
     for _ in calls:
         failed, count = bool(numbers[place]), int(numbers[place + 1])
@@ -133,7 +134,9 @@ def called(texts: Mapping[str, str], calls: Sequence[Call]) -> list[list[Array] 
             size = int(np.prod(shape))
             arrays.append(numbers[place : place + size].reshape(shape, order="F"))
             place += size
-        results.append(OctaveError(text_of(arrays[0])) if failed else arrays)
+        if failed:
+            raise OctaveError(text_of(arrays[0]))
+        results.append(arrays)
     return results
 
 

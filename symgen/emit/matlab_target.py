@@ -10,8 +10,8 @@ The texts keep to the language that MATLAB and Octave share.
 from __future__ import annotations
 
 import re
-from textwrap import wrap
 from collections.abc import Iterable, Mapping, Sequence
+from textwrap import wrap
 from typing import NamedTuple
 
 from symgen.derive.graph import SYM

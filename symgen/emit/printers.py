@@ -21,7 +21,7 @@ from string import ascii_lowercase
 from typing import NamedTuple
 
 from symgen.derive.graph import ADD, CONST, COS, INV, MUL, POS, SIN, SYM, Node, Scalar, reachable
-from symgen.description.expression import FUNCTIONS, Expression, decimal
+from symgen.description.expression import FUNCTIONS, decimal
 from symgen.description.naming import Namespace
 
 SAYABLE = 3  # factors of a name that is made of them

@@ -35,21 +35,21 @@ class Target(NamedTuple):
     bases: tuple[str, ...] = ("fixed", "moving", "free")
 
 
-IN_C = ("fixed", "moving")
+JOINT_ROWS = ("fixed", "moving")
 TARGETS = {
     "numpy": Target("{}.py", "NumPy", iterates=True),
     "casadi": Target(
         "{}.py", "CasADi", 'in CasADi {}.casadi("inverse_dynamics") is a casadi.Function of columns'
     ),
-    "c": Target("{}.c", "C", iterates=True, bases=IN_C),
+    "c": Target("{}.c", "C", iterates=True, bases=JOINT_ROWS),
     "h": Target(
         "{}.h",
         "C",
         "{0}.h declares what {0}.c has; --target c writes both",
         iterates=True,
-        bases=IN_C,
+        bases=JOINT_ROWS,
     ),
-    "matlab": Target("{}_{}.m", "MATLAB and Octave"),
+    "matlab": Target("{}_{}.m", "MATLAB and Octave", bases=JOINT_ROWS),
     "xp": Target(
         "{}.py",
         "arrays of any package",

