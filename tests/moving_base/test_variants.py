@@ -24,7 +24,7 @@ def test_a_variant_is_the_robot_of_another_geometry(base):
     motion, q, qd, qdd = rng.normal(size=(5, 9)), *rng.normal(size=(3, 5, 2))
     chi = rng.normal(size=len(variants.STANDARD_PARAMETERS))
     D = variants.regressor(motion, q, qd, qdd, free_alpha2=0.3, free_d2=0.7)
-    assert variants.BASE == base
+    assert base == variants.BASE
     assert variants.STANDARD_PARAMETERS == other.STANDARD_PARAMETERS
     tau = other.inverse_dynamics(motion, q, qd, qdd, other.base_parameters(chi))
     assert np.abs(D @ chi - tau).max() < 1e-12 * np.abs(tau).max()
