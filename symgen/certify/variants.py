@@ -25,7 +25,7 @@ from typing import Any
 
 from symgen.certify.requests import module_of
 from symgen.description.expression import Expression
-from symgen.description.files import load_robot, on_base
+from symgen.description.files import on_base, robot_of
 from symgen.description.robot import PRISMATIC, REVOLUTE, Frame, Robot
 
 FREE = "free_"
@@ -57,8 +57,8 @@ def variants(robot: str | Path | Robot, *, base: str | None = None) -> ModuleTyp
 
         return ungrouped_path(robot)
 
-    robot = robot if isinstance(robot, Robot) else load_robot(robot)
-    return module_of(freed(on_base(robot, base)), "standard parameters", derived)
+    robot = freed(on_base(robot_of(robot), base))
+    return module_of(robot, "standard parameters", derived)
 
 
 def freed(robot: Robot) -> Robot:
