@@ -81,7 +81,8 @@ def _message(number: int, line: str) -> JointState | None:
         return None
     stamp = int(fields[0]) * NANOSECONDS + int(fields[1])
     sender = printable(f"frame_id {fields[2]}"[:80]) if fields[2] else ""
-    return JointState(number, stamp, tuple(joints), *values, sender)
+    position, velocity, effort = values
+    return JointState(number, stamp, tuple(joints), position, velocity, effort, sender)
 
 
 def _array(fields: list[str]) -> Array:

@@ -209,9 +209,9 @@ def joined(
             values[x].append(np.stack([np.interp(at, t, column) for column in columns], axis=1))
     if not inside.any():
         raise InputError("the messages of different joints do not overlap in time", file=file)
-    whole = {x: np.hstack(columns) for x, columns in values.items()}
+    position, velocity, effort = (np.hstack(values[x]) for x in QUANTITIES)
     messages = [
-        JointState(m.number, m.stamp, tuple(order), *(whole[x][k] for x in QUANTITIES), m.sender)
+        JointState(m.number, m.stamp, tuple(order), position[k], velocity[k], effort[k], m.sender)
         for k, m in enumerate(base)
         if inside[k]
     ]
