@@ -19,6 +19,7 @@ from runtime.ground.errors import InputError, printable
 from runtime.reading.joint_states import NANOSECONDS, QUANTITIES, JointState, JointTable, table_of
 from runtime.reading.table import Array
 
+SECONDS, FRACTION = re.compile(r"[0-9]{1,10}"), re.compile(r"[0-9]{1,9}")
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf)")
 LOST = re.compile(r"A message was lost|total count")  # lines between the messages
 FIRST = 3  # field of the first joint
@@ -61,7 +62,9 @@ def read_echo(file: str, lines: Iterator[tuple[int, str]]) -> JointTable:
 def _message(number: int, line: str) -> JointState | None:
     """Read a line as a message; None if it is none."""
     fields = [field.strip() for field in line.split(",")]
-    if len(fields) <= FIRST + len(QUANTITIES) - 1 or not all(map(str.isdecimal, fields[:2])):
+    if len(fields) < FIRST + len(QUANTITIES):
+        return None
+    if not (SECONDS.fullmatch(fields[0]) and FRACTION.fullmatch(fields[1])):
         return None
     joints = []
     for field in fields[FIRST:]:

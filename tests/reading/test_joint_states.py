@@ -82,7 +82,16 @@ def test_lines_between_messages_and_a_cut_end(tmp_path):
         read(path)
 
 
-@pytest.mark.parametrize("line", ["0,1,2,3,4,5,6", "0,1,a,5,2,3,4", "t,q1,q2,q3,tau1,tau2,tau3"])
+@pytest.mark.parametrize(
+    "line",
+    [
+        "9" * 400 + ",1,f,a,2,3,4",
+        "1,9999999999,f,a,2,3,4",
+        "0,1,2,3,4,5,6",
+        "0,1,a,5,2,3,4",
+        "t,q1,q2,q3,tau1,tau2,tau3",
+    ],
+)
 def test_other_texts_are_no_echo(tmp_path, line):
     table = read_table(written(tmp_path, [line, *["0,1,2,3,4,5,6"] * 3]))
     assert table.joints is None
