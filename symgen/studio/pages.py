@@ -20,7 +20,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route
 
-from runtime.ground.errors import InputError
+from runtime.ground.errors import InputError, SettingsError
 from runtime.reading.formats import endings
 from symgen.derive.models import SYMBOLIC
 from symgen.description import packaged_robots
@@ -128,13 +128,18 @@ class Pages:
             cells, values = table.cells_of(shown.get("text", "")), folder.study()
         except InputError as e:
             wrong = str(e)
+        cells = cells if shown.get("text") else None
+        place = ".".join(shown.get("path", [])[:3])
+        alone = [{"text": shown["error"], "place": place}] if "error" in shown else []
+        told = shown.get("errors", alone)
         return page(
             name,
             steps=PAGE_STEPS,
             version=version,
             shown=shown,
-            place=".".join(shown.get("path", [])[:3]),
-            cells=cells if shown.get("text") else None,
+            told=[(e["text"], e["place"]) for e in told if table.beside(e["place"], cells)],
+            above=[e["text"] for e in told if not table.beside(e["place"], cells)],
+            cells=cells,
             columns=table.columns_of(cells) if cells else [],
             units=table.UNITS_OF_CELLS,
             left_out=self.server.left_out,
@@ -208,7 +213,8 @@ class Pages:
             path = self.folder.path / record
             shown = await self.server.robot()
             (settings, *_) = self.folder.study().get("record") or [{}]
-            joints = tuple(filter(None, shown.get("labels", ())))
+            n, labels = shown.get("joints", 0), tuple(filter(None, shown.get("labels", ())))
+            joints = labels if len(labels) == n else ("",) * n
             given = asked | {"joints": joints, "topic": settings.get("topic")}
         elif name in ("series", "changes"):
             run = self.folder.run(asked.get("run", ""))
@@ -228,11 +234,13 @@ class Pages:
         name, run = request.path_params["name"], request.path_params.get("run")
         folder, robot = self.folder, self.folder.robot or Path()
         own = [folder.path / "study.yaml", *folder.path.glob("applied-*.*"), robot]
+        own += [folder.path / "proof.json"]
         places = folder.run(run).iterdir() if run else own
         path = next((p for p in places if p.name == name and p.is_file()), None)
         if path is None:
             raise InputError("no such file")
         kind = SHOWN_FILES.get(path.suffix) if run and "keep" not in request.query_params else None
+        kind = "text/plain" if "read" in request.query_params else kind
         keep = safe(f"{(await self.server.robot()).get('name')}_{path.name}")
         attached = {"content-disposition": f'attachment; filename="{keep}"'}
         headers = {"content-security-policy": SANDBOX} | ({} if kind else attached)
@@ -368,7 +376,7 @@ class Pages:
     async def _solve(self, form: dict[str, str]) -> str:
         """Queue a run: an identification, or a study of the encoder resolution.
 
-        The settings are those of the study, or values of a form in JSON. The command line is the
+        The settings are those of the study, values of a form in JSON, or those of the run `again`. The command line is the
         first line of the settings file of the run.
         """
         self._command()
@@ -377,9 +385,11 @@ class Pages:
         kind = form.get("kind", "identify")
         if kind not in RUN_COMMANDS:
             raise InputError(f"expected one of {', '.join(RUN_COMMANDS)}")
-        text = self.folder.checked_study(
-            json.loads(form.get("values", "{}")) or self.folder.study()
-        )
+        values = json.loads(form.get("values", "{}")) or self.folder.study()
+        if "again" in form:  # the study of a run, with other runs at each step
+            values = self.folder.study(f"study-{self.folder.run(form['again']).name}.yaml")
+            values["cestac"] = {**(values.get("cestac") or {}), "runs": int(form.get("runs", ""))}
+        text = self.folder.checked_study(values)
         options = [f"--{name}" for name in ("physical", "friction") if form.get(name)] + [
             f"--delta={' '.join(part.split())[:60]}"
             for part in form.get("delta", "").split(",")
@@ -433,6 +443,12 @@ def answering(handler: Handler) -> Handler:
             return await handler(request)  # type: ignore[no-any-return]
         except RecursionError:
             return page("message", 422, text="nested too deeply; expected a plain table or study")
+        except SettingsError as e:  # of a field, if the page has it
+            wrong = {"keys": [str(k) for k in e.path if isinstance(k, str)], "text": e.reason}
+            events = {"wrong": {**wrong, "line": e.line}}
+            answered = page("message", 422, text=e.message)
+            answered.headers["hx-trigger-after-swap"] = json.dumps(events)
+            return answered
         except (InputError, SymgenError, ValueError, OSError) as e:
             return page("message", 422, text=str(e) or type(e).__name__)
 

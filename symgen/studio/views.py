@@ -31,13 +31,16 @@ from symgen.description import AngleWarning
 from symgen.description.files import write_robot
 from symgen.errors import SymgenError
 from symgen.pages.page import figure
-from symgen.studio.table import cells_of, degrees
+from symgen.studio.table import cells_of, degrees, errors
 from symgen.studio.words import on_page
 from symgen.update.mended import mended
 from symgen.update.models import corrected, model_of, variants_of
 
 FIRST_ROWS = 5  # first ones that are shown
 NAMES_LISTED = 200  # columns that are listed
+COPIES = {"latex": "latex-fragment", "sympy": "sympy", "text": "text"}
+"""Formats of the copies of a model, by the key of their button."""
+TYPESET = 1000  # terms of a closed form that a browser draws at once
 
 
 def answered(view: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, Any]]:
@@ -69,6 +72,11 @@ def robot(path: str, draft: str) -> dict[str, Any]:
 
     Returns the text of its table, its drawing, angles in degrees, and doubts about the file.
     """
+    if draft and (found := errors(draft)):
+        told = [
+            {"place": ".".join(map(str, e.path[:3])), "text": on_page(e.message)} for e in found
+        ]
+        return {"error": told[0]["text"], "errors": told}
     described = (
         symgen.parse_robot(draft.encode(), "robot.yaml") if draft else symgen.load_robot(path)
     )
@@ -101,6 +109,7 @@ def formulas(path: str, before: str) -> dict[str, Any]:
     from symgen.pages.effects import effects
     from symgen.pages.page import printed
     from symgen.symbols import expressions
+    from symgen.symbols.documents import printed as printed_model
     from symgen.symbols.printers import math, math_terms
 
     regrouping = symgen.regrouping(symgen.load_robot(path))
@@ -124,44 +133,43 @@ def formulas(path: str, before: str) -> dict[str, Any]:
         | {"why": e.why or reasons.get(e.name, "identified in its own name")}
         for e in of.values()
     ]
-    return {"base": base, "parameters": parameters, "difference": difference}
+    asked = symgen.symbolic(regrouping.robot).model("base_parameters")
+    texts = {kind: printed_model(asked, "closed", form) for kind, form in COPIES.items()}
+    return {"base": base, "parameters": parameters, "difference": difference, "texts": texts}
 
 
 @answered
 def model(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     """Prepare a symbolic model of the robot in four forms: typeset, text, LaTeX and SymPy.
 
-    A long closed form is typeset as recursion. A model without closed form is its recursion in all
-    forms.
+    The form is the one asked for; a closed form of more than TYPESET terms is not typeset. A model
+    that has too many terms for a closed form is its recursion in all forms.
     """
-    from symgen.symbols.documents import READABLE, notes, printed, shown_model
+    from symgen.symbols.documents import notes, printed, shown_model
+    from symgen.symbols.symbolic_model import NoClosedFormError
 
     name, form = request.get("model", "gravity"), request.get("form", "closed")
     frames: dict[str, Any] = {
         key: int(x) for key in ("of", "frame") if (x := request.get(key, "")).isdigit()
     }
     asked = symgen.symbolic(symgen.load_robot(path)).model(name, **frames)
-    typeset, why = form, ""
+    why, long = "", False
     if form == "closed":
         try:
-            if (terms := asked.closed.size) > READABLE:
-                typeset = "recursive"
-                why = (
-                    f"The closed form has {terms} terms. The page shows the recursion; "
-                    "the copies contain the closed form."
-                )
-        except SymgenError as e:
+            terms = asked.closed.size
+            if long := terms > TYPESET:
+                why = f"The closed form has {terms} terms; it is shown as text. Its recursion is short."
+        except NoClosedFormError as e:
             if asked.model.cases is None:
                 raise
-            typeset = form = "recursive"
-            text = str(e).partition(";")[0]
-            why = f"{text[0].upper()}{text[1:]}. The page shows and copies the recursion."
+            form = "recursive"
+            why = f"{e.reason[0].upper()}{e.reason[1:]}. The page shows and copies the recursion."
     return {
-        "typeset": shown_model(asked, typeset),
+        "typeset": None if long else shown_model(asked, form, TYPESET),
         "why": why,
         "about": notes(asked),
         "form": form,
-        "texts": {kind: printed(asked, form, kind) for kind in ("text", "latex", "sympy")},
+        "texts": {kind: printed(asked, form, language) for kind, language in COPIES.items()},
     }
 
 
@@ -182,11 +190,12 @@ def preview(path: str, request: Mapping[str, Any]) -> dict[str, Any]:
     includes the roles of columns as far as their names show them, as in `identify --suggest`, and
     sampling rate and gaps of the time column `t` in its `unit`. If `decimal` is not given, the
     decimal mark that reads more columns is used. `currents` says whether a name in `tau` has a
-    word for current or effort.
+    word for current or effort; `others` counts the joints of the file if they are more than those
+    of the robot.
     """
     from runtime.ground.clock import time_stamps
     from runtime.reading.formats import read_table
-    from runtime.reading.likely_columns import known_columns, may_be_currents
+    from runtime.reading.likely_columns import joint_counts, known_columns, may_be_currents
     from runtime.reading.units import time_unit
 
     topic, mark = request["topic"], request.get("decimal", "") or "."
@@ -208,9 +217,11 @@ def preview(path: str, request: Mapping[str, Any]) -> dict[str, Any]:
     if t is not None:
         t = t * time_unit(request.get("unit") or "s")
     kept = extremes(np.nan_to_num(np.reshape(values, (len(values), N))), LIMIT.INSTANTS_SHOWN)
-    known = known_columns(opened.columns, request["joints"])
+    known = known_columns(opened.columns, joints := request["joints"])
+    counts = joint_counts(opened.columns, joints)
     return {
         "names": names,
+        "others": counts if joints and max(counts.values()) > len(joints) else {},
         "known": known | ({"decimal": mark} if mark != "." else {}),
         "currents": may_be_currents(request.get("tau", "").split(",")),
         "rows": N,
@@ -379,12 +390,12 @@ def mend() -> None:
 def _written(view: Callable[..., dict[str, Any]]) -> None:
     """Compute a view of ROBOT and STUDY and write it to FILE; these are the arguments.
 
-    If there is an error, print one line and exit with code 2.
+    If there is an error, print it as a line of JSON and exit with code 2.
     """
     robot_file, study_file, target = sys.argv[1:4]
     value = view(robot_file, study_file)
     if "error" in value:
-        print(f"error: {value['error']}", file=sys.stderr)
+        print(dumps({key: value[key] for key in ("error", "path")}), file=sys.stderr)
         sys.exit(2)
     write_all(Path(), {target: f"{dumps(value, indent=1)}\n"})
 

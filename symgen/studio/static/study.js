@@ -73,6 +73,28 @@
     (event.target.id === "solve" ? solve : round)(new FormData(event.target, event.submitter));
   });
 
+  /** A setting that is refused is told beside its field; in a text, below it, with its line. */
+  document.addEventListener("wrong", ({ target, detail: { keys, text, line } }) => {
+    const typed = target.closest?.("form")?.querySelector("textarea");
+    const paths = keys.map((_, k) => keys.slice(0, keys.length - k).join("."));
+    const field = typed || paths.map((path) => one(`[data-setting="${path}"]`) || one(`#questions [name="${path.replace(/^record\./, "")}"]`)).find(Boolean);
+    if (!field) return;
+    untold(field);
+    const at = typed && line ? `line ${line}: ${keys.join(".")}: ` : "";
+    field.after(node("span", { className: "wrong", id: `wrong-${field.name}`, role: "alert", textContent: at + text }));
+    field.setAttribute("aria-invalid", "true");
+    one("#message").replaceChildren();
+    field.focus();
+    if (!typed || !line) return;
+    const start = field.value.split("\n").slice(0, line - 1).join("\n").length + (line > 1);
+    field.setSelectionRange(start, field.value.indexOf("\n", start) < 0 ? field.value.length : field.value.indexOf("\n", start));
+  });
+  const untold = (field) => {
+    field.removeAttribute("aria-invalid");
+    document.getElementById(`wrong-${field.name}`)?.remove();
+  };
+  document.addEventListener("input", ({ target }) => target.matches("[aria-invalid][data-setting], #questions [aria-invalid], #study [aria-invalid]") && untold(target));
+
   // --- the file as the form says that it is read ---
   let turn = 0;
 
@@ -105,7 +127,8 @@
     first.setAttribute("role", "region");
     first.setAttribute("aria-label", "First rows");
     const figures = node("div", { className: "figures" });
-    place.replaceChildren(node("p", { textContent: value.stamps || `${value.rows} samples` }), node("p", { className: "note", textContent: `Columns: ${value.names.join(", ")}` }), first, figures);
+    const others = value.others.q ? [node("p", { className: "doubtful", textContent: `The names show positions of ${value.others.q} joints and torques of ${value.others.tau}; the robot has ${joints}. Name the columns of its joints below, or take the robot of this log.` })] : [];
+    place.replaceChildren(...others, node("p", { textContent: value.stamps || `${value.rows} samples` }), node("p", { className: "note", textContent: `Columns: ${value.names.join(", ")}` }), first, figures);
     const chart = (title, list, unit = "") => ({ label: `${title}, as in the file`, t: value.t, panels: [{ title, unit: unit.replace("*", " "), lines: list.filter((name) => value.lines[name]).map((name, i) => ({ name, kind: `c${i % 8}`, values: value.lines[name].map((x) => x ?? NaN) })) }] });
     const charts = (q.length + tau.length ? [chart("q", q, text("units.q")), chart("tau", tau, text("units.tau"))] : [chart("columns", Object.keys(value.lines))]).filter(({ panels: [{ lines }] }) => lines.length);
     if (charts.length) new Group(figures, charts, { unit: t.length ? "s" : "" });
