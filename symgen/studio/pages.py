@@ -213,7 +213,7 @@ class Pages:
             path = self.folder.path / record
             shown = await self.server.robot()
             (settings, *_) = self.folder.study().get("record") or [{}]
-            n, labels = shown.get("joints", 0), tuple(filter(None, shown.get("labels", ())))
+            n, labels = len(shown.get("joints", ())), tuple(filter(None, shown.get("labels", ())))
             joints = labels if len(labels) == n else ("",) * n
             given = asked | {"joints": joints, "topic": settings.get("topic")}
         elif name in ("series", "changes"):

@@ -74,7 +74,8 @@ def test_errors_in_a_row_are_each_told_and_stay(page: Browser, running: Callable
     for text, said in (("record: 5", "record"), ("signals: 7", "signals")):
         page.run(f"document.querySelector('#study-text').value = {text!r}")
         page.run("document.querySelector('#study-text').form.requestSubmit()")
-        until(page, f"{MESSAGE}.includes({said!r})")
+        below = "document.querySelector('#study-text + .wrong')?.textContent"
+        until(page, f"{below}?.includes({said!r})")
 
 
 def give(page: Browser, selector: str, path: Path) -> None:

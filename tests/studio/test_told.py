@@ -157,16 +157,16 @@ def test_few_runs_decide_nothing_and_one_click_runs_more(
 ) -> None:
     studio = running(*lever(tmp_path))
     go(page, studio.address + "solve")
-    for field, text in (("delta", "2*pi/200"), ("runs", "2")):
+    for field, text in (("delta", "2*pi/2000"), ("runs", "3")):
         page.run(f"document.querySelector('#resolution [name={field}]').value = {text!r}")
     page.click("#resolution button")
     work = WorkFolder(studio.work)
     until(page, "document.querySelector('#jobs').dataset.runs === '01-cestac'")
     few = work.about(work.results()[0])["few"]
-    assert few["runs"] == 2 and few["needed"] > 2
+    assert few["runs"] == 3 and few["needed"] > 3
     go(page, studio.address + "results")
     said = page.run("document.querySelector('.verdict .answer').textContent")
-    assert said == f"2 runs decide nothing: run {few['needed']}"
+    assert said == f"3 runs decide nothing: run {few['needed']}"
     page.click(".verdict button")
     until(page, "document.querySelector('#jobs')?.dataset.runs.includes('02-cestac')")
     (level,) = json.loads((studio.work / "runs/02-cestac/cestac.json").read_text())["levels"]
