@@ -70,7 +70,7 @@ def _impossible(given: Sequence[float | None]) -> str:
     if given[9] is not None and M == 0 and MS.any():
         return "mass 0 with first moments"
     if None not in given:
-        return no_body(M, _centred(ten))
+        return no_body(M, centred(ten))
     if M < 0:
         return no_body(M, np.zeros((3, 3)))
     squares = MS**2 / M if M else np.zeros(3)
@@ -82,7 +82,7 @@ def _impossible(given: Sequence[float | None]) -> str:
     return ""
 
 
-def _centred(ten: Array) -> Array:
+def centred(ten: Array) -> Array:
     """Compute the tensor about the centre of mass; differences of rounded moments are zero."""
     I = inertial_of(ten).I
     return np.where(np.abs(I) > ROUNDING * np.abs(ten[:6]).max(), I, 0.0)

@@ -7,6 +7,7 @@
     study.yaml                meaning of the record, and settings of its evaluation
     proof.json, check.json    the certificate and the findings
     repair.json               what the last repair has changed in the study, and the study before
+    times.json                how long the last run of each kind took, s
     robot-NN-name.urdf, study-NN-name.yaml, runs/NN-name/    robot, settings, results of one command
     history/robot/NNNN/, history/study/NNNN/, history/record/NNNN/    what a change has replaced
     history/undone/NNNN/      robots that undo has replaced

@@ -20,11 +20,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from runtime.reporting.result_files import write_all
 from runtime.threads import BLAS_THREADS
 
 GRACE = 3.0  # s, between the interrupt and the kill
 OUTPUT_KEPT = 500_000  # characters of what a command says that are kept
 MOST_COMMANDS = 40  # commands in the queue
+TIMES = "times.json"  # how long the last command of each task took, s
 LINES = "SYMGEN_LINES"  # as symgen.cli.told reads it
 WAITING, RUNNING, DONE, FAILED, CANCELLED = "waiting", "running", "done", "failed", "cancelled"
 
@@ -136,6 +138,7 @@ class Jobs:
         self.folder, self.programs, self.changed = folder, programs, changed
         self.all: list[Job] = []
         self.wake = asyncio.Event()
+        self.times = _times(folder)
 
     def add(
         self, title: str, words: Sequence[str], result: str, *, run: str = "", terminal: str = ""
@@ -165,6 +168,19 @@ class Jobs:
             if job.open
             or (not job.dismissed and job.state != DONE and job.number > done.get(job.task, 0))
         ]
+
+    def left(self, job: Job) -> float | None:
+        """Expected time until a running command ends, s; None if nothing is known of it.
+
+        It is known from the steps that are done, or from the last command of the same task.
+        """
+        passed = time.monotonic() - job.started
+        if job.state != RUNNING:
+            return None
+        if job.counted and job.counted[0]:
+            done, total = job.counted
+            return passed * (total - done) / done
+        return max(self.times[job.task] - passed, 0.0) if job.task in self.times else None
 
     def last(self, title: str) -> Job | None:
         """Return the last command with the given title; None if there is none."""
@@ -229,6 +245,9 @@ class Jobs:
                 before,
             )  # 1: a verdict of no
             job.state = DONE if told else FAILED
+            if told:
+                self.times[job.task] = time.monotonic() - job.started
+                write_all(self.folder, {TIMES: json.dumps(self.times)})
 
     def _written(self, job: Job) -> int:
         """Return the time, ns, at which the result file of a command was last written.
@@ -259,6 +278,15 @@ class Jobs:
                 for path in self.folder.glob(f"{own}-{job.run}.*"):
                     path.unlink()
         self.changed()
+
+
+def _times(folder: Path) -> dict[str, float]:
+    """Read how long the last command of each task took, s."""
+    try:
+        times = json.loads((folder / TIMES).read_text(encoding="utf-8"))
+        return {str(task): float(seconds) for task, seconds in times.items()}
+    except (OSError, ValueError, TypeError, AttributeError):
+        return {}
 
 
 def lines_of(text: str) -> list[dict[str, Any]]:

@@ -21,6 +21,7 @@ from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, R
 from starlette.routing import Route
 
 from runtime.ground.errors import InputError, SettingsError
+from runtime.reading.datasets import DATASETS
 from runtime.reading.formats import endings
 from symgen.derive.models import SYMBOLIC
 from symgen.description import packaged_robots
@@ -36,7 +37,7 @@ PAGE_STEPS = ("robot", "record", "check", "solve", "results")
 PAGE_PARTS = ("table", "certificate", "study", "findings", "jobs", "applied")
 SANDBOX = "sandbox allow-scripts allow-downloads allow-popups"
 SHOWN_FILES = {".html": "text/html", ".png": "image/png", ".svg": "image/svg+xml"}
-VIEWS = ("formulas", "model", "module", "preview", "series", "changes")
+VIEWS = ("formulas", "model", "module", "preview", "recorded", "series", "changes")
 RUN_COMMANDS = {  # what each writes, its verb and options
     "identify": ("estimate.json", "identify"),
     "cestac": ("cestac.json", "cestac"),
@@ -58,7 +59,7 @@ class Pages:
     """The request handlers of one studio server.
 
     Handlers of GET answer with a page. Handlers of POST change something and return the name of the
-    part of the page to show again, "" for the whole page.
+    part of the page to show again, that of another page, or "" for the whole page.
     """
 
     def __init__(self, server: Server) -> None:
@@ -98,6 +99,8 @@ class Pages:
 
     async def _changed(self, name: str, run: str | None = None) -> Response:
         self.server.changed()
+        if name in PAGE_STEPS:
+            return PlainTextResponse("", headers={"hx-redirect": name})
         if name:
             return await self._part(name, run)
         self.server.before, self.server.left_out = "", []
@@ -142,6 +145,7 @@ class Pages:
             cells=cells,
             columns=table.columns_of(cells) if cells else [],
             units=table.UNITS_OF_CELLS,
+            meanings=table.MEANINGS,
             left_out=self.server.left_out,
             digest=folder.digest,
             work=shlex.quote(str(folder.path)),
@@ -166,6 +170,8 @@ class Pages:
             methods=ESTIMATORS,
             jobs=self.jobs.shown,
             now=time.monotonic(),
+            left=self.jobs.left,
+            times=self.jobs.times,
             runs=runs,
             run=run,
             own=own.name if own else "",
@@ -222,8 +228,11 @@ class Pages:
             given = {"run": str(run), "record": asked.get("record", "")}
         else:
             path = self._source()
+        if name == "recorded":
+            study = str(self.folder.path / "study.yaml")
+            given = {"study": study, "of": self.folder.study_digest}
         value = await self.server.view(getattr(views, name), str(path), given)
-        if name in ("preview", "series", "changes"):
+        if name in ("preview", "recorded", "series", "changes"):
             return JSONResponse(value)
         return page(
             name, value=value, asked=asked, file=path.name, work=shlex.quote(str(self.folder.path))
@@ -294,6 +303,9 @@ class Pages:
             self.folder.take_robot("arm.yaml", skeleton("arm").encode())
         elif name in packaged_robots():
             self.folder.take_robot_of(name)
+            if form.get("record") in DATASETS and not self.folder.read("study.yaml"):
+                self.folder.take_record_of(form["record"])
+                return "record"
         return ""
 
     async def _edit(self, form: dict[str, str]) -> str:

@@ -23,6 +23,18 @@ TABLE_COLUMNS = {  # keys of a row in the order of the page, by convention
     "distal": ("ant", "sigma", "mu", "d", "alpha", "r", "theta", "gamma", "b"),
 }
 UNITS_OF_CELLS = {"gamma": "rad", "alpha": "rad", "theta": "rad", "b": "m", "d": "m", "r": "m"}
+MEANINGS = {
+    "ant": "the frame on which frame j stands",
+    "sigma": "0 revolute, 1 prismatic, 2 fixed",
+    "mu": "1 driven, 0 passive",
+    "gamma": "angle about z of the frame before, from its x to the common normal",
+    "b": "distance along z of the frame before, to the common normal",
+    "alpha": "angle between the two z axes, about the common normal",
+    "d": "distance between the two z axes, along the common normal",
+    "theta": "angle about z of frame j, from the common normal to its x",
+    "r": "distance along z of frame j, from the common normal to its origin",
+}
+"""Meaning of the columns of the table."""
 EDITED: dict[str, Any] = {
     "name": "",
     "title": "",

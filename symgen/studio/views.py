@@ -5,6 +5,7 @@ A view that fails returns an error and its place in the file.
 
 from __future__ import annotations
 
+import re
 import sys
 import warnings
 from collections.abc import Callable, Mapping
@@ -12,6 +13,7 @@ from contextlib import suppress
 from dataclasses import asdict
 from functools import wraps
 from hashlib import sha256
+from html import unescape
 from json import dumps
 from pathlib import Path
 from typing import Any
@@ -20,11 +22,10 @@ import numpy as np
 
 import runtime
 import symgen
-from runtime.core.model import joint_labels
-from runtime.ground.errors import InputError
-from runtime.ground.limits import LIMIT
+from runtime.core.model import joint_labels, joint_torque_units, joint_units
+from runtime.ground.errors import InputError, instant
 from runtime.reporting.result_files import write_all
-from runtime.reporting.series import extremes
+from runtime.reporting.series import base64, extremes
 from symgen.derive.doubts import doubts
 from symgen.derive.loops import close
 from symgen.description import AngleWarning
@@ -37,6 +38,7 @@ from symgen.update.mended import mended
 from symgen.update.models import corrected, model_of, variants_of
 
 FIRST_ROWS = 5  # first ones that are shown
+MOST_NUMBERS = 2**23  # of the lines of one answer; of larger records, the extreme values
 NAMES_LISTED = 200  # columns that are listed
 COPIES = {"latex": "latex-fragment", "sympy": "sympy", "text": "text"}
 """Formats of the copies of a model, by the key of their button."""
@@ -135,7 +137,18 @@ def formulas(path: str, before: str) -> dict[str, Any]:
     ]
     asked = symgen.symbolic(regrouping.robot).model("base_parameters")
     texts = {kind: printed_model(asked, "closed", form) for kind, form in COPIES.items()}
-    return {"base": base, "parameters": parameters, "difference": difference, "texts": texts}
+    meanings = {bare(p["symbol"]): f"{p['name']}: {p['meaning']}, {p['unit']}" for p in parameters}
+    for b, row in zip(regrouping.base, base, strict=True):
+        if row["terms"]:
+            said = f"{b.name}: base parameter, {row['unit']}; {b.own} and what is regrouped into it"
+            meanings[bare(row["symbol"])] = said
+    return {
+        "base": base,
+        "parameters": parameters,
+        "difference": difference,
+        "texts": texts,
+        "meanings": meanings,
+    }
 
 
 @answered
@@ -170,7 +183,33 @@ def model(path: str, request: Mapping[str, str]) -> dict[str, Any]:
         "about": notes(asked),
         "form": form,
         "texts": {kind: printed(asked, form, language) for kind, language in COPIES.items()},
+        "meanings": {} if long else meanings_of(asked, form),
     }
+
+
+def meanings_of(asked: Any, form: str) -> dict[str, str]:
+    """Say of the symbols of a symbolic model, by their printed texts, what they are."""
+    from symgen.derive.names import FAMILIES, MEMBER
+    from symgen.symbols import expressions
+    from symgen.symbols.printers import math
+
+    robot = asked.source.robot
+    own = asked.closed.angles if form == "closed" else [x.name for x in asked.listing.lines]
+    meanings = {
+        f"q{j}": f"q{j}: position of joint {j}{f', {name}' if (name := robot.labels.get(j)) else ''}"
+        for j in robot.joints
+    }
+    for name in [*own, *map(asked.label, asked.places)]:
+        if member := MEMBER.match(name):
+            meanings[bare(math(expressions.symbol(name)))] = (
+                f"{name}: {FAMILIES[member[1] or member[2]]}"
+            )
+    return meanings
+
+
+def bare(markup: str) -> str:
+    """The text of a piece of MathML, as a browser has it."""
+    return unescape(re.sub(r"<[^>]*>|\s", "", markup))
 
 
 @answered
@@ -184,7 +223,7 @@ def module(path: str, request: Mapping[str, str]) -> dict[str, Any]:
 
 @answered
 def preview(path: str, request: Mapping[str, Any]) -> dict[str, Any]:
-    """Show the columns of a measured file: names, first rows, and thinned lines for a plot.
+    """Show the columns of a measured file: names, first rows, and lines of all samples.
 
     `columns`, names separated by commas, selects the columns with rows and lines. The result
     includes the roles of columns as far as their names show them, as in `identify --suggest`, and
@@ -216,7 +255,7 @@ def preview(path: str, request: Mapping[str, Any]) -> dict[str, Any]:
     N, t = len(values[0]) if values else 0, columns.get(request.get("t", ""))
     if t is not None:
         t = t * time_unit(request.get("unit") or "s")
-    kept = extremes(np.nan_to_num(np.reshape(values, (len(values), N))), LIMIT.INSTANTS_SHOWN)
+    kept = _shown(np.reshape(values, (len(values), N)))
     known = known_columns(opened.columns, joints := request["joints"])
     counts = joint_counts(opened.columns, joints)
     return {
@@ -226,9 +265,33 @@ def preview(path: str, request: Mapping[str, Any]) -> dict[str, Any]:
         "currents": may_be_currents(request.get("tau", "").split(",")),
         "rows": N,
         "stamps": "" if t is None else time_stamps(t).to_text(),
-        "first": [[f"{x[k]:.6g}" for x in values] for k in range(min(N, FIRST_ROWS))],
-        "t": _plain(kept if t is None else t[kept]),
-        "lines": {name: _plain(x[kept]) for name, x in columns.items()},
+        "first": [[instant(x[k]) for x in values] for k in range(min(N, FIRST_ROWS))],
+        "t": base64(kept if t is None else t[kept], "<f8"),
+        "lines": {name: base64(x[kept]) for name, x in columns.items()},
+    }
+
+
+@answered
+def recorded(path: str, request: Mapping[str, str]) -> dict[str, Any]:
+    """Compute the lines of the record of a study, in SI units, for a plot.
+
+    path : robot file.
+    request : `study`, the study file.
+    """
+    model, _, (record, *_), named = _read(path, Path(request["study"]))
+    kept = _shown(np.vstack([record.q.T, record.tau.T]))
+    labels = joint_labels(model)
+    units = {"q": joint_units(model), "tau": joint_torque_units(model)}
+    lines = {
+        name: {f"{name} {label}": base64(x) for label, x in zip(labels, values.T, strict=True)}
+        for name, values in (("q", record.q[kept]), ("tau", record.tau[kept]))
+    }
+    return {
+        "records": list(named),
+        "rows": len(record),
+        "t": base64(record.t[kept], "<f8"),
+        "lines": lines,
+        "units": {key: " or ".join(dict.fromkeys(own)) for key, own in units.items()},
     }
 
 
@@ -255,14 +318,14 @@ def series(path: str, request: Mapping[str, str]) -> dict[str, Any]:
         rows = np.searchsorted(selection.t, joint.t).clip(max=K - 1)
         torques[:, j, rows] = joint.measured, joint.predicted
     lines = np.concatenate([*torques, torques[0] - torques[1]])
-    shown = extremes(np.nan_to_num(lines), LIMIT.INSTANTS_SHOWN)
+    shown = _shown(lines)
     return {
         "records": list(named),
-        "t": _plain(selection.t[shown]),
+        "t": base64(selection.t[shown], "<f8"),
         "joints": joint_labels(loaded),
-        "q": list(map(_plain, own.states.q[selection.samples.start + selection.kept[shown]].T)),
-        "measured": list(map(_plain, torques[0][:, shown])),
-        "predicted": list(map(_plain, torques[1][:, shown])),
+        "q": list(map(base64, own.states.q[selection.samples.start + selection.kept[shown]].T)),
+        "measured": list(map(base64, torques[0][:, shown])),
+        "predicted": list(map(base64, torques[1][:, shown])),
     }
 
 
@@ -405,5 +468,9 @@ def digest_of(*paths: Path) -> str:
     return sha256(b"".join(path.read_bytes() for path in paths if path.is_file())).hexdigest()
 
 
-def _plain(x: Any) -> list[float | None]:
-    return [float(f"{v:.6g}") if np.isfinite(v) else None for v in np.asarray(x, dtype=float)]
+def _shown(lines: np.ndarray) -> np.ndarray:
+    """Indices of the samples of lines that are sent: all, if they are not too many.
+
+    lines : shape (m, N).
+    """
+    return extremes(np.nan_to_num(lines), MOST_NUMBERS // (len(lines) + 1))

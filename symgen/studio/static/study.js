@@ -106,7 +106,7 @@
   }
 
   async function preview() {
-    if (!one("#preview")) return;
+    if (!one("#preview:not([data-recorded])")) return;
     const value = await previewed(study().record?.[0]?.decimal ? { decimal: study().record[0].decimal } : {});
     if (value.late) return;
     guess = value.known || {};
@@ -129,9 +129,20 @@
     const figures = node("div", { className: "figures" });
     const others = value.others.q ? [node("p", { className: "doubtful", textContent: `The names show positions of ${value.others.q} joints and torques of ${value.others.tau}; the robot has ${joints}. Name the columns of its joints below, or take the robot of this log.` })] : [];
     place.replaceChildren(...others, node("p", { textContent: value.stamps || `${value.rows} samples` }), node("p", { className: "note", textContent: `Columns: ${value.names.join(", ")}` }), first, figures);
-    const chart = (title, list, unit = "") => ({ label: `${title}, as in the file`, t: value.t, panels: [{ title, unit: unit.replace("*", " "), lines: list.filter((name) => value.lines[name]).map((name, i) => ({ name, kind: `c${i % 8}`, values: value.lines[name].map((x) => x ?? NaN) })) }] });
+    const instants = floats(value.t, Float64Array);
+    const chart = (title, list, unit = "") => ({ label: `${title}, as in the file`, t: instants, panels: [{ title, unit: unit.replace("*", " "), lines: list.filter((name) => value.lines[name]).map((name, i) => ({ name, kind: `c${i % 8}`, values: floats(value.lines[name]) })) }] });
     const charts = (q.length + tau.length ? [chart("q", q, text("units.q")), chart("tau", tau, text("units.tau"))] : [chart("columns", Object.keys(value.lines))]).filter(({ panels: [{ lines }] }) => lines.length);
     if (charts.length) new Group(figures, charts, { unit: t.length ? "s" : "" });
+  }
+  /** The record of a study without a file of its own, such as a dataset. */
+  async function recorded() {
+    const place = one("#preview[data-recorded]");
+    if (!place) return;
+    const answer = await fetch("view/recorded"), value = answer.ok ? await answer.json() : { error: await answer.text() };
+    if (value.error) return place.replaceChildren(node("p", { className: "no", textContent: value.error }));
+    const figures = node("div", { className: "figures" }), t = floats(value.t, Float64Array);
+    place.replaceChildren(node("p", { textContent: `${value.records.join("; ")}: ${value.rows} samples` }), figures);
+    new Group(figures, Object.entries(value.lines).map(([title, lines]) => ({ label: `${title}, as the study reads it`, t, panels: [{ title, unit: value.units[title], lines: Object.entries(lines).map(([name, text], i) => ({ name, kind: `c${i % 8}`, values: floats(text) })) }] })));
   }
   // --- remedies as one change of the study: {"record.units.q": "deg"}; what is of record.scale multiplies ---
   const multiplies = (key) => key.startsWith("record.scale.");
@@ -232,9 +243,9 @@
   }
 
   document.addEventListener("htmx:afterSettle", (event) => {
-    if (event.target.id === "study" && one("#preview")) { fill(); drawn(); }
+    if (event.target.id === "study" && one("#questions")) { fill(); drawn(); }
     remedies();
     compare();
   });
-  for (const show of [preview, remedies, compare]) show();
+  for (const show of [preview, recorded, remedies, compare]) show();
 })();
