@@ -141,7 +141,7 @@ def formulas(path: str, before: str) -> dict[str, Any]:
     for b, row in zip(regrouping.base, base, strict=True):
         if row["terms"]:
             said = f"{b.name}: base parameter, {row['unit']}; {b.own} and what is regrouped into it"
-            meanings[bare(row["symbol"])] = said
+            meanings[bare(str(row["symbol"]))] = said
     return {
         "base": base,
         "parameters": parameters,
