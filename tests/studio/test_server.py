@@ -784,3 +784,8 @@ def test_pages_do_not_wait_for_formulas(studio: Any) -> None:
         assert not formulas.done()
         deriving.released.set()
         assert "ZZ3" in formulas.result().text
+
+
+def test_every_page_opens_in_an_empty_folder(studio: Any) -> None:
+    for name in ("robot", "record", "check", "solve", "results"):
+        assert studio.get(name).status_code == 200, name
