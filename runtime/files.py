@@ -181,6 +181,7 @@ def _(result: Excitation, folder: Path, study: Study) -> Files:
     return page_files(excitation_page(result)) | {
         "excitation.json": result.to_json(),
         "trajectory.csv": result.to_csv(),
+        "joint_trajectory.yaml": result.to_joint_trajectory(),
         "motion.yaml": yaml_text({"motion": result.motion.to_mapping()}),
     }
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from runtime.core.problem import SIGNALS, Note, Problem
+from runtime.core.provenance import record_names
 from runtime.core.rows.selection import excerpt
 from runtime.core.signals.filters import median_filtered
 from runtime.ground.limits import LIMIT
@@ -65,17 +66,19 @@ def pulses_in_torques(problem: Problem) -> Problem:
     window = problem.settings.signals.torque_median
     if window == 1:
         return problem
-    shares = []
-    for record in problem.records:
+    taken = {}
+    for name, record in zip(record_names(problem.records), problem.records, strict=True):
         samples = excerpt(record, problem.settings.rows)
-        shares.append(share_taken(record.tau[samples], record.q[samples], record.rate, window))
-    if np.max(shares, initial=0.0) <= MEDIAN_TAKES:
+        share = share_taken(record.tau[samples], record.q[samples], record.rate, window)
+        if share.max() > MEDIAN_TAKES:
+            taken[name] = f"{100 * share.max():.2g} % of the torque of joint {1 + share.argmax()}"
+    if not taken:
         return problem
-    worst = np.max(shares, axis=0)
+    several = len(problem.records) > 1
+    removed = "; ".join(f"{what} of {name}" if several else what for name, what in taken.items())
     text = (
-        f"The median filter of the torques (signals.torque_median: {window}) removes "
-        f"{100 * worst.max():.2g} % of the torque of joint {1 + worst.argmax()} together with "
-        "the motion, as if a controller answers every count of its encoder; "
+        f"The median filter of the torques (signals.torque_median: {window}) removes {removed} "
+        "together with the motion, as if a controller answers every count of its encoder; "
         "set torque_median: 1."
     )
     return problem.changed(Note(SIGNALS, text))

@@ -243,8 +243,12 @@ def _error(problem: Problem, fit: Estimate, treatment: Problem) -> float:
     """
     rows, signals = treatment.settings.rows, treatment.settings.signals
     settings = replace(problem.settings, rows=rows, signals=signals)
-    treated = problem.changed(settings=settings, reader=treatment.reader)
-    whole = tuple(replace(record, tau_known=None) for record in problem.unseen)
+    unseen = tuple(
+        record.cut_at(other.origin.cutoff)
+        for record, other in zip(problem.unseen, treatment.unseen, strict=True)
+    )
+    treated = problem.changed(settings=settings, reader=treatment.reader, unseen=unseen)
+    whole = tuple(replace(record, tau_known=None) for record in unseen)
     residual, _ = stacked(problem.model, treated.prepared_unseen).norms(fit.names, fit.X)
     measured = treated.changed(unseen=whole).prepared_unseen
     _, total = stacked(problem.model, measured).norms((), np.zeros(0))

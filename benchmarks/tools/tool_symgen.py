@@ -26,7 +26,11 @@ def answer(model, found):
 
 
 def fit(job):
-    model, records, study = given(job)
+    return identified(job, *given(job))
+
+
+def identified(job, model, records, study):
+    """What stands for the robot; causes and doubts are printed."""
     variants = symgen.variants(job.robot) if job.final else None
     result = runtime.identify(model, records, study, variants=variants)
     plausibility = result.part("plausibility")

@@ -31,7 +31,7 @@ from runtime.core.drives import Drives, encoder_drives, encoder_root
 from runtime.core.missing import require_positions
 from runtime.core.model import GeneratedModel
 from runtime.core.rows.observation import Observation
-from runtime.core.rows.prepared import Prepared
+from runtime.core.rows.prepared import Prepared, study_of_record
 from runtime.core.rows.regressor import in_time
 from runtime.core.rows.selection import Selection
 from runtime.core.rows.switches import Switch, switches
@@ -181,6 +181,7 @@ def perturbation(
     names : columns of W that are fitted.
     drives : drives for encoders on the motor side; default: those of the record.
     """
+    study = study_of_record(study, record.record)
     signals = replace(study.signals, median=study.cestac.median)
     own = replace(record, study=replace(study, signals=signals), reader=value_reader(record.reader))
     own.take_states(record)

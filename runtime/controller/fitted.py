@@ -279,7 +279,10 @@ def slow_records(problem: Problem) -> tuple[Prepared, ...]:
     low = study.signals.lowpass
     if low is None:
         return problem.prepared
-    hertz = min([low.hertz, *(LIMIT.LAW_BAND * _fastest(record) for record in problem.records)])
+    own = [record.origin.cutoff or low.hertz for record in problem.records]
+    hertz = min(
+        [low.hertz, *own, *(LIMIT.LAW_BAND * _fastest(record) for record in problem.records)]
+    )
     signals = replace(study.signals, lowpass=replace(low, cutoff=hertz))
     return tuple(own.by(replace(study, signals=signals)) for own in problem.prepared)
 

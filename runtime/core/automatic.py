@@ -1,33 +1,96 @@
-"""Replacement of the setting `signals.lowpass.cutoff: auto` by a cut-off frequency in Hz."""
+"""Replacement of the setting `signals.lowpass.cutoff: auto` by cut-off frequencies in Hz.
+
+Each fitted record gets the cut-off that it would have alone, since its rate and the noise of its
+positions are its own. The study gets the cut-off of all these records together: it stands for a
+record that is too short or does not move, and is the highest for a record that is predicted.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from runtime.core.problem import SIGNALS, Note, Problem
+from runtime.core.provenance import record_names
+from runtime.core.record import Record
 from runtime.core.rows.selection import excerpt
-from runtime.core.signals.cutoff import cutoff
+from runtime.core.signals.cutoff import Choice, chosen_cutoff, lines_of
+from runtime.ground.limits import LIMIT
+
+NAMED = 3
+"""Records with the same cut-off that are named; more are counted."""
 
 
 def automatic_cutoff(problem: Problem) -> Problem:
-    """Replace the setting `cutoff: auto` of the low-pass filter by a cut-off frequency in Hz.
+    """Replace the setting `cutoff: auto` of the low-pass filter by cut-off frequencies in Hz.
 
-    All fitted records share this frequency, which has the smallest bias
-    (`runtime.core.signals.cutoff`). A problem with another setting is returned unchanged.
+    The cut-off of a record has the smallest bias for it (`runtime.core.signals.cutoff`). With
+    another setting, all records are filtered alike.
     """
     signals = problem.settings.signals
     low = signals.lowpass
     if low is None or low.cutoff != "auto":
-        return problem
-    positions = []
-    for record in problem.records:
-        positions.append((record.q[excerpt(record, problem.settings.rows)], record.rate))
-    crossing = np.inf if isinstance(signals.velocity, str) else signals.velocity
-    hertz, why = cutoff(positions, signals, crossing, problem.reader.encoder is not None)
-    text = f"Low-pass at {hertz:g} Hz (cutoff: auto): {why}."
-    settings = replace(
-        problem.settings, signals=replace(signals, lowpass=replace(low, cutoff=hertz))
+        return problem.changed(
+            records=tuple(record.cut_at(None) for record in problem.records),
+            unseen=tuple(record.cut_at(None) for record in problem.unseen),
+        )
+    common, own = _choices(problem, problem.records)
+    fitted = [one if one.decided else common for one in own]
+    same = all(one.hertz == common.hertz for one in fitted)
+    text = (
+        f"Low-pass at {common.hertz:g} Hz (cutoff: auto): {common.why}."
+        if same
+        else _by_record(problem.records, fitted)
     )
-    return problem.changed(Note(SIGNALS, text), settings=settings)
+    highest = [
+        min(common.hertz, *([one.hertz] if one.decided else []), LIMIT.HIGHEST_CUTOFF * record.rate)
+        for record, one in zip(problem.unseen, _choices(problem, problem.unseen)[1], strict=True)
+    ]
+
+    def cut(records: Sequence[Record], cutoffs: Sequence[float]) -> tuple[Record, ...]:
+        return tuple(
+            record.cut_at(None if hertz == common.hertz else hertz)
+            for record, hertz in zip(records, cutoffs, strict=True)
+        )
+
+    return problem.changed(
+        Note(SIGNALS, text),
+        records=cut(problem.records, [one.hertz for one in fitted]),
+        unseen=cut(problem.unseen, highest),
+        settings=replace(
+            problem.settings, signals=replace(signals, lowpass=replace(low, cutoff=common.hertz))
+        ),
+    )
+
+
+def _choices(problem: Problem, records: Sequence[Record]) -> tuple[Choice, list[Choice]]:
+    """Choose one cut-off for all records, and one for each; pieces between gaps are one record."""
+    signals, rows = problem.settings.signals, problem.settings.rows
+    crossing = np.inf if isinstance(signals.velocity, str) else signals.velocity
+    counts = problem.reader.encoder is not None
+    read = [lines_of(r.q[excerpt(r, rows)], r.rate, signals, crossing) for r in records]
+    common = chosen_cutoff(read, signals, counts)
+    wholes = [r.origin.whole or str(k) for k, r in enumerate(records)]
+    if len(set(wholes)) <= 1:
+        return common, [common] * len(records)
+    found = {
+        whole: chosen_cutoff(
+            [one for one, own in zip(read, wholes, strict=True) if own == whole], signals, counts
+        )
+        for whole in wholes
+    }
+    return common, [found[whole] for whole in wholes]
+
+
+def _by_record(records: Sequence[Record], choices: Sequence[Choice]) -> str:
+    """Tell in one sentence the cut-offs of records that differ, and what decides them."""
+    names: dict[tuple[float, str], list[str]] = {}
+    for name, one in zip(record_names(records), choices, strict=True):
+        names.setdefault((one.hertz, one.why), []).append(name)
+    parts = [
+        f"at {hertz:g} Hz for {', '.join(own) if len(own) <= NAMED else f'{len(own)} records'} ({why})"
+        for (hertz, why), own in sorted(names.items())
+    ]
+    return f"Low-pass by record (cutoff: auto): {'; '.join(parts)}."

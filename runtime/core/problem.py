@@ -24,7 +24,7 @@ from runtime.core.model import GeneratedModel, drives_of, require_emitted
 from runtime.core.provenance import origin
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
-from runtime.core.rows.prepared import Prepared, stacked
+from runtime.core.rows.prepared import Prepared, stacked, study_of_record
 from runtime.core.signals.reader import Reader
 from runtime.core.study import EstimateSettings, Study
 from runtime.ground.arrays import require_kind
@@ -112,12 +112,13 @@ class Problem:
     def reading(self, record: Record) -> Prepared:
         """Combine a record with settings and reader into a Prepared, which computes q, qd, qdd.
 
-        A record without drives gets those of the model.
+        A record without drives gets those of the model. A record with a cut-off of its own is
+        filtered with it.
         """
         drives = drives_of(self.model)
         if record.origin.drives is None and drives is not None:
             record = replace(record, origin=replace(record.origin, drives=drives))
-        return Prepared(record, self.settings, self.reader)
+        return Prepared(record, study_of_record(self.settings, record), self.reader)
 
     @property
     def method(self) -> Method:

@@ -71,6 +71,9 @@ class Origin:
     sides : (str, str) or None
         Sides of the gears at which positions and torques were measured, each "motor", "joint" or
         "link" (behind the gears); None: not told, so that those of the study count.
+    cutoff : float or None, Hz
+        Cut-off of the low-pass for this record, where it is not that of the study
+        (`runtime.core.automatic`).
     """
 
     files: Mapping[str, str] = field(default_factory=dict)
@@ -84,6 +87,7 @@ class Origin:
     simulated: bool = False
     by_law: bool = False
     sides: tuple[str, str] | None = None
+    cutoff: float | None = None
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -207,6 +211,12 @@ class Record:
         """
         others = {key: x for key, x in self.channels.items() if key != "qd"}
         return replace(self, q=q, channels=others, **changes)
+
+    def cut_at(self, hertz: float | None) -> Record:
+        """Return the record with the cut-off of its own low-pass, Hz; None: that of the study."""
+        if self.origin.cutoff == hertz:
+            return self
+        return replace(self, origin=replace(self.origin, cutoff=hertz))
 
     @property
     def subtracted(self) -> str:

@@ -60,7 +60,7 @@ class Lowpass(Settings):
     Attributes
     ----------
     cutoff : float or str, Hz
-        Cutoff frequency; auto: from the motion and the noise of the records
+        Cutoff frequency; auto: from the motion and the noise of each record
         (`runtime.core.signals.cutoff`), twice that for counts, at most 50, as in the chapter, and
         50 if there is no record.
     order : int

@@ -31,6 +31,7 @@ from runtime.core.problem import Problem
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.predicted import Weights
+from runtime.excitation.accelerations import accelerations
 from runtime.excitation.settings import ExcitationSettings
 from runtime.ground.errors import InputError, SettingsError
 from runtime.ground.limits import limits
@@ -41,8 +42,8 @@ LIMIT = limits(__package__)
 
 Array = np.ndarray
 
-QUANTITIES = {"q": "position", "qd": "velocity", "qdd": "acceleration"}
-UNITS = {"q": "rad or m", "qd": "rad/s or m/s", "qdd": "rad/s^2 or m/s^2"}
+QUANTITIES = {"q": "position", "qd": "velocity"}
+UNITS = {"q": "rad or m", "qd": "rad/s or m/s"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +58,8 @@ class MotionLimits:
         Largest velocity and acceleration.
     tau : ndarray, N m or N
         Largest torque; inf: unlimited.
+    assumed : str
+        Sentence on the accelerations, if neither robot file nor study limits them; else "".
     """
 
     lower: Array
@@ -64,6 +67,7 @@ class MotionLimits:
     qd: Array
     qdd: Array
     tau: Array
+    assumed: str = ""
 
     def of(self, share: float) -> MotionLimits:
         """Return limits that are narrower by the fraction `share` of each limit.
@@ -71,9 +75,8 @@ class MotionLimits:
         The range of positions shrinks about its middle.
         """
         middle, half = (self.lower + self.upper) / 2, (1 - share) * (self.upper - self.lower) / 2
-        return MotionLimits(
-            middle - half, middle + half, *((1 - share) * x for x in (self.qd, self.qdd, self.tau))
-        )
+        qd, qdd, tau = ((1 - share) * x for x in (self.qd, self.qdd, self.tau))
+        return MotionLimits(middle - half, middle + half, qd, qdd, tau, self.assumed)
 
 
 @dataclass(frozen=True)
@@ -104,18 +107,23 @@ class Excess:
         )
 
 
-def limits_of(model: GeneratedModel, given: Mapping[str, Any]) -> MotionLimits:
+def limits_of(
+    model: GeneratedModel, given: Mapping[str, Any], records: Sequence[Record] = ()
+) -> MotionLimits:
     """Combine the limits of the robot file with the limits in `given`, which replace them.
 
-    Raises SettingsError if q, qd or qdd has no limit.
+    Accelerations without a limit get one from the velocities and from `records`
+    (`runtime.excitation.accelerations`).
+
+    Raises SettingsError if q or qd has no limit.
     """
     n = len(model.JOINTS)
     known = {**dict(getattr(model, "LIMITS", None) or {}), **given}
-    missing = [name for name in ("q", "qd", "qdd") if known.get(name) is None]
+    missing = [name for name in ("q", "qd") if known.get(name) is None]
     if missing:
         raise SettingsError(
-            f"{model.NAME} has no {' or '.join(QUANTITIES[name] for name in missing)} limits"
-            f"{' (a URDF has none)' if missing == ['qdd'] else ''}: add "
+            f"{model.NAME} has no {' or '.join(QUANTITIES[name] for name in missing)} limits of every "
+            "joint: add "
             f"`excitation: {{limits: {{{', '.join(f'{name}: [...]' for name in missing)}}}}}` to the "
             f"study file of the record, a number per joint in "
             f"{', '.join(UNITS[name] for name in missing)}, and run `symgen excite ROBOT study.yaml`",
@@ -127,19 +135,10 @@ def limits_of(model: GeneratedModel, given: Mapping[str, Any]) -> MotionLimits:
             f"unknown limit {', '.join(sorted(unknown))}; expected some of q, qd, qdd, tau",
             path=("limits",),
         )
-    largest = {}
-    for name in ("qd", "qdd", "tau"):
-        largest[name] = np.array(
-            np.broadcast_to(np.asarray(known.get(name, np.inf), dtype=float), (n,))
-        )
-        if not np.all(largest[name] > 0):
-            motor = "; a joint with tau 0 has no motor and cannot be moved: lock it" * (
-                name == "tau"
-            )
-            raise SettingsError(
-                f"{name}: {largest[name].tolist()}; expected more than 0{motor}",
-                path=("limits", name),
-            )
+    largest = {name: _largest(model, name, known.get(name)) for name in ("qd", "qdd", "tau")}
+    assumed = ""
+    if known.get("qdd") is None:
+        largest["qdd"], assumed = _assumed(model, largest["qd"], records)
     ranges = [
         (-float(x), float(x)) if np.ndim(x) == 0 else tuple(map(float, x)) for x in known["q"]
     ]
@@ -149,7 +148,43 @@ def limits_of(model: GeneratedModel, given: Mapping[str, Any]) -> MotionLimits:
             path=("limits", "q"),
         )
     lower, upper = np.array(ranges).T
-    return MotionLimits(lower, upper, **largest)
+    return MotionLimits(lower, upper, **largest, assumed=assumed)
+
+
+def _largest(model: GeneratedModel, name: str, given: Any) -> Array:
+    """Read the limits `name` of all joints, shape (n,): above 0; inf if none is given."""
+    n = len(model.JOINTS)
+    limits = np.array(np.inf if given is None else given, dtype=float)
+    if limits.ndim and limits.shape != (n,):
+        raise SettingsError(
+            f"{name}: {limits.tolist()}; expected {n} numbers, one per joint, or one for all",
+            path=("limits", name),
+        )
+    if not np.all(limits > 0):
+        motor = "; a joint with tau 0 has no motor and cannot be moved: lock it" * (name == "tau")
+        raise SettingsError(
+            f"{name}: {limits.tolist()}; expected more than 0{motor}", path=("limits", name)
+        )
+    return np.array(np.broadcast_to(limits, (n,)))
+
+
+def _assumed(model: GeneratedModel, qd: Array, records: Sequence[Record]) -> tuple[Array, str]:
+    """Choose limits of acceleration, and write a sentence on them with the line that changes them."""
+    if not np.all(np.isfinite(qd)):
+        raise SettingsError(
+            f"{model.NAME} has no limits of acceleration, nor of velocity from which to choose them; "
+            "add `excitation: {limits: {qdd: [...]}}` to the study file, a number per joint",
+            path=("limits",),
+        )
+    qdd, of_record = accelerations(qd, records)
+    joints = [j for j, yes in zip(joint_labels(model), of_record, strict=True) if yes]
+    more = f", and the largest of the record for joint {', '.join(joints)}" if joints else ""
+    line = ", ".join(f"{x:g}" for x in qdd)
+    return qdd, (
+        f"No file limits the accelerations; the limits are the velocities reached in "
+        f"{LIMIT.RISE_TIME:g} s{more}. This line of the study file changes them: "
+        f"excitation: {{limits: {{qdd: [{line}]}}}}"
+    )
 
 
 def weights_of(

@@ -14,6 +14,7 @@ import numpy as np
 from runtime.core.model import GeneratedModel, joint_labels
 from runtime.core.rows.predicted import Weights
 from runtime.excitation.criteria import MotionLimits, usage
+from runtime.excitation.joint_trajectory import joint_names, joint_trajectory
 from runtime.excitation.settings import ExcitationSettings
 from runtime.ground.documents import Result
 from runtime.ground.limits import limits
@@ -67,6 +68,8 @@ class Known:
         Condition number of W_w of the records; None without records.
     relative_sigma : dict
         Predicted %sigma by name on the motion of the records; empty without records.
+    without_values : tuple of str
+        Parameters that the search left out, because the robot file has no value of their unit.
     """
 
     X: Array
@@ -74,6 +77,7 @@ class Known:
     weights: Weights
     condition: float | None = None
     relative_sigma: dict[str, float] = field(default_factory=dict)
+    without_values: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,6 +128,14 @@ class Excitation(Result):
         """
         t, q, qd, qdd, _ = self.sampled()
         return csv_text(t, q=q, qd=qd, qdd=qdd)
+
+    def to_joint_trajectory(self) -> str:
+        """Write the motion as a message trajectory_msgs/JointTrajectory of ROS, YAML text.
+
+        Points are rows of the table of `to_csv`, at most 100 in a second.
+        """
+        t, q, qd, qdd, _ = self.sampled()
+        return joint_trajectory(joint_names(self.model), t, q, qd, qdd, self.settings.rate)
 
     @property
     def usage(self) -> dict[str, list[float]]:
@@ -212,7 +224,29 @@ class Excitation(Result):
         return (
             f"A motion of {self.motion.duration:.1f} s within {kept} with weighted cond(W) "
             f"{self.condition:.1f}{of_record}; "
-            f"{self._least_certain}.{self.comparison}{self.torques}"
+            f"{self._least_certain}.{self.comparison}{self._bare}{self.torques} {self.not_judged}"
+        )
+
+    @property
+    def _bare(self) -> str:
+        """Sentence on the parameters without value; "" if there are none."""
+        bare = self.known.without_values
+        if not bare:
+            return ""
+        named = ", ".join(bare[: LIMIT.SIGMAS_NAMED])
+        more = f" and {len(bare) - LIMIT.SIGMAS_NAMED} more" * (len(bare) > LIMIT.SIGMAS_NAMED)
+        return (
+            f" The robot file has no values of {named}{more}: the search left them out; a record "
+            "gives their sizes."
+        )
+
+    @property
+    def not_judged(self) -> str:
+        """Sentence on what the search does not know: collisions and cables."""
+        beyond = " other than of the stated spheres" if self.settings.pairs else ""
+        return (
+            f"Collisions{beyond} and cables were not judged: try the motion in a simulation, then "
+            "slowly on the robot."
         )
 
     @property
@@ -238,6 +272,12 @@ class Excitation(Result):
             "relative_sigma_of_record": self.known.relative_sigma,
             "worse_than_record": self.worse,
             "torque_sigma": self.known.weights.s.tolist(),
+            "limits": {
+                "q": np.column_stack([self.limits.lower, self.limits.upper]).tolist(),
+                "qd": self.limits.qd.tolist(),
+                "qdd": self.limits.qdd.tolist(),
+            },
+            "assumed": self.limits.assumed,
             "limits_used": self.usage,
             "margin": self.margin,
             "starts": [
@@ -299,6 +339,7 @@ class Excitation(Result):
         return "\n\n".join(
             [
                 self.verdict,
+                *filter(None, [self.limits.assumed]),
                 *(
                     f"{table.caption}\n{table.to_text()}"
                     for table in (self.sigma_table(LIMIT.SIGMAS_LISTED), self.usage_table())

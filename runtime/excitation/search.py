@@ -11,7 +11,7 @@ rows that the identification will use, with the exact sign(qd).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -21,7 +21,13 @@ import numpy as np
 from runtime.core.essential import essential_of
 from runtime.core.least_squares.linear import assemble
 from runtime.core.least_squares.wls import weighted_system
-from runtime.core.model import GeneratedModel, require, require_no_channels, require_no_wrench
+from runtime.core.model import (
+    GeneratedModel,
+    base_columns,
+    require,
+    require_no_channels,
+    require_no_wrench,
+)
 from runtime.core.problem import Problem, observe_rows
 from runtime.core.rows.predicted import Weights, kept_correlation
 from runtime.core.study import Study
@@ -71,7 +77,7 @@ def excite(
     require_no_wrench(model, "the search for a motion")
     problem.require_motion("the search for a motion (poses: excitation: {poses: N})")
     settings = study.excitation or ExcitationSettings()
-    limits = limits_of(model, settings.limits)
+    limits = limits_of(model, settings.limits, problem.records)
     known = _known_estimate(problem, settings)
     weights = known.weights
     if settings.criterion == "record" and not known.relative_sigma:
@@ -167,8 +173,9 @@ def _known_estimate(problem: Problem, settings: ExcitationSettings) -> Known:
         values = dict(zip(model.BASE_PARAMETERS, X, strict=True))
         fitted = study.estimate.columns
         kept = model.BASE_PARAMETERS if fitted == "all" else fitted
-        weights = weights_of(model, settings, values, essential=kept)
-        return Known(X, "values of the robot file", weights)
+        judged, bare = _with_values(model, settings, values, kept)
+        weights = weights_of(model, judged, values, essential=kept)
+        return Known(X, "values of the robot file", weights, without_values=bare)
     observation = observe_rows(problem)
     system = weighted_system(observation)
     fit = assemble(system, system.solve(), model=model)
@@ -190,6 +197,28 @@ def _known_estimate(problem: Problem, settings: ExcitationSettings) -> Known:
         weights.condition(observation),
         sigma,
     )
+
+
+def _with_values(
+    model: GeneratedModel,
+    settings: ExcitationSettings,
+    values: Mapping[str, float],
+    essential: Sequence[str],
+) -> tuple[ExcitationSettings, tuple[str, ...]]:
+    """Leave out the parameters whose unit has no value in the robot file, as friction in most URDFs.
+
+    A criterion compares parameters by their size. Returns settings that name the other parameters,
+    and the names left out: none if the user names parameters, or if no parameter has a value.
+    """
+    if settings.columns not in ("essential", "all"):
+        return settings, ()
+    names = base_columns(model, settings.columns, essential, "columns")
+    units = dict(getattr(model, "UNITS", {}))
+    known = {units.get(name) for name in names if values[name]}
+    kept = tuple(name for name in names if units.get(name) in known)
+    if not kept:
+        return settings, ()
+    return replace(settings, columns=kept), tuple(name for name in names if name not in kept)
 
 
 def _relative_sigma(

@@ -23,7 +23,7 @@ from runtime.core.least_squares.linear import percent
 from runtime.core.least_squares.wls import weighted_system
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.predicted import Weights, kept_correlation
-from runtime.core.rows.prepared import stacked
+from runtime.core.rows.prepared import stacked, study_of_record
 from runtime.core.rows.selection import per_joint
 from runtime.core.signals.velocities import agreement
 from runtime.core.study import Signals, Study
@@ -59,7 +59,9 @@ def rest(case: Case) -> Answer:
     change = {"rows.low_speed": stated}
     try:
         moving = replace(study, rows=replace(study.rows, low_speed=proposed))
-        without = stacked(model, [record.by(moving) for record in case.given])
+        without = stacked(
+            model, [one.by(study_of_record(moving, one.record)) for one in case.given]
+        )
     except InputError:
         without = None
     if case.observation is None or without is None:

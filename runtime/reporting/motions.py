@@ -101,6 +101,7 @@ def excitation_page(excitation: Excitation) -> Page:
         sections=[
             Section(
                 "Motion",
+                [excitation.limits.assumed] if excitation.limits.assumed else [],
                 images=[draw_figure("The motion", motion_figure(excitation), shown, "motion")],
                 tables=[excitation.usage_table()],
             ),

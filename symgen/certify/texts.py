@@ -378,8 +378,9 @@ def _derivative_error(module: ModuleType, witness: Witness) -> float:
     base = () if witness.base is None else (witness.base[0],)
     states = (*base, witness.q[0], witness.qd[0], witness.qdd[0], witness.X)
     *_, A, D = map(np.asarray, function(*states, *witness.keywords.values()))
+    joints = witness.A[0][:, -len(witness.q[0]) :]
     return max(
-        difference(A, witness.A[0], np.abs(witness.A).max()),
+        difference(A, joints, np.abs(witness.A).max()),
         difference(D, witness.own[0], np.abs(witness.own).max()),
     )
 
@@ -427,7 +428,8 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
 
             A closed mechanism has one struct with all its states.
             """
-            named = dict(zip(MODELS[f].arguments, check.arguments, strict=True))
+            model = MODELS[f].on(witness.robot)
+            named = dict(zip(model.arguments, check.arguments, strict=True))
             if closed is not None:
                 named = {"s": closed} | {x: a for x, a in named.items() if x not in STATE_NAMES}
             return [*(_flat(a[k] if a.ndim > 1 else a) for a in named.values()), constants]

@@ -24,7 +24,8 @@ def excite(
     output: Annotated[
         Path | None,
         options.folder(
-            "trajectory.csv, motion.yaml (or poses.csv), excitation.json, report.html, the figure"
+            "trajectory.csv, joint_trajectory.yaml (ROS), motion.yaml (or poses.csv), "
+            "excitation.json, report.html, the figure"
         ),
     ] = None,
     poses: Annotated[

@@ -31,11 +31,11 @@ from symgen.description.expression import FUNCTIONS, Expression
 from symgen.description.naming import Namespace
 from symgen.description.robot import FIXED, PRISMATIC
 from symgen.emit.blocks import label
-from symgen.emit.header import header, line_of, packed, plain
+from symgen.emit.header import BASE_MOTION, header, line_of, packed, plain
 from symgen.emit.printers import Language, Section, Text, under_titles
 from symgen.emit.python_target import tuple_of
 from symgen.emit.render import WIDTH, laid_out
-from symgen.emit.spec import STATES, Function, ModuleSpec
+from symgen.emit.spec import BASE, STATES, Function, ModuleSpec
 from symgen.version import VERSION
 
 KEYWORDS = """auto break case char const continue default do double else enum extern float for goto
@@ -160,6 +160,8 @@ class Signature(NamedTuple):
 class CStates(NamedTuple):
     """The arguments by which the C functions of one robot receive the joint states q, qd, ...
 
+    On a moving base, the motion of the base is the state before the others.
+
     Attributes
     ----------
     robot : str
@@ -177,9 +179,10 @@ class CStates(NamedTuple):
     @classmethod
     def of(cls, spec: ModuleSpec) -> CStates:
         """Make the description of the state arguments that all C functions of a robot have."""
-        size = spec.sizes
+        size, motion = spec.sizes, spec.derivation.algebra.base_motion
         if not spec.tied:
-            return cls(spec.robot.name, dict.fromkeys(STATES, size["n"]), closed=False)
+            base = dict.fromkeys(BASE, len(motion)) if motion else {}
+            return cls(spec.robot.name, base | dict.fromkeys(STATES, size["n"]), closed=False)
         joints = dict.fromkeys(("q", "qd", "qdd"), size["k"])
         tied = {"G": size["m"] * size["n"], "qdd0": size["m"]}
         return cls(spec.robot.name, joints | tied, closed=True)
@@ -280,7 +283,7 @@ FLAGS = (
 )
 LONGEST, OF_PART = 1000, 400  # steps of a body; a longer one is cut into parts and compiled once
 RESULTS = (
-    *("joints", "parameters", "energies", "wrench", "standard parameters"),
+    *("joints", "rows", "parameters", "energies", "wrench", "standard parameters"),
     *("frames", "pose"),
 )
 """Axes of the models that have a kernel."""
@@ -393,7 +396,8 @@ def _kinematics(spec: ModuleSpec, states: CStates, names: Namespace) -> dict[str
             by_tied = "" if k < n else f"*G[{(k - n) * n + i}]"
             rates.setdefault((j, i), []).append(f"({_constant(rate)}){by_tied}")
     first = [sum(j < f.j for j, _ in rates) for f in robot.frames]
-    pointers = [*states.parameters("q", "qd"), *(f"const real *{x}" for x in ("tau", "X"))]
+    bias = spec.functions["bias"].model.states
+    pointers = [*states.parameters(*bias), *(f"const real *{x}" for x in ("tau", "X"))]
     return {
         "ant": ", ".join(str(f.ant) for f in robot.frames),
         "sigma": ", ".join(str(int(f.sigma == PRISMATIC)) for f in robot.frames),
@@ -409,6 +413,8 @@ def _kinematics(spec: ModuleSpec, states: CStates, names: Namespace) -> dict[str
             f"int32_t {name}_jacobian1",
             ["int32_t frame", *states.parameters("q"), "const real *constants", "real *J"],
         ),
+        "base": BASE_MOTION if robot.base_moves else "",
+        "bias_arguments": ", ".join(states.arguments(*bias)),
         "forward": ""
         if robot.loaded
         else Signature(
@@ -459,17 +465,18 @@ def _kernel(spec: ModuleSpec, states: CStates, f: Function, names: Namespace) ->
         for k, e in enumerate(distinct)
     ]
     rows = [f"{{{_row(place, f.shape)}, {signal}, {sign}}}" for place, signal, sign in places]
-    independent = spec.derivation.closure.independent
+    algebra, independent = spec.derivation.algebra, spec.derivation.closure.independent
     place = {
         f"{letter}{j}": (state, k)
         for state, letter in STATES.items()
         for k, j in enumerate(independent)
     }
+    place |= {motion: (base, k) for base in BASE for k, motion in enumerate(algebra.base_motion)}
     for k, u in enumerate(spec.tied):
         if "qdd" not in model.arguments:
             place[f"QDP{u}"] = ("qdd0", k)
         for i, j in enumerate(robot.joints):
-            rate = spec.derivation.algebra.named("G", u, j)
+            rate = algebra.named("G", u, j)
             place[rate] = ("G", k * len(robot.joints) + i)
     needed = text.inputs
     free = spec.regrouping.constants
@@ -600,6 +607,7 @@ def _header(spec: ModuleSpec, states: CStates, kernels: Sequence[Mapping[str, An
                 "S (rows, N), samples last, comes zeroed: rows that are always zero are not written"
             ),
         ),
+        *(line_of("base (N, 9)", BASE_MOTION) if spec.robot.base_moves else ()),
         *line_of("constants", ", ".join(spec.regrouping.constants) or "none"),
         *line_of("X, columns", " ".join(spec.regrouping.names)),
         *line_of("Returned", "0, or 1 if N is negative or a pointer is missing"),

@@ -67,17 +67,7 @@ def generate_files(
     dict
         {file name: text}. The same robot file and the same version give the same bytes.
     """
-    refused = [name for name in targets if not TARGETS[name].on_moving_base]
-    if robot.base_moves and (refused or close(robot).tied):
-        wanted = (
-            f"the target {refused[0]} has no models of"
-            if refused
-            else "loops that are closed by iteration are not possible on"
-        )
-        raise SymgenError(
-            f"{robot.name}: {wanted} a base that moves; use the targets numpy, casadi or xp, with "
-            "passive joints that have formulas, or base: fixed"
-        )
+    _require_base(robot, targets)
     spec: ModuleSpec = (
         spec_of(robot, tuple(options)) if regrouping is None else module_spec(regrouping, options)
     )
@@ -85,3 +75,18 @@ def generate_files(
     served = [name for name in targets if TARGETS[name].iterates or not spec.tied]
     file = {TARGETS[name].file.format(robot.name): name for name in served}
     return {path: EMITTERS[name].render(spec, command=command) for path, name in file.items()}
+
+
+def _require_base(robot: Robot, targets: Sequence[str]) -> None:
+    """Raise SymgenError if the models of the robot on its base cannot be written for a target."""
+    if robot.base_moves and close(robot).tied:
+        raise SymgenError(
+            f"{robot.name}: loops that are closed by iteration are not possible on a base that "
+            "moves; use passive joints that have formulas, or base: fixed"
+        )
+    able = [name for name, target in TARGETS.items() if robot.base in target.bases]
+    if refused := [name for name in targets if name not in able]:
+        raise SymgenError(
+            f"{robot.name}: the target {refused[0]} has no models of a robot with base: "
+            f"{robot.base}; use {', '.join(able) or 'base: fixed'}"
+        )

@@ -22,29 +22,30 @@ class Target(NamedTuple):
     iterates : bool
         Whether the file can find the positions of tied joints by iteration. Tied joints are joints
         whose positions only the closure equations define.
-    on_moving_base : bool
-        Whether the file can have the motion of the base as an argument.
+    bases : tuple of str
+        Kinds of base (`Robot.base`) whose models the file can have.
     """
 
     file: str
     language: str
     use: str = ""
     iterates: bool = False
-    on_moving_base: bool = True
+    bases: tuple[str, ...] = ("fixed", "moving", "free")
 
 
+IN_C = ("fixed", "moving")
 TARGETS = {
     "numpy": Target("{}.py", "NumPy", iterates=True),
     "casadi": Target(
         "{}.py", "CasADi", 'in CasADi {}.casadi("inverse_dynamics") is a casadi.Function of columns'
     ),
-    "c": Target("{}.c", "C", iterates=True, on_moving_base=False),
+    "c": Target("{}.c", "C", iterates=True, bases=IN_C),
     "h": Target(
         "{}.h",
         "C",
         "{0}.h declares what {0}.c has; --target c writes both",
         iterates=True,
-        on_moving_base=False,
+        bases=IN_C,
     ),
     "xp": Target(
         "{}.py",

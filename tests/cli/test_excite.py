@@ -72,6 +72,7 @@ def test_motion_from_a_record(study: Path, tmp_path: Path) -> None:
         "report.html",
         "excitation.json",
         "trajectory.csv",
+        "joint_trajectory.yaml",
         "motion.yaml",
         "motion.png",
         "motion.svg",

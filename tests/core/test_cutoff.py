@@ -1,11 +1,14 @@
 """The cut-off that follows from a record: `signals.lowpass.cutoff: auto`."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from problems import problem_of, resolved
 
 import runtime
 import symgen
+from runtime.core.record import Origin
 from runtime.core.signals.cutoff import cutoff
 from runtime.core.signals.filters import median_filtered
 from runtime.median import pulses_in_torques, share_taken
@@ -68,25 +71,85 @@ def records() -> list[runtime.Record]:
     ]
 
 
-def test_one_value_for_all_records(records):
+def cutoffs(settings) -> list[float]:
+    """The cut-offs that results list: one, or those of the records."""
+    each = settings.get("records", [settings])
+    return [own["signals"]["lowpass"]["cutoff"] for own in each]
+
+
+def test_each_record_has_its_own_cutoff(records):
     study, why = resolved(Study(), records)
     alone = [resolved(Study(), [record])[0].signals.lowpass.cutoff for record in records]
     assert alone[0] < study.signals.lowpass.cutoff < alone[1]
-    assert f"{study.signals.lowpass.cutoff:g} Hz" in why and "joint 1 decides" in why
+    assert why == (
+        f"Low-pass by record (cutoff: auto): at {alone[0]:g} Hz for coarse (least bias by motion "
+        f"and noise, joint 1 decides); at {alone[1]:g} Hz for fine (least bias by motion and "
+        "noise, joint 2 decides)."
+    )
     assert resolved(study, records) == (study, "")
+
+
+def same_rows(left, right) -> bool:
+    """Whether two observations have the same rows, bit for bit."""
+    return all(np.array_equal(getattr(left, x), getattr(right, x)) for x in ("W", "Y", "t"))
+
+
+def test_records_of_unlike_rate_and_noise_have_the_rows_that_each_has_alone(records):
+    """One cut-off for both was too high for the noise of one and too low for the motion of the other."""
+    model = symgen.model("planar_2r")
+    slow = records[0]
+    slow = runtime.Record(slow.t[::8], slow.q[::8], slow.tau[::8], name="slow")
+    both = runtime.observe(model, [slow, records[1]])
+    for k, record in enumerate((slow, records[1])):
+        assert same_rows(both.of_record(k), runtime.observe(model, record))
+    stated = Study(signals={"lowpass": {"cutoff": 15}})
+    filtered = runtime.problem(model, [slow, records[1]]).records
+    assert {record.origin.cutoff for record in filtered} != {None}
+    assert same_rows(
+        runtime.observe(model, filtered, stated), runtime.observe(model, [slow, records[1]], stated)
+    )
+
+
+def test_a_predicted_record_has_at_most_the_cutoff_that_suits_it(records):
+    """A validation record of 40 Hz was refused beside a fit at 22 Hz, since 22 Hz is above half its rate."""
+    model, fine = symgen.model("planar_2r"), records[1]
+    few = runtime.Record(fine.t[::25], fine.q[::25], fine.tau[::25], name="few")
+    shown = runtime.problem(model, fine, unseen=[few, fine])
+    alone = resolved(Study(), [few])[0].signals.lowpass.cutoff
+    assert shown.settings.signals.lowpass.cutoff > 20 > 16 >= alone
+    assert [record.origin.cutoff for record in shown.unseen] == [alone, None]
+    result = runtime.identify(model, fine, further=[few])
+    assert cutoffs(result.unseen_rows["few"].settings) == [alone]
+
+
+def test_pieces_between_gaps_are_one_record_and_a_record_at_rest_takes_the_cutoff_of_the_others(
+    records,
+):
+    coarse, fine = records
+    parts = [slice(0, 900), slice(900, None)]
+    pieces = [
+        runtime.Record(
+            coarse.t[s], coarse.q[s], coarse.tau[s], name=f"{k}", origin=Origin(whole="coarse")
+        )
+        for k, s in enumerate(parts)
+    ]
+    _, why = resolved(Study(), [*pieces, fine])
+    assert "for 0, 1 (" in why and why.count(" Hz for ") == 2
+    still = runtime.Record(fine.t, 0 * fine.q, fine.tau, name="still")
+    study, why = resolved(Study(), [fine, still])
+    assert why.startswith(f"Low-pass at {study.signals.lowpass.cutoff:g} Hz (cutoff: auto)")
 
 
 def test_results_say_what_auto_became(records):
     model = symgen.model("planar_2r")
-    result = runtime.identify(model, records)
-    hertz = result.study.signals.lowpass.cutoff
-    assert result.estimate.settings["signals"]["lowpass"]["cutoff"] == hertz
-    assert result.estimate.provenance["signals"] in result.remarks
-    measured = runtime.observe(model, records)
-    assert measured.settings["signals"]["lowpass"]["cutoff"] == hertz
-    study = runtime.Study(cestac={"delta": [1e-4], "runs": 2})
-    perturbed = runtime.cestac(model, records, study)
-    assert perturbed.reference.settings["signals"]["lowpass"]["cutoff"] == hertz
+    for given in (records, records[:1]):
+        result = runtime.identify(model, given)
+        hertz = [own.study.signals.lowpass.cutoff for own in result.prepared]
+        assert len(set(hertz)) == len(given) and cutoffs(result.estimate.settings) == hertz
+        assert result.estimate.provenance["signals"] in result.remarks
+        assert cutoffs(runtime.observe(model, given).settings) == hertz
+        study = runtime.Study(cestac={"delta": [1e-4], "runs": 2})
+        assert cutoffs(runtime.cestac(model, given, study).reference.settings) == hertz
 
 
 def pulses(q: np.ndarray, step: float, size: float) -> np.ndarray:
@@ -117,6 +180,10 @@ def test_pulses_of_a_controller_that_a_median_of_torques_removes_are_told():
         problem = pulses_in_torques(problem_of(study, [record]))
         said = " ".join(note.text for note in problem.notes)
         assert problem.settings == study and ("% of the torque of joint 2" in said) == told
+    other = runtime.Record(T, q, torque, name="quiet")
+    two = pulses_in_torques(problem_of(study, [other, replace(record, name="loop")]))
+    assert "of the torque of joint 2 of loop together" in two.notes[0].text
+    assert "quiet" not in two.notes[0].text
     plain = problem_of(Study(signals=Signals(torque_median=5)), [runtime.Record(T, q, torque)])
     assert not pulses_in_torques(plain).notes
 

@@ -310,8 +310,8 @@ def test_a_record_gives_parameters_and_a_motion_to_compare_with(planar: tuple) -
 def test_what_cannot_be_is_said(planar: tuple) -> None:
     with pytest.raises(InputError, match="gave a motion within the limits"):
         search(planar, settings(begin=[3.0, 0.0]))
-    with pytest.raises(SettingsError, match=r"no acceleration limits .*limits: \{qdd"):
-        limits_of(planar[0], {"q": [1, 1], "qd": [1, 1], "qdd": None})
+    with pytest.raises(SettingsError, match=r"no limits of acceleration, .*limits: \{qdd"):
+        limits_of(planar[0], {"q": [1, 1], "qd": np.inf, "qdd": None})
     with pytest.raises(SettingsError, match="expected 2 limits, each a number or a pair"):
         limits_of(planar[0], {**LIMITS, "q": [1.0]})
     with pytest.raises(SettingsError, match="has no motor and cannot be moved: lock it"):

@@ -28,7 +28,13 @@ from runtime.core.model import GeneratedModel, base_columns
 from runtime.core.problem import Problem
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation, stack
-from runtime.core.rows.prepared import Prepared, decimated_torque, observation_of, stacked
+from runtime.core.rows.prepared import (
+    Prepared,
+    decimated_torque,
+    observation_of,
+    stacked,
+    study_of_record,
+)
 from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import Selection
 from runtime.core.signals.filters import States, derivative
@@ -128,6 +134,7 @@ def prepared_record(
     own_encoder : function that returns the encoder that measured the record, or None.
     exact : whether encoders are studied, beside whose steps the positions of counts are exact.
     """
+    study = study_of_record(study, own.record)
     signals = replace(study.signals, median=study.cestac.median)
     encoder = own_encoder(own.record, study, drives)
     reader, note = _reader_of_measured(own, study, encoder) if exact else (own.reader, "")

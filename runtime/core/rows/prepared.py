@@ -130,6 +130,14 @@ class Prepared:
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
 
+def study_of_record(study: Study, record: Record) -> Study:
+    """Return the study with the cut-off of the record, if the record has one of its own."""
+    low, own = study.signals.lowpass, record.origin.cutoff
+    if low is None or own is None:
+        return study
+    return replace(study, signals=replace(study.signals, lowpass=replace(low, cutoff=own)))
+
+
 def common_drives(model: GeneratedModel, records: Sequence[Prepared]) -> Drives | None:
     """Return the drives that all records have, or the drives of the model if there is no record.
 

@@ -23,6 +23,7 @@ Measured: benchmarks/counts.md.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -34,13 +35,34 @@ from runtime.ground.limits import LIMIT
 Array = np.ndarray
 
 
+class Lines(NamedTuple):
+    """Power spectra of the acceleration of one record.
+
+    samples : number. rate : Hz.
+    power : frequencies, shape (m,), Hz, power of the motion and of the noise, shape (m, n) each;
+        None for a record that is too short, or that lacks positions.
+    """
+
+    samples: int
+    rate: float
+    power: tuple[Array, Array, Array] | None
+
+
+class Choice(NamedTuple):
+    """Cut-off, Hz; its reason in words; whether the records decide it."""
+
+    hertz: float
+    why: str
+    decided: bool
+
+
 def cutoff(
     positions: Sequence[tuple[Array, float]],
     signals: Signals,
     crossing: float | tuple[float, ...] = np.inf,
     counts: bool = False,
 ) -> tuple[float, str]:
-    """Choose the cut-off frequency of the low-pass filter for records that are fitted together.
+    """Choose one cut-off frequency of the low-pass filter for the given records together.
 
     Returns the cut-off, Hz, rounded to two digits, and the reason in words.
 
@@ -49,25 +71,40 @@ def cutoff(
         (`runtime.speeds`).
     counts : whether positions are read as counts of encoders.
     """
+    lines = [lines_of(q, rate, signals, crossing) for q, rate in positions]
+    return chosen_cutoff(lines, signals, counts)[:2]
+
+
+def lines_of(
+    q: Array, rate: float, signals: Signals, crossing: float | tuple[float, ...] = np.inf
+) -> Lines:
+    """Compute the spectra of one record. The parameters are those of `cutoff`."""
+    if len(q) <= LIMIT.FEWEST_LINES or not np.isfinite(q).all():
+        return Lines(len(q), rate, None)
+    f, motion, noise = spectra(q, rate, signals.median)
+    noise = noise / (1 + (f[:, None] / crossing) ** 2)
+    motion[:, stands(q, rate, signals.median)] = 0.0
+    return Lines(len(q), rate, (f, motion, noise))
+
+
+def chosen_cutoff(lines: Sequence[Lines], signals: Signals, counts: bool = False) -> Choice:
+    """Choose one cut-off frequency for records of known spectra, as `cutoff` does."""
     low, parts = signals.lowpass or Lowpass(), []
-    highest = LIMIT.HIGHEST_CUTOFF * min((rate for _, rate in positions), default=np.inf)
-    positions = [(q, rate) for q, rate in positions if len(q) > LIMIT.FEWEST_LINES]
-    if not positions or (counts and not all(np.isfinite(q).all() for q, _ in positions)):
-        return min(CHAPTER_CUTOFF, highest), "the value of the chapter"
-    lowest = max(
-        LIMIT.LOWEST_CUTOFF, *(LIMIT.CUTOFF_PERIODS * rate / len(q) for q, rate in positions)
-    )
+    highest = LIMIT.HIGHEST_CUTOFF * min((one.rate for one in lines), default=np.inf)
+    long = [one for one in lines if one.samples > LIMIT.FEWEST_LINES]
+    read = [(one.rate, *one.power) for one in long if one.power is not None]
+    if len(read) < len(long) or not read:
+        return Choice(min(CHAPTER_CUTOFF, highest), "the value of the chapter", False)
+    lowest = max(LIMIT.LOWEST_CUTOFF, *(LIMIT.CUTOFF_PERIODS * x.rate / x.samples for x in long))
     grid = np.geomspace(min(lowest, highest), highest, LIMIT.CUTOFF_GRID)
-    for q, rate in positions:
-        f, motion, noise = spectra(q, rate, signals.median)
-        noise = noise / (1 + (f[:, None] / crossing) ** 2)
-        motion[:, stands(q, rate, signals.median)] = 0.0
+    for rate, f, motion, noise in read:
         G = _gain(f, rate, low, grid)
         parts.append((G * (1 - G) @ motion, G**2 @ noise, motion.sum(axis=0)))
     distorted, noisy, power = (np.sum(part, axis=0) for part in zip(*parts, strict=True))
     moving = np.flatnonzero(power > 0)
     if not len(moving):
-        return min(CHAPTER_CUTOFF, highest), "no joint moves above the noise of its position"
+        why = "no joint moves above the noise of its position"
+        return Choice(min(CHAPTER_CUTOFF, highest), why, False)
     bias, noise = (
         (x / np.where(power > 0, power, np.inf))[:, moving] for x in (distorted + noisy, noisy)
     )
@@ -80,7 +117,7 @@ def cutoff(
     why = f"least bias by motion and noise, joint {joint} decides"
     if counts:
         hertz, why = min(2 * hertz, CHAPTER_CUTOFF, highest), f"counts, twice that of {why}"
-    return float(f"{hertz:.2g}"), why
+    return Choice(float(f"{hertz:.2g}"), why, True)
 
 
 def stands(q: Array, rate: float, median: int = 1) -> Array:
