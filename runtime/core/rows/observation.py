@@ -329,7 +329,8 @@ class Observation:
         row_weights = np.repeat(weights, self.rows)
         for rows in rows_by_block(groups):
             A = np.empty((len(kept) + 1, len(rows)))  # column by column
-            A[:-1] = self.W[rows].T[kept]
+            for k, column in enumerate(kept):
+                np.take(self.W[:, column], rows, out=A[k], mode="clip")
             A[-1] = self.Y[rows]
             A *= row_weights[rows]
             yield A.T
