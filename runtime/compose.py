@@ -492,13 +492,17 @@ def estimate_of(
     *,
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
+    corrected: bool = True,
 ) -> Estimate:
     """Estimate the parameters of given rows Y = W X + rho by the method of `settings`.
 
-    The default method is ols.
+    The default method is ols. Without `corrected`, `sigma_corrected` is nan: on a long record it
+    takes most of the time.
     """
     settings = settings or EstimateSettings()
-    return estimate_by(observation, settings, METHODS, model=model, provenance=provenance)
+    return estimate_by(
+        observation, settings, METHODS, model=model, provenance=provenance, corrected=corrected
+    )
 
 
 @entry
