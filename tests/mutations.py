@@ -64,7 +64,7 @@ FAULTS = (
     Fault("symgen/emit/printers.py", '("-" if s.sign * self._name_sign(s.node) < 0 else "") + self.called', '("-" if s.sign < 0 else "") + self.called', "the sign of a name is forgotten where the name is used", EMITTED),
     Fault("symgen/derive/regressor.py", "if place[0] <= place[1]}", "if place[0] < place[1]}", "diagonal of an element's form left out of the table of elements", ("emit/test_physical_tables.py", "cli/test_generate.py")),
     Fault("symgen/emit/c_target.py", '"above({})",\n    "below({})",', '"below({})",\n    "above({})",', "one-sided friction of C in the other direction", ("emit/test_c_target.py",)),
-    Fault("symgen/derive/models.py", "d.columns[own][j], f\"Joint", "d.columns[own].get(d.robot.joints[0], d.columns[own][j]), f\"Joint", "an entry of another joint in a row of D", EMITTED),
+    Fault("symgen/derive/models.py", "d.columns[own][j], _heading", "d.columns[own].get(d.robot.joints[0], d.columns[own][j]), _heading", "an entry of another joint in a row of D", EMITTED),
     # observation
     Fault("runtime/core/signals/filters.py", "np.gradient(x, 1 / rate, axis=0", "np.gradient(x, 2 / rate, axis=0", "velocities half as large", SIGNALS),
     Fault("runtime/core/signals/filters.py", "CUTOFF * rate / (2 * signals.lowpass.hertz)", "CUTOFF * rate / signals.lowpass.hertz", "decimation by twice the factor of eq. (13)", SIGNALS),

@@ -37,6 +37,7 @@ INERTIAL = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 
 KINDS = ("inertia", "viscous", "coulomb", "stiffness", "offset", "column")
 LONGEST, MOST, POWER = 2000, 300, 64  # characters of an expression, entries of a list, an exponent
+BASE_ROWS = ("FX0", "FY0", "FZ0", "NX0", "NY0", "NZ0")
 FRAME = ("gamma", "b", "alpha", "d", "theta", "r")
 SIMPLE = ("sin", "cos")
 LAWS = (*SIMPLE, "sign", "abs", "exp", "tanh")
@@ -559,13 +560,13 @@ def regressor(F):
     """{parameter: {actuated joint: column}} at a random state."""
     p, rows, claim = F.p, F.move(), F.claim
     w, wd, g = [0] * 3, [0] * 3, [-F.value(e) for e in claim["gravity"]]
-    if moves(claim):  # at random, gravity in the acceleration
+    free = base_of(claim) == "free"
+    if base_of(claim) != "fixed":  # at random, gravity in the acceleration
         w, wd, g = ([random.randrange(p) for _ in g] for _ in range(3))
     at, torque = motion(F, w, wd, g), {}
-    for f in claim["frames"]:
-        j = f["j"]
+    for j in links(claim):
         R, P, w, wd, a, axes = at[j]
-        for k, name in enumerate(INERTIAL if f["link"] else ()):
+        for k, name in enumerate(INERTIAL):
             force, moment = [0] * 3, [0] * 3
             if name == "M":
                 force = a
@@ -587,15 +588,18 @@ def regressor(F):
                 else dot(z, force)
                 for i, (z, o) in axes.items()
             }
+            if free:
+                wrench = (*force, *add(moment, cross(P, force)))
+                torque[f"{name}{j}"] |= dict(zip(BASE_ROWS, wrench, strict=True))
     for cut, twin in claim["loops"]:
         if at[cut][:2] != at[twin][:2]:
             raise RefutedError(f"frames {cut} and {twin} do not coincide")
     torque |= elements(F, rows)
     total = {}
     for name, by_joint in torque.items():
-        total[name] = dict.fromkeys(claim["joints"], 0)
+        total[name] = dict.fromkeys(rows_of(claim), 0)
         for j, x in by_joint.items():
-            for i, n in rows[j].items():
+            for i, n in ({j: 1} if j in BASE_ROWS else rows[j]).items():
                 total[name][i] = (total[name][i] + n * x) % p
     return total
 
@@ -693,11 +697,21 @@ def require(condition, text):
         raise SkipError(text)
 
 
-def moves(claim):
-    """Whether the base moves: its motion is an input."""
+def base_of(claim):
+    """Whether the base is fixed, moves (its motion is an input), or is free (its wrench is a row)."""
     base = claim.get("base", "fixed")
-    require(base in ("fixed", "moving"), "the base is neither fixed nor moving")
-    return base == "moving"
+    require(base in ("fixed", "moving", "free"), "the base is neither fixed, moving nor free")
+    return base
+
+
+def rows_of(claim):
+    """The rows of the torques: of a free base, then the joints."""
+    return [*(BASE_ROWS if base_of(claim) == "free" else ()), *claim["joints"]]
+
+
+def links(claim):
+    """The links with parameters, that of a free base before the others."""
+    return [0] * (base_of(claim) == "free") + [f["j"] for f in claim["frames"] if f["link"]]
 
 
 def well_formed(claim):
@@ -710,7 +724,7 @@ def well_formed(claim):
     for key in lists:
         require(isinstance(claim[key], list), f"{key} is no list")
         require(len(claim[key]) <= 20 * MOST, f"{key} is too long")
-    moves(claim)
+    base_of(claim)
     require(claim["frames"] and claim["joints"] and len(claim["gravity"]) == 3, "no robot")
     require(all(type(p) is int and p > 1 for p in claim["primes"]), "a prime is a whole number")
     require(claim["valid"] is True and claim["failures"] == [], "it says itself that it fails")
@@ -739,7 +753,7 @@ def well_formed(claim):
     require(sorted(given) == sorted(moving), "joints are not those of the frames")
     for pair in claim["loops"]:
         require(len(pair) == 2 and {*pair} <= seen - {0}, "a loop of frames that are none")
-    require(not (claim["tied"] and moves(claim)), "a base that moves, with a loop")
+    require(not claim["tied"] or base_of(claim) == "fixed", "a base that moves, with a loop")
     free = {f"q{j}" for j in (*claim["joints"], *claim["tied"])}
     for text in claim["passive"].values():
         known(text, constants | free)
@@ -786,7 +800,7 @@ def element(e, moving, constants):
 
 def parameters(claim):
     """Names of the standard parameters of a robot, by its links and elements, each of them once."""
-    of_links = [f"{name}{f['j']}" for f in claim["frames"] if f["link"] for name in INERTIAL]
+    of_links = [f"{name}{j}" for j in links(claim) for name in INERTIAL]
     keys = [(e["family"], key) for e in claim["elements"] for key in {**e["along"], **e["form"]}]
     names = [*of_links, *(f"{family}{key}" for family, key in keys)]
     twice = {name for name in names if names.count(name) > 1}
@@ -811,16 +825,17 @@ def check(claim):
     hidden = set(own_names)
     for p in (prime(), prime()):
         F = Field(claim, p)
-        states = [regressor(F) for _ in range(2 * len(base) // len(claim["joints"]) + 15)]
+        rows = rows_of(claim)
+        states = [regressor(F) for _ in range(2 * len(base) // len(rows) + 15)]
         independent(F)
-        W = [[D[name][i] for name in own] for D in states for i in claim["joints"]]
+        W = [[D[name][i] for name in own] for D in states for i in rows]
         if (found := rank(W, p)) != len(base):
             wrong.add(f"the rank is {found}, not {len(base)}")
         K = [{name: F.value(c) for name, c in b["coefficients"].items()} for b in base]
         for name in sorted(own_names):
             of_base = [(o, k[name]) for o, k in zip(own, K, strict=True) if k.get(name)]
             for D in states:
-                for i in claim["joints"]:
+                for i in rows:
                     if D[name][i] % p:
                         hidden.discard(name)
                     if (D[name][i] - sum(D[o][i] * x for o, x in of_base)) % p:

@@ -192,11 +192,11 @@ def checked_model(module: ModuleType) -> GeneratedModel:
             ),
             file=label,
         )
-    structure = np.asarray(model.STRUCTURE)
-    if structure.shape != (b, n) or structure.dtype != np.bool_:
+    structure, rows = np.asarray(model.STRUCTURE), n + len(base_rows(model))
+    if structure.shape != (b, rows) or structure.dtype != np.bool_:
         raise ModelError(
             (
-                f"STRUCTURE is {structure.dtype} {structure.shape}; expected bool {(b, n)}, base "
+                f"STRUCTURE is {structure.dtype} {structure.shape}; expected bool {(b, rows)}, base "
                 "parameters by joints; generate the module again"
             ),
             file=label,
@@ -209,6 +209,15 @@ def checked_model(module: ModuleType) -> GeneratedModel:
         )
     _check_store(model, b, n, label)
     return model
+
+
+def base_rows(model: GeneratedModel) -> tuple[str, ...]:
+    """Return the names of the rows that an emitted model has before its joints: of a free base.
+
+    They are the force on frame 0, then the moment about its origin, in its axes.
+    """
+    free = getattr(model, "BASE", "fixed") == "free"
+    return ("FX0", "FY0", "FZ0", "NX0", "NY0", "NZ0") if free else ()
 
 
 def require(model: GeneratedModel, *functions: str) -> None:
@@ -280,6 +289,18 @@ def require_no_wrench(model: GeneratedModel, what: str) -> None:
         )
 
 
+def axes_of(model: GeneratedModel) -> tuple[str, str] | None:
+    """Return what gives a model axes that no motor moves, and how a study does without it.
+
+    None: the model has no such axes.
+    """
+    if not any(is_axis(joint) for joint in model.JOINTS):
+        return None
+    if base_rows(model):
+        return "a free base", "with --base moving"
+    return "force sensors", "without record.columns.wrench"
+
+
 def joint_labels(model: GeneratedModel) -> tuple[str, ...]:
     """Return the labels of the joints in results: the number and perhaps the name, as in "2 elbow".
 
@@ -296,7 +317,7 @@ def joint_labels(model: GeneratedModel) -> tuple[str, ...]:
 
 
 def is_axis(joint: int | str) -> bool:
-    """Whether an entry of JOINTS is an axis of a force sensor (`runtime.wrench`), not a joint."""
+    """Whether an entry of JOINTS is an axis of a force sensor (`runtime.wrench`) or a free base."""
     return isinstance(joint, str)
 
 
@@ -377,7 +398,7 @@ def joint_units(model: GeneratedModel) -> tuple[str, ...]:
         return cast(tuple[str, ...], stated)
     units, elements = getattr(model, "UNITS", {}), getattr(model, "ELEMENTS", {})
     result = []
-    for row, joint in enumerate(model.JOINTS):
+    for row, joint in enumerate(model.JOINTS, start=len(base_rows(model))):
         acting = [name for k, name in enumerate(model.BASE_PARAMETERS) if model.STRUCTURE[k, row]]
         own = {
             units.get(name, "")
@@ -442,6 +463,7 @@ def _check_store(model: GeneratedModel, b: int, n: int, label: str) -> None:
             "the module again",
             file=label,
         ) from e
+    n += len(base_rows(model))
     if shape != (b, n, N):
         raise ModelError(f"store({N}) has shape {shape}; expected {(b, n, N)}", file=label)
     if shapes != ((N, n, b), (n * N, b)):

@@ -438,7 +438,7 @@ def _modulo(
     robot = regrouping.robot
     names, own = robot.parameters, [robot.parameters.index(name) for name in regrouping.own]
     if close(robot).tied:
-        states = len(own) // len(robot.joints) + 10
+        states = len(own) // len(robot.rows) + 10
         try:  # identities at the numbers of the file, where some were recognised; rank at any
             draw: Draw = closed_draw(robot, seed, 1, count=FEW_STATES, p=p, at_numbers=True)
             fixed = closed_draw(robot, seed, states, p=p)
@@ -450,7 +450,7 @@ def _modulo(
         draw = Draw(robot, seed, states_for(robot, names), p=p)
         W = sampler(draw, names)
         rank = len(rref(W[:, own], p, reduced=False)[0])
-        few = W.reshape(len(robot.joints), -1, len(names))[:, :FEW_STATES]
+        few = W.reshape(len(robot.rows), -1, len(names))[:, :FEW_STATES]
     predicted = np.zeros_like(few)
     for k, b in enumerate(regrouping.base):
         for name, coefficient in b.combination.items():
@@ -481,7 +481,7 @@ def independent(robot: Robot) -> Sample:
         sampled,
     )  # CasADi, loaded late
 
-    count = 3 * len(robot.parameters) // len(robot.joints) + 10
+    count = 3 * len(robot.parameters) // len(robot.rows) + 10
     return sampled(in_one_mode(robot), count, seed=5, in_time=bool(robot.channels))
 
 

@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from symgen.derive.assembly import inertia_of
 from symgen.derive.exact import Array
 from symgen.derive.loops import close
 from symgen.derive.models import EMITTED, MODELS, ON_REQUEST
@@ -109,8 +108,8 @@ class Witness:
                 self.chi[self.robot.parameters.index(X[name][0])] += value - X[name][1]
         self.D = self.model.actuated_regressor(self.q, self.qd, self.qdd, self.base)
         self.x, self.xd, self.xdd, self.G = self.model.motion(self.q, self.qd, self.qdd)
-        self.A = inertia_of(lambda qdd: self.torque(self.q, 0 * self.q, qdd), self.q)
-        no_direct = np.linalg.matrix_rank(self.A).min() < self.q.shape[1] or self.robot.loaded
+        self.A = self.inertia()
+        no_direct = np.linalg.matrix_rank(self.A).min() < self.A.shape[1] or self.robot.loaded
         self.left_out = {
             *["gravity"] * absorbing,
             *["forward_dynamics"] * bool(no_direct),
@@ -130,6 +129,21 @@ class Witness:
         return np.asarray(
             self.model.actuated_regressor(q, qd, qdd, base) @ (self.chi if chi is None else chi)
         )
+
+    def inertia(self) -> Array:
+        """Compute the inertia matrix A from the energy, shape (N, n, n), or (N, 6 + n, 6 + n).
+
+        A free base has rows of force and moment, and columns of a unit of a0 and of wd0: torques.
+        """
+        A = self.G.swapaxes(1, 2) @ self.model.inertia_matrix(self.x, self.chi) @ self.G
+        if not self.robot.base_is_free:
+            return np.asarray(A)
+        units = (np.tile(row, (len(self.q), 1)) for row in np.eye(9)[[6, 7, 8, 3, 4, 5]])
+        links = self.chi * ~of_elements(self.robot, lambda e: True)
+        D = [self.model.actuated_regressor(self.q, 0 * self.q, 0 * self.q, u) for u in units]
+        of_base = np.stack([x @ links for x in D], axis=-1)
+        beside = of_base[:, 6:].swapaxes(1, 2)
+        return np.concatenate([of_base, np.concatenate([beside, A], axis=1)], axis=2)
 
     @property
     def X(self) -> Array:
@@ -194,6 +208,30 @@ class Witness:
         return self.torque(self.q, self.qd, 0 * self.q)
 
     @cached_property
+    def unforced(self) -> Array:
+        """Torques Gamma without accelerations, shape (N, n): H, of a free base at wd0 = a0 = 0."""
+        if self.base is None or not self.robot.base_is_free:
+            return self.H
+        base = self.base * (np.arange(9) < 3)
+        return np.asarray(
+            self.model.actuated_regressor(self.q, self.qd, 0 * self.q, base) @ self.chi
+        )
+
+    @property
+    def accelerations(self) -> Array:
+        """Accelerations qdd, shape (N, n); of a free base wd0, a0, qdd, shape (N, 6 + n)."""
+        if self.base is None or not self.robot.base_is_free:
+            return self.qdd
+        return np.hstack([self.base[:, 3:], self.qdd])
+
+    def of_rows(self, accelerations: Array) -> Array:
+        """Reorder wd0, a0, qdd of a free base to a0, wd0, qdd, the order of its rows; shape (..., n)."""
+        if not self.robot.base_is_free:
+            return accelerations
+        wd0, a0, qdd = np.split(accelerations, (3, 6), axis=-1)
+        return np.concatenate([a0, wd0, qdd], axis=-1)
+
+    @cached_property
     def checks(self) -> dict[str, list[Check]]:
         """Test calls of each function with the expected results, by function name."""
         q, qd, qdd, X = self.q, self.qd, self.qdd, self.X
@@ -201,7 +239,7 @@ class Witness:
         columns = np.abs(self.own).max(axis=(0, 1))
         columns = np.maximum(columns, SMALL * columns.max(initial=1e-300))
         W, largest = self.own.transpose(1, 0, 2).reshape(-1, b), np.abs(self.tau).max()
-        A, H, size = self.A, self.H, np.abs(X).max(initial=1e-300)
+        A, H, size = self.A, self.unforced, np.abs(X).max(initial=1e-300)
 
         def of_states(
             arguments: tuple[Array, ...], expected: Array, scale: Array | float, **given: Any
@@ -240,9 +278,11 @@ class Witness:
         checks["forward_dynamics"] = [
             whole._replace(
                 expected=self.tau,
-                compared=lambda qdd: _torque(A, qdd, H),
+                compared=lambda qdd: _torque(A, self.of_rows(qdd), H),
             ),
-            first._replace(expected=self.tau[0], compared=lambda qdd: _torque(A[0], qdd, H[0])),
+            first._replace(
+                expected=self.tau[0], compared=lambda qdd: _torque(A[0], self.of_rows(qdd), H[0])
+            ),
         ]
         if self.robot.passive:
             place = [self.robot.moving.index(j) for j in self.robot.passive]
@@ -307,7 +347,7 @@ class Witness:
             "inertia_matrix": lambda: self.A,
             "bias": lambda: self.H,
             "gravity": lambda: self.rest,
-            "forward_dynamics": lambda: self.qdd,
+            "forward_dynamics": lambda: self.accelerations,
             "frame_poses": lambda: T[:, 1:],
             "pose": lambda: np.linalg.inv(T[:, frame]) @ T[:, of],
             "jacobian": jacobian,

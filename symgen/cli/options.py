@@ -49,7 +49,7 @@ Base = Annotated[
     Text,
     typer.Option(
         "--base",
-        help="fixed or moving: whether frame 0 stands, or is a body whose motion is measured. Default: that of the robot file.",
+        help="fixed, moving or free: whether frame 0 stands, is a body whose motion is measured, or one whose motion and wrench are measured. Default: that of the robot file.",
     ),
 ]
 Trust = Annotated[

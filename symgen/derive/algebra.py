@@ -136,6 +136,12 @@ class GraphAlgebra:
         families = BASE if self.robot.base_moves else ()
         return tuple(self.named(family, k, 0) for family in families for k in (1, 2, 3))
 
+    @property
+    def accelerations(self) -> tuple[str, ...]:
+        """Names of the accelerations of a free base in the order of its rows: of a0, then of wd0."""
+        wd0, a0 = self.base_motion[3:6], self.base_motion[6:]
+        return (*a0, *wd0) if self.robot.base_is_free else ()
+
     def base(self, family: str) -> Vector:
         """Return the nodes of w0 (family W), wd0 (WP) or a0 (VP) of a moving base."""
         names = (self.named(family, k, 0) for k in (1, 2, 3))

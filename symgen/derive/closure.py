@@ -110,27 +110,32 @@ class Closure:
     def project(self, algebra: GraphAlgebra, torque: Mapping[int, Scalar]) -> dict[int, Scalar]:
         """Convert torques of all moving joints to torques of the actuated joints, by virtual work.
 
-        Gamma_a = G' Gamma_tree, with G = dq/dq_a; `torque` is Gamma_tree by joint.
+        Gamma_a = G' Gamma_tree, with G = dq/dq_a; `torque` is Gamma_tree by joint. Rows of a free
+        base stay as they are.
         """
         if not self.robot.passive:
             return dict(torque)
         total: dict[int, Scalar] = dict.fromkeys(self.independent, 0)
+        base = {j: x for j, x in torque.items() if j not in self.row}
         for j, value in torque.items():
-            for i, g in self.row[j].items():
+            for i, g in self.row.get(j, {}).items():
                 total[i] = total[i] + algebra.constant(g) * value
         for i in self.robot.joints:
             for u in self.tied:
                 total[i] = total[i] + algebra.rate(u, i) * total[u]
-        return {i: total[i] for i in self.robot.joints}
+        return base | {i: total[i] for i in self.robot.joints}
 
     def project_twice(
         self, algebra: GraphAlgebra, A: Mapping[tuple[int, int], Scalar]
     ) -> dict[tuple[int, int], Scalar]:
-        """Return G' A G of the actuated joints from the matrix A of all moving joints; G = dq/dq_a."""
-        joints, moving = self.robot.joints, self.robot.moving
-        AG = {j: self.project(algebra, {k: A[j, k] for k in moving}) for j in moving}
-        columns = {k: self.project(algebra, {j: AG[j][k] for j in moving}) for k in joints}
-        return {(i, k): columns[k][i] for k in joints for i in joints}
+        """Return G' A G of the actuated joints from the matrix A of all moving joints; G = dq/dq_a.
+
+        Rows and columns of a free base stay as they are.
+        """
+        rows, every = self.robot.rows, dict.fromkeys(j for j, _ in A)
+        AG = {j: self.project(algebra, {k: A[j, k] for k in every}) for j in every}
+        columns = {k: self.project(algebra, {j: AG[j][k] for j in every}) for k in rows}
+        return {(i, k): columns[k][i] for k in rows for i in rows}
 
 
 def parts(robot: Robot) -> int:

@@ -12,8 +12,12 @@ Column k of A is the wrench by which composite link k resists a unit acceleratio
     E = (-MSP_2, MSP_1, 0) ,   NE = (JP_13, JP_23, JP_33)      revolute
     E = (0, 0, MP) ,           NE = (MSP_2, -MSP_1, 0)         prismatic
 
-propagated to every joint before joint k. With base parameters, YY = MZ = M = 0 for most links, and
-the terms in MP vanish.
+propagated to every joint before joint k, and to the rows of a free base. There the composite link 0
+resists the accelerations a_0 and wd_0 of the base with
+
+    E = MP a_0 - MSP x wd_0 ,   NE = MSP x a_0 + JP wd_0 .
+
+With base parameters, YY = MZ = M = 0 for most links, and the terms in MP vanish.
 
 Coriolis matrix C(q, qd), from the Christoffel symbols of A, so that Ad - 2C is skew symmetric. A
 mass point at r in frame j has the velocity rd = w_j x r relative to the origin of the frame. The
@@ -52,12 +56,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from fractions import Fraction
 
-from symgen.derive.algebra import E3, Matrix, Scalar, Vector, array, cross, dot
+from symgen.derive.algebra import E3, IDENTITY, Matrix, Scalar, Vector, array, cross, dot
 from symgen.derive.geometry import Geometry, Rotation
 from symgen.derive.newton_euler import Motion
 from symgen.derive.regressor import element_names
 from symgen.description.expression import Expression
-from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, parameter
+from symgen.description.robot import BASE_ROWS, FIXED, INERTIAL, PRISMATIC, parameter
 
 Tensor = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]  # 11, 12, 13, 22, 23, 33
 PLACES = ((1, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 3))
@@ -87,18 +91,22 @@ class CompositeLinks:
         self.MSP: dict[int, Vector] = {}
         self.MP: dict[int, Scalar] = {}
         self.own: dict[int, list[Scalar]] = {}  # XX .. M of the link alone
-        for f in self.robot.frames:
-            link = [chi[parameter(p, f.j)] if f.j in self.robot.links else 0 for p in INERTIAL]
-            self.own[f.j] = link
+        base = (0,) if self.robot.base_is_free else ()
+        for j in (*base, *(f.j for f in self.robot.frames)):
+            link = [chi[parameter(p, j)] if j in self.robot.links else 0 for p in INERTIAL]
+            self.own[j] = link
             XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M = link
-            self.JP[f.j] = (XX, XY, XZ, YY, YZ, ZZ)
-            self.MSP[f.j] = array((MX, MY, MZ))
-            self.MP[f.j] = M
+            self.JP[j] = (XX, XY, XZ, YY, YZ, ZZ)
+            self.MSP[j] = array((MX, MY, MZ))
+            self.MP[j] = M
         for f in reversed(self.robot.frames):
             self.algebra.section(f"Composite link {f.j}")
             self._name(f.j)
-            if f.ant:
+            if f.ant in self.own:
                 self._take(f.j, f.ant)
+        if base:
+            self.algebra.section("Composite link 0")
+            self._name(0)
 
     def _name(self, j: int) -> None:
         """Give names to inertia, first moments and mass of link j with all links after it: JP332,
@@ -127,14 +135,16 @@ class CompositeLinks:
     def matrix(self) -> dict[Place, Scalar]:
         """Return the inertia matrix {(i, k): A_ik} of all moving joints of the open tree.
 
-        Inertias on the joints (elements) are included.
+        Inertias on the joints (elements) are included. A free base has six rows and columns more.
         """
-        moving = self.robot.moving
+        base = tuple(BASE_ROWS) if self.robot.base_is_free else ()
+        moving = (*base, *self.robot.moving)
         A: dict[Place, Scalar] = {(i, k): 0 for i in moving for k in moving}
-        for k in moving:
+        for k in self.robot.moving:
             for i, x in self._column(k).items():
                 A[i, k] = x
                 A[k, i] = x
+        A |= self._of_base() if base else {}
         for name, (e, j) in element_names(self.robot).items():
             if e.kind == "inertia":
                 row = e.along.get(j, {})
@@ -165,7 +175,23 @@ class CompositeLinks:
             rotation = self.geometry.rotation[i]
             E = rotation.up(E)
             NE = rotation.up(NE) + cross(self.geometry.P[i], E)
+        if self.robot.base_is_free:
+            column |= dict(zip(BASE_ROWS, (*E, *NE), strict=True))
         return column
+
+    def _of_base(self) -> dict[Place, Scalar]:
+        """Return the entries of the inertia matrix in rows and columns of a free base alone."""
+        XX, XY, XZ, YY, YZ, ZZ = self.JP[0]
+        J = ((XX, XY, XZ), (XY, YY, YZ), (XZ, YZ, ZZ))
+        wrenches = [(e * self.MP[0], cross(self.MSP[0], e)) for e in IDENTITY]
+        wrenches += [
+            (cross(e, self.MSP[0]), row) for e, row in zip(IDENTITY, array(J), strict=True)
+        ]
+        return {
+            (i, k): x
+            for k, (E, NE) in zip(BASE_ROWS, wrenches, strict=True)
+            for i, x in zip(BASE_ROWS, (*E, *NE), strict=True)
+        }
 
 
 def turned(R: Rotation, J: Tensor) -> Tensor:

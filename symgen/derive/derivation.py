@@ -51,11 +51,11 @@ class Derivation(NamedTuple):
     chi : mapping
         Scalar of each standard parameter.
     torque : mapping
-        Gamma by actuated joint, N m or N.
+        Gamma by actuated joint, N m or N, after the six rows of a free base (`Robot.rows`).
     inertia : mapping
-        {(i, k): A_ik} of the actuated joints.
+        {(i, k): A_ik} of these rows.
     columns : mapping
-        {standard parameter: {actuated joint: D}}.
+        {standard parameter: {row: D}}.
     poses : mapping
         {frame: (A_0j, P_0j)}.
     """
@@ -112,7 +112,7 @@ def derived(robot: Robot, closing: Callable[[Robot], Closure]) -> Derivation:
     poses = frame_poses(geometry)
     inertia = closure.project_twice(algebra, CompositeLinks(geometry, chi).matrix())
     algebra.graph.seal()
-    joints = {i: actuated.get(i, 0) for i in robot.joints}
+    rows = {i: actuated.get(i, 0) for i in robot.rows}
     return Derivation(
-        robot, closing(robot), algebra, geometry, motion, chi, joints, inertia, D, poses
+        robot, closing(robot), algebra, geometry, motion, chi, rows, inertia, D, poses
     )

@@ -30,7 +30,7 @@ from symgen.derive.loop_equations import LoopSystem, loop_system
 from symgen.derive.regressor import element_names
 from symgen.derive.rewrite import Input, Inputs, Rewrite
 from symgen.description.expression import ONE, ZERO
-from symgen.description.robot import Element, Robot
+from symgen.description.robot import BASE_ROWS, Element, Robot
 from symgen.errors import SymgenError
 
 Place = tuple[int, ...]
@@ -249,6 +249,7 @@ class Model(NamedTuple):
 
 AXES: Mapping[str, Callable[[Derivation, Sequence[str]], Iterable[object]]] = {
     "joints": lambda d, parameters: d.robot.joints,
+    "rows": lambda d, parameters: d.robot.rows.values(),
     "parameters": lambda d, parameters: parameters,
     "standard parameters": lambda d, parameters: d.robot.parameters,
     "frames": lambda d, parameters: [f.j for f in d.robot.frames],
@@ -368,7 +369,7 @@ def _friction(d: Derivation, r: Request) -> Iterator[Case]:
 
 
 def _inertia_matrix(d: Derivation, r: Request) -> Iterator[Case]:
-    row = {j: k for k, j in enumerate(d.robot.joints)}
+    row = {j: k for k, j in enumerate(d.robot.rows)}
     entries = [Entry((row[i], row[k]), x, "Inertia matrix") for (i, k), x in d.inertia.items()]
     yield Case(entries)
 
@@ -376,11 +377,19 @@ def _inertia_matrix(d: Derivation, r: Request) -> Iterator[Case]:
 def _unit_accelerations(d: Derivation, r: Request) -> Iterator[Case]:
     """Yield the columns of A: column i is Gamma for qdd_i = 1, from rest and without gravity.
 
+    The first columns of a free base are those of a unit of a0 and of wd0.
     A tied passive joint then has the acceleration G = dq_u/dq_i.
     """
     named, common = d.algebra.named, _still(d, "qd", "qdd") | _weightless(d)
     common |= _without(d, lambda e: e.kind == "inertia")
-    for column, i in enumerate(d.robot.joints):
+    columns = [*d.robot.rows]
+    for key, name in zip(BASE_ROWS, d.algebra.accelerations, strict=False):
+        symbol = {Symbol("base", name): ONE}
+        yield Case(
+            _torques(d, "Inertia matrix", (columns.index(key),)), common | symbol, f"_{name}"
+        )
+    for i in d.robot.joints:
+        column = columns.index(i)
         unit: dict[Symbol, Input] = {Symbol("qdd", f"QDP{i}"): ONE}
         for u in d.closure.tied:
             unit[Symbol("qdd", f"QDP{u}")] = Symbol("rate", named("G", u, i))
@@ -404,10 +413,14 @@ def _coriolis(d: Derivation, r: Request) -> Iterator[Case]:
     yield Case([Entry((row[i], row[k]), x) for (i, k), x in projected.items()])
 
 
+def _heading(j: int) -> str:
+    return "Base" if j in BASE_ROWS else f"Joint {j}"
+
+
 def _regressor(d: Derivation, r: Request) -> Iterator[Case]:
     entries = [
-        Entry((row, column), d.columns[own][j], f"Joint {j}", f"DG{j}{own}")
-        for row, j in enumerate(d.robot.joints)
+        Entry((row, column), d.columns[own][j], _heading(j), f"DG{label}{own}")
+        for row, (j, label) in enumerate(d.robot.rows.items())
         for column, own in enumerate(r.parameters)
         if j in d.columns[own]
     ]
@@ -416,8 +429,8 @@ def _regressor(d: Derivation, r: Request) -> Iterator[Case]:
 
 def _by_column(d: Derivation, r: Request, columns: Columns) -> list[Entry]:
     return [
-        Entry((row, column), columns[own].get(j, 0), f"Joint {j}")
-        for row, j in enumerate(d.robot.joints)
+        Entry((row, column), columns[own].get(j, 0), _heading(j))
+        for row, j in enumerate(d.robot.rows)
         for column, own in enumerate(r.parameters)
     ]
 
@@ -559,32 +572,32 @@ MODELS = {
     model.name: model
     for model in (
         Model(
-            "regressor", "D", ("q", "qd", "qdd"), ("joints", "parameters"), "Gamma by X",
+            "regressor", "D", ("q", "qd", "qdd"), ("rows", "parameters"), "Gamma by X",
             "D of Gamma = D X", _regressor, result="D", by_columns=True, base=READ,
         ),
         Model(
-            "inverse_dynamics", "GAM", ("q", "qd", "qdd", "X"), ("joints",), TORQUE,
+            "inverse_dynamics", "GAM", ("q", "qd", "qdd", "X"), ("rows",), TORQUE,
             "joint torques Gamma = A qdd + C qd + Q + friction", _inverse_dynamics, result="GAM",
             page=7, latex=r"\Gamma", base=READ,
         ),
         Model(
-            "inertia_matrix", "A", ("q", "X"), ("joints", "joints"), INERTIA,
+            "inertia_matrix", "A", ("q", "X"), ("rows", "rows"), INERTIA,
             "A(q), actuators included: column i is Gamma for a unit acceleration of joint i from "
             "rest",
             _inertia_matrix, closed=_unit_accelerations, result="A", symmetric=True, page=3,
         ),
         Model(
-            "bias", "H", ("q", "qd", "X"), ("joints",), TORQUE,
+            "bias", "H", ("q", "qd", "X"), ("rows",), TORQUE,
             "Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset", _bias,
             result="GAM", page=6, case_of="inverse_dynamics", base=READ,
         ),
         Model(
-            "gravity", "Q", ("q", "X"), ("joints",), TORQUE,
+            "gravity", "Q", ("q", "X"), ("rows",), TORQUE,
             "Gamma at rest without friction: gravity, offset and springs "
             "(a base parameter may mix them)", _gravity, result="GAM", page=5, base=READ,
         ),
         Model(
-            "forward_dynamics", "QDP", ("q", "qd", "tau", "X"), ("joints",), "rad/s**2 | m/s**2",
+            "forward_dynamics", "QDP", ("q", "qd", "tau", "X"), ("rows",), "rad/s**2 | m/s**2",
             "qdd = A(q)**-1 (tau - bias)", None, result="qdd", composed="quotient",
             latex=r"\det \mathbf{A} \; \ddot{q}",
             denominator="det A",
@@ -663,7 +676,7 @@ MODELS = {
             option="base_wrench_regressor", base=UNDEFINED,
         ),
         Model(
-            "friction", "F", ("q", "qd", "X"), ("joints",), TORQUE,
+            "friction", "F", ("q", "qd", "X"), ("rows",), TORQUE,
             "viscous and Coulomb friction", _friction,
         ),
         Model(

@@ -8,7 +8,8 @@ Link j, frame j, i = ant(j), a_j the acceleration of O_j minus gravity, U = skew
     F_j  = M_j a_j + U_j MS_j ,     N_j = J_j wd_j + w_j x (J_j w_j) + MS_j x a_j
     f_j  = F_j + sum_k jRk f_k ,    n_j = N_j + sum_k (jRk n_k + P_jk x jRk f_k)
 
-with k over the frames mounted on frame j. A moving base has measured w_0, wd_0 and a_0. N_j is written in product form (see `moment`): with base
+with k over the frames mounted on frame j. A moving base has measured w_0, wd_0 and a_0; of a free
+base, f_0 and n_0 are six more rows. N_j is written in product form (see `moment`): with base
 parameters, YY = MZ = M = 0 for most links, and many products disappear.
 
 W. Khalil, J.-F. Kleinfinger, ICRA 1986; Khalil and Dombre, Modeling, Identification and Control of
@@ -23,7 +24,14 @@ from typing import NamedTuple
 from symgen.derive.algebra import BASE, ZERO3, Matrix, Scalar, Vector, array, cross, dot, is_zero
 from symgen.derive.geometry import Geometry
 from symgen.description.expression import Expression
-from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, REVOLUTE, parameter
+from symgen.description.robot import (
+    BASE_ROWS,
+    FIXED,
+    INERTIAL,
+    PRISMATIC,
+    REVOLUTE,
+    parameter,
+)
 
 ZERO33 = array((ZERO3, ZERO3, ZERO3))
 TWO = Expression.number(2)
@@ -214,8 +222,9 @@ def moment(m: LinkMotion, K: Mapping[str, Scalar]) -> Vector:
 def joint_torques(motion: Motion, K: Mapping[str, Scalar]) -> dict[int, Scalar]:
     """Return the torques {j: Gamma_j} that move the links, by the inward recursion.
 
-    Every moving joint of the tree has an entry; friction and other elements are not included. K
-    maps a standard parameter's name to its scalar; a parameter that is not in K counts as 0.
+    Every moving joint of the tree has an entry; friction and other elements are not included. A
+    free base has the force and the moment that move it as six more entries (BASE_ROWS). K maps a
+    standard parameter's name to its scalar; a parameter that is not in K counts as 0.
     """
     robot, geometry, vector = motion.robot, motion.geometry, motion.vector
     f: dict[int, Vector] = dict.fromkeys(range(len(robot.frames) + 1), ZERO3)
@@ -237,4 +246,10 @@ def joint_torques(motion: Motion, K: Mapping[str, Scalar]) -> dict[int, Scalar]:
         fi = vector("FDI", geometry.rotation[j].up(f[j]), j)
         f[i] = f[i] + fi
         n[i] = n[i] + (geometry.rotation[j].up(n[j]) + cross(geometry.P[j], fi))
+    if robot.base_is_free:
+        motion.algebra.section("Base")
+        link = {p: K.get(parameter(p, 0), 0) for p in INERTIAL}
+        E = vector("E", vector("F", force(motion.link[0], link), 0) + f[0], 0)
+        NE = vector("NE", vector("N", moment(motion.link[0], link), 0) + n[0], 0)
+        torque |= dict(zip(BASE_ROWS, (*E, *NE), strict=True))
     return torque

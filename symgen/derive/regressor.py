@@ -8,7 +8,9 @@ on link j. Joint i feels this wrench through its own axis, expressed in frame j:
 
 z_ij is the axis of joint i in frame j, v_ij the velocity of O_j per unit rate of joint i. Both are
 propagated from the base to the tips: z <- jRi' z, v <- jRi' (v + z x P). A prismatic joint has
-z = 0, and v is its direction.
+z = 0, and v is its direction. The six rows of a free base feel the force and the moment about O_0,
+
+    0Rj F_k ,   0Rj N_k + P_0j x 0Rj F_k .
 
 An element (friction, spring, actuator inertia, torque law of the user) with parameter c adds one of
 these torques:
@@ -29,12 +31,14 @@ from collections.abc import Iterable
 from functools import lru_cache
 from typing import Any
 
-from symgen.derive.algebra import E3, ZERO3, Scalar, Vector, cross, dot
+from symgen.derive.algebra import E3, IDENTITY, ZERO3, Scalar, Vector, cross, dot
+from symgen.derive.geometry import frame_poses
 from symgen.derive.graph import Turn
 from symgen.derive.newton_euler import LinkMotion, Motion, force, moment
 from symgen.description.element import CHANNEL, STATE, varies
 from symgen.description.expression import FUNCTIONS, ONE, ZERO, Atom, Call, Expression
 from symgen.description.robot import (
+    BASE_ROWS,
     FIXED,
     INERTIAL,
     KINDS,
@@ -119,6 +123,9 @@ class Axes:
         self.v: dict[tuple[int, int], Vector] = {}
         for f in motion.robot.frames:
             self._carry(f.j)
+        self.poses = {0: (IDENTITY, ZERO3)}
+        if motion.robot.base_is_free:
+            self.poses |= frame_poses(motion.geometry)
 
     def _carry(self, j: int) -> None:
         motion, geometry, robot = self.motion, self.motion.geometry, self.motion.robot
@@ -147,11 +154,16 @@ class Axes:
     def column(self, parameter: str, j: int) -> dict[int, Scalar]:
         """Return the joint torques {i: D_ik} of link j if its `parameter` is 1 and all others 0.
 
-        The joints i are the moving joints between the base and link j.
+        The joints i are the moving joints between the base and link j, after the rows of a free
+        base.
         """
         F, N = unit_wrench(self.motion.link[j], parameter)
         motion = self.motion
         entries: dict[int, Scalar] = {}
+        if motion.robot.base_is_free:
+            R, P = self.poses[j]
+            force = R @ F
+            entries |= dict(zip(BASE_ROWS, (*force, *(R @ N + cross(P, force))), strict=True))
         for i in motion.robot.path(j):
             if motion.robot.frame(i).sigma != FIXED:
                 turning = motion.algebra.hint(

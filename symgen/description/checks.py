@@ -123,12 +123,6 @@ def _check_tree(frames: Sequence[Frame], massless: Collection[int]) -> Iterator[
 
 def _check_base(robot: Any) -> Iterator[Problem]:
     """Check that a base that moves is of a kind with models, outside every loop and its names."""
-    yield (
-        robot.base == "free",
-        "base: free, with the six rows of the wrench on the base, has no models yet; write base: "
-        "moving, whose rows are the joints alone",
-        ("base",),
-    )
     if not robot.base_moves:
         return
     for loop in robot.loops:

@@ -15,7 +15,7 @@ from pathlib import Path
 from symgen.description.angles import NotReadWarning
 from symgen.description.fields import located
 from symgen.description.par import read_par
-from symgen.description.robot import Robot
+from symgen.description.robot import INERTIAL, Robot, parameter
 from symgen.description.yaml import parse_robot, write_yaml
 from symgen.errors import DescriptionError
 
@@ -61,8 +61,8 @@ def load_robot(
         needs. Otherwise, an angle within 1e-4 rad of a multiple of pi/12 becomes this multiple, and
         an AngleWarning names the largest change, if it exceeds 1e-9 rad.
     base : str, optional
-        `moving`: frame 0 is a body whose motion is measured; `fixed`: it stands. Default: that of
-        the file.
+        `moving`: frame 0 is a body whose motion is measured; `free`: the wrench on this body is
+        measured too; `fixed`: it stands. Default: that of the file.
 
     Returns
     -------
@@ -79,12 +79,19 @@ def load_robot(
 
 
 def on_base(robot: Robot, base: str | None) -> Robot:
-    """Return the robot with a fixed or moving base; None leaves that of the file."""
+    """Return the robot with a fixed, moving or free base; None leaves that of the file."""
     if base is None:
         return robot
     if base not in BASES:
-        raise DescriptionError(f"base {base!r:.40}; expected {' or '.join(BASES)}")
-    return replace(robot, base=base)  # type: ignore[arg-type]  # checked
+        raise DescriptionError(
+            f"base {base!r:.40}; expected {', '.join(BASES[:-1])} or {BASES[-1]}"
+        )
+    values = dict(robot.values)
+    if base == "free":
+        values = {**robot.of_base, **values}
+    elif robot.base_is_free:
+        values = {k: x for k, x in values.items() if k not in [parameter(p, 0) for p in INERTIAL]}
+    return replace(robot, base=base, values=values)  # type: ignore[arg-type]  # checked
 
 
 def read_robot(

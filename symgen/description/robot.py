@@ -112,6 +112,10 @@ def _rows_by_name(name: str) -> BeforeValidator:
     )
 
 
+BASE_ROWS = dict(enumerate(("FX0", "FY0", "FZ0", "NX0", "NY0", "NZ0"), start=-5))
+"""Rows of a free base, by key: force (N), then moment about O_0 (N m), in the axes of frame 0."""
+
+
 @dataclass(frozen=True, config=CONFIG)
 class Robot:
     """The complete, checked and immutable description of a robot, in SI units and rad.
@@ -213,18 +217,23 @@ class Robot:
         Literal["fixed", "moving", "free"],
         Field(
             description=(
-                "fixed, or moving: frame 0 is a body whose motion is measured, and the rows are "
-                "the joints alone"
+                "fixed; or moving: frame 0 is a body whose motion is measured, and the rows are "
+                "the joints alone; or free: the wrench on this body is measured too, six rows "
+                "before the joints, and link 0 has parameters"
             )
         ),
     ] = "fixed"
     angles: Annotated[str, *UNWRITTEN] = ""  # how those of a foreign file were read
     # of links whose inertia no body can have: the frame, and what is wrong
     impossible: Annotated[tuple[tuple[int, str], ...], *UNWRITTEN] = ()
+    # of the links of a foreign file: frame, name, M, centre from the origin of the link, tensor about it
+    bodies: Annotated[tuple[tuple[int, str, float, Any, Any], ...], *UNWRITTEN] = ()
     # parts of a foreign file that change the torques and are not in the equations
     not_read: Annotated[tuple[str, ...], *UNWRITTEN] = ()
     # of a foreign file, on which a load is mounted: name, link, pose in its frame (`mounts`)
     mounts: Annotated[tuple[tuple[str, int, Any], ...], *UNWRITTEN] = ()
+    # parameters of link 0 in a foreign file, which a free base has
+    of_base: Annotated[Mapping[str, float], *UNWRITTEN] = Field(default={})
     distal: Annotated[int, *UNWRITTEN] = 0  # rows of a classic table in the file; 0: Khalil's
     file: Annotated[str, *UNWRITTEN] = ""
     sha256: Annotated[str, *UNWRITTEN] = ""
@@ -233,7 +242,7 @@ class Robot:
         if "q" in self.limits:  # one number: to either side
             q = ((-x, x) if isinstance(x, int | float) else x for x in self.limits["q"])
             object.__setattr__(self, "limits", {**self.limits, "q": tuple(q)})
-        for name in ("constants", "constraints", "limits", "values", "labels"):
+        for name in ("constants", "constraints", "limits", "values", "labels", "of_base"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
         for name, kind in (
             ("elements", tuple),
@@ -287,6 +296,20 @@ class Robot:
         """Whether frame 0 is a body whose motion is an input of the models."""
         return self.base != "fixed"
 
+    @property
+    def base_is_free(self) -> bool:
+        """Whether the wrench on frame 0 is known too: link 0 has parameters, and six rows."""
+        return self.base == "free"
+
+    @cached_property
+    def rows(self) -> dict[int, str]:
+        """Names of the rows of the torques, by key, in their order.
+
+        The key of a joint is its number. A free base has six rows before the joints, with the keys
+        of BASE_ROWS.
+        """
+        return (BASE_ROWS if self.base_is_free else {}) | {j: str(j) for j in self.joints}
+
     @cached_property
     def moving(self) -> tuple[int, ...]:
         """Numbers of the revolute and prismatic joints, including the cut joints of loops."""
@@ -326,8 +349,11 @@ class Robot:
 
     @cached_property
     def links(self) -> tuple[int, ...]:
-        """Numbers of the links that have inertial parameters."""
-        return tuple(f.j for f in self.frames if f.j not in self.cut and f.j not in self.massless)
+        """Numbers of the links that have inertial parameters; link 0 is that of a free base."""
+        base = (0,) if self.base_is_free else ()
+        return base + tuple(
+            f.j for f in self.frames if f.j not in self.cut and f.j not in self.massless
+        )
 
     @cached_property
     def parameters(self) -> tuple[str, ...]:
@@ -337,7 +363,7 @@ class Robot:
         OFFSET, as far as the robot has them. Further elements are in the order of the file.
         """
         by_family = {e.family: e for e in self.elements}
-        names: list[str] = []
+        names = [parameter(p, 0) for p in INERTIAL] if self.base_is_free else []
         for f in self.frames:
             if f.j in self.links:
                 names += [parameter(p, f.j) for p in INERTIAL]

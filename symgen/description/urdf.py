@@ -265,7 +265,7 @@ def _inertial(link: XmlElement, angles: Angles) -> Inertial | None:
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     wrong = no_body(M, tensor, ("ixx", "iyy", "izz"))
     name = f"link {link.word('name')!a:.60} (line {inertia.line})"
-    return Inertial(M, pose, tensor, f"{name}: {wrong}" if wrong else "")
+    return Inertial(M, pose, tensor, name, wrong)
 
 
 def _joint(e: XmlElement, angles: Angles) -> Joint:
@@ -389,7 +389,7 @@ def write_urdf(
     lines = [
         '<?xml version="1.0"?>',
         f"<robot name={quoteattr(robot.name)}>",
-        '  <link name="link0"/>',
+        *_link_lines(robot, 0, values),
     ]
     for f in robot.frames:
         lines += _link_lines(robot, f.j, values) + _joint_lines(robot, f, values)
@@ -519,7 +519,7 @@ def _losses(robot: Robot, values: Mapping[str, float]) -> tuple[str, ...]:
     if unknown := [name for name in lost if name not in values]:
         notes.append(f"parameters without a place or value: {', '.join(unknown)}")
     if robot.base_moves:
-        notes.append("base: moving, which --base moving gives when the file is read")
+        notes.append(f"base: {robot.base}, which --base {robot.base} gives when the file is read")
     notes.append("constants as numbers, frames as placements: formulas are not carried")
     gravity = tuple(e.value(robot.constants) for e in robot.gravity)
     if gravity[:2] != (0.0, 0.0) or gravity[2] >= 0:

@@ -283,7 +283,7 @@ FLAGS = (
 )
 LONGEST, OF_PART = 1000, 400  # steps of a body; a longer one is cut into parts and compiled once
 RESULTS = (
-    *("joints", "parameters", "energies", "wrench", "standard parameters"),
+    *("joints", "rows", "parameters", "energies", "wrench", "standard parameters"),
     *("frames", "pose"),
 )
 """Axes of the models that have a kernel."""

@@ -15,7 +15,7 @@ from symgen.derive.names import FAMILIES, families_of
 from symgen.derive.regressor import element_names, unit
 from symgen.description.distal import frames_text
 from symgen.description.element import TRANSMITTED
-from symgen.description.robot import FIXED, KINDS, Element, Robot
+from symgen.description.robot import BASE_ROWS, FIXED, KINDS, Element, Robot
 from symgen.emit.printers import Text
 from symgen.emit.render import WIDTH
 from symgen.emit.spec import ModuleSpec
@@ -42,7 +42,7 @@ def header(spec: ModuleSpec, texts: Mapping[str, Text], formulas: bool) -> list[
         *(f"    {line}" for line in frame_table(robot)),
         *(wrap_text(f"Angles      {robot.angles}", "") if robot.angles else ()),
         *(
-            line_of("Base", "moves; gravity is a part of its measured acceleration a0")
+            line_of("Base", _base_text(robot))
             if robot.base_moves
             else line_of("Gravity", f"acceleration ({gravity}) in frame 0, m/s**2")
         ),
@@ -109,6 +109,15 @@ def header(spec: ModuleSpec, texts: Mapping[str, Text], formulas: bool) -> list[
         "Cost per sample",
         *(f"    {name:<18} {f.cost}" for name, f in spec.functions.items() if not f.model.case_of),
     ]
+
+
+def _base_text(robot: Robot) -> str:
+    """Say in the header what a base that moves is."""
+    text = "moves; gravity is a part of its measured acceleration a0"
+    if not robot.base_is_free:
+        return text
+    rows = ", ".join(robot.rows[k] for k in BASE_ROWS)
+    return f"{text}. It is free: before the joints, rows {rows} of the force that moves frame 0 and of the moment about its origin, in its axes"
 
 
 def line_of(title: str, text: str) -> list[str]:
@@ -351,7 +360,8 @@ def _drives(robot: Robot) -> list[str]:
 def _structure(spec: ModuleSpec) -> list[str]:
     rows = ['"' + "".join("x" if mark else "." for mark in row) + '",' for row in spec.structure]
     return [
-        "# STRUCTURE[k, j]: whether base parameter k acts on joint j",
+        "# STRUCTURE[k, j]: whether base parameter k acts on "
+        + ("row j" if spec.robot.base_is_free else "joint j"),
         'STRUCTURE = np.array([[mark == "x" for mark in row] for row in (',
         *(f"    {line}" for line in wrap(" ".join(rows), WIDTH - 4, break_long_words=False)),
         ")])",

@@ -122,8 +122,8 @@ class ModuleSpec:
 
     @cached_property
     def structure(self) -> tuple[tuple[bool, ...], ...]:
-        """Table structure[k][i]: whether base parameter k can affect the torque of the joint with
-        index i.
+        """Table structure[k][i]: whether base parameter k can affect the torque with index i: of a
+        joint, or of a row of a free base.
 
         It can act if the entry of the regressor D is not identically zero.
         """
@@ -144,14 +144,14 @@ class ModuleSpec:
 
     @property
     def sizes(self) -> dict[str, int]:
-        """Numbers of joints, parameters and frames by name: n, m, k, b, p, frames.
+        """Numbers of joints, parameters and frames by name: n, r, m, k, b, p, frames.
 
-        n actuated joints, m tied joints, k = n + m independent joints, b base parameters, p
-        standard parameters.
+        n actuated joints, r rows of the torques, m tied joints, k = n + m independent joints, b
+        base parameters, p standard parameters.
         """
-        n, m = len(self.robot.joints), len(self.tied)
-        p, frames = len(self.robot.parameters), len(self.robot.frames)
-        return {"n": n, "m": m, "k": n + m, "b": len(self.regrouping), "p": p, "frames": frames}
+        n, r, m = len(self.robot.joints), len(self.robot.rows), len(self.tied)
+        p, frames, b = len(self.robot.parameters), len(self.robot.frames), len(self.regrouping)
+        return {"n": n, "r": r, "m": m, "k": n + m, "b": b, "p": p, "frames": frames}
 
     def names(self, is_word: Callable[[str], bool] = lambda name: False) -> Namespace:
         """Make the table of names of one source text, so that no two quantities share a name.

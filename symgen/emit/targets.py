@@ -30,17 +30,22 @@ class Target(NamedTuple):
     language: str
     use: str = ""
     iterates: bool = False
-    bases: tuple[str, ...] = ("fixed", "moving")
+    bases: tuple[str, ...] = ("fixed", "moving", "free")
 
 
+IN_C = ("fixed", "moving")
 TARGETS = {
     "numpy": Target("{}.py", "NumPy", iterates=True),
     "casadi": Target(
         "{}.py", "CasADi", 'in CasADi {}.casadi("inverse_dynamics") is a casadi.Function of columns'
     ),
-    "c": Target("{}.c", "C", iterates=True),
+    "c": Target("{}.c", "C", iterates=True, bases=IN_C),
     "h": Target(
-        "{}.h", "C", "{0}.h declares what {0}.c has; --target c writes both", iterates=True
+        "{}.h",
+        "C",
+        "{0}.h declares what {0}.c has; --target c writes both",
+        iterates=True,
+        bases=IN_C,
     ),
     "xp": Target(
         "{}.py",

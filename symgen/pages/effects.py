@@ -40,8 +40,8 @@ class Effect:
         Number of that link or joint.
     base : tuple of str
         Base parameters whose formulas contain the parameter.
-    joints : tuple of int
-        Joints whose torques depend on these base parameters.
+    joints : tuple of int or str
+        Joints whose torques depend on these base parameters; rows of a free base by name.
     why : str
         Reason why the parameter has no effect; "" if it has one.
     """
@@ -52,7 +52,7 @@ class Effect:
     place: str
     link: int
     base: tuple[str, ...]
-    joints: tuple[int, ...]
+    joints: tuple[int | str, ...]
     why: str = ""
 
 
@@ -71,7 +71,7 @@ def effects(spec: ModuleSpec) -> tuple[Effect, ...]:
     result = []
     for name, rows in into.items():
         joints = tuple(
-            j for row, j in enumerate(robot.joints) if any(spec.structure[k][row] for k in rows)
+            j for row, j in enumerate(rows_of(robot)) if any(spec.structure[k][row] for k in rows)
         )
         base = tuple(spec.regrouping.names[k] for k in rows)
         if name in inertial:
@@ -93,6 +93,11 @@ def effects(spec: ModuleSpec) -> tuple[Effect, ...]:
             Effect(name, meaning, unit(robot, name), place, j, base, joints, "" if rows else said)
         )
     return tuple(result)
+
+
+def rows_of(robot: Robot) -> tuple[int | str, ...]:
+    """Return the numbers of the joints, after the names of the rows of a free base."""
+    return tuple(j if j in robot.joints else name for j, name in robot.rows.items())
 
 
 def inertial_meaning(family: str, j: int) -> str:

@@ -31,7 +31,7 @@ from symgen.description.parts import GEOMETRY
 from symgen.description.robot import PRISMATIC, Element, Robot
 from symgen.emit.header import informative_columns
 from symgen.emit.spec import ModuleSpec, module_spec
-from symgen.pages.effects import Effect, effects
+from symgen.pages.effects import Effect, effects, rows_of
 from symgen.regroup.reasons import Absorption, absorptions
 from symgen.regroup.regrouping import Regrouping
 from symgen.symbols import expressions
@@ -183,7 +183,7 @@ def _formulas(spec: ModuleSpec) -> list[dict[str, Any]]:
             "text": str(b.formula),
             "unit": printed(unit(robot, b.own)),
             "joints": [
-                (j, entered) for j, entered in zip(robot.joints, spec.structure[k], strict=True)
+                (j, entered) for j, entered in zip(rows_of(robot), spec.structure[k], strict=True)
             ],
         }
         for k, b in enumerate(spec.regrouping.base)
@@ -234,13 +234,14 @@ def _pointed_at(
         own = by_name[b.own]
         others = [name for name in b.combination if name != b.own or b.combination[name] != ONE]
         text = own.meaning + (f"; takes in {', '.join(others)}" if others else "")
-        joints = [j for j, entered in zip(robot.joints, spec.structure[k], strict=True) if entered]
+        acts = zip(rows_of(robot), spec.structure[k], strict=True)
+        joints = [j for j, entered in acts if entered]
         entries[b.name] = _entry(own, text, [b.name], joints, "")
     return entries
 
 
 def _entry(
-    e: Effect, text: str, base: Sequence[str], joints: Sequence[int], why: str
+    e: Effect, text: str, base: Sequence[str], joints: Sequence[int | str], why: str
 ) -> dict[str, Any]:
     return {
         "text": text,

@@ -25,7 +25,9 @@ from symgen.regroup.states import states_for
 
 # singular values of unit columns: those below are rounding where a gap says so, at most here
 LARGEST_ROUNDING, SMALLEST = 1e-9, 1e-14
-NEGLIGIBLE = 1e-6  # of a coefficient between unit columns
+# coefficients between unit columns that may be left out, first the largest, where the column stays
+# the same to KEPT without them; nearly dependent base columns have small ones that count
+NEGLIGIBLE, KEPT = (1e-6, 1e-8, 1e-10, 1e-12), 1e-13
 OVERFLOWS = 1e100  # its square is a number
 SPREAD, MOST_STATES = 0.8, 4000  # rad about the start, and of half the longest length for slides
 DECADES = -3.5, 1.0  # decades of the velocities at which laws are compared
@@ -81,7 +83,7 @@ def float_regressor(robot: Robot, names: Sequence[str]) -> Array:
         states = states_of(q=q, qd=qd, qdd=qdd) | _base_motion(robot, rng, count)
         floats = Floats(robot, states, _in_time(robot, rng, count))
         return sampled_columns(floats, names, count).reshape(-1, len(names))
-    system, count = loop_system(robot), 3 * len(names) // len(robot.joints) + 10
+    system, count = loop_system(robot), 3 * len(names) // len(robot.rows) + 10
     blocks: list[Array] = []
     closed = tried = 0
     while closed < count:
@@ -97,13 +99,13 @@ def float_regressor(robot: Robot, names: Sequence[str]) -> Array:
 
 
 def sampled_columns(floats: Floats, names: Sequence[str], count: int) -> Array:
-    """Compute the regressor columns `names` at given states, shape (actuated joints, count, names).
+    """Compute the regressor columns `names` at given states, shape (rows, count, names).
 
     `count` is the number of states. A column that is not finite raises DescriptionError.
     """
     robot = floats.robot
     D = derive(robot).columns
-    entries = [D[name].get(j, 0) for j in robot.joints for name in names]
+    entries = [D[name].get(j, 0) for j in robot.rows for name in names]
     with np.errstate(all="ignore"):  # of laws, which are judged here
         values = [
             np.broadcast_to(np.asarray(x, dtype=float), count) for x in interpret(entries, floats)
@@ -124,7 +126,7 @@ def sampled_columns(floats: Floats, names: Sequence[str], count: int) -> Array:
             + "; write a law that is finite everywhere, such as sqrt(max(1 - q, 0))",
             path=("columns", own.family) if own else (),
         )
-    return np.stack(values).reshape(len(robot.joints), len(names), count).swapaxes(1, 2)
+    return np.stack(values).reshape(len(robot.rows), len(names), count).swapaxes(1, 2)
 
 
 def _columns_near_start(
@@ -207,7 +209,20 @@ def float_base(W: Array) -> tuple[list[int], Array]:
         if (size := float(np.linalg.norm(u))) > independent:
             pivots.append(c)
             Q = np.column_stack([Q, u / size])
-    K = np.linalg.lstsq(U[:, pivots], U, rcond=None)[0]
-    return pivots, np.where(np.abs(K) > NEGLIGIBLE, K, 0.0) * np.where(
-        np.isinf(norms), 0.0, norms
-    ) / norms[pivots][:, None]
+    K = _without_negligible(U, pivots)
+    return pivots, K * np.where(np.isinf(norms), 0.0, norms) / norms[pivots][:, None]
+
+
+def _without_negligible(U: Array, pivots: list[int]) -> Array:
+    """Write all columns of U, shape (rows, columns), as combinations of those in `pivots`, without
+    coefficients that are only rounding.
+
+    Return the coefficients, shape (pivots, columns).
+    """
+    every = np.linalg.lstsq(U[:, pivots], U, rcond=None)[0]
+    K, open_ = every.copy(), np.ones(U.shape[1], dtype=bool)
+    for least in (*NEGLIGIBLE, 0.0):
+        K[:, open_] = np.where(np.abs(every) > least, every, 0.0)[:, open_]
+        left = np.linalg.norm(U - U[:, pivots] @ K, axis=0)
+        open_ = left > KEPT
+    return np.asarray(K)

@@ -126,7 +126,7 @@ def _rule(robot: Robot, name: str) -> str:
     """Describe the general rule that moved an inertial parameter of a link to another link."""
     family, j = inertial_names(robot)[name]
     frame = robot.frame(j)
-    i = f"link {frame.ant}" if frame.ant else "the base"
+    i = f"link {frame.ant}" if frame.ant or robot.base_is_free else "the base"
     if frame.sigma == REVOLUTE:
         return OF_REVOLUTE[family].format(i=i, j=j)
     if frame.sigma == PRISMATIC:

@@ -297,7 +297,7 @@ def preference(robot: Robot, names: tuple[str, ...]) -> tuple[str, ...]:
         family, j = inertial[name]
         if family in FIRST_CHOICE:
             return (2, j, FIRST_CHOICE.index(family))
-        if family == "M" and robot.frame(j).sigma == PRISMATIC:
+        if family == "M" and j and robot.frame(j).sigma == PRISMATIC:
             return (2, j, len(FIRST_CHOICE))
         return (4, j, LAST_CHOICE.index(family))
 

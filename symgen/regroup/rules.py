@@ -10,7 +10,7 @@ and p = P_ij are constant, and
 
 Therefore YY_j, MZ_j and M_j are moved to link i. For a prismatic joint j, the inertia tensor is
 moved to link i, J_i += iRj J_j iRj'. For a fixed joint j, all ten parameters are moved. A parameter
-that reaches the base has no effect.
+that reaches the base has no effect, unless the base is free: its link 0 has parameters.
 
 [GK90] M. Gautier, W. Khalil, IEEE T-RA 6(3), 1990. [KB95] W. Khalil, F. Bennis, IJRR 14(2), 1995.
 """
@@ -79,9 +79,9 @@ class Transfer:
         """Express the regressor column of an inertial parameter in frame j by columns of link parameters.
 
         A frame that is fixed to a link but is no link itself is replaced by that link. Parameters
-        of the base have no columns.
+        of the base have no columns, unless it is free.
         """
-        if j == 0:
+        if j == 0 and not self.robot.base_is_free:
             return {}
         if j not in self.rigid:
             return {parameter(name, j): ONE}

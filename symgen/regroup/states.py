@@ -354,7 +354,7 @@ def draw_states(
 def sample(draw: Draw, names: tuple[str, ...]) -> Array:
     """Compute the regressor columns `names` at the random states of `draw`, modulo p.
 
-    The result has shape (..., n_active * samples, len(names)), int64 residues; the axis ... counts
+    The result has shape (..., rows * samples, len(names)), int64 residues; the axis ... counts
     the geometries if the draw has several.
     """
     robot = draw.robot
@@ -362,10 +362,10 @@ def sample(draw: Draw, names: tuple[str, ...]) -> Array:
     entries = {
         (k, row): D[name][j]
         for k, name in enumerate(names)
-        for row, j in enumerate(robot.joints)
+        for row, j in enumerate(robot.rows)
         if j in D[name]
     }
-    W = np.zeros((len(names), len(robot.joints), *draw.shape), dtype=np.int64)
+    W = np.zeros((len(names), len(robot.rows), *draw.shape), dtype=np.int64)
     for place, value in zip(entries, interpret([*entries.values()], draw), strict=True):
         W[place] = draw.spread(value)
     W = np.moveaxis(W, -1, 2)  # names, joints, samples, geometries
@@ -380,13 +380,13 @@ def states_for(robot: Robot, names: Sequence[str], spare: int = 4) -> int:
     """
     acting = _acting(robot)
     acts = np.stack([acting[name] for name in names])
-    sets = {tuple(row) for row in acts.tolist() if any(row)} | {(True,) * len(robot.joints)}
+    sets = {tuple(row) for row in acts.tolist() if any(row)} | {(True,) * len(robot.rows)}
     needed = max(np.count_nonzero((acts <= S).all(axis=1)) / sum(S) for S in sets)
-    return int(np.ceil(needed + (6 + spare) / len(robot.joints))) + spare
+    return int(np.ceil(needed + (6 + spare) / len(robot.rows))) + spare
 
 
 @lru_cache(maxsize=8)
 def _acting(robot: Robot) -> dict[str, Array]:
     """Find, with random states, the joints whose torques depend on each standard parameter."""
-    W = sample(Draw(robot, 5, 2), robot.parameters).reshape(len(robot.joints), 2, -1)
+    W = sample(Draw(robot, 5, 2), robot.parameters).reshape(len(robot.rows), 2, -1)
     return dict(zip(robot.parameters, (W != 0).any(axis=1).T, strict=True))

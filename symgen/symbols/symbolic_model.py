@@ -364,6 +364,12 @@ class SymbolicModel:
         """Solve the direct dynamic model by Cramer's rule, qdd = adj(A) (Gamma - H) / det A."""
         robot = self.source.robot
         n = range(len(robot.joints))
+        if robot.base_is_free:
+            raise SymgenError(
+                f"the direct model of {robot.name}, whose base is free, has no closed form; solve "
+                "A (a0, wd0, qdd) = Gamma - H with inertia_matrix and bias, or use "
+                "forward_dynamics of the generated module"
+            )
         if robot.loaded:
             raise SymgenError(
                 f"the direct model of {robot.name} has no closed form: the laws of "

@@ -225,6 +225,7 @@ def apply(
         (text.robot, text.file) if robot is None else (read_robot(robot)[0], Path(robot).name)
     )
     described = on_base(described, base)
+    text = text.on(described.base)
     require_same_frames(text, described, of)
     warn_not_read(text.robot)
     result = _estimate(estimate)
@@ -264,7 +265,7 @@ def apply(
         writing, edits = Writing(text, closest, own, _root(result, names)), XmlEdits(content)
         rows = [*writing.links(edits), *writing.joints(edits)]
         new = edits.edited()
-        writing.require_read_back(read_text(new, path, exact, part))
+        writing.require_read_back(read_text(new, path, exact, part).on(described.base))
     except DescriptionError as error:
         again = FEASIBLE if error.message.startswith(NONE) and result.method != "feasible" else ""
         raise DescriptionError(

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from symgen.description.fields import located
-from symgen.description.files import TREES
+from symgen.description.files import TREES, on_base
 from symgen.description.mjcf import DEEPEST, ORIENTATION
 from symgen.description.robot import FIXED, Robot
 from symgen.description.tree import (
@@ -41,7 +41,6 @@ from symgen.description.tree import (
 from symgen.description.tree_robot import (
     JOINT_TERMS,
     Table,
-    on_its_base,
     parse_tree,
     placed,
     robot_of_tree,
@@ -430,6 +429,10 @@ class RobotText:
     robot: Robot
     places: Places
 
+    def on(self, base: str) -> RobotText:
+        """Return the text as that of a robot with this base, whose link 0 may have parameters."""
+        return replace(self, robot=on_base(self.robot, base))
+
     @property
     def links(self) -> list[FileLink]:
         """Links with inertia on moving bodies; in a body, the link at the joint comes first."""
@@ -469,9 +472,9 @@ def read_text(content: bytes, path: Path, exact: bool, part: TreePart) -> RobotT
         whole = parse_tree(content, path.name, exact=exact)
         attributes = URDF if suffix == ".urdf" else MJCF
         tree = part_of(whole, part)
-        robot, tree = robot_of_tree(tree, path.name, "")[0], on_its_base(tree)
+        robot, table = robot_of_tree(tree, path.name, "")[0], placed(tree)
         places = Places(content, whole, attributes)
-        return RobotText(path.name, tree, placed(tree), robot, places)
+        return RobotText(path.name, table.tree, table, robot, places)
 
 
 def require_same_frames(text: RobotText, robot: Robot, file: str) -> None:

@@ -132,8 +132,8 @@ FREE = ARM.replace('<joint name="s" axis="0 1 0"/>', '<freejoint name="root"/>')
 
 def test_a_free_base_rests_on_request(tmp_path):
     file = written(tmp_path, **{"arm.xml": FREE})
-    moving, notes = read_robot(file)
-    assert moving.base == "moving" and any("--lock root=0 fixes it" in note for note in notes)
+    free, notes = read_robot(file)
+    assert free.base == "free" and any("--lock root=0 fixes it" in note for note in notes)
     with pytest.raises(DescriptionError, match="can only be locked at its pose in the file"):
         read_robot(file, lock={"root": 0.3})
     robot, notes = read_robot(file, lock={"root": 0.0})

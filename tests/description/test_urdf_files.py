@@ -86,8 +86,8 @@ def test_a_free_base_rests_on_request(kind: str) -> None:
         '<link name="base"/><link name="world"/><joint name="root" type="KIND"><parent link="world"/>'
         '<child link="base"/><origin xyz="0 0 1" rpy="0.3 0.2 0"/></joint>',
     )
-    moving, notes = read_tree(free.replace("KIND", kind).encode(), "arm.urdf")
-    assert moving.base == "moving" and any("--lock root=0 fixes it" in note for note in notes)
+    flying, notes = read_tree(free.replace("KIND", kind).encode(), "arm.urdf")
+    assert flying.base == "free" and any("--lock root=0 fixes it" in note for note in notes)
     with pytest.raises(DescriptionError, match="can only be locked at its pose in the file"):
         read_tree(free.replace("KIND", kind).encode(), "arm.urdf", part=TreePart({"root": 0.3}))
     held, notes = read_tree(

@@ -26,12 +26,16 @@ from symgen.certify.witness import Witness
 from symgen.cli.main import app
 from symgen.derive.regressor import inertial_names
 from symgen.description import load_robot, parse_robot
+from symgen.description.files import on_base
+from symgen.description.robot import INERTIAL, parameter
 from symgen.description.tree import TreePart
 from symgen.description.tree_robot import read_tree
+from symgen.description.urdf import write_urdf
 from symgen.description.yaml import write_yaml
 from symgen.emit.generate import generate_files
 from symgen.emit.targets import TARGETS
 from symgen.errors import DescriptionError, SymgenError
+from symgen.pages.page import robot_page
 from symgen.regroup.regrouping import BaseParameter, regroup
 
 TOLERANCE = 1e-10  # of the largest torque
@@ -59,33 +63,98 @@ FREE_PANDA = panda().replace('<mimic joint="finger1"/>', "")
 """Seven joints and two fingers, each on its own."""
 
 
-def module_of(robot):
-    return symgen.model(robot, base="moving")
+def humanoid() -> str:
+    """A URDF of 24 joints: a trunk, legs of six, arms of five, a neck of two; random inertias."""
+    rng, parts = np.random.default_rng(8), ['<robot name="humanoid">']
+
+    def link(name, mass):
+        a, b, c = mass * np.array([0.011, 0.012, 0.013]) * rng.uniform(0.9, 1.1, 3)
+        xyz = " ".join(f"{x:.3f}" for x in rng.uniform(-0.1, 0.1, 3))
+        parts.append(
+            f'<link name="{name}"><inertial><origin xyz="{xyz}" rpy="0.1 0.2 0.3"/><mass value="{mass}"/>'
+            f'<inertia ixx="{a:.4f}" ixy="0" ixz="0" iyy="{b:.4f}" iyz="0" izz="{c:.4f}"/></inertial></link>'
+        )
+
+    link("trunk", 30.0)
+    limbs = {
+        "leg": ("0 0.1 -0.2", "xyzyyx", "0 0 -0.2"),
+        "arm": ("0 0.2 0.3", "yxzyz", "0 0 -0.15"),
+    }
+    chains = [(f"{limb}{side}", *limbs[limb]) for limb in limbs for side in "ab"]
+    for limb, start, axes, step in [*chains, ("neck", "0 0 0.4", "zy", "0 0 0.1")]:
+        parent, xyz = "trunk", start.replace("0.1 ", "-0.1 ") if limb.endswith("b") else start
+        for k, axis in enumerate(axes):
+            link(f"{limb}{k}", round(3.0 / (k + 1), 3))
+            direction = " ".join(str(int(axis == c)) for c in "xyz")
+            parts.append(
+                f'<joint name="{limb}j{k}" type="revolute"><parent link="{parent}"/><child link="{limb}{k}"/>'
+                f'<origin xyz="{xyz}"/><axis xyz="{direction}"/>'
+                '<limit lower="-2" upper="2" effort="99" velocity="9"/></joint>'
+            )
+            parent, xyz = f"{limb}{k}", step
+    return "\n".join([*parts, "</robot>"])
+
+
+def module_of(robot, base="moving"):
+    return symgen.model(robot, base=base)
 
 
 def standard(module):
     return dict.fromkeys(module.STANDARD_PARAMETERS, 0.0) | dict(module.VALUES)
 
 
+def links_alone(module):
+    """Standard parameters without those of friction and rotors, which pinocchio's recursion lacks."""
+    return {name: x * (name not in module.ELEMENTS) for name, x in standard(module).items()}
+
+
+@pytest.mark.parametrize("base", ["moving", "free"])
 @pytest.mark.parametrize("text", [ur5(), FREE_PANDA, random_tree(3)], ids=["ur5", "panda", "tree"])
-def test_torques_are_those_of_pinocchio_with_a_free_flyer(text):
+def test_torques_are_those_of_pinocchio_with_a_free_flyer(text, base):
     robot, notes = read_tree(text.encode(), "arm.urdf", exact=True)
-    module = module_of(robot)
+    module = module_of(robot, base)
+    X = module.base_parameters(links_alone(module))
     names = dict(re.findall(r"q(\d+) = '([^']*)'", notes[0]))
-    inertial = inertial_names(robot)  # pinocchio's recursion has no friction
-    chi = {name: x * (name in inertial) for name, x in standard(module).items()}
-    X = module.base_parameters(chi)
-    base, q, qd, qdd, expected, _ = free_flyer(text, [names[str(j)] for j in module.JOINTS], 20)
+    joints = [names[str(j)] for j in module.JOINTS]
+    of_base, q, qd, qdd, expected, _ = free_flyer(text, joints, 20, wrench=base == "free")
+    found = module.inverse_dynamics(of_base, q, qd, qdd, X)
+    assert np.abs(found - expected).max() < TOLERANCE * np.abs(expected).max()
+    assert found.shape[1] == len(module.JOINTS) + 6 * (base == "free")
+
+
+def test_a_humanoid_and_its_accelerations():
+    """24 joints: torques of a free base from its accelerations, and its accelerations from torques."""
+    text = humanoid()
+    robot, notes = read_tree(text.encode(), "humanoid.urdf", exact=True)
+    module = module_of(robot, "free")
+    assert len(module.JOINTS) == 24
+    names = dict(re.findall(r"q(\d+) = '([^']*)'", notes[0]))
+    joints = [names[str(j)] for j in module.JOINTS]
+    base, q, qd, qdd, expected, _ = free_flyer(text, joints, 20, wrench=True)
+    X = module.base_parameters(links_alone(module))
     found = module.inverse_dynamics(base, q, qd, qdd, X)
     assert np.abs(found - expected).max() < TOLERANCE * np.abs(expected).max()
+    direct = module.forward_dynamics(base, q, qd, found, X)
+    np.testing.assert_allclose(direct, np.hstack([base[:, 3:], qdd]), atol=1e-9)
+    other = base * (np.arange(9) < 3)  # of the base, only w0 is read
+    np.testing.assert_allclose(module.forward_dynamics(other, q, qd, found, X), direct, atol=1e-9)
+    A = module.inertia_matrix(q, X)
+    assert A.shape == (20, 30, 30)
+    accelerations = np.hstack([base[:, 6:], base[:, 3:6], qdd])
+    still = np.hstack([base[:, :3], np.zeros((20, 6))])
+    rest = module.inverse_dynamics(still, q, qd, 0 * qdd, X)
+    np.testing.assert_allclose((A @ accelerations[..., None])[..., 0] + rest, found, atol=1e-9)
+    falling = module.forward_dynamics(0 * base, 0 * q, 0 * qd, 0 * found, X)
+    np.testing.assert_allclose(falling, 0, atol=1e-9)  # no weight where nothing holds it
 
 
-def test_torques_of_legs_are_those_of_mujoco():
-    """A freejoint is read as a base that moves; the inverse dynamics of MuJoCo, constraints off."""
+@pytest.mark.parametrize("base", ["moving", "free"])
+def test_torques_of_legs_are_those_of_mujoco(base):
+    """A freejoint is read as a free base; the inverse dynamics of MuJoCo, constraints off."""
     robot, notes = read_tree(QUADRUPED.encode(), "legs.xml")
-    assert robot.base == "moving"
-    assert any("free joint 'fly': read as base: moving" in note for note in notes)
-    module = symgen.model(robot)
+    assert robot.base == "free"
+    assert any("free joint 'fly': read as base: free" in note for note in notes)
+    module = module_of(robot, base)
     compiled = mujoco.MjModel.from_xml_string(QUADRUPED)
     compiled.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     data, rng = mujoco.MjData(compiled), np.random.default_rng(1)
@@ -97,10 +166,12 @@ def test_torques_of_legs_are_those_of_mujoco():
         mujoco.mj_inverse(compiled, data)
         R = np.empty(9)
         mujoco.mju_quat2Mat(R, data.qpos[3:7])
-        a0 = R.reshape(3, 3).T @ (data.qacc[:3] - compiled.opt.gravity)
-        base = np.concatenate([data.qvel[3:6], data.qacc[3:6], a0])
-        found = module.inverse_dynamics(base, data.qpos[7:], data.qvel[6:], data.qacc[6:], X)
-        expected = data.qfrc_inverse[6:]
+        R = R.reshape(3, 3)
+        a0 = R.T @ (data.qacc[:3] - compiled.opt.gravity)
+        motion = np.concatenate([data.qvel[3:6], data.qacc[3:6], a0])
+        found = module.inverse_dynamics(motion, data.qpos[7:], data.qvel[6:], data.qacc[6:], X)
+        forces = data.qfrc_inverse  # of a freejoint: the force in the world, the moment in the body
+        expected = np.concatenate([R.T @ forces[:3], forces[3:]])[-len(found) :]
         assert np.abs(found - expected).max() < TOLERANCE * np.abs(expected).max()
 
 
@@ -120,22 +191,39 @@ def test_at_rest_it_is_the_fixed_robot():
     assert (module.gravity(turning, q, X) == module.gravity(base, q, X)).all()
 
 
+@pytest.mark.parametrize("base", ["moving", "free"])
 @pytest.mark.parametrize("make", NAMED, ids=lambda make: make.__name__)
-def test_the_count_is_the_rank_of_the_joint_rows_of_a_free_flyer(make):
-    """By SVD of pinocchio's regressor: inertial parameters, joint rows of random free-flyer states."""
+def test_the_count_is_the_rank_of_a_free_flyer(make, base):
+    """By SVD of pinocchio's regressor: inertial parameters, rows of random free-flyer states."""
     text = FREE_PANDA if make is panda else make()
-    robot = replace(read_tree(text.encode(), "arm.urdf")[0], base="moving", elements=(), values={})
+    robot = replace(read_tree(text.encode(), "arm.urdf")[0], base=base, elements=(), values={})
+    assert len(regroup(robot)) == rank_of_pinocchio(text, base)
+
+
+def rank_of_pinocchio(text, base):
     model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
-    assert len(robot.joints) == model.nv - 6
     data, rng, rows = model.createData(), np.random.default_rng(0), []
     for _ in range(40):
         Q = pin.randomConfiguration(model, -3 * np.ones(model.nq), 3 * np.ones(model.nq))
         v, a = rng.normal(size=(2, model.nv))
-        rows.append(pin.computeJointTorqueRegressor(model, data, Q, v, a)[6:])
+        D = pin.computeJointTorqueRegressor(model, data, Q, v, a)
+        rows.append(D if base == "free" else D[6:])
     W = np.vstack(rows)
     W = W[:, np.linalg.norm(W, axis=0) > 0]
     s = np.linalg.svd(W / np.linalg.norm(W, axis=0), compute_uv=False)
-    assert len(regroup(robot)) == np.sum(s > 1e-9 * s[0])
+    return np.sum(s > 1e-9 * s[0])
+
+
+def test_a_free_base_adds_the_ten_parameters_of_its_link():
+    """Whatever the arm: link 0 alone under a base that shakes at will, 10 more than a moving base."""
+    for name in ("tx40", "scara", "sr400", "panda"):
+        moving, free = (regroup(load_robot(name, base=base)) for base in ("moving", "free"))
+        assert len(free) == len(moving) + 10
+        assert {*free.own} - {*moving.own} == {parameter(p, 0) for p in INERTIAL}
+    formulas = {b.name: str(b.formula) for b in regroup(load_robot("tx40", base="free")).base}
+    assert formulas["M0R"] == "M0 + M1 + M2 + M3 + M4 + M5 + M6"
+    assert formulas["XX0R"] == "XX0 + YY1"
+    assert formulas["MZ0R"] == "MZ0 + MZ1"
 
 
 def test_which_parameters_a_turning_base_reveals():
@@ -149,9 +237,18 @@ def test_which_parameters_a_turning_base_reveals():
     assert formulas["ZZ1R"] == "ZZ1 + YY2 + YY3 + D3**2*(M3 + M4 + M5 + M6)"
 
 
-@pytest.mark.parametrize("name", ["tx40", "sr400", "scara"])
-def test_the_certificate_holds_and_refuses_false_formulas(name):
-    regrouping = regroup(load_robot(name, base="moving"))
+@pytest.mark.parametrize(
+    ("name", "base"),
+    [
+        ("tx40", "moving"),
+        ("sr400", "moving"),
+        ("scara", "moving"),
+        ("tx40", "free"),
+        ("sr400", "free"),
+    ],
+)
+def test_the_certificate_holds_and_refuses_false_formulas(name, base):
+    regrouping = regroup(load_robot(name, base=base))
     found = certify(regrouping)
     assert found.valid
     assert found.primes
@@ -162,34 +259,37 @@ def test_the_certificate_holds_and_refuses_false_formulas(name):
     assert not certify_formulas(wrong).valid, dropped
 
 
-def test_faults_in_the_text_are_refused():
-    """A turned sign in any line of the motion from the base on."""
+@pytest.mark.parametrize("base", ["moving", "free"])
+def test_faults_in_the_text_are_refused(base):
+    """A turned sign in any line of the motion from the base on, or of the rows of a free base."""
     import random
 
-    regrouping = regroup(load_robot("planar_2r", base="moving"))
+    regrouping = regroup(load_robot("planar_2r", base=base))
     ((file, text),) = generate_files(regrouping.robot, regrouping=regrouping).items()
     witness, rng, lines = Witness(regrouping), random.Random(5), text.splitlines()
     assert text_check(file, text, "numpy", witness).valid
-    inner = ("_motion", "_gravity_block")
+    inner = ("_motion", "_gravity_block", "_inertia_matrix_block", "forward_dynamics")
     places = [(n, line) for f, n, line in code_lines(text, False) if f in inner]
     tried = 0
     for number, line in rng.sample(places, len(places)):
         code, mark, comment = line.partition("  #")
         new = turned_sign(code, rng) + mark + comment
-        if new == line or not re.search(r"\b(W|WP|VP)[123]0\b", code) or "unpack" in code:
+        of_base = re.search(r"\b(W|WP|VP|E|NE)[123]0\b|\b(D|GAM|A)\[", code)
+        if new == line or not of_base or "unpack" in code:
             continue
         tried += 1
         changed = [*lines[:number], new, *lines[number + 1 :]]
         assert not text_check(file, "\n".join(changed) + "\n", "numpy", witness).valid, new
-        if tried == 6:
+        if tried == 12:
             break
-    assert tried >= 4
+    assert tried == 12
 
 
-def test_a_claim_is_verified_by_a_script_that_shares_no_code(tmp_path):
+@pytest.mark.parametrize(("base", "rank"), [("moving", 22), ("free", 32)])
+def test_a_claim_is_verified_by_a_script_that_shares_no_code(tmp_path, base, rank):
     import json
 
-    regrouping = regroup(load_robot("planar_2r", base="moving"))
+    regrouping = regroup(load_robot("planar_2r", base=base))
     file = tmp_path / "claim.json"
     stated = claim(regrouping, certify_formulas(regrouping))
     script = HERE / "docs" / "examples" / "check_certificate.py"
@@ -199,7 +299,7 @@ def test_a_claim_is_verified_by_a_script_that_shares_no_code(tmp_path):
         run = subprocess.run([sys.executable, script, file], capture_output=True, text=True)
         return run.stdout
 
-    assert "verified: rank 22" in verdict()
+    assert f"verified: rank {rank}" in verdict()
     stated["base"] = "fixed"
     assert "refuted" in verdict()
 
@@ -215,29 +315,64 @@ def test_what_has_no_models_is_refused_in_one_sentence(monkeypatch):
         generate_files(robot, options=("coriolis",))
     with pytest.raises(SymgenError, match="kinetic_energy has no meaning"):
         symgen.symbolic(robot).model("kinetic_energy")
-    with pytest.raises(DescriptionError, match="base: free, with the six rows"):
-        load_robot("tx40", base="free")
-    with pytest.raises(DescriptionError, match="expected fixed or moving"):
+    free = load_robot("tx40", base="free")
+    with pytest.raises(
+        SymgenError, match="target c has no models of a robot with base: free; use numpy"
+    ):
+        generate_files(free, targets=("c",))
+    with pytest.raises(SymgenError, match="the direct model of tx40, whose base is free"):
+        symgen.symbolic(free).forward_dynamics()
+    with pytest.raises(DescriptionError, match="expected fixed, moving or free"):
         load_robot("tx40", base="flying")
     with pytest.raises(DescriptionError, match="closes through frame 0"):
-        load_robot("five_bar", base="moving")
+        load_robot("five_bar", base="free")
     module = module_of("planar_2r")
     with pytest.raises(ValueError, match=r"base of shape \(5, 8\); expected \(5, 9\)"):
         module.regressor(np.zeros((5, 8)), *np.zeros((3, 5, 2)))
+    module = module_of("planar_2r", "free")
+    X = np.zeros(len(module.BASE_PARAMETERS))
+    with pytest.raises(ValueError, match=r"tau of shape \(5, 2\); expected \(5, 8\)"):
+        module.forward_dynamics(np.zeros((5, 9)), *np.zeros((3, 5, 2)), X)
 
 
-def test_a_robot_file_keeps_its_base():
-    robot = load_robot("planar_2r", base="moving")
+@pytest.mark.parametrize("base", ["moving", "free"])
+def test_a_robot_file_keeps_its_base(base):
+    robot = load_robot("planar_2r", base=base)
     text = write_yaml(robot)
-    assert "base: moving" in text
-    assert parse_robot(text.encode(), "planar_2r.yaml").base == "moving"
+    assert f"base: {base}" in text
+    assert parse_robot(text.encode(), "planar_2r.yaml").base == base
     assert "base" not in write_yaml(load_robot("planar_2r"))
     named = text.replace("constants: {", "constants: {W10: 1.0, ")
     with pytest.raises(DescriptionError, match="W10 is an input of a robot whose base moves"):
         parse_robot(named.encode(), "planar_2r.yaml")
 
 
-def test_a_free_joint_of_a_urdf_below_all_others_is_a_base_that_moves():
+def test_the_parameters_of_link_0_are_those_of_the_file():
+    """A free base has them, whether a joint of the file or the option frees it; others have none."""
+    free, _ = read_tree(QUADRUPED.encode(), "legs.xml")
+    assert free.values["M0"] == 7
+    moving = on_base(free, "moving")
+    assert "M0" not in moving.values
+    assert on_base(moving, "free") == free
+    held, _ = read_tree(QUADRUPED.encode(), "legs.xml", part=TreePart({"fly": 0.0}))
+    assert not {*held.values} & {parameter(p, 0) for p in INERTIAL}
+    assert on_base(held, "free").values["M0"] == 7  # in the axes of the world, which hold it
+    text, notes = write_urdf(free)
+    assert any("base: free, which --base free gives" in note for note in notes)
+    again = on_base(read_tree(text.encode(), "legs.urdf")[0], "free")
+    for p in INERTIAL:
+        assert again.values[parameter(p, 0)] == pytest.approx(
+            free.values[parameter(p, 0)], abs=1e-12
+        )
+
+
+def test_a_page_names_the_rows_of_a_free_base():
+    text = robot_page(regroup(load_robot("planar_2r", base="free")))
+    assert "Γ<sub>NZ0</sub>" in text
+    assert "mass of link 0" in text
+
+
+def test_a_free_joint_of_a_urdf_below_all_others_is_a_free_base():
     """Only the joint that carries all others; held, it is the fixed robot."""
     text = ur5()
     root = re.search(r'<link name="([^"]+)"', text)[1]
@@ -247,7 +382,7 @@ def test_a_free_joint_of_a_urdf_below_all_others_is_a_base_that_moves():
     )
     flying = text.replace("</robot>", free)
     robot, _ = read_tree(flying.encode(), "arm.urdf")
-    assert robot.base == "moving"
+    assert robot.base == "free"
     assert robot.frames == read_tree(text.encode(), "arm.urdf")[0].frames
     held, _ = read_tree(flying.encode(), "arm.urdf", part=TreePart({"fly": 0.0}))
     assert held.base == "fixed"

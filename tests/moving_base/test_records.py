@@ -235,7 +235,7 @@ def test_a_study_names_the_columns_of_the_base(case, tmp_path: Path):
 
 @pytest.mark.parametrize("flying", [False, True])
 def test_identified_values_are_written_into_the_file(case, tmp_path: Path, flying):
-    """Into the URDF with --base moving, or into one whose root joint is floating: mass of the forearm."""
+    """With --base moving, into a URDF, and into one whose root joint is floating: mass of the forearm."""
     _, module, _, (t, q, tau, base, _) = case
     rng = np.random.default_rng(12)
     noisy = tau + 0.1 * rng.normal(size=tau.shape)
@@ -250,11 +250,11 @@ def test_identified_values_are_written_into_the_file(case, tmp_path: Path, flyin
         )
     file = tmp_path / "ur5.urdf"
     file.write_text(text, encoding="utf-8")
-    applied = symgen.apply(result, file, base=None if flying else "moving")
+    applied = symgen.apply(result, file, base="moving")
     new = tmp_path / "new.urdf"
     applied.write(new)
     before, after = (read_tree(f.read_bytes(), f.name)[0] for f in (file, new))
-    assert after.base == before.base == ("moving" if flying else "fixed")
+    assert after.base == before.base == ("free" if flying else "fixed")
     X = [
         module.base_parameters(dict.fromkeys(module.STANDARD_PARAMETERS, 0.0) | dict(r.values))
         for r in (before, after)

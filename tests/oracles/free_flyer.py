@@ -33,8 +33,13 @@ class FreeFlyer(NamedTuple):
     W: Array
 
 
-def free_flyer(text: str, joints: list[str], count: int, seed: int = 0) -> FreeFlyer:
-    """Draw states of the free-flyer of a URDF; `joints` are the names of the joints in order."""
+def free_flyer(
+    text: str, joints: list[str], count: int, seed: int = 0, *, wrench: bool = False
+) -> FreeFlyer:
+    """Draw states of the free-flyer of a URDF; `joints` are the names of the joints in order.
+
+    wrench : whether the force and the moment on the root are six rows before those of the joints.
+    """
     model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
     data, rng = model.createData(), np.random.default_rng(seed)
     moved = [model.joints[model.getJointId(name)] for name in joints]
@@ -53,7 +58,7 @@ def free_flyer(text: str, joints: list[str], count: int, seed: int = 0) -> FreeF
         # the spatial acceleration becomes that of the origin, minus gravity
         a0 = a[:3] + np.cross(v[3:6], v[:3]) - R.T @ model.gravity.linear
         base.append([*v[3:6], *a[3:6], *a0])
-        rows = [joint.idx_v for joint in moved]
+        rows = [*range(6 * wrench), *(joint.idx_v for joint in moved)]
         tau.append(pin.rnea(model, data, Q, v, a)[rows])
         W.append(pin.computeJointTorqueRegressor(model, data, Q, v, a)[rows])
     return FreeFlyer(np.array(base), q, qd, qdd, np.array(tau), np.array(W))
