@@ -53,7 +53,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from symgen.derive.assembly import inertia_of, newton
+from symgen.derive.assembly import newton
 from symgen.derive.loops import close
 from symgen.description.element import CHANNEL
 from symgen.description.expression import FUNCTIONS, Expression
@@ -167,7 +167,8 @@ class Lagrange:
     def __init__(self, robot: Robot, constants: Mapping[str, float] | None = None) -> None:
         self.robot, self.names = robot, robot.parameters
         self.constants = {**robot.constants, **(constants or {})}
-        self._functions, self._values = _functions(robot), np.array([*self.constants.values(), 1.0])
+        self._functions, self._moves = _functions(robot)
+        self._values = np.array([*self.constants.values(), 1.0])
         self._elements = {
             parameter(e.family, j): (e, *self._row_and_form(e, j))
             for e in robot.elements
@@ -195,7 +196,19 @@ class Lagrange:
 
     def slopes(self, q: Array) -> Array:
         """Return the derivatives d0Tj/dq_i of all poses, shape (..., n, frames, 4, 4)."""
-        return _matrices(self._floats("slopes", q))
+        dT = np.zeros((*np.shape(q)[:-1], np.shape(q)[-1], len(self.robot.frames), 4, 4))
+        dT[..., self._moves.joint, self._moves.frame, :, :] = self._moving(q)
+        return dT
+
+    def _moving(self, q: Array) -> Array:
+        """Return d0Tj/dq_i of the pairs of a joint i and a frame j that it moves, (..., pairs, 4, 4).
+
+        Other derivatives are zero: in a tree, a joint moves the frames of its own branches only.
+        """
+        values = self._floats("slopes", q)[..., 0]
+        stacked = np.zeros((*values.shape[:-1], 16 * len(self._moves.joint)))
+        stacked[..., self._moves.entry] = values
+        return np.swapaxes(stacked.reshape(*values.shape[:-1], -1, 4, 4), -1, -2)
 
     def regressor(self, q: Array, qd: Array, qdd: Array, base: Array | None = None) -> Array:
         """Return the standard regressor D of Gamma = D chi, shape (..., n, p).
@@ -204,27 +217,35 @@ class Lagrange:
 
         A free base has six rows more, before the joints: D has the shape (..., 6 + n, p).
         """
-        robot, dT = self.robot, self.slopes(q)
-        ddT = _matrices(self._floats("accelerations", q, qd, qdd))
-        first_frame = 1
+        robot, dT, (joint, frame, _) = self.robot, self._moving(q), self._moves
+        ddT = _matrices(self._floats("accelerations", q, qd, qdd))[..., 0, :, :, :]
+        links, rows = [f.j for f in robot.frames], np.shape(q)[-1]
         if base is None:
             ddT[..., :3, 3] -= [e.value(self.constants) for e in robot.gravity]
         else:
-            T, rate = self.poses(q), np.einsum("...ifab,...i->...fab", dT, qd)
-            ddT = ddT[..., 0, :, :, :]
+            T, rate = self.poses(q), np.zeros_like(ddT)
+            for i in range(rows):
+                own = joint == i
+                rate[..., frame[own], :, :] += dT[..., own, :, :] * qd[..., i, None, None, None]
             if robot.base_is_free:
-                first_frame, zero = 0, np.zeros((4, 4))
-                T = _with_link_0(T, np.eye(4))
-                rate, ddT, dT = (_with_link_0(x, zero) for x in (rate, ddT, dT))
-                dT = np.concatenate([SHIFTS_AND_TURNS @ T[..., None, :, :, :], dT], axis=-4)
-            ddT = (ddT + _carried(T, rate, base))[..., None, :, :, :]
-        products = np.swapaxes(dT, -1, -2) @ ddT
+                links, rows, zero = [0, *links], 6 + rows, np.zeros((4, 4))
+                T, rate, ddT = (
+                    _with_link_0(x, own) for x, own in ((T, np.eye(4)), (rate, zero), (ddT, zero))
+                )
+                of_base = SHIFTS_AND_TURNS @ T[..., None, :, :, :]
+                of_base = of_base.reshape(*T.shape[:-3], 6 * len(links), 4, 4)
+                dT = np.concatenate([of_base, dT], axis=-3)
+                joint = np.concatenate([np.repeat(np.arange(6), len(links)), 6 + joint])
+                frame = np.concatenate([np.tile(np.arange(len(links)), 6), 1 + frame])
+            ddT = ddT + _carried(T, rate, base)
+        products = np.swapaxes(dT, -1, -2) @ ddT[..., frame, :, :]
         by_link = products.reshape(*products.shape[:-2], 16) @ LINK.reshape(-1, 16).T
         column = {name: k for k, name in enumerate(self.names)}
-        D = np.zeros((*by_link.shape[:-2], len(self.names)))
-        for j in robot.links:
-            first = column[parameter(INERTIAL[0], j)]
-            D[..., first : first + len(INERTIAL)] = by_link[..., j - first_frame, :]
+        D = np.zeros((*by_link.shape[:-2], rows, len(self.names)))
+        first = np.array([column.get(parameter(INERTIAL[0], j), -1) for j in links])
+        has = first[frame] >= 0
+        columns = first[frame[has], None] + np.arange(len(INERTIAL))
+        D[..., joint[has, None], columns] = by_link[..., has, :]
         for name in self._elements:
             D[..., -q.shape[-1] :, column[name]] = self._element(name, q, qd, qdd)
         return D
@@ -266,11 +287,26 @@ class Lagrange:
         return np.asarray((self.regressor(q, qd, qdd) @ np.asarray(chi)[..., None])[..., 0])
 
     def inertia_matrix(self, q: Array, chi: Array) -> Array:
-        """Return the inertia matrix A = d2E/dqd2, shape (..., n, n), from joint torques.
+        """Return the inertia matrix A = d2E/dqd2, shape (..., n, n).
 
-        Column i is Gamma for qdd_i = 1 from rest, minus Gamma at rest.
+            A_ik = sum_j tr(dT_j/dq_i Sigma_j dT_j/dq_k')
+
+        and, for each element with a moment of inertia c, c B.
         """
-        return inertia_of(lambda qdd: self.torque(q, 0 * q, qdd, chi), q)
+        value, dT = dict(zip(self.names, chi, strict=True)), self._moving(q)
+        n = np.shape(q)[-1]
+        A = np.zeros((*np.shape(q), n))
+        for j in self.robot.links:
+            pairs = np.flatnonzero(self._moves.frame == j - 1)
+            own = np.array([value[parameter(name, j)] for name in INERTIAL])
+            left = dT[..., pairs, :, :] @ np.tensordot(own, LINK, 1)
+            left, right = (x.reshape(*x.shape[:-2], 16) for x in (left, dT[..., pairs, :, :]))
+            i = self._moves.joint[pairs]
+            A[..., i[:, None], i] += left @ np.swapaxes(right, -1, -2)
+        for name, (e, _, B) in self._elements.items():
+            if e.kind == "inertia":
+                A += value[name] * B
+        return A
 
     def jacobian(self, q: Array, frame: int | None = None) -> Array:
         """Return the Jacobian of a frame (default: the last) in frame 0, shape (..., 6, n).
@@ -454,15 +490,39 @@ def _axial(W: Array) -> Array:
     return np.stack([W[..., 2, 1], W[..., 0, 2], W[..., 1, 0]], axis=-1)
 
 
+class Moves(NamedTuple):
+    """The pairs of a joint i and a frame j that it moves: those in which dT_j/dq_i is not zero.
+
+    Attributes
+    ----------
+    joint, frame : ndarray, shape (pairs,)
+        Index of the joint in `robot.moving`, and of the frame in `robot.frames`.
+    entry : ndarray
+        Where the derivatives that CasADi computes stand in a table (pairs, 16) of columns.
+    """
+
+    joint: Array
+    frame: Array
+    entry: Array
+
+
+def _moves(slopes: SX) -> Moves:
+    """Return the pairs of joint and frame whose derivatives in dt/dq are not structurally zero."""
+    row, joint = (np.array(x, dtype=int) for x in slopes.sparsity().get_triplet())
+    pairs, of = np.unique(joint * slopes.shape[0] + row // 16, return_inverse=True)
+    return Moves(pairs // slopes.shape[0], pairs % slopes.shape[0], of * 16 + row % 16)
+
+
 SHIFTS_AND_TURNS = _generators()
 
 
 @lru_cache(maxsize=8)
-def _functions(robot: Robot) -> dict[str, Any]:
+def _functions(robot: Robot) -> tuple[dict[str, Any], Moves]:
     """Return the CasADi functions of a robot by name, such as the poses and their derivatives.
 
     Their arguments are q, qd, qdd of all moving joints, as far as needed, then the constants with
-    one more number at the end.
+    one more number at the end. Of the derivatives of the poses, only those that are not zero are
+    computed; `Moves` tells their places.
     """
     n, symbols = len(robot.moving), ca.SX.sym("c", len(robot.constants) + 1)
     constants = dict(zip(robot.constants, ca.vertsplit(symbols), strict=False))
@@ -472,9 +532,10 @@ def _functions(robot: Robot) -> dict[str, Any]:
     rate = ca.jtimes(t, q, qd)
     phi = _closure(robot, q, constants)
     actuated, start = _start(robot, q, constants)
+    slopes = ca.jacobian(t, q)
     outputs = {
         "poses": ([q], t),
-        "slopes": ([q], ca.jacobian(t, q)),
+        "slopes": ([q], slopes.nz[:]),
         "accelerations": (
             [q, qd, qdd],
             ca.jtimes(rate, ca.vertcat(q, qd), ca.vertcat(qd, qdd)),
@@ -488,10 +549,11 @@ def _functions(robot: Robot) -> dict[str, Any]:
         for j in e.along:
             name, (torque, U) = parameter(e.family, j), _law(robot, e, j, q, qd, constants)
             outputs |= {name: ([q, qd], torque), f"U_{name}": ([q], U)}
-    return {
+    functions = {
         name: ca.Function(name, [*inputs, symbols], [ca.densify(value)])
         for name, (inputs, value) in outputs.items()
     }
+    return functions, _moves(slopes)
 
 
 def _closure(robot: Robot, q: SX, constants: Mapping[str, SX]) -> SX:

@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from symgen.derive.assembly import inertia_of
 from symgen.derive.exact import Array
 from symgen.derive.loops import close
 from symgen.derive.models import EMITTED, MODELS, ON_REQUEST
@@ -132,17 +131,19 @@ class Witness:
         )
 
     def inertia(self) -> Array:
-        """Compute the inertia matrix A from torques, shape (N, n, n), or (N, 6 + n, 6 + n).
+        """Compute the inertia matrix A from the energy, shape (N, n, n), or (N, 6 + n, 6 + n).
 
-        A free base has rows of force and moment, and columns of a unit of a0 and of wd0.
+        A free base has rows of force and moment, and columns of a unit of a0 and of wd0: torques.
         """
-        A = inertia_of(lambda qdd: self.torque(self.q, 0 * self.q, qdd), self.q)
+        A = self.G.swapaxes(1, 2) @ self.model.inertia_matrix(self.x, self.chi) @ self.G
         if not self.robot.base_is_free:
-            return A
+            return np.asarray(A)
         units = (np.tile(row, (len(self.q), 1)) for row in np.eye(9)[[6, 7, 8, 3, 4, 5]])
         links = self.chi * ~of_elements(self.robot, lambda e: True)
         D = [self.model.actuated_regressor(self.q, 0 * self.q, 0 * self.q, u) for u in units]
-        return np.concatenate([np.stack([x @ links for x in D], -1), A], -1)
+        of_base = np.stack([x @ links for x in D], axis=-1)
+        beside = of_base[:, 6:].swapaxes(1, 2)
+        return np.concatenate([of_base, np.concatenate([beside, A], axis=1)], axis=2)
 
     @property
     def X(self) -> Array:

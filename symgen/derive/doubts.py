@@ -1,6 +1,6 @@
 """Warnings about values of a robot that are valid but probably wrong, such as lengths in mm.
 
-Further examples: angles very near to a round one, equal sides of a loop with two names, a start at
+Further examples: inertias in g mm^2, angles very near to a round one, equal sides of a loop with two names, a start at
 which a loop does not close, angles in degrees.
 """
 
@@ -11,6 +11,7 @@ from fractions import Fraction
 from itertools import combinations
 
 from symgen.derive.loops import close
+from symgen.description.cad import from_cad
 from symgen.description.expression import PI, twelfths
 from symgen.description.robot import REVOLUTE, Robot
 
@@ -30,6 +31,7 @@ def doubts(robot: Robot) -> list[str]:
     return [
         *nearly_round(robot),
         *other_units(robot),
+        *from_cad(robot),
         *equal_sides(robot),
         *far_starts(robot),
     ]

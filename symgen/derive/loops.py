@@ -343,14 +343,21 @@ def _coincide(closure: Closure) -> bool:
 
 def _wrong_mobility(robot: Robot, freedoms: int, left: int) -> DescriptionError:
     expected = len(robot.joints)
+    joints = [robot.labels.get(j, j) for j in robot.joints]
+    foreign = robot.file and not robot.file.endswith((".yaml", ".yml"))  # mu follows from motors
+    fewer, more = (
+        ("name fewer joints with motors", "name more joints with motors")
+        if foreign
+        else ("set mu: 0 for each joint without a motor", "set mu: 1 for more joints")
+    )
     what = (
-        "over-constrained or has too many actuators; set mu: 0 for each joint without a motor"
+        f"over-constrained or has too many actuators; {fewer}"
         if freedoms < expected
-        else "under-constrained; set mu: 1 for more joints, or add relations under constraints"
+        else f"under-constrained; {more}, or add relations under constraints"
     )
     held = f"; if these joints are fixed, {left} degrees of freedom remain" if left else ""
     return DescriptionError(
-        f"mobility is {freedoms}, but {expected} joints are actuated ({list(robot.joints)}){held}; "
+        f"mobility is {freedoms}, but {expected} joints are actuated ({joints}){held}; "
         f"the mechanism is {what}",
         path=("loops",),
         file=robot.file or None,

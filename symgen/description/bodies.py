@@ -15,6 +15,7 @@ from symgen.description.tree import Array, inertial_of
 
 MOMENTS = ("xx", "yy", "zz")
 ROUNDING = 1e-6  # of moments that a file rounds
+CLEARLY = 0.01  # of the largest moment: more than a file rounds
 ROUNDED = 1e-15  # kg m^2: smaller moments are zero
 
 
@@ -31,17 +32,57 @@ def no_body(M: float, tensor: Array, names: Sequence[str] = MOMENTS) -> str:
     small, middle, large = np.linalg.eigvalsh(tensor)
     if small >= -ROUNDING * abs(large) and large <= (1 + ROUNDING) * (small + middle):
         return ""
-    wrong = "no body has this inertia about its centre of mass: "
+    wrong = f"no body has this inertia about its centre of mass: {_excess(tensor, names)}"
+    others = _other_products(tensor)
+    return f"{wrong}; a body has it {others}" if others else wrong
+
+
+def _excess(tensor: Array, names: Sequence[str]) -> str:
+    """Write the inequality of moments that a tensor violates."""
     moments = dict(zip(names, np.diag(tensor), strict=True))
     for name, moment in moments.items():
         if moment < 0:
-            return f"{wrong}{name} {moment:.4g} below zero"
+            return f"{name} {moment:.4g} below zero"
     for name, moment in moments.items():
         others = [other for other in names if other != name]
         rest = sum(moments[other] for other in others)
         if moment > (1 + ROUNDING) * rest:
-            return f"{wrong}{name} {moment:g} > {' + '.join(others)} {rest:g}"
-    return f"{wrong}principal moments {small:.3g}, {middle:.3g}, {large:.3g}"
+            return f"{name} {moment:g} > {' + '.join(others)} {rest:g}"
+    small, middle, large = np.linalg.eigvalsh(tensor)
+    return f"principal moments {small:.3g}, {middle:.3g}, {large:.3g}"
+
+
+def _other_products(tensor: Array) -> str:
+    """Say which other products make a body of a tensor that no body has; "" if none clearly does.
+
+    CAD writes products with the other sign (SolidWorks: positive), or six numbers in another order.
+    """
+    xx, yy, zz = np.diag(tensor)
+    xy, xz, yz = tensor[0, 1], tensor[0, 2], tensor[1, 2]
+    if _violation(tensor) < CLEARLY:
+        return ""
+    others = {
+        "with products of the other sign": (xx, yy, zz, -xy, -xz, -yz),
+        "with the six numbers in the order xx, yy, zz, xy, xz, yz": (xx, xy, xz, yy, yz, zz),
+        "with the six numbers in the order xx, yy, zz, xy, yz, xz": (xx, xy, xz, yy, zz, yz),
+    } | {
+        f"with {a} and {b} exchanged": (xx, yy, zz, *products)
+        for a, b, products in (
+            ("xy", "xz", (xz, xy, yz)),
+            ("xy", "yz", (yz, xz, xy)),
+            ("xz", "yz", (xy, yz, xz)),
+        )
+    }
+    for words, (a, b, c, d, e, f) in others.items():
+        if _violation(np.array([[a, d, e], [d, b, f], [e, f, c]])) <= 0:
+            return words
+    return ""
+
+
+def _violation(tensor: Array) -> float:
+    """Compute how far a tensor is from that of a body, of its largest moment; 0 or less: it is one."""
+    small, middle, large = np.linalg.eigvalsh(tensor)
+    return float(max(-small, large - small - middle) / max(abs(large), abs(small), 1e-300))
 
 
 def impossible_links(robot: Robot) -> tuple[tuple[int, str], ...]:
@@ -70,7 +111,9 @@ def _impossible(given: Sequence[float | None]) -> str:
     if given[9] is not None and M == 0 and MS.any():
         return "mass 0 with first moments"
     if None not in given:
-        return no_body(M, _centred(ten))
+        wrong, tensor = no_body(M, _centred(ten)), _tensor(ten[:6])
+        about_centre = bool(wrong and MS.any() and tensor.any() and not no_body(M, tensor))
+        return wrong + "; about the centre of mass, a body has these moments" * about_centre
     if M < 0:
         return no_body(M, np.zeros((3, 3)))
     squares = MS**2 / M if M else np.zeros(3)
@@ -80,6 +123,13 @@ def _impossible(given: Sequence[float | None]) -> str:
         if own is not None and moment - rest < -ROUNDING * max(abs(moment), ROUNDED):
             return f"no body has this inertia about its centre of mass: {name} {moment - rest:.4g} below zero"
     return ""
+
+
+def _tensor(J: Array) -> Array:
+    """Arrange XX XY XZ YY YZ ZZ as a tensor, shape (3, 3)."""
+    I = np.zeros((3, 3))
+    I[np.triu_indices(3)] = J
+    return I + np.triu(I, 1).T
 
 
 def _centred(ten: Array) -> Array:

@@ -72,7 +72,7 @@ def corrected(robot: str | Path | Robot, study: Any) -> Robot:
     except DescriptionError as error:
         message = f"the section `robot` of the study: {error.message}"
         raise DescriptionError(message, path=error.path, file=robot.file) from error
-    return replace(new, angles=robot.angles, impossible=robot.impossible)
+    return replace(new, angles=robot.angles, impossible=robot.impossible, bodies=robot.bodies)
 
 
 def _correct_frames(frames: dict[Any, Any], entries: Mapping[Any, Mapping[str, Any]]) -> None:

@@ -27,7 +27,7 @@ import math
 import re
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import isfinite
 from typing import Any
 from xml.etree import ElementTree
@@ -47,8 +47,10 @@ from symgen.description.tree import (
     Inertial,
     Joint,
     Tree,
+    TreeLoop,
     rotation,
 )
+from symgen.description.tree_loops import link_poses
 from symgen.description.xml_text import LARGEST, XmlElement, read_elements
 from symgen.errors import DescriptionError
 
@@ -58,13 +60,13 @@ INCLUDE = re.compile(rb"""<include\s(?:[^<>"']|"[^"<]*"|'[^'<]*')*?(?:/>|>\s*</i
 MULTIPLIED = (
     "replicate", "composite", "flexcomp", "flex", "attach", "include", "plugin", "extension",
 )  # fmt: skip
-SECTIONS = ("compiler", "option", "default", "worldbody", "equality", "tendon")
+SECTIONS = ("compiler", "option", "default", "worldbody", "equality", "tendon", "actuator")
 IGNORED = (
-    "actuator", "asset", "contact", "custom", "deformable", "keyframe", "sensor", "size",
+    "asset", "contact", "custom", "deformable", "keyframe", "sensor", "size",
     "statistic", "visual",
 )  # fmt: skip
 DRAWN = ("light", "camera")  # of bodies, without effect on the mechanism
-RELATIONS = ("joint", "tendon")
+RELATIONS = ("joint", "tendon", "connect", "weld")
 FLUID = ("density", "viscosity", "wind")
 FORCES = ("constraint", "equality", "frictionloss", "passive", "spring", "damper")  # flags
 TEXTS = re.compile(r"\w*(name|class|joint\d?|tendon\d?|body\d?|model|mesh|material|file)\w*")
@@ -209,8 +211,7 @@ def _refuse(root: XmlElement) -> None:
         if e.tag not in RELATIONS and e.attrib.get("active") != "false":
             name = e.attrib.get("name", "")
             raise DescriptionError(
-                f"<{e.tag[:30]}> {name[:40]!r} in <equality>: only joint and tendon relations are supported, not closed loops and ties between bodies; "
-                "describe the loop by cut and twin in a robot file",
+                f"<{e.tag[:30]}> {name[:40]!r} in <equality>: only {', '.join(RELATIONS)} are read",
                 line=e.line,
             )
 
@@ -235,7 +236,7 @@ def _take_out(holder: XmlElement) -> None:
 def _is_left_out(holder: XmlElement, e: XmlElement) -> bool:
     match holder.tag:
         case "mujoco":
-            return e.tag in IGNORED
+            return e.tag in IGNORED or e.tag == "actuator"
         case "equality":
             return e.attrib.get("active") == "false"
         case "tendon":
@@ -327,7 +328,8 @@ def _no_mesh(geom: Any) -> bool:
 # --- from the compiled model to a tree ---
 
 FREE_JOINT, BALL, SLIDE_JOINT, HINGE = range(4)  # mjtJoint
-JOINT_RELATION = 2  # mjtEq; the others left in the text are relations of tendons
+CONNECT, WELD, JOINT_RELATION, _ = range(4)  # mjtEq; the last are relations of tendons
+SITE = 6  # mjtObj
 
 
 def parse_mjcf(content: bytes, file: str, *, exact: bool = False, sites: bool = False) -> Tree:
@@ -369,8 +371,14 @@ def parse_mjcf(content: bytes, file: str, *, exact: bool = False, sites: bool = 
             growing.joints.append(_fixed(name, link, pose @ own))
     gx, gy, gz = (0.0 if mjcf.weightless else float(x) + 0.0 for x in model.opt.gravity)
     relations, joints = _relations(growing), tuple(growing.joints)
+    start = {
+        name: float(model.qpos0[int(model.jnt_qposadr[k])])
+        for k, name in enumerate(growing.names)
+        if int(model.jnt_type[k]) in (SLIDE_JOINT, HINGE)
+    }
+    rounded = bool(angles.near) and not exact
     text, snapped = angles.report(file)
-    return Tree(
+    tree = Tree(
         mjcf.name,
         growing.links,
         joints,
@@ -383,7 +391,11 @@ def parse_mjcf(content: bytes, file: str, *, exact: bool = False, sites: bool = 
         text,
         mjcf.not_read,
         of_links,
+        driven=mjcf.driven,
+        start=start,
+        motor_line='<actuator><motor joint="{}"/></actuator>',
     )
+    return replace(tree, loops=_loops(growing, tree, rounded))
 
 
 @dataclass
@@ -488,10 +500,11 @@ def _body(growing: _Growing, b: int) -> None:
         growing.bare |= {child} if child != name else set()
         link = child
     M, inertia = float(model.body_mass[b]), np.diag(model.body_inertia[b])
-    has = M > 0 or inertia.any()
-    growing.links[name] = (
-        Inertial(M, pose @ _pose(model.body_ipos[b], model.body_iquat[b]), inertia) if has else None
-    )
+    if M > 0 or inertia.any():
+        own = pose @ _pose(model.body_ipos[b], model.body_iquat[b])
+        growing.links[name] = Inertial(M, own, inertia, what)
+    else:
+        growing.links[name] = None
     growing.place[b] = (link, pose)
 
 
@@ -591,6 +604,8 @@ def _relations(growing: _Growing) -> dict[str, Expression]:
     model, names = growing.mjcf.model, growing.names
     relations: dict[str, Expression] = {}
     for e in range(model.neq):
+        if int(model.eq_type[e]) in (CONNECT, WELD):
+            continue
         line = growing.mjcf.relations[e]
         equation = _equation(model, names, e, line).substitute(relations)
         free = [name for name in names if name in equation.atoms - growing.mjcf.driven]
@@ -643,3 +658,50 @@ def _deflection(model: Any, names: list[str], kind: int, k: int) -> Expression:
         _deflection(model, names, JOINT_RELATION, i) * c for i, c in coefficients.items()
     )
     return sum(deflections, start=ZERO)
+
+
+# --- loops ---
+
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+ROUNDED = 1e-3, 1e-9  # m, rad: poses differ by no more if angles were rounded, and otherwise
+
+
+def _loops(growing: _Growing, tree: Tree, rounded: bool) -> tuple[TreeLoop, ...]:
+    """Convert each <connect> and <weld> of an MJCF model to a loop of the tree.
+
+    MuJoCo takes what the file leaves out from the pose at ref: the point of a <connect> in its
+    second body, and the pose of a <weld>. This pose of the tree, whose angles may be rounded, is
+    used in both cases.
+    """
+    model, pose = growing.mjcf.model, link_poses(tree, tree.start)
+    names = {model.equality(e).name for e in range(model.neq)}
+    loops: list[TreeLoop] = []
+    for e in range(model.neq):
+        kind, data = int(model.eq_type[e]), np.array(model.eq_data[e])
+        if kind not in (CONNECT, WELD):
+            continue
+        name = model.equality(e).name or f"loop{e}"
+        while not model.equality(e).name and name in names:
+            name += "_"
+        ends = [int(model.eq_obj1id[e]), int(model.eq_obj2id[e])]
+        if int(model.eq_objtype[e]) == SITE:
+            links, frames = [], []
+            for site in ends:
+                link, X = growing.place[int(model.site_bodyid[site])]
+                turned = model.site_quat[site] if kind == WELD else UPRIGHT
+                links.append(link)
+                frames.append(X @ _pose(model.site_pos[site], turned))
+            (first, second), (P, Q) = links, frames
+        else:
+            (first, X), (second, Y) = (growing.place[b] for b in ends)
+            if kind == CONNECT:
+                P = X @ _pose(data[:3], UPRIGHT)
+                Q = np.linalg.inv(pose[second]) @ pose[first] @ P
+            else:
+                P, Q = X @ _pose(data[3:6], data[6:10]), Y @ _pose(data[:3], UPRIGHT)
+                at_ref = np.linalg.inv(pose[first]) @ pose[second] @ Q
+                P = at_ref if np.abs(P - at_ref).max() < ROUNDED[not rounded] else P
+        kinds = {CONNECT: "spherical", WELD: FIXED_TYPE}
+        line = growing.mjcf.relations[e]
+        loops.append(TreeLoop(name, kinds[kind], (first, second), (P, Q), line))
+    return tuple(loops)

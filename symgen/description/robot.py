@@ -226,6 +226,8 @@ class Robot:
     angles: Annotated[str, *UNWRITTEN] = ""  # how those of a foreign file were read
     # of links whose inertia no body can have: the frame, and what is wrong
     impossible: Annotated[tuple[tuple[int, str], ...], *UNWRITTEN] = ()
+    # of the links of a foreign file: frame, name, M, centre from the origin of the link, tensor about it
+    bodies: Annotated[tuple[tuple[int, str, float, Any, Any], ...], *UNWRITTEN] = ()
     # parts of a foreign file that change the torques and are not in the equations
     not_read: Annotated[tuple[str, ...], *UNWRITTEN] = ()
     # of a foreign file, on which a load is mounted: name, link, pose in its frame (`mounts`)

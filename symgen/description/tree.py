@@ -40,14 +40,16 @@ class Inertial:
         Frame at the centre of mass, in the link frame.
     I : ndarray, shape (3, 3), kg m^2
         Tensor elements about the centre of mass, in that frame.
+    name : str
+        Name of the link in the file, with its line.
     wrong : str
-        Name of the link in the file, and the reason why no body has this inertia; "" if a body can
-        have this inertia.
+        The reason why no body has this inertia; "" if a body can have it.
     """
 
     M: float
     pose: Array
     I: Array
+    name: str = ""
     wrong: str = ""
 
 
@@ -119,6 +121,35 @@ class Joint:
 
 
 @dataclass(frozen=True)
+class TreeLoop:
+    """A closed loop: a frame of one link coincides with a frame of another link.
+
+    Attributes
+    ----------
+    name : str
+        Name in the file.
+    kind : str
+        The motion that the loop leaves free: revolute (about z), prismatic (along z), spherical
+        (any rotation), or fixed (none).
+    links : two str
+        Names of both links.
+    poses : two ndarrays, shape (4, 4)
+        The frame in each link.
+    line : int
+        Line of the file, 0 if it is in no line.
+    joint : Joint or None
+        A joint of the file that is cut here; None if the file has only the loop.
+    """
+
+    name: str
+    kind: str
+    links: tuple[str, str]
+    poses: tuple[Array, Array]
+    line: int = 0
+    joint: Joint | None = None
+
+
+@dataclass(frozen=True)
 class Tree:
     """The links and joints of a robot, in the order of the file.
 
@@ -150,6 +181,16 @@ class Tree:
         How angles near multiples of pi/12 were read.
     sites : mapping
         For an MJCF: the link of each site, and the pose (4, 4) of the site in the frame of this link.
+    loops : tuple of TreeLoop
+        Closed loops. Joints around them are passive unless they are in `driven`.
+    driven : frozenset of str
+        Names of the joints that a motor drives, as far as the file says so.
+    start : mapping, rad or m
+        Joint positions, by name, near which the loops are closed; 0 for others.
+    motor_line : str
+        What to write for a motor at joint {}, if the file does not say it.
+    floats : bool
+        Whether the root is a base that moves.
     """
 
     name: str
@@ -164,6 +205,11 @@ class Tree:
     angles: str = ""
     not_read: tuple[str, ...] = ()
     sites: Mapping[str, tuple[str, Array]] = field(default_factory=dict)
+    loops: tuple[TreeLoop, ...] = ()
+    driven: frozenset[str] = frozenset()
+    start: Mapping[str, float] = field(default_factory=dict)
+    motor_line: str = ""
+    floats: bool = False
 
 
 def turn(axis: int, angle: float) -> Array:
@@ -305,7 +351,7 @@ def _hold(tree: Tree, positions: Mapping[str, float]) -> Tree:
     }
     fixed = {**positions, **{name: float(e) for name, e in relations.items() if not e.atoms}}
     joints = tuple(
-        replace(j, kind=FIXED_TYPE, pose=j.pose @ _motion(j, fixed[j.name]), limits={})
+        replace(j, kind=FIXED_TYPE, pose=j.pose @ motion(j, fixed[j.name]), limits={})
         if j.name in fixed
         else j
         for j in tree.joints
@@ -314,7 +360,7 @@ def _hold(tree: Tree, positions: Mapping[str, float]) -> Tree:
     return replace(tree, joints=joints, relations=following)
 
 
-def _motion(joint: Joint, q: float) -> Array:
+def motion(joint: Joint, q: float) -> Array:
     """Compute the displacement, shape (4, 4), of a joint at position q, along or about its axis.
 
     About an axis a, the rotation is

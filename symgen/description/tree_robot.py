@@ -47,6 +47,7 @@ from symgen.description.robot import (
     REVOLUTE,
     Element,
     Frame,
+    Loop,
     Robot,
     parameter,
 )
@@ -55,6 +56,7 @@ from symgen.description.tree import (
     FREE_TYPE,
     WHOLE_TREE,
     Array,
+    Inertial,
     Joint,
     Tree,
     TreePart,
@@ -62,11 +64,13 @@ from symgen.description.tree import (
     ten_of,
     transform,
 )
+from symgen.description.tree_loops import Cut, cut_open, passive_names, start_of
 from symgen.description.urdf import parse_urdf
 from symgen.errors import DescriptionError
 
 DIGITS = 13  # decimals kept of lengths (m) and angles (rad)
 SAME = 1e-12  # m, rad: closer is equal
+START_DIGITS = 9  # decimals of the positions near which a loop is closed
 # sine of the angle of two axes below which their common normal is too far away to compute with
 STEEP = 0.02
 
@@ -103,6 +107,10 @@ class Table:
         Joint, body, and link on a fixed joint, by frame number.
     notes : list of str
         Remarks on the table for the user.
+    cuts, loops : list
+        Closed loops, in the tree, and by the numbers of their frames.
+    passive : frozenset of str
+        Names of the joints around loops that no motor drives.
     """
 
     tree: Tree
@@ -112,15 +120,21 @@ class Table:
     bodies: dict[int, Body] = field(default_factory=dict)
     fixed_links: dict[int, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    cuts: tuple[Cut, ...] = ()
+    loops: list[Loop] = field(default_factory=list)
+    passive: frozenset[str] = frozenset()
 
 
 def placed(tree: Tree, *, keep_fixed: bool = False) -> Table:
     """Choose the frames of all bodies of a tree, from the root outward, and return the frame table.
 
-    A body comes before the bodies that are mounted on it, branch by branch. If `keep_fixed`, the
-    frames of links on fixed joints come last.
+    A body comes before the bodies that are mounted on it, branch by branch; loops are cut. The
+    twins of cut joints come last, and before them, if `keep_fixed`, the frames of links on fixed
+    joints. Raises DescriptionError, with the line, if loops or a base that moves make no robot.
     """
-    table = Table(tree)
+    tree, cuts = cut_open(tree)
+    tree = on_its_base(tree)
+    table = Table(tree, cuts=cuts, passive=passive_names(tree, cuts))
     table.bodies[0] = _body(tree, tree.root, np.eye(4))
     waiting = [(0, joint, parent) for joint, parent in reversed(table.bodies[0].joints)]
     while waiting:
@@ -130,20 +144,50 @@ def placed(tree: Tree, *, keep_fixed: bool = False) -> Table:
     if keep_fixed:
         for j, body in table.bodies.items():
             for name, pose in list(body.links.items())[1:]:
-                _keep(table, j, name, pose)
+                if name not in tree.bare:
+                    table.fixed_links[_keep(table, j, pose)[0]] = name
+    for cut in cuts:
+        _close(table, cut)
     return table
 
 
-def _keep(table: Table, ant: int, name: str, pose: Array) -> None:
-    """Append a fixed frame on frame `ant` for the link `name`, which has `pose` in frame `ant`."""
+def _close(table: Table, cut: Cut) -> None:
+    """Append the twin of a cut joint to the frame table, and the loop to its loops.
+
+    A cut joint that the file does not have is at 0 where the x axes of both frames agree.
+    """
+    number = {joint.name: j for j, joint in table.joint.items()}
+    holder = next((j for j, body in table.bodies.items() if cut.link in body.links), None)
+    if holder is None or cut.joint not in number:
+        raise DescriptionError(
+            f"loop {cut.loop.name!a:.60} is closed by link {cut.link!a:.60}, which the free base does "
+            "not carry; leave out the loop",
+            line=cut.loop.line or None,
+        )
+    j = number[cut.joint]
+    to_cut = np.linalg.inv(table.bodies[j].links[cut.child])
+    pose = table.bodies[holder].links[cut.link] @ cut.pose @ to_cut
+    free = cut.added == (cut.joint,) and table.frames[j - 1].sigma == REVOLUTE
+    twin, theta = _keep(table, holder, pose, free=free)
+    positions = start_of(table.tree, cut)
+    positions[cut.joint] -= theta if free else 0.0
+    start = {number[name]: round(x, START_DIGITS) + 0.0 for name, x in positions.items()}
+    table.loops.append(Loop(j, twin, start))
+
+
+def _keep(table: Table, ant: int, pose: Array, *, free: bool = False) -> tuple[int, float]:
+    """Append a fixed frame on frame `ant`, which has `pose` in frame `ant`; return its number.
+
+    If its x axis is `free`, theta is 0, and the angle that it would have is returned too.
+    """
     if _nearly_parallel(pose[:3, 2]):
         to_aside, ant = _row(table, ant, FIXED, _normal(np.array([1.0, 0.0, 0.0]), pose[:3, 3]))
         pose = np.linalg.inv(to_aside) @ pose
     before = _numbered(_normal(pose[:3, 2], pose[:3, 3]))
     rest = np.linalg.inv(transform((*before, 0.0, 0.0))) @ pose
     theta, r = _numbered((math.atan2(rest[1, 0], rest[0, 0]), rest[2, 3]))
-    _, j = _row(table, ant, FIXED, before, theta, r)
-    table.fixed_links[j] = name
+    _, j = _row(table, ant, FIXED, before, 0.0 if free else theta, r)
+    return j, theta
 
 
 def _body(tree: Tree, link: str, pose: Array) -> Body:
@@ -184,10 +228,14 @@ def _add(table: Table, ant: int, joint: Joint, parent: Array) -> int:
     before = _numbered(_normal(axis, point))
     body = _body(table.tree, joint.child, np.linalg.inv(transform((*before, 0.0, 0.0))) @ pose)
     theta = r = 0.0
-    if body.joints:
-        first, link = body.joints[0]
-        placed_joint = link @ first.pose
-        along = placed_joint[:3, :3] @ first.axis
+    ends = [(link @ held.pose, held.axis) for held, link in body.joints] + [
+        (body.links[cut.link] @ cut.pose, np.array([0.0, 0.0, 1.0]))
+        for cut in table.cuts
+        if cut.link in body.links
+    ]
+    if ends:
+        placed_joint, own_axis = ends[0]
+        along = placed_joint[:3, :3] @ own_axis
         if not _nearly_parallel(along):
             theta, r, _, _ = _normal(along, placed_joint[:3, 3])
             theta, r = _numbered((theta, r))
@@ -366,11 +414,10 @@ def robot_of_tree(
     The notes list which joint is which q, which link is which kept frame, and what was not read.
     Raises DescriptionError, with the line of the wrong joint, if the tree describes no robot.
     """
-    free = any(joint.kind == FREE_TYPE for joint in tree.joints)
-    tree = on_its_base(tree)
     table = placed(tree, keep_fixed=keep_fixed)
+    tree = table.tree
     try:
-        robot = _robot(table, file, sha256, base="free" if free else "fixed")
+        robot = _robot(table, file, sha256, base="free" if tree.floats else "fixed")
     except DescriptionError as error:
         key = str((*error.path, "", "")[1]).removeprefix("q")
         joint = table.joint.get(int(key)) if key.isdigit() and error.line is None else None
@@ -417,6 +464,7 @@ def on_its_base(tree: Tree) -> Tree:
         joints=tuple(joint for joint in tree.joints if joint.parent in inside),
         root=base.child,
         notes=(*tree.notes, note),
+        floats=True,
     )
 
 
@@ -426,13 +474,19 @@ def _legend(what: str, names: dict[str, str]) -> str:
 
 def _robot(table: Table, file: str, sha256: str, base: Literal["fixed", "free"]) -> Robot:
     constraints = _constraints(table)
-    actuated = [j for j in table.joint if j not in constraints]
+    actuated = [
+        j
+        for j, joint in table.joint.items()
+        if j not in constraints and joint.name not in table.passive
+    ]
     if not actuated:
         raise DescriptionError(
             "the file has no joint that moves; a robot needs at least one moving joint"
         )
     frames = tuple(Frame(**{**vars(f), "mu": int(f.j in actuated)}) for f in table.frames)
     values, massless = _values(table, actuated)
+    links = [(j, table.tree.links[name]) for j, body in table.bodies.items() for name in body.links]
+    bodies = [(j, own) for j, own in links if own is not None]
     of_base = _of_base(table) if values else {}
     gravity, constants = _gravity(table.tree.gravity)
     return Robot(
@@ -445,6 +499,7 @@ def _robot(table: Table, file: str, sha256: str, base: Literal["fixed", "free"])
             for family, kind, value in JOINT_TERMS
             if (keys := _keys(table, family, value, actuated))
         ),
+        loops=tuple(table.loops),
         constraints=constraints,
         massless=massless,
         limits=_limits(table, actuated),
@@ -453,17 +508,22 @@ def _robot(table: Table, file: str, sha256: str, base: Literal["fixed", "free"])
         labels=_labels(table),
         base=base,
         angles=table.tree.angles,
-        impossible=tuple(
-            (j, own.wrong)
-            for j, body in table.bodies.items()
-            for own in map(table.tree.links.__getitem__, body.links)
-            if own is not None and own.wrong
-        ),
+        impossible=tuple((j, f"{own.name}: {own.wrong}") for j, own in bodies if own.wrong),
+        bodies=tuple((j, *_about_centre(own)) for j, own in bodies),
         not_read=table.tree.not_read,
         mounts=_mounts(table),
         file=file,
         sha256=sha256,
     )
+
+
+def _about_centre(own: Inertial) -> tuple[str, float, tuple[float, ...], Any]:
+    """Return name, mass, centre of mass from the origin of the link, and tensor about this centre.
+
+    Both have the axes of the inertial frame of the link.
+    """
+    c = own.pose[:3, :3].T @ own.pose[:3, 3]
+    return own.name, own.M, tuple(map(float, c)), rows_of(own.I)
 
 
 def _mounts(table: Table) -> tuple[tuple[str, int, Any], ...]:

@@ -265,7 +265,7 @@ def _inertial(link: XmlElement, angles: Angles) -> Inertial | None:
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     wrong = no_body(M, tensor, ("ixx", "iyy", "izz"))
     name = f"link {link.word('name')!a:.60} (line {inertia.line})"
-    return Inertial(M, pose, tensor, f"{name}: {wrong}" if wrong else "")
+    return Inertial(M, pose, tensor, name, wrong)
 
 
 def _joint(e: XmlElement, angles: Angles) -> Joint:

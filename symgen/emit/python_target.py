@@ -27,6 +27,7 @@ from symgen.version import VERSION
 
 BLOCK = 4096  # samples
 MANY = 8  # values of a source that are named in one assignment, others beside them
+LARGE = 20  # joints above which CasADi factorizes the inertia matrix, in an order without fill-in
 FEWEST_SHARED = 8  # steps of the motion of the links that are worth one text for two functions
 
 
@@ -120,6 +121,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
             },
             "functions": spec.functions,
             "slides": slides,
+            "large": len(robot.joints) > LARGE,
             "turn": loop_system(robot).turn() if spec.tied else None,
             "pace": f"{loop_system(robot).pace():.2g}" if spec.tied else "",
             "joint": robot.joints[0],

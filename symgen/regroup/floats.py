@@ -25,7 +25,9 @@ from symgen.regroup.states import states_for
 
 # singular values of unit columns: those below are rounding where a gap says so, at most here
 LARGEST_ROUNDING, SMALLEST = 1e-9, 1e-14
-NEGLIGIBLE = 1e-6  # of a coefficient between unit columns
+# coefficients between unit columns that may be left out, first the largest, where the column stays
+# the same to KEPT without them; nearly dependent base columns have small ones that count
+NEGLIGIBLE, KEPT = (1e-6, 1e-8, 1e-10, 1e-12), 1e-13
 OVERFLOWS = 1e100  # its square is a number
 SPREAD, MOST_STATES = 0.8, 4000  # rad about the start, and of half the longest length for slides
 DECADES = -3.5, 1.0  # decades of the velocities at which laws are compared
@@ -207,7 +209,20 @@ def float_base(W: Array) -> tuple[list[int], Array]:
         if (size := float(np.linalg.norm(u))) > independent:
             pivots.append(c)
             Q = np.column_stack([Q, u / size])
-    K = np.linalg.lstsq(U[:, pivots], U, rcond=None)[0]
-    return pivots, np.where(np.abs(K) > NEGLIGIBLE, K, 0.0) * np.where(
-        np.isinf(norms), 0.0, norms
-    ) / norms[pivots][:, None]
+    K = _without_negligible(U, pivots)
+    return pivots, K * np.where(np.isinf(norms), 0.0, norms) / norms[pivots][:, None]
+
+
+def _without_negligible(U: Array, pivots: list[int]) -> Array:
+    """Write all columns of U, shape (rows, columns), as combinations of those in `pivots`, without
+    coefficients that are only rounding.
+
+    Return the coefficients, shape (pivots, columns).
+    """
+    every = np.linalg.lstsq(U[:, pivots], U, rcond=None)[0]
+    K, open_ = every.copy(), np.ones(U.shape[1], dtype=bool)
+    for least in (*NEGLIGIBLE, 0.0):
+        K[:, open_] = np.where(np.abs(every) > least, every, 0.0)[:, open_]
+        left = np.linalg.norm(U - U[:, pivots] @ K, axis=0)
+        open_ = left > KEPT
+    return np.asarray(K)

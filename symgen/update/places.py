@@ -41,7 +41,6 @@ from symgen.description.tree import (
 from symgen.description.tree_robot import (
     JOINT_TERMS,
     Table,
-    on_its_base,
     parse_tree,
     placed,
     robot_of_tree,
@@ -473,9 +472,9 @@ def read_text(content: bytes, path: Path, exact: bool, part: TreePart) -> RobotT
         whole = parse_tree(content, path.name, exact=exact)
         attributes = URDF if suffix == ".urdf" else MJCF
         tree = part_of(whole, part)
-        robot, tree = robot_of_tree(tree, path.name, "")[0], on_its_base(tree)
+        robot, table = robot_of_tree(tree, path.name, "")[0], placed(tree)
         places = Places(content, whole, attributes)
-        return RobotText(path.name, tree, placed(tree), robot, places)
+        return RobotText(path.name, table.tree, table, robot, places)
 
 
 def require_same_frames(text: RobotText, robot: Robot, file: str) -> None:

@@ -74,9 +74,21 @@ WRONG = [  # what is replaced, by what, line of the error, words of the message
         "</worldbody>",
         '</worldbody><equality><connect name="c" body1="a" anchor="0 0 0"/></equality>',
         6,
-        "<connect> 'c' in <equality>",
+        "does not say which of the joints 's' have motors; write <actuator><motor joint=\"s\"/></actuator>",
     ),
-    ("</worldbody>", '</worldbody><equality><weld body1="a"/></equality>', 6, "<weld> ''"),
+    ("</worldbody>", '</worldbody><equality><flex flex="f"/></equality>', 6, "<flex> is not read"),
+    (
+        "</worldbody>",
+        '</worldbody><equality><distance name="d" geom1="g"/></equality>',
+        6,
+        "<distance> 'd' in <equality>: only joint, tendon, connect, weld are read",
+    ),
+    (
+        "</worldbody>",
+        '</worldbody><equality><weld name="w" body1="a"/></equality><actuator><motor joint="s"/></actuator>',
+        6,
+        "loop 'w' ties two links between which only joints with motors or relations move ('s')",
+    ),
     (
         "</worldbody>",
         (

@@ -18,6 +18,7 @@ from symgen.description.yaml import write_yaml
 READ_FROM_OTHERS = (
     "angles",
     "impossible",
+    "bodies",
     "not_read",
     "mounts",
     "of_base",

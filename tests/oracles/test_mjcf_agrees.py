@@ -142,7 +142,7 @@ def test_values_and_limits_of_an_arm():
         robot.values["OFFSET2"] == pytest.approx(-3 * np.deg2rad(10))
         and dict(robot.constants)["gx"] == 0.5
     )
-    assert "not read: <actuator>, <asset>, <sensor>, <visual>" in notes
+    assert "not read: <asset>, <sensor>, <visual>" in notes
 
 
 def test_relations_of_joints_and_tendons():

@@ -1,5 +1,6 @@
 """Random MJCF with relations of joints and tendons, connect and weld: torques and relations are
-those of MuJoCo's compiled model, or the file is refused by the name of what is not read.
+those of MuJoCo's compiled model, or the file is refused by the name of what is not read, or because
+the mechanism has another mobility in MuJoCo too.
 """
 
 import re
@@ -8,10 +9,14 @@ import mujoco
 import numpy as np
 import pytest
 from campaign import FULL
+from support.loop_files import ClosedMuJoCo
 
 from oracles.mjcf_robots import random_tree
+from oracles.test_loop_files import difference as loop_difference
 from oracles.test_mjcf_agrees import TOLERANCE, difference, motion
 from oracles.test_urdf_agrees import legend
+from symgen.derive.loops import close
+from symgen.description import Robot
 from symgen.description.tree_robot import read_tree
 from symgen.errors import DescriptionError
 
@@ -74,6 +79,8 @@ def outcome(seed: int) -> str:
         robot, notes = read_tree(text.encode(), "tree.xml")
         if len(robot.moving) == len(robot.constraints):
             return "nothing moves"
+        if "<weld" in text or "<connect" in text:
+            return closed_outcome(text, robot, notes, seed)
         assert difference(text, robot, notes, seed) < TOLERANCE, seed
     except DescriptionError as error:
         message = str(error)
@@ -86,7 +93,14 @@ def outcome(seed: int) -> str:
         named = re.search(r"'(e\d)'", message)
         assert named and f'name="{named[1]}"' in lines[error.line - 1], message
         return next(
-            w for w in ("connect", "weld", "polycoef", "only actuated joints") if w in message
+            w
+            for w in (
+                "polycoef",
+                "only actuated joints",
+                "does not say which",
+                "no joint can be cut",
+            )
+            if w in message
         )
     model = mujoco.MjModel.from_xml_string(text)
     data, names = mujoco.MjData(model), legend(notes)
@@ -98,6 +112,22 @@ def outcome(seed: int) -> str:
         assert data.ne == model.neq and np.abs(data.efc_pos[: data.ne]).max(initial=0) < 1e-11
         assert np.abs(data.efc_vel[: data.ne]).max(initial=0) < 1e-10
     return "read"
+
+
+def closed_outcome(text: str, robot: Robot, notes: tuple[str, ...], seed: int) -> str:
+    """Of a file with loops: closed, or why it is no mechanism, which MuJoCo confirms."""
+    names = legend(notes)
+    try:
+        close(robot)
+    except DescriptionError as error:
+        assert error.file == "tree.xml", error
+        assert (told := re.search(r"mobility is (\d+), but (\d+) .* are actuated", str(error)))
+        left = re.search(r"(\d+) degrees of freedom remain", str(error))
+        oracle = ClosedMuJoCo(text, [names[j] for j in robot.joints])
+        assert oracle.mobility() == (int(told[1]), int(left[1]) if left else 0), error
+        return "mobility"
+    assert loop_difference(text, [names[j] for j in robot.joints], seed, 2) < 1e-8, seed
+    return "closed"
 
 
 @pytest.fixture(autouse=True)
