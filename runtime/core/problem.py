@@ -33,6 +33,8 @@ from runtime.ground.errors import InputError, SettingsError
 RECORD_EXPECTED = (
     "a Record, or a list of them: runtime.Record(t, q, tau), runtime.read_record(file)"
 )
+CONTACTS = "contacts"
+"""Kind of the note that contacts of the robot with the world are measured."""
 SIGNALS = "signals"
 """Kind of the notes on settings of signals that were automatic."""
 
