@@ -24,16 +24,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
 
-from runtime.core.least_squares.method import linear_method
+from runtime.core.contacts import settings_of_axes, with_axes
 from runtime.core.model import BoundModel, GeneratedModel, channels_of, elements_of, joint_units
 from runtime.core.problem import Problem
-from runtime.core.record import JOINT_CHANNELS, WRENCH, Record
-from runtime.core.rows.selection import UNMEASURED, per_joint
+from runtime.core.record import WRENCH, Record
 from runtime.ground.errors import InputError
 from runtime.physical.inertia import INERTIAL, physical_model
 
@@ -92,39 +90,17 @@ def force_sensors(problem: Problem) -> Problem:
         )
     n = len(problem.model.JOINTS)
     torques = any(record.tau.any() for record in problem.records)
-    if not torques or settings.rows.low_speed != "auto":
-        slow = per_joint(settings.rows.slow, n, "rows.low_speed") if torques else [UNMEASURED] * n
-        low_speed = (*map(float, slow), *[0.0] * 6 * len(channels))
-        settings = replace(settings, rows=replace(settings.rows, low_speed=low_speed))
-    if problem.method.linear and not problem.method.weighs:  # N and N m in one sum
-        method = linear_method("joint", problem.methods)
-        weighted = replace(settings.estimate, method=method, weights="joint")
-        settings = replace(settings, estimate=weighted)
+    settings = settings_of_axes(settings, n, 6 * len(channels), torques, problem.methods)
+
+    def sensed(record: Record) -> Record:
+        return with_axes(record, [record.channels[c] for c in channels])
+
     frames = [int(c.removeprefix(WRENCH)) for c in channels]
     return problem.changed(
         model=WrenchModel(problem.model, frames, torques),
-        records=tuple(_record(record, channels) for record in problem.records),
-        unseen=tuple(_record(record, channels) for record in problem.unseen),
+        records=tuple(sensed(record) for record in problem.records),
+        unseen=tuple(sensed(record) for record in problem.unseen),
         settings=settings,
-    )
-
-
-def _record(record: Record, channels: Sequence[str]) -> Record:
-    """Add six fixed joints per force sensor to a record; their torques are the measured wrench."""
-    rest = np.zeros((len(record), 6 * len(channels)))
-    others = {
-        c: np.hstack([x, rest]) if c in JOINT_CHANNELS else x
-        for c, x in record.channels.items()
-        if c not in channels
-    }
-    known = record.tau_known
-    return replace(
-        record,
-        q=np.hstack([record.q, rest]),
-        tau=np.hstack([record.tau, *(record.channels[c] for c in channels)]),
-        tau_known=None if known is None else np.hstack([known, rest]),
-        channels=others,
-        origin=replace(record.origin, drives=None),
     )
 
 

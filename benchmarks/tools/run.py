@@ -50,6 +50,8 @@ class Tool:
     cutoffs: tuple[float, ...] = CUTOFFS
     slipped: bool = True
     """Whether it is given the records with slips."""
+    chooses: bool = False
+    """Whether it chooses its cut-off from the record; the one that it is given is not used."""
 
     @property
     def lines(self) -> int:
@@ -69,7 +71,12 @@ SYMGEN = (f"{ROOT}[mjcf]",)
 TOOLS = {
     "symgen": Tool("symgen", "tool_symgen", "symgen", SYMGEN),
     "symgen-default": Tool(
-        "symgen, default settings", "tool_symgen", "symgen", SYMGEN, "defaults", cutoffs=(20.0,)
+        "symgen, default settings",
+        "tool_symgen_default",
+        "symgen",
+        SYMGEN,
+        cutoffs=(20.0,),
+        chooses=True,
     ),
     "symgen-ls": Tool("symgen, least squares", "tool_symgen", "symgen", SYMGEN, "least_squares"),
     "figaroh": Tool(
@@ -222,7 +229,8 @@ class Runs:
         both = [np.concatenate(pair) for pair in zip(self.states, random, strict=True)]
         self.job("final", case.train, knobs, both, final=True)
         final = self.run()["final"]
-        row: Answer = {"knobs": knobs, **{k: final.get(k) for k in ("error", "seconds", "memory")}}
+        row: Answer = {k: final.get(k) for k in ("error", "seconds", "memory")}
+        row |= {} if self.tool.chooses else {"knobs": knobs}
         if "predicted" not in final:
             return row
         slipped = case.name in SLIPPED and self.tool.slipped

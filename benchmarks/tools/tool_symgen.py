@@ -26,13 +26,12 @@ def answer(model, found):
 
 
 def fit(job):
-    model, records, study = given(job)
-    variants = symgen.variants(job.robot) if job.final else None
-    return answer(model, judged(model, records, study, variants))
+    return identified(job, *given(job))
 
 
-def judged(model, records, study, variants):
+def identified(job, model, records, study):
     """What stands for the robot; causes and doubts are printed."""
+    variants = symgen.variants(job.robot) if job.final else None
     result = runtime.identify(model, records, study, variants=variants)
     plausibility = result.part("plausibility")
     if plausibility:
@@ -41,17 +40,10 @@ def judged(model, records, study, variants):
         for check in plausibility.checks():
             if check.state in ("no", "doubtful"):
                 print(check.finding)
-    return result.model_estimate
+    return answer(model, result.model_estimate)
 
 
 def least_squares(job):
     """All parameters, nothing but the record behind them."""
     model, records, study = given(job)
     return answer(model, runtime.estimate(model, records, study))
-
-
-def defaults(job):
-    """The default study, which chooses cut-off and rows by itself; the job's are not used."""
-    model, records, _ = given(job)
-    variants = symgen.variants(job.robot) if job.final else None
-    return answer(model, judged(model, records, runtime.Study(), variants))

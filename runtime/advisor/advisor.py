@@ -53,7 +53,7 @@ from runtime.core.cestac.result import deciding_names, names_judged
 from runtime.core.cestac.rounding import VARIANCE
 from runtime.core.drives import Drives
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.model import GeneratedModel, is_axis, joint_labels, joint_units
+from runtime.core.model import GeneratedModel, axes_of, joint_labels, joint_units
 from runtime.core.problem import Problem, estimated
 from runtime.core.record import Record
 from runtime.core.result import Identification
@@ -483,9 +483,9 @@ def assumptions(
 
 def _refuse(problem: Problem) -> None:
     """Raise an error for problems for which no prediction is possible."""
-    if any(is_axis(joint) for joint in problem.model.JOINTS):
+    if (axes := axes_of(problem.model)) is not None:
         raise InputError(
-            "the advisor supports only encoders of joints, but the record has a force sensor; remove record.columns.wrench"
+            f"the advisor supports only encoders of joints, not {axes[0]}; identify {axes[1]}"
         )
     study = problem.settings
     if not problem.method.linear:

@@ -289,6 +289,18 @@ def require_no_wrench(model: GeneratedModel, what: str) -> None:
         )
 
 
+def axes_of(model: GeneratedModel) -> tuple[str, str] | None:
+    """Return what gives a model axes that no motor moves, and how a study does without it.
+
+    None: the model has no such axes.
+    """
+    if not any(is_axis(joint) for joint in model.JOINTS):
+        return None
+    if base_rows(model):
+        return "a free base", "with --base moving"
+    return "force sensors", "without record.columns.wrench"
+
+
 def joint_labels(model: GeneratedModel) -> tuple[str, ...]:
     """Return the labels of the joints in results: the number and perhaps the name, as in "2 elbow".
 
@@ -305,7 +317,7 @@ def joint_labels(model: GeneratedModel) -> tuple[str, ...]:
 
 
 def is_axis(joint: int | str) -> bool:
-    """Whether an entry of JOINTS is an axis of a force sensor (`runtime.wrench`), not a joint."""
+    """Whether an entry of JOINTS is an axis of a force sensor (`runtime.wrench`) or a free base."""
     return isinstance(joint, str)
 
 
@@ -386,7 +398,7 @@ def joint_units(model: GeneratedModel) -> tuple[str, ...]:
         return cast(tuple[str, ...], stated)
     units, elements = getattr(model, "UNITS", {}), getattr(model, "ELEMENTS", {})
     result = []
-    for row, joint in enumerate(model.JOINTS):
+    for row, joint in enumerate(model.JOINTS, start=len(base_rows(model))):
         acting = [name for k, name in enumerate(model.BASE_PARAMETERS) if model.STRUCTURE[k, row]]
         own = {
             units.get(name, "")

@@ -6,7 +6,8 @@ An emitted model of such a robot takes the motion of the base before the states 
 
 while an identification knows states of joints, and channels: signals that a record gives at each
 sample. `MovingModel` makes the nine components of the base channels of the model, so that every
-analysis that supports channels supports a base that moves.
+analysis that supports channels supports a base that moves. The six rows of a free base are those of
+six more joints, which stand after the others and stay at zero (`runtime.core.contacts`).
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from runtime.core.model import GeneratedModel
+from runtime.core.contacts import on_links
+from runtime.core.model import GeneratedModel, base_rows, joint_units
 from runtime.core.problem import Problem
 from runtime.core.record import (
     BASE_GRAVITY,
@@ -24,7 +26,6 @@ from runtime.core.record import (
     BASE_MOTION,
     BASE_POSITION,
     BASE_QUATERNION,
-    WRENCH,
     Record,
 )
 from runtime.core.signals.base import INPUTS
@@ -32,12 +33,15 @@ from runtime.ground.errors import InputError
 
 Array = np.ndarray
 UNIT = 0.01  # of the length of a measured quaternion
+KEPT = ("base_parameters", "elements", "store")
+"""Functions of an emitted model of a free base that hold for its joints and axes together."""
 
 
 class MovingModel:
     """A model whose base moves, with the motion of the base as channels W10 .. VP30.
 
-    A component that is not given is that of a base at rest in the axes of the world.
+    A component that is not given is that of a base at rest in the axes of the world. A free base
+    adds the joints FX0 .. NZ0, whose torques are the wrench on it.
     """
 
     def __init__(self, model: GeneratedModel) -> None:
@@ -47,10 +51,22 @@ class MovingModel:
         rest = (0.0,) * 6 + tuple(-g + 0.0 for g in cast(Any, model).GRAVITY)
         self._rest = dict(zip(INPUTS, rest, strict=True))
 
+        rows, self._n = base_rows(model), len(model.JOINTS)
+        self._order = [*range(len(rows), len(rows) + self._n), *range(len(rows))]
+        if rows:
+            of_axes = ("m" if row[0] == "F" else "rad" for row in rows)
+            self.JOINTS, self.JOINT_UNITS = (*model.JOINTS, *rows), (*joint_units(model), *of_axes)
+            self.STRUCTURE, self.DRIVES = np.asarray(model.STRUCTURE)[:, self._order], None
+
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
+        free = len(self._order) > self._n
+        if name.startswith("_") or (free and name not in KEPT and not name.isupper()):
             raise AttributeError(name)
         return getattr(self._model, name)
+
+    def _joints(self, *states: Array) -> Any:
+        """Leave out the six joints of a free base, which stay at zero."""
+        return tuple(x[..., : self._n] for x in states)
 
     def _base(self, q: Array, further: dict[str, Any]) -> Array:
         """Take the motion of the base, shape (..., 9), out of the keyword arguments `further`."""
@@ -61,22 +77,27 @@ class MovingModel:
 
     def regressor(self, q: Array, qd: Array, qdd: Array, **further: Any) -> Array:
         """Compute the regressor D, shape (N, n, b)."""
-        base = self._base(q, further)
-        return np.asarray(cast(Any, self._model).regressor(base, q, qd, qdd, **further))
+        base, states = self._base(q, further), self._joints(q, qd, qdd)
+        D = np.asarray(cast(Any, self._model).regressor(base, *states, **further))
+        return D if len(self._order) == self._n else D[..., self._order, :]
 
     def observation_matrix(self, q: Array, qd: Array, qdd: Array, **further: Any) -> Array:
         """Compute the observation matrix W, shape (n*N, b), with the rows of joint 1 first."""
-        base = self._base(q, further)
-        return np.asarray(cast(Any, self._model).observation_matrix(base, q, qd, qdd, **further))
+        base, states = self._base(q, further), self._joints(q, qd, qdd)
+        W = np.asarray(cast(Any, self._model).observation_matrix(base, *states, **further))
+        if len(self._order) == self._n:
+            return W
+        return W.reshape(len(self._order), -1, W.shape[1])[self._order].reshape(W.shape)
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array, X: Array, **further: Any) -> Array:
         """Compute the joint torques, shape (N, n)."""
-        base = self._base(q, further)
-        return np.asarray(cast(Any, self._model).inverse_dynamics(base, q, qd, qdd, X, **further))
+        base, states = self._base(q, further), self._joints(q, qd, qdd)
+        tau = np.asarray(cast(Any, self._model).inverse_dynamics(base, *states, X, **further))
+        return tau if len(self._order) == self._n else tau[..., self._order]
 
 
 def moved_base(problem: Problem) -> Problem:
-    """Use the motion of the base of each record, if the base of the robot moves.
+    """Use the motion of the base of each record, if the base of the robot moves or is free.
 
     This is a step of the preparation of a problem.
 
@@ -84,16 +105,13 @@ def moved_base(problem: Problem) -> Problem:
     ------
     InputError
         A record without the motion of the base of such a robot, or with that of a fixed base; a
-        quaternion that is not of unit length; a pose of the base with poses at rest; force sensors;
-        a free base.
+        quaternion that is not of unit length; a pose of the base with poses at rest; wrenches on
+        links as `on_links` refuses them.
     """
     model, records = problem.model, (*problem.records, *problem.unseen)
-    if getattr(model, "BASE", "fixed") == "free":
-        raise InputError(
-            f"records of a free base are not read yet; use --base moving for {model.NAME}, whose "
-            "rows are the joints alone"
-        )
-    moves = getattr(model, "BASE", "fixed") == "moving"
+    if isinstance(model, MovingModel):
+        return problem
+    moves = getattr(model, "BASE", "fixed") != "fixed"
     for record in records:
         _require_motion(model, record, moves)
         if problem.reader.at_rest and {BASE_POSITION, BASE_IMU} & {*record.channels}:
@@ -101,19 +119,13 @@ def moved_base(problem: Problem) -> Problem:
                 "poses at rest have no rates of the base; give record.base: {motion: [...]}",
                 file=record.file,
             )
-        if moves and any(c.startswith(WRENCH) for c in record.channels):
-            raise InputError(
-                "force sensors are not possible on a base that moves; remove record.columns.wrench",
-                file=record.file,
-            )
-    if not moves or isinstance(model, MovingModel):
+    if not moves:
         return problem
-    g = cast(Any, model).GRAVITY
-    return problem.changed(
-        model=cast(GeneratedModel, MovingModel(model)),
-        records=tuple(_with_gravity(record, g) for record in problem.records),
-        unseen=tuple(_with_gravity(record, g) for record in problem.unseen),
-    )
+    changed, g = on_links(problem), cast(Any, model).GRAVITY
+    for part in ("records", "unseen"):
+        records = changed.get(part, getattr(problem, part))
+        changed[part] = tuple(_with_gravity(record, g) for record in records)
+    return problem.changed(model=cast(GeneratedModel, MovingModel(model)), **changed)
 
 
 def _require_motion(model: GeneratedModel, record: Record, moves: bool) -> None:

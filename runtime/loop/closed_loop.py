@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from runtime.core.model import GeneratedModel, is_axis, joint_labels
+from runtime.core.model import GeneratedModel, axes_of, joint_labels
 from runtime.core.problem import Problem
 from runtime.core.record import Record
 from runtime.core.rows.observation import LoopRows, Observation, stack
@@ -251,9 +251,9 @@ def observed_loop(problem: Problem, simulator: Simulator | None = None) -> Obser
     `controller` of the settings; without this section no loop is attached.
     """
     settings: Any = problem.settings
-    if any(is_axis(joint) for joint in problem.model.JOINTS):
+    if (axes := axes_of(problem.model)) is not None:
         raise InputError(
-            f"estimate.method: {settings.estimate.method} cannot use the measured wrench of the base; use another method, or remove record.columns.wrench"
+            f"estimate.method: {settings.estimate.method} does not support {axes[0]}; use another method, or identify {axes[1]}"
         )
     if simulator is None and settings.controller is not None:
         from runtime.loop.simulation import Simulator as FromController

@@ -17,7 +17,7 @@ options (also all options of `runtime.physical.feasibility.RobotLimits`):
     prior      none | euclidean: distance D of the inertial parameters from the values of the robot
                file; "auto": euclidean if the file has values of links, else none
     weight     weight of D, a number; "held-out": the weight with which four fifths of the record in
-               time predict the left-out fifth best; "auto": the largest, to half a decade, that
+               time predict the left-out fifth best (product of the five errors); "auto": the largest, to half a decade, that
                raises the residual norm by at most 1 %
     reach      size of the robot, m, which bounds masses and their centres; "auto": from its frames
                if these show the size; null: no such bounds
@@ -268,10 +268,11 @@ def held_out_weight(
 ) -> float:
     """Choose the weight of the prior with which a fit best predicts data not used in this fit.
 
-    Four fifths of the record predict the other fifth, five times; the squared errors of the
-    predictions are added. If two weights are equally good, the larger is chosen. A weight is
-    abandoned as soon as it cannot be the best, since no prediction error is below the error of
-    least squares on the same fifth.
+    Four fifths of the record predict the other fifth, five times; the product of the five errors is
+    smallest. A sum would be decided by a fifth that alone determines a parameter, since the others
+    predict it badly unless the prior is strong. If two weights are equally good, the larger is
+    chosen. A weight is abandoned as soon as it cannot be the best, since no prediction error is
+    below the error of least squares on the same fifth.
     """
     number = observation.equal_parts(LIMIT.HELD_OUT_PARTS)
     parts = [part_factor(observation.where(number == p), system) for p in np.unique(number)]
@@ -279,7 +280,13 @@ def held_out_weight(
         Factor(system.names, triangularise(np.vstack([o.R for o in parts if o is not part])), ())
         for part in parts
     ]
-    least = np.cumsum([part.r22**2 for part in parts][::-1])[
+
+    def logarithm(part: Factor, error: float) -> float:
+        """Logarithm of an error norm, which is at least that of rounding."""
+        measured = float(np.hypot(np.linalg.norm(part.r12), part.r22))
+        return float(np.log(max(error, LIMIT.EXACT_FIT * measured, np.finfo(float).tiny)))
+
+    least = np.cumsum([logarithm(part, part.r22) for part in parts][::-1])[
         ::-1
     ]  # of this part and those after it
     K = physical.rows(system.names)
@@ -287,25 +294,26 @@ def held_out_weight(
     at("feasible, the weight of the prior by held-out error")
 
     def error(weight: float, best: float) -> float:
-        fixed, squares = replace(options, weight=weight), 0.0
+        fixed, product = replace(options, weight=weight), 0.0
         try:
             for rows, part, left in zip(others, parts, least, strict=True):
-                if squares + left > best:
+                if product + left > best:
                     return float("inf")
-                squares += residual_norm(part, K @ solve_with_weight(rows, physical, fixed)[0]) ** 2
+                chi, _ = solve_with_weight(rows, physical, fixed)
+                product += logarithm(part, residual_norm(part, K @ chi))
         except SettingsError:
             raise
         except InputError:  # a weight by which the program is too badly scaled for the solver
             return float("inf")
-        return squares
+        return product
 
     chosen = 0.0
     best = float("inf")
     for weight in map(float, (0.0, *DECADES[::-1])):
-        squares = error(weight, best)
-        if squares <= best:
+        product = error(weight, best)
+        if product <= best:
             chosen = weight
-            best = squares
+            best = product
     return chosen
 
 

@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from runtime.core.model import GeneratedModel, is_axis, require_no_channels
+from runtime.core.model import GeneratedModel, axes_of, require_no_channels
 from runtime.core.problem import Problem
 from runtime.core.result import Identification
 from runtime.ground.check import WORST, Check, worst_of
@@ -181,16 +181,15 @@ class Plausibility(
 def plausibility_of(result: Identification, variants: GeneratedModel | None = None) -> Plausibility:
     """Check record, study and robot file of an identification (see `plausibility`).
 
-    Static poses and robots with force sensors are refused with an InputError.
+    Static poses and robots with force sensors or a free base are refused with an InputError.
     """
     if result.problem.reader.at_rest:
         raise InputError(
             "record and study are not judged for poses at rest; the checks need a motion"
         )
-    if any(is_axis(joint) for joint in result.model.JOINTS):
+    if (axes := axes_of(result.model)) is not None:
         raise InputError(
-            "record and study are not judged for a robot with force sensors; identify once without "
-            "record.columns.wrench"
+            f"record and study are not judged for a robot with {axes[0]}; identify once {axes[1]}"
         )
     return plausibility(result.problem, variants=variants)
 
@@ -210,10 +209,10 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
         table of frames are among them.
     """
     problem.require_motion("a check of slips")
-    if any(is_axis(joint) for joint in problem.model.JOINTS):
+    if (axes := axes_of(problem.model)) is not None:
         raise InputError(
-            "plausibility of the record: not judged for a robot with force sensors; identify once "
-            "without record.columns.wrench"
+            f"plausibility of the record: not judged for a robot with {axes[0]}; identify once "
+            f"{axes[1]}"
         )
     at("plausibility of the record")
     first = times(problem.records)

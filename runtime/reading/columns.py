@@ -67,7 +67,7 @@ def column_names(
         )
     q = _meant(first, "q", "position", given.q, joints)
     tau: tuple[str, ...] = ()
-    by_wrench = given.wrench and not given.tau and "tau1" not in last.names
+    by_wrench = given.wrench and not given.flies and not given.tau and "tau1" not in last.names
     if settings.by_law and settings.controller is None:
         raise InputError(
             "record.columns has q_ref but no tau; set record.columns.tau, or controller: {kp: ..., kd: ...} to compute the torque from this law",

@@ -93,6 +93,12 @@ def _pieces(
     first, last, other = _places(settings, tables)
     motors = [bool(x) for x in getattr(model, "LIMITS", {}).get("tau", ())]
     columns = column_names(settings, first, last, _names_of(model), motors)
+    if columns.flies and getattr(model, "BASE", "fixed") == "fixed":
+        raise InputError(
+            "record.columns.wrench: none says that the robot flies, but its base is fixed; remove "
+            "it, or use --base free",
+            file=", ".join(hashes),
+        )
     signals = _signals(columns, settings.base.columns, first, last, other, missing)
     n = signals["q"].values.shape[1]
     _require_shapes(columns, signals, first, last)
@@ -137,6 +143,8 @@ def _pieces(
         if law is not None:
             piece = law.signals(stretch.t, piece, rate)
         channels = (*JOINT_CHANNELS, *columns.further, *settings.base.columns, "law_v")
+        if columns.flies:
+            piece[f"{WRENCH}0"], channels = np.zeros((len(stretch.t), 6)), (*channels, f"{WRENCH}0")
         record = Record(
             stretch.t,
             piece["q"],

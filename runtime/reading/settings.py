@@ -105,7 +105,9 @@ class Columns(Settings):
     wrench : mapping of int to six str
         Three forces and three moments of a sensor in the axes of a frame, about its origin, by the
         number of the frame, in the file of the positions, N and N m: {0: [fx, fy, fz, mx, my, mz]}
-        below the robot, {7: [...]} ahead of link 7. In addition to tau, or in place of tau.
+        below the robot, {7: [...]} ahead of link 7. In addition to tau, or in place of tau. Of a
+        robot whose base moves or is free: the force and the moment by which the world acts on the
+        link of the frame; none: nothing acts, it flies.
     """
 
     t: Text | None = None
@@ -118,7 +120,14 @@ class Columns(Settings):
     tau_ff: Names = ()
     tau_known: Names = ()
     channels: Mapping[Text, Text] = field(default_factory=dict)
-    wrench: Mapping[Annotated[int, Field(ge=0)], Names] = field(default_factory=dict)
+    wrench: Literal["none"] | Mapping[Annotated[int, Field(ge=0)], Names] = field(
+        default_factory=dict
+    )
+
+    @property
+    def flies(self) -> bool:
+        """Whether no wrench acts on the robot from outside."""
+        return self.wrench == "none"
 
     @property
     def further(self) -> dict[str, tuple[str, ...]]:
@@ -128,7 +137,8 @@ class Columns(Settings):
         They are listed by name of the channel or wrench.
         """
         own = {name: (column,) for name, column in self.channels.items()}
-        return own | {f"{WRENCH}{frame}": names for frame, names in self.wrench.items()}
+        wrench = {} if isinstance(self.wrench, str) else self.wrench
+        return own | {f"{WRENCH}{frame}": names for frame, names in wrench.items()}
 
     def __post_init__(self) -> None:
         require(

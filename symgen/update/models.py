@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 def model_of(robot: Robot | GeneratedModel, *, study: Study | None = None) -> GeneratedModel:
     """Return the model of a robot; a generated module is its own model.
 
-    study : if its records name wrenches, the model has the columns of force sensors.
+    study : if its records name wrenches, the model of a fixed robot has the columns of force sensors.
     """
     from runtime.core.model import load_model
     from symgen.certify.requests import model
@@ -21,7 +21,7 @@ def model_of(robot: Robot | GeneratedModel, *, study: Study | None = None) -> Ge
 
     if not isinstance(robot, Robot):
         return robot
-    records = () if study is None else study.record
+    records = () if study is None or robot.base_moves else study.record
     options = ("base_wrench_regressor",) * any(record.columns.wrench for record in records)
     return load_model(model(robot, options=options))
 

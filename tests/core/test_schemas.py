@@ -116,7 +116,7 @@ def test_editors_know_the_lists(wrong):
 def test_editors_show_what_a_key_holds():
     definitions = json_schema("study")["$defs"]
     assert definitions["Lowpass"]["properties"]["cutoff"]["description"] == (
-        "Cutoff frequency; auto: from the motion and the noise of the records "
+        "Cutoff frequency; auto: from the motion and the noise of each record "
         "(`runtime.core.signals.cutoff`), twice that for counts, at most 50, as in the chapter, and 50 "
         "if there is no record. [Hz]"
     )

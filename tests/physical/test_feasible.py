@@ -290,6 +290,27 @@ def test_held_out_weight_is_that_of_the_best_prediction(arm) -> None:
     assert weights[0] > 10 * weights[1]
 
 
+def test_a_part_that_alone_moves_a_joint_does_not_decide_the_weight(arm) -> None:
+    """Joint 2 hardly moves before the last fifth, which wrong values predict better than the fit of
+    the others: a sum of errors chose a weight of 0.01, and values 54 deviations off.
+    """
+    true, N = arm.base_parameters(arm.VALUES), 200
+    q, qd, qdd = np.random.default_rng(0).uniform(-3, 3, (3, N, 2))
+    early = np.arange(N) < 4 * N // 5
+    for x in (q, qd, qdd):
+        x[early, 1] *= 0.02
+    noise = 0.01 * np.random.default_rng(1).standard_normal((2, N))
+    noise[1, early] += qdd[early, 1]  # an inertia that is not there, seen in small motions alone
+    W = np.asfortranarray(arm.observation_matrix(q, qd, qdd))
+    seen = replace(simulated(arm, true, 0.0, N=N), W=W, Y=W @ true + noise.ravel())
+    off = replace_values(arm)
+    off.VALUES = {name: 1.3 * x for name, x in off.VALUES.items()}
+    free = estimate_of(seen, EstimateSettings("ols"), model=off)
+    fit = estimate_of(seen, EstimateSettings("feasible", options={"reach": None}), model=off)
+    assert fit.relative_error < 1.1 * free.relative_error
+    assert (np.abs(fit.X - true) < 3 * free.sigma).all()
+
+
 def test_a_strong_pull_ends_at_the_values_and_auto_costs_one_per_cent(arm) -> None:
     prior = "euclidean"
     seen = simulated(arm, arm.base_parameters(arm.VALUES), 0.5)
