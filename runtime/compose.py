@@ -12,11 +12,14 @@ function of the package. A feature is one file and one line of a list.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields, replace
-from functools import partial
+from functools import partial, wraps
+from inspect import signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from types import NoneType
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from runtime.advisor.advice import NoAdvice
 from runtime.core import identify as identification
@@ -199,6 +202,48 @@ judged = partial(verdict, on_record=RECORD_QUESTIONS, on_parameters=QUESTIONS)
 
 Records = Record | Sequence[Record]
 T = TypeVar("T")
+P = ParamSpec("P")
+R = TypeVar("R")
+
+ARGUMENTS: dict[str, tuple[tuple[type, ...], str]] = {
+    "unseen": ((Record, list, tuple), RECORD_EXPECTED),
+    "further": ((Record, list, tuple, NoneType), RECORD_EXPECTED),
+    "loaded": ((Record, list, tuple, NoneType), RECORD_EXPECTED),
+    "map": ((Callable,), "a function like the built-in map"),  # type: ignore[dict-item]
+    "progress": ((Callable, NoneType), "a function of two numbers"),  # type: ignore[dict-item]
+    "readers": ((list, tuple, NoneType), "a list of names, such as ['counts']"),
+    "provenance": ((Mapping, NoneType), "a mapping of names to data"),
+    "folder": ((str, Path, NoneType), "the name of a folder"),
+    "name": ((str, NoneType), "a text"),
+    "physical": ((bool,), "True or False"),
+    "friction": ((bool,), "True or False"),
+    "ideal": ((bool,), "True or False"),
+    "missing": ((bool,), "True or False"),
+    "plausible": ((bool, NoneType), "True, False or None"),
+}
+"""Types of the further arguments of the public functions, which have one meaning in all of them."""
+
+
+def entry(function: Callable[P, R]) -> Callable[P, R]:
+    """Wrap a public function: its arguments are checked, and it runs with one BLAS thread.
+
+    InputError, in one sentence, for an argument of another type than in `ARGUMENTS`.
+    """
+
+    @wraps(function)
+    def checked(*args: P.args, **kwargs: P.kwargs) -> R:
+        for name, given in signature(function).bind(*args, **kwargs).arguments.items():
+            if name in ARGUMENTS:
+                require_kind(given, ARGUMENTS[name][0], name, ARGUMENTS[name][1])
+            if name == "variants" and given is not None:
+                require_emitted(given, name)
+            if name == "simulator" and not (given is None or hasattr(given, "run")):
+                raise InputError(
+                    f"simulator is {kind_of(given)}; expected a runtime.loop.simulation.Simulator"
+                )
+        return single_threaded(function)(*args, **kwargs)
+
+    return checked
 
 
 def require_study(study: Study | None) -> Study:
@@ -220,8 +265,17 @@ def list_records(records: Records) -> tuple[Record, ...]:
     """
     if isinstance(records, Record):
         return (records,)
-    require_kind(records, Sequence, "records", RECORD_EXPECTED)
+    require_kind(records, (list, tuple), "records", RECORD_EXPECTED)
+    for record in records:
+        require_kind(record, Record, "a record", RECORD_EXPECTED)
     return tuple(records)
+
+
+def with_records(problem: Problem) -> Problem:
+    """Return the problem; raise InputError if it has no record to fit."""
+    if not problem.records:
+        raise InputError(f"no record; expected {RECORD_EXPECTED}")
+    return problem
 
 
 def complete_study(study: Study) -> Study:
@@ -283,6 +337,7 @@ def state_problem(
     )
 
 
+@entry
 def problem(
     model: GeneratedModel,
     records: Records,
@@ -327,6 +382,7 @@ def records_of(
     return read_records(settings, model, folder=folder, missing=missing)
 
 
+@entry
 def read_record(
     path: str | Path | RecordSettings,
     model: GeneratedModel | None = None,
@@ -357,13 +413,13 @@ def read_record(
         Files that cannot be read or have other content, several records, or one record that
         `resample` splits.
     """
-    bare = False
+    bare, folder = False, folder or "."
     if isinstance(path, RecordSettings):
         settings: tuple[RecordSettings, ...] = (path,)
     else:
         require_kind(path, (str, Path), "path", "the name of a file, or RecordSettings")
         named = Path(folder) / path
-        study, folder = study_of(named if named.exists() else path)
+        study, folder = study_of(named if os.path.exists(named) else path)  # noqa: PTH110 (any length)
         bare = is_measured(named)
         settings = study.record
         missing = missing or reader_of(study.signals).missing
@@ -378,7 +434,7 @@ def read_record(
     return replace(record, origin=replace(record.origin, sides=None)) if bare else record
 
 
-@single_threaded
+@entry
 def observe(
     model: GeneratedModel,
     records: Records,
@@ -393,7 +449,7 @@ def observe(
     return observe_rows(problem(model, records, study, simulator=simulator))
 
 
-@single_threaded
+@entry
 def estimate(
     model: GeneratedModel,
     records: Records,
@@ -445,7 +501,7 @@ def estimate_of(
     return estimate_by(observation, settings, METHODS, model=model, provenance=provenance)
 
 
-@single_threaded
+@entry
 def essential(
     model: GeneratedModel,
     records: Records,
@@ -467,7 +523,7 @@ def essential(
     )
 
 
-@single_threaded
+@entry
 def identify(
     model: GeneratedModel,
     records: Records,
@@ -533,7 +589,7 @@ def identify(
     return identification.identify(whole, extras(asked), judged, provenance=provenance)
 
 
-@single_threaded
+@entry
 def assess(
     model: GeneratedModel,
     records: Records,
@@ -563,7 +619,7 @@ def assess(
     )
 
 
-@single_threaded
+@entry
 def compare(
     model: GeneratedModel,
     candidates: Mapping[str, Study | tuple[Study, Records, Records]],
@@ -598,7 +654,7 @@ def compare(
     return comparing.compare(problems, extras({}), judged, of_the_best)
 
 
-@single_threaded
+@entry
 def cestac(
     model: GeneratedModel,
     records: Records,
@@ -625,7 +681,7 @@ def cestac(
     )
 
 
-@single_threaded
+@entry
 def advise(
     model: GeneratedModel,
     records: Records,
@@ -645,13 +701,15 @@ def advise(
 
     whole = problem(model, records, study)
     suited = {name: reader for name, reader in READERS.items() if reader.reads_encoders}
+    for name in readers or ():
+        require_kind(name, str, "a reader", "its name, such as 'counts'")
     chosen = {name: _named(suited, name, ("signals", "reader")) for name in readers or ()}
     if not chosen:
         chosen = advisor.readers_of_law(whole, READERS)
     return advisor.advise(whole, readers=chosen, **options)
 
 
-@single_threaded
+@entry
 def plausibility(
     model: GeneratedModel,
     records: Records,
@@ -665,10 +723,11 @@ def plausibility(
     """
     from runtime.plausible import plausibility as checks
 
-    return checks.plausibility(problem(model, records, study), variants=variants)
+    whole = with_records(problem(model, records, study))
+    return checks.plausibility(whole, variants=variants)
 
 
-@single_threaded
+@entry
 def delay(
     model: GeneratedModel, record: Record, study: Study | None = None, **options: Any
 ) -> Delay:
@@ -678,10 +737,10 @@ def delay(
     """
     from runtime.plausible import delay as delays
 
-    return delays.delay(problem(model, record, study), **options)
+    return delays.delay(with_records(problem(model, record, study)), **options)
 
 
-@single_threaded
+@entry
 def payload(
     model: GeneratedModel, records: Records, study: Study, *, loaded: Sequence[Record] | None = None
 ) -> PayloadStudy:
@@ -696,7 +755,7 @@ def payload(
     return loads.payload_study(whole, () if note is None else note.result)
 
 
-@single_threaded
+@entry
 def excite(
     model: GeneratedModel,
     records: Records = (),
@@ -716,7 +775,7 @@ def excite(
     return search.excite(whole, map=alone_each(map), progress=progress)
 
 
-@single_threaded
+@entry
 def static_poses(
     model: GeneratedModel, records: Records = (), study: Study | None = None
 ) -> StaticPoses:
@@ -730,7 +789,7 @@ def static_poses(
     return poses.static_poses(problem(model, records, study))
 
 
-@single_threaded
+@entry
 def repair(
     model: GeneratedModel,
     records: Records,
@@ -776,7 +835,7 @@ def repair(
     study = require_study(study)
     if further is None:
         further = records_of(study.validate.record, model, study, folder=folder)
-    whole = problem(model, records, study, unseen=further)
+    whole = with_records(problem(model, records, study, unseen=further))
     stated = study if study.record else replace(study, record=(RecordSettings(),))
     given = list_records(records)
     return repairing.repair(whole, stated, records=given, variants=variants, folder=folder)
@@ -798,6 +857,7 @@ def extras(asked: Mapping[str, Mapping[str, Any]], attempted: bool = False) -> l
     return chosen
 
 
+@entry
 def simulate(
     model: GeneratedModel,
     study: Study,

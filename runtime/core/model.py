@@ -8,6 +8,7 @@ emitted and certified it, or with trust=True (`runtime.core.loading`).
 from __future__ import annotations
 
 import copyreg
+import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -112,6 +113,8 @@ def load_model(
     ModelError
         There is no such file, it was not emitted here, or it is not a model.
     """
+    require_kind(folder, (str, Path, type(None)), "folder", "the name of a folder")
+    require_kind(trust, bool, "trust", "True or False")
     if isinstance(model, ModuleType):
         return checked_model(model)
     require_kind(
@@ -120,25 +123,26 @@ def load_model(
     path = Path(model)
     if isinstance(model, str) and re.fullmatch(r"\w+", model):
         path = Path(folder or FOLDER) / f"{model}.py"
-    if not path.is_file():
+    if not os.path.isfile(path):  # noqa: PTH113 (a name of any length)
         present = (
             sorted(p.stem for p in path.parent.glob("*.py") if p.stem != "__init__")
             if path.parent.is_dir()
             else []
         )
+        shown = " ".join(str(path).split("\n"))
         raise ModelError(
-            f"there is no generated model {path} ({path.parent} contains "
+            f"there is no generated model {shown} ({path.parent} contains "
             f"{', '.join(present) or 'none'}); generate the model with "
-            f"`symgen generate {path.stem}`"
+            f"`symgen generate {Path(shown).stem}`"
         )
     return checked_model(module_of(path, trust=trust))
 
 
-def require_emitted(model: Any) -> None:
-    """Raise InputError unless `model` is an emitted model or has its interface."""
+def require_emitted(model: Any, label: str = "model") -> None:
+    """Raise InputError unless the argument `label` is an emitted model or has its interface."""
     if not all(hasattr(model, name) for name in ("NAME", "JOINTS", "DRIVES")):
         raise InputError(
-            f"model is {kind_of(model)}; expected a generated model, such as symgen.model('arm.urdf') "
+            f"{label} is {kind_of(model)}; expected a generated model, such as symgen.model('arm.urdf') "
             "or runtime.load_model('arm.py')"
         )
 

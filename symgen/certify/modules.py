@@ -11,17 +11,18 @@ from symgen.certify.importing import cached_path, stored_path
 from symgen.certify.texts import text_check, with_certificate
 from symgen.certify.witness import Witness, ungrouped
 from symgen.derive.doubts import nearly_round
+from symgen.derive.models import OPTIONS
 from symgen.description.robot import Robot
 from symgen.description.values import WITHIN
 from symgen.emit.generate import generate_files
 from symgen.emit.targets import TARGETS
-from symgen.errors import CertificateError
-from symgen.regroup.regrouping import Regrouping, regroup
+from symgen.errors import CertificateError, require, require_names
+from symgen.regroup.regrouping import Regrouping, regroup, regrouping_of
 from symgen.time_limit import limited
 
 
 def certify(
-    regrouping: Regrouping,
+    robot: str | Path | Robot | Regrouping,
     files: Mapping[str, str] | None = None,
     options: Sequence[str] = (),
 ) -> Certificate:
@@ -29,8 +30,8 @@ def certify(
 
     Parameters
     ----------
-    regrouping : Regrouping
-        Base parameters with their formulas.
+    robot : str, Path, Robot or Regrouping
+        A robot as for `symgen.model`, or its base parameters.
     files : mapping, optional
         Source texts by file name. Default: the NumPy module.
     options : sequence of str
@@ -41,7 +42,14 @@ def certify(
     DescriptionError
         The loops close in too few random states.
     """
+    regrouping = regrouping_of(robot)
     robot = regrouping.robot
+    require_names(options, OPTIONS, "options")
+    if files is not None:
+        require(files, Mapping, "files", "{file name: text}")
+        require_names({*files}, [t.file.format(robot.name) for t in TARGETS.values()], "files")
+        for name, text in files.items():
+            require(text, str, f"files[{name!r}]", "the text of the file")
     target = {t.file.format(robot.name): name for name, t in reversed(TARGETS.items())}
     with limited(f"the certificate of {robot.name}"):
         certificate = certify_formulas(regrouping)

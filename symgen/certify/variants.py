@@ -25,7 +25,7 @@ from typing import Any
 
 from symgen.certify.requests import module_of
 from symgen.description.expression import Expression
-from symgen.description.files import load_robot
+from symgen.description.files import robot_of
 from symgen.description.robot import PRISMATIC, REVOLUTE, Frame, Robot
 
 FREE = "free_"
@@ -55,7 +55,7 @@ def variants(robot: str | Path | Robot) -> ModuleType:
 
         return ungrouped_path(robot)
 
-    robot = freed(robot if isinstance(robot, Robot) else load_robot(robot))
+    robot = freed(robot_of(robot))
     return module_of(robot, "standard parameters", derived)
 
 

@@ -30,7 +30,7 @@ from symgen.description.fields import Declared, Given, Path, dotted, located
 from symgen.description.naming import check_identifier
 from symgen.description.parts import GEOMETRY, Form, Row
 from symgen.description.robot import Robot
-from symgen.errors import DescriptionError, SymgenError
+from symgen.errors import DescriptionError, SymgenError, require
 
 SCHEMA = 1  # version of the robot file
 READER = TypeAdapter(Robot)  # its validators are built when the first file is read
@@ -83,6 +83,7 @@ def parse_robot(content: bytes, file: str) -> Robot:
             f"content is of type {type(content).__name__}; expected the bytes of a robot file "
             "(for a text: text.encode()); use load_robot to read a file by its path"
         )
+    require(file, str, "file", "the name of the file, a text")
     lines: dict[Path, int] = {}
 
     def line(path: Path) -> int:
@@ -92,7 +93,7 @@ def parse_robot(content: bytes, file: str) -> Robot:
     with located(file, line):
         data = document(content, lines)
         _check_version(data)
-        return robot_of(data, file, hashlib.sha256(content).hexdigest())
+        return described(data, file, hashlib.sha256(content).hexdigest())
 
 
 def _check_version(data: Any) -> None:
@@ -207,7 +208,7 @@ def _scalar(node: ScalarNode, line: int) -> Any:
 # --- plain data to a robot ---
 
 
-def robot_of(data: Mapping[str, Any], file: str, sha256: str) -> Robot:
+def described(data: Mapping[str, Any], file: str, sha256: str) -> Robot:
     """Build the Robot from the data of a robot file, and check all fields.
 
     Raises DescriptionError with the path of the wrong field.
@@ -430,8 +431,13 @@ def tables_of(robot: Robot) -> dict[str, Any]:
 
 
 def data_of(robot: Robot) -> dict[str, Any]:
+<<<<<<< HEAD
     """Return the data of a robot file that describes `robot`, of which `robot_of` makes it again."""
     data: dict[str, Any] = document(write_yaml(robot).encode(), {})
+=======
+    """Return the data of a robot file that describes `robot`, of which `described` makes it again."""
+    data: dict[str, Any] = _document(write_yaml(robot).encode(), {})
+>>>>>>> main
     return data
 
 

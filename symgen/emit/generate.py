@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 from symgen.derive.loops import close
+from symgen.derive.models import OPTIONS
+from symgen.description.files import robot_of
 from symgen.description.robot import Robot
 from symgen.emit import c_target, python_target
 from symgen.emit.c_target import C
 from symgen.emit.printers import PYTHON, Language
 from symgen.emit.spec import ModuleSpec, module_spec, spec_of
 from symgen.emit.targets import TARGETS
-from symgen.errors import SymgenError
+from symgen.errors import SymgenError, require, require_names
 from symgen.regroup.regrouping import Regrouping
 
 
@@ -33,8 +36,18 @@ EMITTERS = {
 }
 
 
-def generate_module(robot: Robot, *, command: str | None = None) -> str:
-    """Return the source text of the NumPy module of `robot`."""
+def generate_module(robot: str | Path | Robot, *, command: str | None = None) -> str:
+    """Return the source text of the NumPy module of a robot.
+
+    Parameters
+    ----------
+    robot : str, Path or Robot
+        As for `symgen.model`.
+    command : str, optional
+        As for `generate_files`.
+    """
+    robot = robot_of(robot)
+    require(command, (str, type(None)), "command", "the argument of `symgen generate`, a text")
     return generate_files(robot, command=command)[TARGETS["numpy"].file.format(robot.name)]
 
 
@@ -67,6 +80,8 @@ def generate_files(
     dict
         {file name: text}. The same robot file and the same version give the same bytes.
     """
+    require_names(targets, TARGETS, "targets")
+    require_names(options, OPTIONS, "options")
     _require_base(robot, targets)
     spec: ModuleSpec = (
         spec_of(robot, tuple(options)) if regrouping is None else module_spec(regrouping, options)
