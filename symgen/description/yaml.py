@@ -431,13 +431,8 @@ def tables_of(robot: Robot) -> dict[str, Any]:
 
 
 def data_of(robot: Robot) -> dict[str, Any]:
-<<<<<<< HEAD
-    """Return the data of a robot file that describes `robot`, of which `robot_of` makes it again."""
-    data: dict[str, Any] = document(write_yaml(robot).encode(), {})
-=======
     """Return the data of a robot file that describes `robot`, of which `described` makes it again."""
-    data: dict[str, Any] = _document(write_yaml(robot).encode(), {})
->>>>>>> main
+    data: dict[str, Any] = document(write_yaml(robot).encode(), {})
     return data
 
 
