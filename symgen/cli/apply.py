@@ -63,6 +63,7 @@ def apply(
             )
         if output is not None and output.exists() and not force:
             fail(f"{output} exists already; choose another name or add --force")
+        beside = copied_loops(model, output, force)
         locked = dict(assignment(text, "--lock") for text in lock or ())
         applied = applied_to(
             results, model, robot=robot, lock=locked, chain=chain, exact=exact, base=base
@@ -76,9 +77,30 @@ def apply(
             return
         path = applied.write(output or model)
         typer.echo(f"written: {path.name if output is None else output}", err=True)
+        for place, content in beside.items():
+            place.write_bytes(content)
+            typer.echo(f"written: {place}, the loops of {model.name}", err=True)
         if path.parent != model.resolve().parent and applied.names_files:
             typer.echo(
                 f"note: {output} lies in another folder than {model.name}; mesh paths in it "
                 "did not change",
                 err=True,
             )
+
+
+def copied_loops(model: Path, output: Path | None, force: bool) -> dict[Path, bytes]:
+    """Return the file with the loops of `model`, at the place where `output` needs it, if it lacks
+    it.
+    """
+    from symgen.description.files import loops_beside
+
+    text = loops_beside(model) if output is not None else None
+    if text is None or output is None:
+        return {}
+    own = output.with_suffix(".loops.yaml")
+    place = own if text.file.endswith(".loops.yaml") else output.parent / text.file
+    if not place.exists():
+        return {place: text.content}
+    if place.read_bytes() != text.content and not force:
+        fail(f"{place} has other loops than {model.name}; choose another name or add --force")
+    return {} if place.read_bytes() == text.content else {place: text.content}

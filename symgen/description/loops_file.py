@@ -127,7 +127,7 @@ class _Reader:
         return np.asarray(axis / np.linalg.norm(axis))
 
     def link(self, value: Any, path: Path) -> str:
-        if value not in self.tree.links:
+        if not isinstance(value, str) or value not in self.tree.links:
             shown = ", ".join(f"{name!a:.60}" for name in list(self.tree.links)[:20])
             raise DescriptionError(
                 f"there is no link {value!r:.60}; the links are {shown}", path=path

@@ -111,7 +111,8 @@ class Writing:
             }
             before = self.text.joint_values(j)
             values = {self.own[name][0]: self._value(name) for name in attributes}
-            self.text.places.set_joint(edits, joint, values, before)
+            if attributes:  # a joint that closes a loop may have no element in the file
+                self.text.places.set_joint(edits, joint, values, before)
             for name, attribute in attributes.items():
                 family, k = self.own[name][0], self.nearest.elements[name]
                 row = (before[family], values[family], self.sigma(k))
