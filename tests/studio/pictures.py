@@ -20,7 +20,7 @@ READY = {
     "record": "document.querySelectorAll('#preview .plot > svg').length === 2",
     "check": "document.querySelectorAll('.checks li').length > 10",
     "solve": "document.querySelectorAll('#compared tbody tr').length > 0",
-    "results?run=02-feasible": "document.querySelectorAll('.plot > svg').length === 4",
+    "results?run=02-feasible": "document.querySelectorAll('.plot > svg').length === 4 && document.querySelectorAll('#compared th[scope=col]').length === 5",
     "results?run=03-cestac": "document.querySelector('figure img')?.naturalWidth > 300",
 }
 
