@@ -34,5 +34,5 @@ def test_a_variant_is_the_robot_of_another_geometry(base):
 
 
 def test_a_base_that_is_none_is_refused():
-    with pytest.raises(DescriptionError, match="base 'flying'"):
+    with pytest.raises(DescriptionError, match="base is 'flying'"):
         symgen.variants("planar_2r", base="flying")
