@@ -85,6 +85,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
             "constants": constants,
             "passed": {name: _passed_constants(robot, names) for name, names in constants.items()},
             "tuple_of": tuple_of,
+            "numbers": tuple_of([c for c in constants["regressor"] if c not in robot.channels]),
             "listed": further_arguments,
             "keywords": "".join(f", {c}={c}" for c in free),
             "channels": robot.channels,
