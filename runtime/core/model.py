@@ -7,6 +7,7 @@ emitted and certified it, or with trust=True (`runtime.core.loading`).
 
 from __future__ import annotations
 
+import ast
 import copyreg
 import os
 import re
@@ -150,10 +151,11 @@ def require_emitted(model: Any, label: str = "model") -> None:
 def _reduced(module: ModuleType) -> tuple[Callable[..., ModuleType], tuple[Any, ...]]:
     """Return the function and the arguments from which pickle rebuilds a module in another process.
 
-    An emitted module is sent as its text.
+    An emitted module is sent as its text, as it was loaded.
 
     The receiving process trusts the sending one. Any other module is imported by its name. Raise
-    InputError for an emitted module without a file.
+    InputError for an emitted module without a file, and for one that was imported from a file that
+    has changed since: the docstring has the hash of the text.
     """
     if not hasattr(module, "SOURCE_SHA256"):
         return import_module, (module.__name__,)
@@ -164,7 +166,25 @@ def _reduced(module: ModuleType) -> tuple[Callable[..., ModuleType], tuple[Any, 
         )
     loader = getattr(getattr(module, "__spec__", None), "loader", None)
     text = getattr(loader, "text", None)  # that runs here, whatever stands in the file by now
-    return run, (text or Path(file).read_text(encoding="utf-8"), Path(file))
+    if text is None:
+        text = _text_as_loaded(Path(file), module)
+    return run, (text, Path(file))
+
+
+def _text_as_loaded(file: Path, module: ModuleType) -> str:
+    """Read the text of a module that Python has imported from a file; InputError if it changed."""
+    try:
+        text = file.read_text(encoding="utf-8")
+        same = ast.get_docstring(ast.parse(text), clean=False) == module.__doc__
+    except (OSError, ValueError, SyntaxError):
+        same = False
+    if not same:
+        raise InputError(
+            "the file has changed since it was imported, so that other processes would run another "
+            "model; start Python again, or use one process",
+            file=str(file),
+        )
+    return text
 
 
 copyreg.pickle(ModuleType, _reduced)
