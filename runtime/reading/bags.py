@@ -84,7 +84,8 @@ def stored_files(folder: Path) -> list[Path]:
     where = f"{folder.name}/metadata.yaml"
     require_file(folder / "metadata.yaml")
     try:
-        text = (folder / "metadata.yaml").open("rb").read(4 * LIMIT.YAML_CHARACTERS + 1).decode()
+        with (folder / "metadata.yaml").open("rb") as stream:
+            text = stream.read(4 * LIMIT.YAML_CHARACTERS + 1).decode()
     except (OSError, UnicodeDecodeError) as e:
         raise InputError(f"the bag cannot be read: {e}", file=where) from e
     values, _ = yaml_values(text, file=where)
