@@ -3,6 +3,7 @@
     STEPS      Problem -> Problem: changes of a problem before its rows are made, in this order
     READERS    Record, Signals -> States: signals.reader of a study (`runtime.core.signals.reader`)
     METHODS    Observation -> rows of a least squares -> their fit: estimate.method of a study
+    CORRECTIONS  Identification -> Identification: deviations, by what the model lacks
     EXTRAS     Identification -> Part: further analyses of the records
     QUESTIONS  Identification -> Check: what the verdict asks; a part asks its own
 
@@ -25,7 +26,7 @@ from runtime.advisor.advice import NoAdvice
 from runtime.core import identify as identification
 from runtime.core.automatic import automatic_cutoff
 from runtime.core.essential import Essential, essential_of
-from runtime.core.identify import Extra, OnRequest
+from runtime.core.identify import Correction, Extra, OnRequest
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import LinearOptions, ordinary
 from runtime.core.least_squares.method import Method
@@ -64,6 +65,7 @@ from runtime.rest import STATIC, poses_at_rest
 from runtime.speeds import recorded_speeds
 from runtime.study import Study, study_of, study_schema
 from runtime.threads import alone_each, single_threaded
+from runtime.unmodelled import with_lacking
 from runtime.verdict import questions
 from runtime.verdict.verdict import Ask, of_parts, verdict
 
@@ -132,6 +134,7 @@ METHODS: Listed[Method] = Listed(
         "didim": "runtime.loop.didim:METHOD",
     }
 )
+CORRECTIONS: list[Correction] = [with_lacking]
 EXTRAS: list[Extra] = [
     PartWhen(
         Late("runtime.packets.packets:packets_told"),
@@ -492,13 +495,17 @@ def estimate_of(
     *,
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
+    corrected: bool = True,
 ) -> Estimate:
     """Estimate the parameters of given rows Y = W X + rho by the method of `settings`.
 
-    The default method is ols.
+    The default method is ols. Without `corrected`, `sigma_corrected` is nan: on a long record it
+    takes most of the time.
     """
     settings = settings or EstimateSettings()
-    return estimate_by(observation, settings, METHODS, model=model, provenance=provenance)
+    return estimate_by(
+        observation, settings, METHODS, model=model, provenance=provenance, corrected=corrected
+    )
 
 
 @entry
@@ -586,7 +593,9 @@ def identify(
     if plausible or (plausible is None and variants is not None):
         asked["plausible"] = {"variants": variants}
     whole = _with_loaded(model, records, study, further, loaded, simulator)
-    return identification.identify(whole, extras(asked), judged, provenance=provenance)
+    return identification.identify(
+        whole, extras(asked), judged, corrections=CORRECTIONS, provenance=provenance
+    )
 
 
 @entry
@@ -615,7 +624,12 @@ def assess(
     whole = _with_loaded(model, records, study, None, None, None)
     progress("identification")
     return identification.identify(
-        whole, extras(asked, attempted=True), judged, provenance=provenance, progress=progress
+        whole,
+        extras(asked, attempted=True),
+        judged,
+        corrections=CORRECTIONS,
+        provenance=provenance,
+        progress=progress,
     )
 
 
@@ -963,6 +977,7 @@ def _candidate(model: GeneratedModel, candidate: Study | tuple[Study, Records, R
 
 
 __all__ = [
+    "CORRECTIONS",
     "EXTRAS",
     "METHODS",
     "QUESTIONS",

@@ -128,6 +128,20 @@ def known_columns(names: Names, joints: Sequence[str] = ()) -> dict[str, Any]:
     return {**({"columns": columns} if columns else {}), **({"units": units} if units else {})}
 
 
+def joint_counts(names: Names, joints: Sequence[str] = ()) -> dict[str, int]:
+    """Count the joints of which names show positions ("q") and torques ("tau"); 0 if none do.
+
+    Commanded columns do not count beside measured ones.
+    """
+    families = [*families_of(names, joints)]
+    counts = {}
+    for key in QUANTITIES:
+        own = [f for f in families if f.quantity == key]
+        measured = [f for f in own if f.target < 2] or own
+        counts[key] = max((f.width for f in measured), default=0)
+    return counts
+
+
 def missing_joints(names: Names, joints: Sequence[str], n: int) -> dict[str, list[int]]:
     """List the joints whose positions ("q") or torques ("tau") are not recognised.
 

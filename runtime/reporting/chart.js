@@ -32,6 +32,13 @@ function ticks(low, high, count) {
   return found.map((value) => [value, minus(value.toFixed(digits))]);
 }
 
+/** Numbers of little-endian floats in base64. */
+function floats(text, Kind = Float32Array) {
+  const raw = atob(text), bytes = new Uint8Array(raw.length);
+  for (let k = 0; k < raw.length; k++) bytes[k] = raw.charCodeAt(k);
+  return new Kind(bytes.buffer);
+}
+
 /** Panels of one joint: predicted over measured torque, and their difference. */
 function torques(measured, predicted, unit, source = "measured") {
   const error = measured.map((x, k) => x - predicted[k]);
@@ -70,12 +77,14 @@ class Chart {
   draw() {
     const width = this.plot.clientWidth, [a, b] = this.group.span, t = this.t;
     if (!width) return;
-    this.kept = [...t.keys()].filter((k) => t[k] === t[k] && (t[k] < a ? t[k + 1] >= a : t[k] <= b || t[k - 1] <= b)); // one more on either side
+    this.kept = [];
+    for (let k = 0; k < t.length; k++) if (t[k] === t[k] && (t[k] < a ? t[k + 1] >= a : t[k] <= b || t[k - 1] <= b)) this.kept.push(k); // one more on either side
     [this.left, this.top] = NARROW.matches ? [50, GAP] : [60, 10];
     this.width = Math.max(40, width - this.left - 10);
     this.span = this.over ? this.extent([this.across]) : [a, b];
     this.drawn = [];
-    const root = svgNode("g", { transform: `translate(${this.left} 0)` }), places = ticks(...this.span, Math.max(2, this.width / 60));
+    const root = svgNode("g", { transform: `translate(${this.left} 0)` }), from = this.over ? 0 : this.group.origin;
+    const places = ticks(this.span[0] - from, this.span[1] - from, Math.max(2, this.width / 60)).map(([value, label]) => [value + from, label]);
     let top = this.top;
     for (const [k, panel] of this.panels.entries()) {
       this.panel(root, panel, top, k ? 84 : 170, places);
@@ -83,7 +92,7 @@ class Chart {
     }
     this.bottom = top - GAP;
     for (const [value, label] of places) root.append(svgNode("text", { x: this.x(value), y: this.bottom + 16, "text-anchor": "middle" }, label));
-    const title = this.over ? titled(this.over.title, this.over.unit) : this.group.unit ? `time, ${this.group.unit}` : "sample";
+    const title = this.over ? titled(this.over.title, this.over.unit) : this.group.unit ? `time, ${this.group.unit}${from ? ` after ${from.toFixed(3)}` : ""}` : "sample";
     this.marks = svgNode("svg", { width: this.width, height: this.bottom });
     root.append(svgNode("text", { x: this.width / 2, y: this.bottom + 34, "text-anchor": "middle" }, title), this.marks);
     const height = this.bottom + BELOW;
@@ -107,14 +116,42 @@ class Chart {
 
   /** A line through the instants kept; it breaks where an instant or a value is missing. */
   path(values, y) {
-    let text = "", last = NaN;
-    for (const k of this.kept) {
-      const place = `${this.x(this.across[k]).toFixed(1)} ${y(values[k]).toFixed(1)}`;
-      if (place.includes("NaN")) continue;
-      text += (last === k - 1 ? "L" : "M") + place;
-      last = k;
+    const text = [], joined = (k, last) => last === k - 1, point = (mark, k) => text.push(`${mark}${this.x(this.across[k]).toFixed(1)} ${y(values[k]).toFixed(1)}`);
+    const known = this.kept.filter((k) => this.across[k] === this.across[k] && values[k] === values[k]);
+    if (this.over) this.strokes(known, (k) => `${this.x(this.across[k]).toFixed(0)} ${y(values[k]).toFixed(0)}`, joined, point);
+    else this.columns(known, values, joined, point);
+    return text.join("");
+  }
+
+  /** Of the instants in one column of pixels: the first, the smallest, the largest and the last, in their order. */
+  columns(known, values, joined, point) {
+    for (let i = 0; i < known.length;) {
+      const first = known[i], pixel = Math.floor(this.x(this.across[first]));
+      let [low, high, last] = [first, first, first];
+      point(joined(first, known[i - 1]) ? "L" : "M", first);
+      for (i++; i < known.length && joined(known[i], last) && Math.floor(this.x(this.across[known[i]])) === pixel; i++) {
+        last = known[i];
+        if (values[last] < values[low]) low = last;
+        if (values[last] > values[high]) high = last;
+      }
+      for (const k of new Set(low < high ? [low, high, last] : [high, low, last])) if (k !== first) point("L", k);
     }
-    return text;
+  }
+
+  /** Strokes from pixel to pixel, each drawn once. */
+  strokes(known, cell, joined, point) {
+    const drawn = new Set();
+    let pen = "", before = "", last = NaN;
+    for (const k of known) {
+      const now = cell(k), stroke = `${before}:${now}`;
+      if (joined(k, last) && now !== before && !drawn.has(stroke)) {
+        if (pen !== before) point("M", last);
+        point("L", k);
+        pen = now;
+        drawn.add(stroke);
+      }
+      [before, last] = [now, k];
+    }
   }
 
   x(value) { return this.width * (value - this.span[0]) / (this.span[1] - this.span[0]); }
@@ -162,8 +199,7 @@ class Chart {
 
   /** Mark the instant next to a time, and write the values there. */
   at(time) {
-    let least = Infinity;
-    this.t.forEach((t, k) => { if (Math.abs(t - time) < least) [least, this.k] = [Math.abs(t - time), k]; });
+    this.k = this.group.nearest(this.t, time);
     this.mark();
   }
 
@@ -176,7 +212,7 @@ class Chart {
       const numbers = lines.map(({ name, values }) => `${name} ${known(values[k]) ? minus(values[k].toFixed(digits)) : "–"}`);
       said.push(`${numbers.join(", ")} ${unit}`.trim());
     }
-    this.readout.textContent = `${unit ? `${this.t[k].toFixed(3)} ${unit}` : `sample ${this.t[k]}`}: ${said.join("; ")}`;
+    this.readout.textContent = `${unit ? `${(this.t[k] - this.group.origin).toFixed(3)} ${unit}` : `sample ${this.t[k]}`}: ${said.join("; ")}`;
   }
 }
 
@@ -187,14 +223,15 @@ class Group {
     this.tools(box, charts);
     this.charts = charts.map((chart) => new Chart(this, chart.figure ?? box.appendChild(node("figure", {}, node("figcaption", { textContent: chart.label }))), chart));
     let low = Infinity, high = -Infinity;
-    for (const { t } of this.charts) for (const x of t) if (x === x) [low, high] = [Math.min(low, x), Math.max(high, x)];
+    for (const { t } of this.charts) for (const x of t) { if (x < low) low = x; if (x > high) high = x; }
     this.all = low < high ? [low, high] : low === high ? [low - 0.5, low + 0.5] : [0, 1];
+    this.origin = Math.abs(low) >= 1e5 && low < high ? low : 0; // of stamps that count from 1970
     this.whole();
   }
 
   tools(box, charts) {
     const bar = node("div", { className: "tools", role: "toolbar", ariaLabel: "Span of time and lines of the figures" });
-    for (const [key, label, name] of [["+", "+", "Zoom in"], ["-", "−", "Zoom out"], ["ArrowLeft", "◀", "Earlier"], ["ArrowRight", "▶", "Later"], ["0", "all", "Show the whole time"]]) {
+    for (const [key, label, name] of [["+", "+", "Zoom in"], ["-", "−", "Zoom out"], ["ArrowLeft", "◀", "Earlier"], ["ArrowRight", "▶", "Later"], ["0", "all", "all: show the whole time"]]) {
       const button = node("button", { type: "button", textContent: label, title: name, ariaLabel: name });
       button.addEventListener("click", () => this.key(key));
       bar.append(button);
@@ -212,6 +249,16 @@ class Group {
     }
     bar.append(node("span", { className: "hint", textContent: "Drag over a figure: zoom. Click, then wheel or + − ← → 0. All figures move together." }));
     box.before(bar);
+  }
+
+  /** The instant of `t` next to a time; charts of one record share `t`. */
+  nearest(t, time) {
+    if (this.found?.t !== t || this.found.time !== time) {
+      let least = Infinity, at = 0;
+      for (let k = 0; k < t.length; k++) if (Math.abs(t[k] - time) < least) [least, at] = [Math.abs(t[k] - time), k];
+      this.found = { t, time, at };
+    }
+    return this.found.at;
   }
 
   at(time) { for (const chart of this.charts) chart.at(time); }

@@ -1,17 +1,11 @@
 // Figures come to life, tables are sorted, what is folded opens for print.
 
-/** Numbers of little-endian float32 in base64. */
-function floats(text) {
-  const view = new DataView(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
-  return Array.from({ length: view.byteLength / 4 }, (_, k) => view.getFloat32(4 * k, true));
-}
-
 (function () {
   const data = JSON.parse(document.getElementById("data").textContent);
   for (const box of document.querySelectorAll(".figures")) {
     const charts = [...box.querySelectorAll("figure[data-series]")].map((figure) => {
       const { start, t, measured, predicted, unit, source } = data[figure.dataset.series];
-      return { figure, label: figure.dataset.label, t: floats(t).map((x) => x + start), panels: torques(floats(measured), floats(predicted), unit, source) };
+      return { figure, label: figure.dataset.label, t: Float64Array.from(floats(t), (x) => x + start), panels: torques(floats(measured), floats(predicted), unit, source) };
     });
     if (charts.length) new Group(box, charts);
   }

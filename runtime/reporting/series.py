@@ -52,7 +52,7 @@ class Series:
             "start": start,
             "unit": self.unit,
             "source": self.source,
-            **{name: _base64(x) for name, x in arrays.items()},
+            **{name: base64(x) for name, x in arrays.items()},
         }
 
 
@@ -99,5 +99,9 @@ def gaps(t: Array) -> Array:
     return np.flatnonzero((steps <= 0) | (steps > 5 * usual)) + 1
 
 
-def _base64(values: Array) -> str:
-    return b64encode(np.asarray(values, dtype="<f4").tobytes()).decode("ascii")
+def base64(values: Array, kind: str = "<f4") -> str:
+    """Write numbers as little-endian floats in base64, which `floats` of chart.js reads.
+
+    kind : "<f4" for 32 bits, "<f8" for 64.
+    """
+    return b64encode(np.asarray(values, dtype=kind).tobytes()).decode("ascii")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 from symgen.certify.certificate import Certificate, certify_formulas, hair_off
@@ -15,7 +16,7 @@ from symgen.derive.models import OPTIONS
 from symgen.description.robot import Robot
 from symgen.description.values import WITHIN
 from symgen.emit.generate import generate_files
-from symgen.emit.targets import TARGETS
+from symgen.emit.targets import TARGETS, target_of
 from symgen.errors import CertificateError, require, require_names
 from symgen.regroup.regrouping import Regrouping, regroup, regrouping_of
 from symgen.time_limit import limited
@@ -47,17 +48,19 @@ def certify(
     require_names(options, OPTIONS, "options")
     if files is not None:
         require(files, Mapping, "files", "{file name: text}")
-        require_names({*files}, [t.file.format(robot.name) for t in TARGETS.values()], "files")
+        known = [t.file.format(robot.name, "*") for t in TARGETS.values()]
+        strange = {file for file in files if not any(fnmatchcase(str(file), x) for x in known)}
+        require_names(strange, known, "files")
         for name, text in files.items():
             require(text, str, f"files[{name!r}]", "the text of the file")
-    target = {t.file.format(robot.name): name for name, t in reversed(TARGETS.items())}
     with limited(f"the certificate of {robot.name}"):
         certificate = certify_formulas(regrouping)
     with limited(f"the derivation of {robot.name}"):
         files = generate_files(robot, regrouping=regrouping) if files is None else files
         witness = Witness(regrouping, options=options)
         texts = {
-            file: text_check(file, text, target[file], witness) for file, text in files.items()
+            file: text_check(file, text, target_of(file), witness, files)
+            for file, text in files.items()
         }
     certificate = replace(certificate, texts=texts)
     unsaid = not certificate.valid and not certificate.failures

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import typer
 
+from symgen.cli.told import as_json, counter, error_data, tell
 from symgen.update.models import corrected as corrected
 from symgen.update.models import model_of as model_of
 from symgen.update.models import variants_of as variants_of
@@ -69,7 +70,8 @@ def reported_errors() -> Iterator[None]:
         code = NEGATIVE if isinstance(e, CertificateError) else BAD_INPUT
         likely = "; identify --suggest FILE writes a likely study"
         likely = "" if getattr(e, "remedy", None) is None else likely
-        fail(f"{e}{likely}", lines=isinstance(e, DataUnavailableError), code=code)
+        lines = isinstance(e, DataUnavailableError)
+        fail(f"{e}{likely}", lines=lines, code=code, data=error_data(e))
     except OSError as e:
         fail(f"{e.filename or 'cannot print, or write a temporary file'}: {e.strerror or e}")
 
@@ -100,7 +102,7 @@ def _noted_warnings() -> Iterator[None]:
         finally:
             width = get_terminal_size().columns
             for text in notes:
-                typer.echo(_wrapped(f"note: {text}", width), err=True)
+                tell(_wrapped(f"note: {text}", width), note=text)
 
 
 @contextmanager
@@ -116,22 +118,29 @@ def results_in(output: Path | None) -> Iterator[Any]:
             yield results
 
 
-def fail(message: str, *, lines: bool = False, code: int = BAD_INPUT) -> NoReturn:
+def fail(
+    message: str,
+    *,
+    lines: bool = False,
+    code: int = BAD_INPUT,
+    data: Mapping[str, Any] | None = None,
+) -> NoReturn:
     """End the command with `message` on the error stream and an exit code.
 
     lines : whether line ends of the message are kept. Otherwise they are printed as backslash n,
         because a name in the message may contain any character.
+    data : what a program reads instead (`symgen.cli.told`).
     """
     from symgen.errors import printable
 
     text = message if lines else message.replace("\n", "\\n")
-    typer.echo(f"error: {printable(text)}", err=True)
+    tell(f"error: {printable(text)}", **(data or {"error": printable(text)}))
     raise typer.Exit(code)
 
 
 def say(text: str) -> None:
     """Print a line of progress on the error stream."""
-    typer.echo(f"  {text}", err=True)
+    tell(f"  {text}", stage=text)
 
 
 def show(
@@ -149,7 +158,8 @@ def show(
         text = on_terminal(text, get_terminal_size().columns, verdict)
     typer.echo(text, nl=not json)
     if results is not None:
-        typer.echo(f"report: {results.folder / 'report.html'}", err=True)
+        report = str(results.folder / "report.html")
+        tell(f"report: {report}", report=report)
 
 
 def on_terminal(text: str, width: int, verdict: Any = None) -> str:
@@ -358,9 +368,12 @@ def progress_lines() -> Iterator[None]:
 
     from runtime.ground.progress import LOGGER
 
+    class Stages(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            say(record.getMessage())
+
     start, level = monotonic(), LOGGER.level
-    handler = logging.StreamHandler()
-    handler.setFormatter(logging.Formatter("  %(message)s"))
+    handler = Stages()
     handler.addFilter(lambda record: monotonic() - start > 2.0)
     LOGGER.addHandler(handler)
     LOGGER.setLevel(logging.INFO)
@@ -378,6 +391,9 @@ def progress_bar(what: str) -> Iterator[Any]:
     Yield a function of the number of finished steps and the number of all steps, which updates the
     bar.
     """
+    if as_json():
+        yield counter()
+        return
     from rich import progress as rich
     from rich.console import Console
 

@@ -111,7 +111,7 @@ def _impossible(given: Sequence[float | None]) -> str:
     if given[9] is not None and M == 0 and MS.any():
         return "mass 0 with first moments"
     if None not in given:
-        wrong, tensor = no_body(M, _centred(ten)), _tensor(ten[:6])
+        wrong, tensor = no_body(M, centred(ten)), _tensor(ten[:6])
         about_centre = bool(wrong and MS.any() and tensor.any() and not no_body(M, tensor))
         return wrong + "; about the centre of mass, a body has these moments" * about_centre
     if M < 0:
@@ -132,7 +132,7 @@ def _tensor(J: Array) -> Array:
     return I + np.triu(I, 1).T
 
 
-def _centred(ten: Array) -> Array:
+def centred(ten: Array) -> Array:
     """Compute the tensor about the centre of mass; differences of rounded moments are zero."""
     I = inertial_of(ten).I
     return np.where(np.abs(I) > ROUNDING * np.abs(ten[:6]).max(), I, 0.0)

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from symgen.description.angles import NotReadWarning
 from symgen.description.fields import located
@@ -201,7 +202,10 @@ def _read(
         from symgen.description.tree_robot import read_tree
 
         part = TreePart(lock or {}, chain)
-        return read_tree(content, path.name, exact=exact, keep_fixed=keep_fixed, part=part)
+        beside = loops_beside(path)
+        return read_tree(
+            content, path.name, exact=exact, keep_fixed=keep_fixed, part=part, loops=beside
+        )
     return parse_robot(content, path.name), ()
 
 
@@ -229,6 +233,23 @@ def _beside(path: Path) -> Callable[[str, int], bytes]:
         return content_of(included)
 
     return read
+
+
+def loops_beside(path: Path) -> Any:
+    """Return the LoopsText of the file with the loops of a URDF or MJCF, or None if there is none.
+
+    It is NAME.loops.yaml in the same folder, or loop_closures.yaml there; of a file in a folder
+    `urdf`, also in the folder that holds it, or in `config` there.
+    """
+    from symgen.description.loops_file import EXPORTED, LoopsText  # numpy
+
+    folders = [path.parent]
+    if path.resolve().parent.name == "urdf":
+        above = path.resolve().parent.parent
+        folders += [above, above / "config"]
+    places = [path.with_suffix(".loops.yaml"), *(folder / EXPORTED for folder in folders)]
+    found = next((place for place in places if place.is_file()), None)
+    return None if found is None else LoopsText(found.name, content_of(found))
 
 
 def write_robot(

@@ -91,7 +91,7 @@ def parse_robot(content: bytes, file: str) -> Robot:
         return next((lines[place] for place in places if place in lines), 1)
 
     with located(file, line):
-        data = _document(content, lines)
+        data = document(content, lines)
         _check_version(data)
         return described(data, file, hashlib.sha256(content).hexdigest())
 
@@ -111,7 +111,7 @@ def _check_version(data: Any) -> None:
         )
 
 
-def _document(content: bytes, lines: dict[Path, int]) -> Any:
+def document(content: bytes, lines: dict[Path, int]) -> Any:
     """Parse `content` as one YAML document and return its data as Python objects.
 
     `lines` receives the line number of every key path.
@@ -432,7 +432,7 @@ def tables_of(robot: Robot) -> dict[str, Any]:
 
 def data_of(robot: Robot) -> dict[str, Any]:
     """Return the data of a robot file that describes `robot`, of which `described` makes it again."""
-    data: dict[str, Any] = _document(write_yaml(robot).encode(), {})
+    data: dict[str, Any] = document(write_yaml(robot).encode(), {})
     return data
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,8 +10,9 @@ from symgen.derive.loops import close
 from symgen.derive.models import OPTIONS
 from symgen.description.files import robot_of
 from symgen.description.robot import Robot
-from symgen.emit import c_target, python_target
+from symgen.emit import c_target, matlab_target, python_target
 from symgen.emit.c_target import C
+from symgen.emit.matlab_target import MATLAB
 from symgen.emit.printers import PYTHON, Language
 from symgen.emit.spec import ModuleSpec, module_spec, spec_of
 from symgen.emit.targets import TARGETS
@@ -20,10 +21,13 @@ from symgen.regroup.regrouping import Regrouping
 
 
 class Emitter(NamedTuple):
-    """Code generator for one kind of file, such as C: its language and its writing function."""
+    """Code generator for one kind of file, such as C: its language and its writing function.
+
+    A function `render` that returns {function: text} writes a file for each function.
+    """
 
     language: Language
-    render: Callable[..., str]
+    render: Callable[..., str | Mapping[str, str]]
 
 
 _PYTHON = Emitter(PYTHON, python_target.render)
@@ -33,6 +37,7 @@ EMITTERS = {
     "xp": _PYTHON,
     "c": Emitter(C, c_target.render),
     "h": Emitter(C, c_target.render_header),
+    "matlab": Emitter(MATLAB, matlab_target.render),
 }
 
 
@@ -88,8 +93,12 @@ def generate_files(
     )
     targets = [*targets, *["h"] * ("c" in targets)]
     served = [name for name in targets if TARGETS[name].iterates or not spec.tied]
-    file = {TARGETS[name].file.format(robot.name): name for name in served}
-    return {path: EMITTERS[name].render(spec, command=command) for path, name in file.items()}
+    files: dict[str, str] = {}
+    for pattern, name in {TARGETS[name].file: name for name in served}.items():
+        made = EMITTERS[name].render(spec, command=command)
+        texts = {"": made} if isinstance(made, str) else made
+        files |= {pattern.format(robot.name, function): text for function, text in texts.items()}
+    return files
 
 
 def _require_base(robot: Robot, targets: Sequence[str]) -> None:

@@ -14,7 +14,7 @@ class Drawing {
   constructor(robot, pose) {
     this.robot = robot;
     this.root = svg("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, "aria-hidden": "true" });
-    this.options = { y: false, names: true };
+    this.options = { y: false, names: true, boxes: false };
     this.marked = null;
     const g = norm(robot.gravity);
     this.up = g > 0 ? robot.gravity.map((x) => -x / g) : [0, 0, 1]; // up in the picture is against gravity
@@ -68,14 +68,16 @@ class Drawing {
       this.frameAxes(f.j, T);
     }
     for (const arrow of this.arrows) this.arrow(arrow, L);
+    if (this.options.boxes) for (const box of this.robot.boxes) this.box(box, pose[box.link]);
     this.items.sort((a, b) => a.depth - b.depth);
     this.root.replaceChildren(...this.ground(), ...this.items.map((item) => item.node), ...this.gravityArrow());
   }
 
-  /** Zoom out where a joint would leave the picture. */
+  /** Zoom out where a joint, or the box of a body, would leave the picture. */
   fit(pose) {
-    for (const T of pose) {
-      const [x, y] = this.project(T.p);
+    const bodies = this.options.boxes ? this.robot.boxes.flatMap((box) => corners(box, pose[box.link])) : [];
+    for (const p of [...pose.map((T) => T.p), ...bodies]) {
+      const [x, y] = this.project(p);
       const over = Math.max(Math.abs(x - WIDTH / 2) / (WIDTH / 2 - MARGIN), Math.abs(y - HEIGHT / 2) / (HEIGHT / 2 - MARGIN));
       if (over > 1 && !this.near) this.scale /= over;
     }
@@ -122,6 +124,17 @@ class Drawing {
     this.add(depth + 1e-6, svg("polygon", { points: path(front), ...this.named("cap", f.j) }));
     const reach = L * 1.6;
     this.line(along(T.p, T.z, -reach), along(T.p, T.z, reach), { class: "axis" }, -0.01 * L);
+  }
+
+  /** The homogeneous box with mass and inertia of a link: the faces that look at the eye. */
+  box({ link, centre, axes, sides }, T) {
+    const [p, halves] = placed({ centre, axes, sides }, T);
+    for (const k of [0, 1, 2]) {
+      const [u, v] = [halves[(k + 1) % 3], halves[(k + 2) % 3]], toward = this.project(sum(p, halves[k], 1, 1))[2] < this.project(sum(p, halves[k], 1, -1))[2] ? -1 : 1;
+      const middle = sum(p, halves[k], 1, toward), corner = (a, b) => this.project(along(along(middle, u, a), v, b));
+      const points = [corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)].map((c) => `${c[0].toFixed(2)},${c[1].toFixed(2)}`).join(" ");
+      this.add(this.project(middle)[2], svg("polygon", { points, ...this.named("mass", link) }));
+    }
   }
 
   /** Axes x and z (y on demand). One arrow for axes that coincide, x4 x5 x6; a longer one where an axis of another letter lies below. */
@@ -173,6 +186,17 @@ class Drawing {
       svg("text", { x: 34, y: HEIGHT - 38, class: "g" }, "gravity ↓"),
     ];
   }
+}
+
+/** Centre of a box in frame 0, and half of each of its sides as a vector there. */
+function placed({ centre, axes, sides }, T) {
+  const turned = (v) => along(along(along([0, 0, 0], T.x, v[0]), T.y, v[1]), T.z, v[2]);
+  return [sum(T.p, turned(centre), 1, 1), axes.map((axis, k) => turned(axis).map((x) => (x * sides[k]) / 2))];
+}
+
+function corners(box, T) {
+  const [p, halves] = placed(box, T), signs = [-1, 1];
+  return signs.flatMap((a) => signs.flatMap((b) => signs.map((c) => along(along(along(p, halves[0], a), halves[1], b), halves[2], c))));
 }
 
 /** How many earlier frames share the origin of each frame. */

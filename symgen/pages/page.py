@@ -31,6 +31,7 @@ from symgen.description.parts import GEOMETRY
 from symgen.description.robot import PRISMATIC, Element, Robot
 from symgen.emit.header import informative_columns
 from symgen.emit.spec import ModuleSpec, module_spec
+from symgen.pages.boxes import boxes
 from symgen.pages.effects import Effect, effects, rows_of
 from symgen.regroup.reasons import Absorption, absorptions
 from symgen.regroup.regrouping import Regrouping
@@ -294,6 +295,7 @@ def figure(robot: Robot, closure: Closure) -> dict[str, Any]:
         "follows": follows,
         "tied": {j: closure.start[j] for j in closure.tied},
         "loops": [{"cut": loop.cut, "twin": loop.twin} for loop in robot.loops],
+        "boxes": boxes(robot),
     }
 
 

@@ -7,6 +7,7 @@
     study.yaml                meaning of the record, and settings of its evaluation
     proof.json, check.json    the certificate and the findings
     repair.json               what the last repair has changed in the study, and the study before
+    times.json                how long the last run of each kind took, s
     robot-NN-name.urdf, study-NN-name.yaml, runs/NN-name/    robot, settings, results of one command
     history/robot/NNNN/, history/study/NNNN/, history/record/NNNN/    what a change has replaced
     history/undone/NNNN/      robots that undo has replaced
@@ -241,12 +242,12 @@ class WorkFolder:
         text = self.read("study.yaml")
         return sha256(text.encode()).hexdigest() if text else ""
 
-    def study(self) -> dict[str, Any]:
-        """Read study.yaml as plain values, with the records as a list; {} if it is empty.
+    def study(self, name: str = "study.yaml") -> dict[str, Any]:
+        """Read a study file as plain values, with the records as a list; {} if it is empty.
 
         InputError if it is not valid YAML.
         """
-        values = yaml_values(self.read("study.yaml"), file="study.yaml")[0]
+        values = yaml_values(self.read(name), file=name)[0]
         values = values if isinstance(values, dict) else {}
         single = isinstance(values.get("record"), dict)
         return values | {"record": [values["record"]]} if single else values
@@ -300,6 +301,8 @@ class WorkFolder:
             "verdict": data.get("verdict", ""),
             "enough": data.get("enough"),
             "levels": data.get("levels") or [],
+            "asked": bool(data.get("asked")),
+            "few": few_runs(data.get("levels") or []),
             "command": self.read(f"study-{run.name}.yaml").partition("\n")[0].partition("# ")[2],
             "files": sorted(p.name for p in run.iterdir() if p.is_file() and p.name[0] != "."),
         }
@@ -329,6 +332,13 @@ def measured_name(name: str) -> str:
 def result_of(run: Path) -> str:
     """Return the name of the result file of a run; "" if the run is not complete."""
     return next((name for name in RESULT_FILES if (run / name).is_file()), "")
+
+
+def few_runs(levels: list[dict[str, Any]]) -> dict[str, int]:
+    """Numbers of runs of a resolution study, and that it needs; {} if its means are narrow enough."""
+    short = [level for level in levels if level["run_count"] < level["runs_needed"]]
+    keys = {"runs": "run_count", "needed": "runs_needed"}
+    return {key: max(level[of] for level in short) for key, of in keys.items()} if short else {}
 
 
 def remove(path: Path) -> None:

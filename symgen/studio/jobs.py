@@ -7,8 +7,8 @@ is interrupted, then killed. Its folder of results is deleted unless it is compl
 from __future__ import annotations
 
 import asyncio
+import json
 import os
-import re
 import shlex
 import shutil
 import signal
@@ -20,12 +20,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from runtime.reporting.result_files import write_all
 from runtime.threads import BLAS_THREADS
 
 GRACE = 3.0  # s, between the interrupt and the kill
 OUTPUT_KEPT = 500_000  # characters of what a command says that are kept
-CONTROL_CODES = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]|[━╸╺]")  # bars, colours, moves of the cursor
 MOST_COMMANDS = 40  # commands in the queue
+TIMES = "times.json"  # how long the last command of each task took, s
+LINES = "SYMGEN_LINES"  # as symgen.cli.told reads it
 WAITING, RUNNING, DONE, FAILED, CANCELLED = "waiting", "running", "done", "failed", "cancelled"
 
 
@@ -88,23 +90,27 @@ class Job:
         """Whether the command is unfinished: it waits in the queue, or it runs."""
         return self.state in (WAITING, RUNNING)
 
-    @property
-    def said(self) -> list[str]:
-        """Lines of the error stream of the command, without control sequences."""
-        lines = re.split(r"[\r\n]+", CONTROL_CODES.sub(" ", self.progress))
-        return [" ".join(line.split()) for line in lines if line.strip()]
+    def told(self, key: str) -> list[Any]:
+        """Values of a key in the JSON lines of the error stream (`symgen.cli.told`), in order."""
+        return [line[key] for line in lines_of(self.progress) if key in line]
 
     @property
-    def counted(self) -> list[str]:
-        """Numbers of finished steps and of all steps, from the progress bar; empty without bar."""
-        return re.findall(r"\d+(?=/\d)|(?<=\d/)\d+", "".join(self.said[-1:]))[:2]
+    def said(self) -> list[str]:
+        """Parts of the work and notes, and lines that are no JSON, in order."""
+        lines = lines_of(self.progress)
+        return [str(line[k]) for line in lines for k in ("stage", "note", "text") if k in line]
+
+    @property
+    def counted(self) -> tuple[int, int] | None:
+        """Numbers of finished steps and of all steps; None before the first of them is known."""
+        pairs = zip(self.told("done")[-1:], self.told("total")[-1:], strict=False)
+        return next(((done, total) for done, total in pairs if total), None)
 
     @property
     def last(self) -> str:
-        """Last error message of the command, or else its last line of text or its exit code."""
-        errors = [line for line in self.said if line.startswith("error: ")]
-        words = (errors or self.said or [f"exit code {self.code}"])[-1]
-        return words.removeprefix("error: ")
+        """Error of the command, or else its last line of text or its exit code."""
+        words = self.told("error") or self.said or [f"exit code {self.code}"]
+        return str(words[-1])
 
     def signal(self, number: signal.Signals) -> None:
         """Send a signal to the process of the command and to its child processes."""
@@ -132,6 +138,7 @@ class Jobs:
         self.folder, self.programs, self.changed = folder, programs, changed
         self.all: list[Job] = []
         self.wake = asyncio.Event()
+        self.times = _times(folder)
 
     def add(
         self, title: str, words: Sequence[str], result: str, *, run: str = "", terminal: str = ""
@@ -161,6 +168,19 @@ class Jobs:
             if job.open
             or (not job.dismissed and job.state != DONE and job.number > done.get(job.task, 0))
         ]
+
+    def left(self, job: Job) -> float | None:
+        """Expected time until a running command ends, s; None if nothing is known of it.
+
+        It is known from the steps that are done, or from the last command of the same task.
+        """
+        passed = time.monotonic() - job.started
+        if job.state != RUNNING:
+            return None
+        if job.counted and job.counted[0]:
+            done, total = job.counted
+            return passed * (total - done) / done
+        return max(self.times[job.task] - passed, 0.0) if job.task in self.times else None
 
     def last(self, title: str) -> Job | None:
         """Return the last command with the given title; None if there is none."""
@@ -211,7 +231,7 @@ class Jobs:
             stderr=PIPE,
             env=os.environ
             | dict.fromkeys(BLAS_THREADS, "1")
-            | {"TMPDIR": str(temporary), "FORCE_COLOR": "1", "TERM": "xterm"},  # bars are drawn
+            | {"TMPDIR": str(temporary), LINES: "json", "NO_COLOR": "1"},
             start_new_session=True,
         )
         if job.state == CANCELLED:  # while it was started
@@ -225,6 +245,9 @@ class Jobs:
                 before,
             )  # 1: a verdict of no
             job.state = DONE if told else FAILED
+            if told:
+                self.times[job.task] = time.monotonic() - job.started
+                write_all(self.folder, {TIMES: json.dumps(self.times)})
 
     def _written(self, job: Job) -> int:
         """Return the time, ns, at which the result file of a command was last written.
@@ -255,3 +278,24 @@ class Jobs:
                 for path in self.folder.glob(f"{own}-{job.run}.*"):
                     path.unlink()
         self.changed()
+
+
+def _times(folder: Path) -> dict[str, float]:
+    """Read how long the last command of each task took, s."""
+    try:
+        times = json.loads((folder / TIMES).read_text(encoding="utf-8"))
+        return {str(task): float(seconds) for task, seconds in times.items()}
+    except (OSError, ValueError, TypeError, AttributeError):
+        return {}
+
+
+def lines_of(text: str) -> list[dict[str, Any]]:
+    """Read the lines of an error stream: mappings in JSON, or {"text": line} for any other line."""
+    found: list[dict[str, Any]] = []
+    for line in filter(str.strip, text.splitlines()):
+        try:
+            value = json.loads(line)
+        except ValueError:
+            value = None
+        found.append(value if isinstance(value, dict) else {"text": line})
+    return found

@@ -20,7 +20,8 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route
 
-from runtime.ground.errors import InputError
+from runtime.ground.errors import InputError, SettingsError
+from runtime.reading.datasets import DATASETS
 from runtime.reading.formats import endings
 from symgen.derive.models import SYMBOLIC
 from symgen.description import packaged_robots
@@ -36,7 +37,7 @@ PAGE_STEPS = ("robot", "record", "check", "solve", "results")
 PAGE_PARTS = ("table", "certificate", "study", "findings", "jobs", "applied")
 SANDBOX = "sandbox allow-scripts allow-downloads allow-popups"
 SHOWN_FILES = {".html": "text/html", ".png": "image/png", ".svg": "image/svg+xml"}
-VIEWS = ("formulas", "model", "module", "preview", "series", "changes")
+VIEWS = ("formulas", "model", "module", "preview", "recorded", "series", "changes")
 RUN_COMMANDS = {  # what each writes, its verb and options
     "identify": ("estimate.json", "identify"),
     "cestac": ("cestac.json", "cestac"),
@@ -58,7 +59,7 @@ class Pages:
     """The request handlers of one studio server.
 
     Handlers of GET answer with a page. Handlers of POST change something and return the name of the
-    part of the page to show again, "" for the whole page.
+    part of the page to show again, that of another page, or "" for the whole page.
     """
 
     def __init__(self, server: Server) -> None:
@@ -98,6 +99,8 @@ class Pages:
 
     async def _changed(self, name: str, run: str | None = None) -> Response:
         self.server.changed()
+        if name in PAGE_STEPS:
+            return PlainTextResponse("", headers={"hx-redirect": name})
         if name:
             return await self._part(name, run)
         self.server.before, self.server.left_out = "", []
@@ -128,15 +131,21 @@ class Pages:
             cells, values = table.cells_of(shown.get("text", "")), folder.study()
         except InputError as e:
             wrong = str(e)
+        cells = cells if shown.get("text") else None
+        place = ".".join(shown.get("path", [])[:3])
+        alone = [{"text": shown["error"], "place": place}] if "error" in shown else []
+        told = shown.get("errors", alone)
         return page(
             name,
             steps=PAGE_STEPS,
             version=version,
             shown=shown,
-            place=".".join(shown.get("path", [])[:3]),
-            cells=cells if shown.get("text") else None,
+            told=[(e["text"], e["place"]) for e in told if table.beside(e["place"], cells)],
+            above=[e["text"] for e in told if not table.beside(e["place"], cells)],
+            cells=cells,
             columns=table.columns_of(cells) if cells else [],
             units=table.UNITS_OF_CELLS,
+            meanings=table.MEANINGS,
             left_out=self.server.left_out,
             digest=folder.digest,
             work=shlex.quote(str(folder.path)),
@@ -161,6 +170,8 @@ class Pages:
             methods=ESTIMATORS,
             jobs=self.jobs.shown,
             now=time.monotonic(),
+            left=self.jobs.left,
+            times=self.jobs.times,
             runs=runs,
             run=run,
             own=own.name if own else "",
@@ -208,7 +219,8 @@ class Pages:
             path = self.folder.path / record
             shown = await self.server.robot()
             (settings, *_) = self.folder.study().get("record") or [{}]
-            joints = tuple(filter(None, shown.get("labels", ())))
+            n, labels = len(shown.get("joints", ())), tuple(filter(None, shown.get("labels", ())))
+            joints = labels if len(labels) == n else ("",) * n
             given = asked | {"joints": joints, "topic": settings.get("topic")}
         elif name in ("series", "changes"):
             run = self.folder.run(asked.get("run", ""))
@@ -216,8 +228,11 @@ class Pages:
             given = {"run": str(run), "record": asked.get("record", "")}
         else:
             path = self._source()
+        if name == "recorded":
+            study = str(self.folder.path / "study.yaml")
+            given = {"study": study, "of": self.folder.study_digest}
         value = await self.server.view(getattr(views, name), str(path), given)
-        if name in ("preview", "series", "changes"):
+        if name in ("preview", "recorded", "series", "changes"):
             return JSONResponse(value)
         return page(
             name, value=value, asked=asked, file=path.name, work=shlex.quote(str(self.folder.path))
@@ -228,11 +243,13 @@ class Pages:
         name, run = request.path_params["name"], request.path_params.get("run")
         folder, robot = self.folder, self.folder.robot or Path()
         own = [folder.path / "study.yaml", *folder.path.glob("applied-*.*"), robot]
+        own += [folder.path / "proof.json"]
         places = folder.run(run).iterdir() if run else own
         path = next((p for p in places if p.name == name and p.is_file()), None)
         if path is None:
             raise InputError("no such file")
         kind = SHOWN_FILES.get(path.suffix) if run and "keep" not in request.query_params else None
+        kind = "text/plain" if "read" in request.query_params else kind
         keep = safe(f"{(await self.server.robot()).get('name')}_{path.name}")
         attached = {"content-disposition": f'attachment; filename="{keep}"'}
         headers = {"content-security-policy": SANDBOX} | ({} if kind else attached)
@@ -286,6 +303,9 @@ class Pages:
             self.folder.take_robot("arm.yaml", skeleton("arm").encode())
         elif name in packaged_robots():
             self.folder.take_robot_of(name)
+            if form.get("record") in DATASETS and not self.folder.read("study.yaml"):
+                self.folder.take_record_of(form["record"])
+                return "record"
         return ""
 
     async def _edit(self, form: dict[str, str]) -> str:
@@ -368,7 +388,7 @@ class Pages:
     async def _solve(self, form: dict[str, str]) -> str:
         """Queue a run: an identification, or a study of the encoder resolution.
 
-        The settings are those of the study, or values of a form in JSON. The command line is the
+        The settings are those of the study, values of a form in JSON, or those of the run `again`. The command line is the
         first line of the settings file of the run.
         """
         self._command()
@@ -377,9 +397,11 @@ class Pages:
         kind = form.get("kind", "identify")
         if kind not in RUN_COMMANDS:
             raise InputError(f"expected one of {', '.join(RUN_COMMANDS)}")
-        text = self.folder.checked_study(
-            json.loads(form.get("values", "{}")) or self.folder.study()
-        )
+        values = json.loads(form.get("values", "{}")) or self.folder.study()
+        if "again" in form:  # the study of a run, with other runs at each step
+            values = self.folder.study(f"study-{self.folder.run(form['again']).name}.yaml")
+            values["cestac"] = {**(values.get("cestac") or {}), "runs": int(form.get("runs", ""))}
+        text = self.folder.checked_study(values)
         options = [f"--{name}" for name in ("physical", "friction") if form.get(name)] + [
             f"--delta={' '.join(part.split())[:60]}"
             for part in form.get("delta", "").split(",")
@@ -433,6 +455,12 @@ def answering(handler: Handler) -> Handler:
             return await handler(request)  # type: ignore[no-any-return]
         except RecursionError:
             return page("message", 422, text="nested too deeply; expected a plain table or study")
+        except SettingsError as e:  # of a field, if the page has it
+            wrong = {"keys": [str(k) for k in e.path if isinstance(k, str)], "text": e.reason}
+            events = {"wrong": {**wrong, "line": e.line}}
+            answered = page("message", 422, text=e.message)
+            answered.headers["hx-trigger-after-swap"] = json.dumps(events)
+            return answered
         except (InputError, SymgenError, ValueError, OSError) as e:
             return page("message", 422, text=str(e) or type(e).__name__)
 

@@ -21,6 +21,7 @@ from symgen.studio.words import on_page
 
 VIEW_PATIENCE = 60.0  # s that a page waits for a view
 REMEMBERED = 30  # views
+LARGE = ("preview", "series")  # have all samples: the last of each is remembered
 DERIVING = (views.formulas, views.model, views.module)  # pages do not wait for these
 PAGE_TEMPLATES = Environment(
     loader=ChoiceLoader(
@@ -86,8 +87,10 @@ class Server:
                     "error": f"takes more than {VIEW_PATIENCE:g} s, or than the memory that there "
                     "is; the terminal has no such limit"
                 }
-            while len(self.views) >= REMEMBERED:
-                self.views.pop(next(iter(self.views)))
+            large = [own for own in self.views if own[0] == view.__name__ in LARGE]
+            others = [*self.views][: max(len(self.views) - REMEMBERED + 1, 0)]
+            for old in {*large, *others}:
+                del self.views[old]
             self.views[key] = value
             return value
 

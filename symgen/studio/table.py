@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from runtime.documents.yaml_text import yaml_values
+from runtime.ground.errors import InputError
 from symgen.description import parse_robot
 from symgen.description.grammar import parse
 from symgen.errors import DescriptionError
@@ -22,6 +23,18 @@ TABLE_COLUMNS = {  # keys of a row in the order of the page, by convention
     "distal": ("ant", "sigma", "mu", "d", "alpha", "r", "theta", "gamma", "b"),
 }
 UNITS_OF_CELLS = {"gamma": "rad", "alpha": "rad", "theta": "rad", "b": "m", "d": "m", "r": "m"}
+MEANINGS = {
+    "ant": "the frame on which frame j stands",
+    "sigma": "0 revolute, 1 prismatic, 2 fixed",
+    "mu": "1 driven, 0 passive",
+    "gamma": "angle about z of the frame before, from its x to the common normal",
+    "b": "distance along z of the frame before, to the common normal",
+    "alpha": "angle between the two z axes, about the common normal",
+    "d": "distance between the two z axes, along the common normal",
+    "theta": "angle about z of frame j, from the common normal to its x",
+    "r": "distance along z of frame j, from the common normal to its origin",
+}
+"""Meaning of the columns of the table."""
 EDITED: dict[str, Any] = {
     "name": "",
     "title": "",
@@ -36,6 +49,7 @@ SIZED = ("limits", "drives", "values", "labels", "elements", "constraints", "mas
 PLAIN_CELL = re.compile(r"(?!- )[A-Za-z0-9_.+/(-][A-Za-z0-9_.+*/() -]*(?<! )\Z|[0-9]\Z")
 TOP_LEVEL = re.compile(r"^(?=[A-Za-z_]+\s*:)", re.M)
 CELL = 200  # characters of a cell
+MOST_ERRORS = 30  # that are told at once
 PRINTED = ((r"(?<=\d)\s*°", "*pi/180"), (r"(?<=[\d)])\s*π", "*pi"), ("π", "pi"), ("−", "-"))
 """Signs that textbooks print, as patterns, and the text of a robot file for each."""
 
@@ -146,6 +160,67 @@ def wrong(text: str) -> DescriptionError | None:
     except DescriptionError as error:
         return error
     return None
+
+
+def errors(text: str) -> list[DescriptionError]:
+    """List the errors in the text of a robot file, each once.
+
+    Behind each error, the robot is read again with a usual value in place of the wrong one. An
+    error in a value that was replaced, or in a part that the table does not show, ends the search.
+    """
+    found: list[DescriptionError] = []
+    while (error := wrong(text)) is not None:
+        if error.path[:3] in {other.path[:3] for other in found}:
+            break
+        found.append(error)
+        try:
+            shorter = _without(text, error.path)
+        except (DescriptionError, InputError):
+            break
+        if len(found) == MOST_ERRORS or shorter == text:
+            break
+        text = shorter
+    return found
+
+
+def _without(text: str, path: tuple[str | int, ...]) -> str:
+    """Replace the value that a path names by a usual one, or leave out a part that is no cell."""
+    cells = cells_of(text)
+    part, *keys = (*map(str, path), "")
+    if part in SIZED:
+        return "".join(block for key, block in blocks(text) if key != part)
+    if part == "frames" and keys[0] in cells["frames"]:
+        row, j = cells["frames"][keys[0]], int(keys[0])
+        own = {"0": ("0", f"q{j}", "0"), "1": ("1", "0", f"q{j}"), "2": ("2", "0", "0")}
+        turned = ("sigma", "theta", "r")  # the joint variable stands where sigma says
+        new = dict(zip(turned, own.get(row.get("sigma", ""), own["0"]), strict=True))
+        new = {**dict.fromkeys(("gamma", "b", "alpha", "d"), "0"), "ant": str(j - 1), **new}
+        columns = turned if keys[1] == "sigma" else keys[1:2] if keys[1] else [*new]
+        for column in columns:
+            row[column] = new.get(column, "0")
+        if keys[1] not in ("", *new):
+            del row[keys[1]]
+    elif part == "constants" and keys[0] in cells["constants"]:
+        cells["constants"][keys[0]] = "1"
+    elif part == "gravity" and keys[0].isdigit():
+        cells["gravity"][int(keys[0])] = "0"
+    elif part == "loops" and keys[0].isdigit():
+        del cells["loops"][int(keys[0])]
+    elif part in ("name", "title", "convention"):
+        cells[part] = "arm" if part == "name" else EDITED[part]
+    return with_cells(text, json.dumps(cells))
+
+
+def beside(place: str, cells: Mapping[str, Any] | None) -> bool:
+    """Whether the page has a cell, a row or a pair for a place such as frames.2.alpha."""
+    part, key, *_ = f"{place}..".split(".")
+    if not cells:
+        return False
+    if part in ("frames", "constants"):
+        return key in cells[part]
+    if part in ("loops", "gravity"):
+        return key.isdigit() and int(key) < len(cells[part])
+    return part in ("name", "title", "convention")
 
 
 def fitted(text: str) -> tuple[str, list[str]]:

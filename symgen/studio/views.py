@@ -5,6 +5,7 @@ A view that fails returns an error and its place in the file.
 
 from __future__ import annotations
 
+import re
 import sys
 import warnings
 from collections.abc import Callable, Mapping
@@ -12,6 +13,7 @@ from contextlib import suppress
 from dataclasses import asdict
 from functools import wraps
 from hashlib import sha256
+from html import unescape
 from json import dumps
 from pathlib import Path
 from typing import Any
@@ -20,24 +22,27 @@ import numpy as np
 
 import runtime
 import symgen
-from runtime.core.model import joint_labels
-from runtime.ground.errors import InputError
-from runtime.ground.limits import LIMIT
+from runtime.core.model import joint_labels, joint_torque_units, joint_units
+from runtime.ground.errors import InputError, instant
 from runtime.reporting.result_files import write_all
-from runtime.reporting.series import extremes
+from runtime.reporting.series import base64, extremes
 from symgen.derive.doubts import doubts
 from symgen.derive.loops import close
 from symgen.description import AngleWarning
 from symgen.description.files import write_robot
 from symgen.errors import SymgenError
 from symgen.pages.page import figure
-from symgen.studio.table import cells_of, degrees
+from symgen.studio.table import cells_of, degrees, errors
 from symgen.studio.words import on_page
 from symgen.update.mended import mended
 from symgen.update.models import corrected, model_of, variants_of
 
 FIRST_ROWS = 5  # first ones that are shown
+MOST_NUMBERS = 2**23  # of the lines of one answer; of larger records, the extreme values
 NAMES_LISTED = 200  # columns that are listed
+COPIES = {"latex": "latex-fragment", "sympy": "sympy", "text": "text"}
+"""Formats of the copies of a model, by the key of their button."""
+TYPESET = 1000  # terms of a closed form that a browser draws at once
 
 
 def answered(view: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, Any]]:
@@ -69,6 +74,11 @@ def robot(path: str, draft: str) -> dict[str, Any]:
 
     Returns the text of its table, its drawing, angles in degrees, and doubts about the file.
     """
+    if draft and (found := errors(draft)):
+        told = [
+            {"place": ".".join(map(str, e.path[:3])), "text": on_page(e.message)} for e in found
+        ]
+        return {"error": told[0]["text"], "errors": told}
     described = (
         symgen.parse_robot(draft.encode(), "robot.yaml") if draft else symgen.load_robot(path)
     )
@@ -101,6 +111,7 @@ def formulas(path: str, before: str) -> dict[str, Any]:
     from symgen.pages.effects import effects
     from symgen.pages.page import printed
     from symgen.symbols import expressions
+    from symgen.symbols.documents import printed as printed_model
     from symgen.symbols.printers import math, math_terms
 
     regrouping = symgen.regrouping(symgen.load_robot(path))
@@ -124,45 +135,81 @@ def formulas(path: str, before: str) -> dict[str, Any]:
         | {"why": e.why or reasons.get(e.name, "identified in its own name")}
         for e in of.values()
     ]
-    return {"base": base, "parameters": parameters, "difference": difference}
+    asked = symgen.symbolic(regrouping.robot).model("base_parameters")
+    texts = {kind: printed_model(asked, "closed", form) for kind, form in COPIES.items()}
+    meanings = {bare(p["symbol"]): f"{p['name']}: {p['meaning']}, {p['unit']}" for p in parameters}
+    for b, row in zip(regrouping.base, base, strict=True):
+        if row["terms"]:
+            said = f"{b.name}: base parameter, {row['unit']}; {b.own} and what is regrouped into it"
+            meanings[bare(str(row["symbol"]))] = said
+    return {
+        "base": base,
+        "parameters": parameters,
+        "difference": difference,
+        "texts": texts,
+        "meanings": meanings,
+    }
 
 
 @answered
 def model(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     """Prepare a symbolic model of the robot in four forms: typeset, text, LaTeX and SymPy.
 
-    A long closed form is typeset as recursion. A model without closed form is its recursion in all
-    forms.
+    The form is the one asked for; a closed form of more than TYPESET terms is not typeset. A model
+    that has too many terms for a closed form is its recursion in all forms.
     """
-    from symgen.symbols.documents import READABLE, notes, printed, shown_model
+    from symgen.symbols.documents import notes, printed, shown_model
+    from symgen.symbols.symbolic_model import NoClosedFormError
 
     name, form = request.get("model", "gravity"), request.get("form", "closed")
     frames: dict[str, Any] = {
         key: int(x) for key in ("of", "frame") if (x := request.get(key, "")).isdigit()
     }
     asked = symgen.symbolic(symgen.load_robot(path)).model(name, **frames)
-    typeset, why = form, ""
+    why, long = "", False
     if form == "closed":
         try:
-            if (terms := asked.closed.size) > READABLE:
-                typeset = "recursive"
-                why = (
-                    f"The closed form has {terms} terms. The page shows the recursion; "
-                    "the copies contain the closed form."
-                )
-        except SymgenError as e:
+            terms = asked.closed.size
+            if long := terms > TYPESET:
+                why = f"The closed form has {terms} terms; it is shown as text. Its recursion is short."
+        except NoClosedFormError as e:
             if asked.model.cases is None:
                 raise
-            typeset = form = "recursive"
-            text = str(e).partition(";")[0]
-            why = f"{text[0].upper()}{text[1:]}. The page shows and copies the recursion."
+            form = "recursive"
+            why = f"{e.reason[0].upper()}{e.reason[1:]}. The page shows and copies the recursion."
     return {
-        "typeset": shown_model(asked, typeset),
+        "typeset": None if long else shown_model(asked, form, TYPESET),
         "why": why,
         "about": notes(asked),
         "form": form,
-        "texts": {kind: printed(asked, form, kind) for kind in ("text", "latex", "sympy")},
+        "texts": {kind: printed(asked, form, language) for kind, language in COPIES.items()},
+        "meanings": {} if long else meanings_of(asked, form),
     }
+
+
+def meanings_of(asked: Any, form: str) -> dict[str, str]:
+    """Say of the symbols of a symbolic model, by their printed texts, what they are."""
+    from symgen.derive.names import FAMILIES, MEMBER
+    from symgen.symbols import expressions
+    from symgen.symbols.printers import math
+
+    robot = asked.source.robot
+    own = asked.closed.angles if form == "closed" else [x.name for x in asked.listing.lines]
+    meanings = {
+        f"q{j}": f"q{j}: position of joint {j}{f', {name}' if (name := robot.labels.get(j)) else ''}"
+        for j in robot.joints
+    }
+    for name in [*own, *map(asked.label, asked.places)]:
+        if member := MEMBER.match(name):
+            meanings[bare(math(expressions.symbol(name)))] = (
+                f"{name}: {FAMILIES[member[1] or member[2]]}"
+            )
+    return meanings
+
+
+def bare(markup: str) -> str:
+    """The text of a piece of MathML, as a browser has it."""
+    return unescape(re.sub(r"<[^>]*>|\s", "", markup))
 
 
 @answered
@@ -176,17 +223,18 @@ def module(path: str, request: Mapping[str, str]) -> dict[str, Any]:
 
 @answered
 def preview(path: str, request: Mapping[str, Any]) -> dict[str, Any]:
-    """Show the columns of a measured file: names, first rows, and thinned lines for a plot.
+    """Show the columns of a measured file: names, first rows, and lines of all samples.
 
     `columns`, names separated by commas, selects the columns with rows and lines. The result
     includes the roles of columns as far as their names show them, as in `identify --suggest`, and
     sampling rate and gaps of the time column `t` in its `unit`. If `decimal` is not given, the
     decimal mark that reads more columns is used. `currents` says whether a name in `tau` has a
-    word for current or effort.
+    word for current or effort; `others` counts the joints of the file if they are more than those
+    of the robot.
     """
     from runtime.ground.clock import time_stamps
     from runtime.reading.formats import read_table
-    from runtime.reading.likely_columns import known_columns, may_be_currents
+    from runtime.reading.likely_columns import joint_counts, known_columns, may_be_currents
     from runtime.reading.units import time_unit
 
     topic, mark = request["topic"], request.get("decimal", "") or "."
@@ -207,17 +255,43 @@ def preview(path: str, request: Mapping[str, Any]) -> dict[str, Any]:
     N, t = len(values[0]) if values else 0, columns.get(request.get("t", ""))
     if t is not None:
         t = t * time_unit(request.get("unit") or "s")
-    kept = extremes(np.nan_to_num(np.reshape(values, (len(values), N))), LIMIT.INSTANTS_SHOWN)
-    known = known_columns(opened.columns, request["joints"])
+    kept = _shown(np.reshape(values, (len(values), N)))
+    known = known_columns(opened.columns, joints := request["joints"])
+    counts = joint_counts(opened.columns, joints)
     return {
         "names": names,
+        "others": counts if joints and max(counts.values()) > len(joints) else {},
         "known": known | ({"decimal": mark} if mark != "." else {}),
         "currents": may_be_currents(request.get("tau", "").split(",")),
         "rows": N,
         "stamps": "" if t is None else time_stamps(t).to_text(),
-        "first": [[f"{x[k]:.6g}" for x in values] for k in range(min(N, FIRST_ROWS))],
-        "t": _plain(kept if t is None else t[kept]),
-        "lines": {name: _plain(x[kept]) for name, x in columns.items()},
+        "first": [[instant(x[k]) for x in values] for k in range(min(N, FIRST_ROWS))],
+        "t": base64(kept if t is None else t[kept], "<f8"),
+        "lines": {name: base64(x[kept]) for name, x in columns.items()},
+    }
+
+
+@answered
+def recorded(path: str, request: Mapping[str, str]) -> dict[str, Any]:
+    """Compute the lines of the record of a study, in SI units, for a plot.
+
+    path : robot file.
+    request : `study`, the study file.
+    """
+    model, _, (record, *_), named = _read(path, Path(request["study"]))
+    kept = _shown(np.vstack([record.q.T, record.tau.T]))
+    labels = joint_labels(model)
+    units = {"q": joint_units(model), "tau": joint_torque_units(model)}
+    lines = {
+        name: {f"{name} {label}": base64(x) for label, x in zip(labels, values.T, strict=True)}
+        for name, values in (("q", record.q[kept]), ("tau", record.tau[kept]))
+    }
+    return {
+        "records": list(named),
+        "rows": len(record),
+        "t": base64(record.t[kept], "<f8"),
+        "lines": lines,
+        "units": {key: " or ".join(dict.fromkeys(own)) for key, own in units.items()},
     }
 
 
@@ -244,14 +318,14 @@ def series(path: str, request: Mapping[str, str]) -> dict[str, Any]:
         rows = np.searchsorted(selection.t, joint.t).clip(max=K - 1)
         torques[:, j, rows] = joint.measured, joint.predicted
     lines = np.concatenate([*torques, torques[0] - torques[1]])
-    shown = extremes(np.nan_to_num(lines), LIMIT.INSTANTS_SHOWN)
+    shown = _shown(lines)
     return {
         "records": list(named),
-        "t": _plain(selection.t[shown]),
+        "t": base64(selection.t[shown], "<f8"),
         "joints": joint_labels(loaded),
-        "q": list(map(_plain, own.states.q[selection.samples.start + selection.kept[shown]].T)),
-        "measured": list(map(_plain, torques[0][:, shown])),
-        "predicted": list(map(_plain, torques[1][:, shown])),
+        "q": list(map(base64, own.states.q[selection.samples.start + selection.kept[shown]].T)),
+        "measured": list(map(base64, torques[0][:, shown])),
+        "predicted": list(map(base64, torques[1][:, shown])),
     }
 
 
@@ -379,12 +453,12 @@ def mend() -> None:
 def _written(view: Callable[..., dict[str, Any]]) -> None:
     """Compute a view of ROBOT and STUDY and write it to FILE; these are the arguments.
 
-    If there is an error, print one line and exit with code 2.
+    If there is an error, print it as a line of JSON and exit with code 2.
     """
     robot_file, study_file, target = sys.argv[1:4]
     value = view(robot_file, study_file)
     if "error" in value:
-        print(f"error: {value['error']}", file=sys.stderr)
+        print(dumps({key: value[key] for key in ("error", "path")}), file=sys.stderr)
         sys.exit(2)
     write_all(Path(), {target: f"{dumps(value, indent=1)}\n"})
 
@@ -394,5 +468,9 @@ def digest_of(*paths: Path) -> str:
     return sha256(b"".join(path.read_bytes() for path in paths if path.is_file())).hexdigest()
 
 
-def _plain(x: Any) -> list[float | None]:
-    return [float(f"{v:.6g}") if np.isfinite(v) else None for v in np.asarray(x, dtype=float)]
+def _shown(lines: np.ndarray) -> np.ndarray:
+    """Indices of the samples of lines that are sent: all, if they are not too many.
+
+    lines : shape (m, N).
+    """
+    return extremes(np.nan_to_num(lines), MOST_NUMBERS // (len(lines) + 1))

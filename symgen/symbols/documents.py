@@ -552,17 +552,20 @@ def shown_models(regrouping: Regrouping) -> tuple[list[ShownModel], list[str]]:
     return [*filter(None, map(shown_model, models))], passive_notes(models[0])
 
 
-def shown_model(model: SymbolicModel, form: str = "closed") -> ShownModel | None:
+def shown_model(
+    model: SymbolicModel, form: str = "closed", readable: int = READABLE
+) -> ShownModel | None:
     """Prepare a model for an HTML page; None if it has no short closed form and no recursion.
 
     form : recursive, or closed for the closed form where it is short.
+    readable : largest number of terms of a short one.
     """
     title = model.model.name.replace("_", " ")
     try:
         closed = model.closed if form == "closed" else None
     except SymgenError:
         closed = None
-    if closed is None or closed.size > READABLE:
+    if closed is None or closed.size > readable:
         try:
             sections, values = recursion(model)
         except SymgenError:

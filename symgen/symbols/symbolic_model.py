@@ -35,6 +35,22 @@ from symgen.symbols.expressions import Tree, angle, evaluated, rational, rounded
 from symgen.symbols.source import Source
 
 
+class NoClosedFormError(SymgenError):
+    """Error raised if a closed form has too many terms.
+
+    Parameters
+    ----------
+    reason : str
+        What is too large.
+    instead : str
+        The form or models that work.
+    """
+
+    def __init__(self, reason: str, instead: str) -> None:
+        self.reason, self.instead = reason, instead
+        super().__init__(f"{reason}; {instead}")
+
+
 @dataclass(frozen=True)
 class Equation:
     """An equation `name = expression` as two texts, printed under the heading `section`."""
@@ -226,8 +242,8 @@ class SymbolicModel:
     def closed(self) -> ClosedModel:
         """The closed form of the model: each entry as one factored formula.
 
-        Raises SymgenError if the closed form has too many terms or does not exist; the message
-        names the form that works.
+        Raises NoClosedFormError if the closed form has too many terms, SymgenError if it does not
+        exist; the message names the form that works.
         """
         try:
             return self._closed()
@@ -237,9 +253,8 @@ class SymbolicModel:
                 if self.model.cases is None
                 else f"use form recursive, with {len(self.listing.lines)} equations"
             )
-            raise SymgenError(
-                f"the closed form of {self.model.name} of {self.source.robot.name} has {e}; {more}"
-            ) from e
+            told = f"the closed form of {self.model.name} of {self.source.robot.name} has {e}"
+            raise NoClosedFormError(told, more) from e
 
     def _closed(self) -> ClosedModel:
         composed = {

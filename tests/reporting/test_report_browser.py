@@ -284,7 +284,7 @@ def test_pointer_zooms_all_figures_and_legend_hides_lines(shown):
     shown.call("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=-120)
     shown.run(FRAME)
     assert shown.run(DRAWN) != near  # the drag has given the figure the focus
-    shown.click("[aria-label='Show the whole time']")
+    shown.click("[aria-label='all: show the whole time']")
     shown.run(FRAME)
     assert shown.run(SPAN) == whole
     shown.click("[role=toolbar] button:nth-of-type(8)")

@@ -257,16 +257,15 @@ def test_a_folder_of_ros_2_is_a_record_of_the_command_line(studio: Any, tmp_path
     assert [p.name for p in (studio.path / "record").iterdir()] == ["run.csv"]
 
 
-def test_what_a_bar_draws_in_a_terminal_is_a_count_on_the_page() -> None:
-    bar = "\x1b[?25lruns \x1b[38;5;237m━━━━\x1b[0m  \x1b[32m0/?\x1b[0m \x1b[36m-:--:--\x1b[0m"
-    job = Job(1, "01-cestac", ("symgen",), "", progress=bar)
-    assert job.said == ["runs 0/? -:--:--"] and job.counted == []
-    job.progress += (
-        "\r\x1b[2Kruns \x1b[35m━━\x1b[0m\x1b[90m╺━\x1b[0m 12/40 \x1b[36m0:00:07\x1b[0m\r"
-    )
-    assert job.said[-1] == "runs 12/40 0:00:07" and job.counted == ["12", "40"]
-    job.progress += "\x1b[2K\x1b[?25h\nerror: no such file\nmore of it"
-    assert job.last == "no such file"
+def test_what_a_command_tells_is_read_as_data() -> None:
+    """Counts, stages and errors by their keys, whatever their words; other lines as they are."""
+    job = Job(1, "01-cestac", ("symgen",), "", progress='{"stage": "12/40 error: of words"}\n')
+    assert job.counted is None and job.said == ["12/40 error: of words"]
+    job.progress += '{"done": 12, "total": 40}\n{"done": 13, "tot'  # the rest is on its way
+    assert job.counted == (12, 40)
+    job.progress += 'al": 40}\n{"error": "no such file", "path": []}\nKilled\n'
+    assert job.counted == (13, 40)
+    assert job.last == "no such file" and job.said[-1] == "Killed"
 
 
 def test_the_settings_of_a_run_begin_with_its_command(studio: Any) -> None:
@@ -671,7 +670,9 @@ def test_a_check_that_is_refused_ends_with_2(tmp_path, monkeypatch, capsys):
     )
     with pytest.raises(SystemExit) as ended:
         views.check()
-    assert ended.value.code == 2 and capsys.readouterr().err.startswith("error: ")
+    assert ended.value.code == 2
+    told = json.loads(capsys.readouterr().err)
+    assert "not YAML" in told["error"] and told["path"] == []
 
 
 def test_what_is_nested_without_end_is_refused(studio: Any) -> None:
@@ -783,3 +784,8 @@ def test_pages_do_not_wait_for_formulas(studio: Any) -> None:
         assert not formulas.done()
         deriving.released.set()
         assert "ZZ3" in formulas.result().text
+
+
+def test_every_page_opens_in_an_empty_folder(studio: Any) -> None:
+    for name in ("robot", "record", "check", "solve", "results"):
+        assert studio.get(name).status_code == 200, name

@@ -47,6 +47,9 @@ const one = (selector, of = document) => of.querySelector(selector), all = (sele
     arm.q = closeLoops(robot, { ...robot.tied, ...start }) || { ...robot.tied, ...start };
     arm.drawing = new Drawing(robot, poses(robot, positions(robot, arm.q)));
     if (before) Object.assign(arm.drawing, { yaw: before.yaw, pitch: before.pitch });
+    const boxes = one("#show-boxes");
+    arm.drawing.options.boxes = !boxes || boxes.checked;
+    if (boxes) boxes.parentElement.hidden = !robot.boxes.length;
     view.replaceChildren(arm.drawing.root);
     sliders(one(view.dataset.sliders || "#none"));
     redraw();
@@ -89,6 +92,7 @@ const one = (selector, of = document) => of.querySelector(selector), all = (sele
     redraw();
     return true;
   }
+  one("#show-boxes")?.addEventListener("change", ({ target }) => { arm.drawing.options.boxes = target.checked; redraw(); });
   for (const button of all("[data-key]")) button.addEventListener("click", () => key(button.dataset.key));
   const view = one("#arm");
   if (view) {
@@ -111,7 +115,7 @@ const one = (selector, of = document) => of.querySelector(selector), all = (sele
       group.at(t);
       const { k } = group.charts[0];
       cursor.value = t;
-      one("#now").textContent = `${plain(data.t[k], 2)} s`;
+      one("#now").textContent = `${plain(data.t[k] - group.origin, 2)} s`;
       if (!arm.robot) return;
       arm.robot.joints.forEach((own, i) => { arm.q[own.j] = data.q[i]?.[k] ?? 0; });
       arm.q = closeLoops(arm.robot, arm.q) || arm.q;
@@ -124,9 +128,10 @@ const one = (selector, of = document) => of.querySelector(selector), all = (sele
       return [{ label: `Joint ${joint}`, t, panels: [...panels, moving] }, { label: `Joint ${joint}, over its position`, t, over: { ...position, values: q[i] }, panels }];
     };
     const load = async () => { // the record that is chosen, "" for the first
-      const answer = await fetch(`${place.dataset.series}&record=${encodeURIComponent(part.value)}`), text = await answer.text(), value = answer.ok ? JSON.parse(text, (_, x) => x ?? NaN) : { error: text };
+      const answer = await fetch(`${place.dataset.series}&record=${encodeURIComponent(part.value)}`), text = await answer.text(), value = answer.ok ? JSON.parse(text) : { error: text };
       if (value.error) return say(value.error);
-      data = value;
+      const rows = (key) => value[key].map((row) => floats(row));
+      data = { ...value, t: floats(value.t, Float64Array), q: rows("q"), measured: rows("measured"), predicted: rows("predicted") };
       const chosen = Math.max(part.selectedIndex, 0), box = node("div", { className: "figures" });
       part.replaceChildren(...data.records.map((name, k) => new Option(name, name, k === chosen, k === chosen)));
       Object.assign(cursor, { min: data.t[0], max: data.t.at(-1), value: data.t[0] });
@@ -272,6 +277,52 @@ const one = (selector, of = document) => of.querySelector(selector), all = (sele
     try { await navigator.clipboard.writeText(source.textContent); } catch { getSelection().selectAllChildren(source); document.execCommand("copy"); }
     button.textContent = "Copied";
     setTimeout(() => { button.textContent = before; }, 1200);
+  });
+  // --- what a symbol means, where it is pointed at ---
+  const about = node("div", { id: "about", hidden: true, role: "status" });
+  document.body.append(about);
+  const symbol = (mark) => (mark.localName === "msubsup" ? mark.children[0].textContent + mark.children[1].textContent : mark.textContent).replace(/\s/g, "");
+  document.addEventListener("pointerover", ({ target }) => {
+    let text = target.closest?.("[data-means]")?.dataset.means, place = target;
+    const known = Object.assign({}, ...all("[data-meanings]").map(({ dataset }) => JSON.parse(dataset.meanings)));
+    for (let mark = target; !text && mark?.closest?.("math"); mark = mark.parentElement) [text, place] = [known[symbol(mark)], mark];
+    about.hidden = !text;
+    if (!text) return;
+    const { left, bottom } = place.getBoundingClientRect();
+    about.textContent = text;
+    about.style.left = `${Math.max(0, Math.min(left, innerWidth - about.offsetWidth - 8))}px`;
+    about.style.top = `${Math.min(bottom + 6, innerHeight - about.offsetHeight - 4)}px`;
+  });
+  document.addEventListener("scroll", () => { about.hidden = true; }, true);
+  // --- keys and blocks in the table of frames ---
+  const beside = (cell, down, right) => {
+    const row = cell.closest("tr"), cells = (of) => (of ? all("input", of) : []), at = cells(row).indexOf(cell);
+    let to = row;
+    for (let k = Math.abs(down); k && to; ) { to = down > 0 ? to.nextElementSibling : to.previousElementSibling; if (cells(to).length) k--; }
+    return cells(to)[at + right];
+  };
+  document.addEventListener("keydown", (event) => {
+    const cell = event.target, steps = { ArrowUp: [-1, 0], ArrowDown: [1, 0], Enter: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] }[event.key];
+    if (!steps || event.ctrlKey || event.altKey || event.metaKey || event.shiftKey || !cell.matches(".cells input")) return;
+    const { selectionStart: from, selectionEnd: to, value } = cell, whole = from === 0 && to === value.length;
+    if (steps[1] && !whole && (from !== to || from !== (steps[1] < 0 ? 0 : value.length))) return; // within the text
+    const next = beside(cell, ...steps);
+    event.preventDefault();
+    if (next) { next.focus(); next.select(); }
+    else if (event.key === "Enter") edit();
+  });
+  document.addEventListener("paste", (event) => {
+    const cell = event.target, text = event.clipboardData.getData("text").replace(/\r/g, "").replace(/\n$/, "");
+    if (!cell.matches?.(".cells input") || !/[\t\n]/.test(text)) return;
+    event.preventDefault();
+    let left = 0;
+    text.split("\n").forEach((line, down) => line.split("\t").forEach((word, right) => {
+      const place = down ? beside(cell, down, right) : beside(cell, 0, right);
+      if (place) place.value = word.trim();
+      else left++;
+    }));
+    edit();
+    if (left) say(`${left} cells of the block are outside the table; add frames first, and paste again.`);
   });
   // --- news of the server ---
   let shownRobot = one("#figure")?.dataset.digest || "", version = Number(one("#values").dataset.version), timer = null;

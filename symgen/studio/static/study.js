@@ -73,6 +73,28 @@
     (event.target.id === "solve" ? solve : round)(new FormData(event.target, event.submitter));
   });
 
+  /** A setting that is refused is told beside its field; in a text, below it, with its line. */
+  document.addEventListener("wrong", ({ target, detail: { keys, text, line } }) => {
+    const typed = target.closest?.("form")?.querySelector("textarea");
+    const paths = keys.map((_, k) => keys.slice(0, keys.length - k).join("."));
+    const field = typed || paths.map((path) => one(`[data-setting="${path}"]`) || one(`#questions [name="${path.replace(/^record\./, "")}"]`)).find(Boolean);
+    if (!field) return;
+    untold(field);
+    const at = typed && line ? `line ${line}: ${keys.join(".")}: ` : "";
+    field.after(node("span", { className: "wrong", id: `wrong-${field.name}`, role: "alert", textContent: at + text }));
+    field.setAttribute("aria-invalid", "true");
+    one("#message").replaceChildren();
+    field.focus();
+    if (!typed || !line) return;
+    const start = field.value.split("\n").slice(0, line - 1).join("\n").length + (line > 1);
+    field.setSelectionRange(start, field.value.indexOf("\n", start) < 0 ? field.value.length : field.value.indexOf("\n", start));
+  });
+  const untold = (field) => {
+    field.removeAttribute("aria-invalid");
+    document.getElementById(`wrong-${field.name}`)?.remove();
+  };
+  document.addEventListener("input", ({ target }) => target.matches("[aria-invalid][data-setting], #questions [aria-invalid], #study [aria-invalid]") && untold(target));
+
   // --- the file as the form says that it is read ---
   let turn = 0;
 
@@ -84,7 +106,7 @@
   }
 
   async function preview() {
-    if (!one("#preview")) return;
+    if (!one("#preview:not([data-recorded])")) return;
     const value = await previewed(study().record?.[0]?.decimal ? { decimal: study().record[0].decimal } : {});
     if (value.late) return;
     guess = value.known || {};
@@ -105,10 +127,22 @@
     first.setAttribute("role", "region");
     first.setAttribute("aria-label", "First rows");
     const figures = node("div", { className: "figures" });
-    place.replaceChildren(node("p", { textContent: value.stamps || `${value.rows} samples` }), node("p", { className: "note", textContent: `Columns: ${value.names.join(", ")}` }), first, figures);
-    const chart = (title, list, unit = "") => ({ label: `${title}, as in the file`, t: value.t, panels: [{ title, unit: unit.replace("*", " "), lines: list.filter((name) => value.lines[name]).map((name, i) => ({ name, kind: `c${i % 8}`, values: value.lines[name].map((x) => x ?? NaN) })) }] });
+    const others = value.others.q ? [node("p", { className: "doubtful", textContent: `The names show positions of ${value.others.q} joints and torques of ${value.others.tau}; the robot has ${joints}. Name the columns of its joints below, or take the robot of this log.` })] : [];
+    place.replaceChildren(...others, node("p", { textContent: value.stamps || `${value.rows} samples` }), node("p", { className: "note", textContent: `Columns: ${value.names.join(", ")}` }), first, figures);
+    const instants = floats(value.t, Float64Array);
+    const chart = (title, list, unit = "") => ({ label: `${title}, as in the file`, t: instants, panels: [{ title, unit: unit.replace("*", " "), lines: list.filter((name) => value.lines[name]).map((name, i) => ({ name, kind: `c${i % 8}`, values: floats(value.lines[name]) })) }] });
     const charts = (q.length + tau.length ? [chart("q", q, text("units.q")), chart("tau", tau, text("units.tau"))] : [chart("columns", Object.keys(value.lines))]).filter(({ panels: [{ lines }] }) => lines.length);
     if (charts.length) new Group(figures, charts, { unit: t.length ? "s" : "" });
+  }
+  /** The record of a study without a file of its own, such as a dataset. */
+  async function recorded() {
+    const place = one("#preview[data-recorded]");
+    if (!place) return;
+    const answer = await fetch("view/recorded"), value = answer.ok ? await answer.json() : { error: await answer.text() };
+    if (value.error) return place.replaceChildren(node("p", { className: "no", textContent: value.error }));
+    const figures = node("div", { className: "figures" }), t = floats(value.t, Float64Array);
+    place.replaceChildren(node("p", { textContent: `${value.records.join("; ")}: ${value.rows} samples` }), figures);
+    new Group(figures, Object.entries(value.lines).map(([title, lines]) => ({ label: `${title}, as the study reads it`, t, panels: [{ title, unit: value.units[title], lines: Object.entries(lines).map(([name, text], i) => ({ name, kind: `c${i % 8}`, values: floats(text) })) }] })));
   }
   // --- remedies as one change of the study: {"record.units.q": "deg"}; what is of record.scale multiplies ---
   const multiplies = (key) => key.startsWith("record.scale.");
@@ -209,9 +243,9 @@
   }
 
   document.addEventListener("htmx:afterSettle", (event) => {
-    if (event.target.id === "study" && one("#preview")) { fill(); drawn(); }
+    if (event.target.id === "study" && one("#questions")) { fill(); drawn(); }
     remedies();
     compare();
   });
-  for (const show of [preview, remedies, compare]) show();
+  for (const show of [preview, recorded, remedies, compare]) show();
 })();

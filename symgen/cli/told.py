@@ -1,0 +1,56 @@
+"""What a command tells on its error stream: lines for people, or JSON lines for programs.
+
+SYMGEN_LINES=json symgen cestac arm.urdf study.yaml 2> lines.jsonl
+
+{"stage": "identification"}                     a part of the work begins
+{"done": 3, "total": 40}                        runs, encoders or starts
+{"note": "..."}                                 a doubt about robot or record
+{"report": "results/report.html"}               what was written
+{"error": "...", "path": ["signals", "rate"]}   why the command ends; keys of the wrong setting
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from time import monotonic
+from typing import Any
+
+import typer
+
+LINES = "SYMGEN_LINES"
+PAUSE = 0.1  # s between two counts
+
+
+def as_json() -> bool:
+    """Whether the error stream is to have JSON lines."""
+    return os.environ.get(LINES) == "json"
+
+
+def tell(line: str, **data: Any) -> None:
+    """Print a line for people, or the data that it says as one line of JSON."""
+    typer.echo(json.dumps(data) if as_json() else line, err=True)
+
+
+def error_data(error: Exception) -> dict[str, Any]:
+    """Return the message of an error, and the keys of the setting or cell that is wrong.
+
+    The message of a setting names its keys, not the line of a file.
+    """
+    path = [*map(str, getattr(error, "path", ()))]
+    text = getattr(error, "message", "") if path else ""
+    return {"error": text or str(error) or type(error).__name__, "path": path}
+
+
+def counter() -> Callable[[int, int], None]:
+    """Return a function that tells the numbers of finished steps and of all steps, ten times a s."""
+    last = 0.0
+
+    def count(done: int, total: int) -> None:
+        nonlocal last
+        if done == total or monotonic() - last > PAUSE:
+            last = monotonic()
+            tell("", done=done, total=total)
+
+    return count
