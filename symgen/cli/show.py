@@ -20,6 +20,16 @@ FORMATS = ("text", "latex", "latex-fragment", "json", "sympy")
 OF_MODELS = ("latex-fragment", "sympy")
 
 
+def _packaged(wanted: bool) -> None:
+    if wanted:
+        from symgen.description import load_robot, packaged_robots
+
+        names = packaged_robots()
+        for name in names:
+            typer.echo(f"{name:{max(map(len, names))}}  {load_robot(name).title}")
+        raise typer.Exit
+
+
 def show(
     robot: options.RobotFile,
     model: Annotated[
@@ -95,6 +105,15 @@ def show(
         Path | None,
         typer.Option("-o", "--output", help="File of the page. Default: <name>.html."),
     ] = None,
+    packaged: Annotated[
+        bool,
+        typer.Option(
+            "--packaged",
+            callback=_packaged,
+            is_eager=True,
+            help="List the packaged robots, whose names every command accepts as ROBOT.",
+        ),
+    ] = False,
 ) -> None:
     """Print the base parameters of ROBOT with their regrouping formulas, and the parameters without effect.
 

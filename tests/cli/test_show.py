@@ -224,3 +224,11 @@ def test_decimals_are_the_values_of_the_exact_coefficients(tmp_path):
             assert float(values[name]) == pytest.approx(
                 c.value(robot.constants), rel=1e-11
             )  # cos(1.571) of floats has 12 digits
+
+
+def test_the_packaged_robots_are_listed():
+    result = CliRunner().invoke(app, ["show", "--packaged"])
+    lines = result.stdout.splitlines()
+    assert result.exit_code == 0
+    assert [line.split()[0] for line in lines] == list(packaged_robots())
+    assert any(line.startswith("tx40 ") and "TX40" in line for line in lines)
