@@ -3,7 +3,7 @@
 `python call_c.py` reads {"library": path, "calls": [[name, arguments, size, before]]} as JSON. The
 argument null stands for the result. Its `size` numbers are all equal to `before` when the call
 begins, or are copied from the array of the library that `before` names. The program prints [status,
-numbers] of every call.
+numbers] of every call, the numbers as doubles in base64: those of large robots are millions.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 import json
 import sys
+from base64 import b64encode
 from typing import Any
 
 
@@ -23,7 +24,7 @@ def main() -> None:
         named = isinstance(before, str)
         result = numbers(*(numbers.in_dll(library, before) if named else [before] * size))
         status = getattr(library, name)(*(_argument(a, result) for a in arguments))
-        results.append([status, list(result)])
+        results.append([status, b64encode(bytes(result)).decode()])
     json.dump(results, sys.stdout)
 
 

@@ -13,6 +13,7 @@ import re
 import shutil
 import subprocess
 import sys
+from base64 import b64decode
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -624,10 +625,11 @@ def _closed(library: Path, witness: Witness, constants: list[float]) -> Array:
     return np.array([[np.nan if status else x for x in numbers] for status, numbers in results])
 
 
-def _results(library: Path, calls: list[Call]) -> Any:
+def _results(library: Path, calls: list[Call]) -> list[tuple[Any, Array]]:
     """Call functions of a C library in another process; return status and result of each call."""
     job = {"library": str(library), "calls": calls}
-    return json.loads(_run([sys.executable, "-I", call_c.__file__], json.dumps(job)))
+    found = json.loads(_run([sys.executable, "-I", call_c.__file__], json.dumps(job)))
+    return [(status, np.frombuffer(b64decode(numbers))) for status, numbers in found]
 
 
 def _of_one_state(name: str, text: str, witness: Witness) -> Iterator[tuple[str, Check]]:
