@@ -52,7 +52,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: ed15f7d7f8b63a29107c2d00b444295b9a618ed5d0fdd295776179770302a2b3
+sha256 of all but these lines: 8368b13f29bd083cd0dbd5342459a9e962bc65b89b23a41a3f73bfb2bfaefeab
 """
 
 import numpy as np
@@ -109,12 +109,20 @@ def _real(x, name):
     try:
         array = np.asarray(x)
     except Exception as error:
-        raise ValueError(f"{name}: {type(x).__name__} with rows of several lengths") from error
+        raise ValueError(f"{name}: {type(x).__name__}, no numbers in rows of one length") from error
     masked = array is not x and np.ma.is_masked(x)
-    if array.dtype.kind not in "iuf" or masked:
+    if array.dtype.kind not in "iuf" or masked or hasattr(x, "units") or hasattr(x, "unit"):
         kind = "a masked array" if masked else f"{type(x).__name__} of {array.dtype}"
         raise ValueError(f"{name}: {kind}; expected real numbers")
     return array.astype(float, copy=False)
+
+
+def _numbers(constants):
+    """The constants; ValueError unless each is a real number."""
+    for x in constants:
+        if type(x) is not float and _real(x, "a constant").ndim:
+            raise ValueError(f"a constant: {type(x).__name__}; expected a real number")
+    return constants
 
 
 def _states(*arrays):
@@ -160,7 +168,7 @@ def _evaluated(block, shape, states, X, constants):
         return _gathered(xp, {}, block, shape, states, X, constants)
     rows, X = _states(*states), [_parameters(_real(x, "X")) for x in X]
     result = np.zeros((*shape, len(rows[0])))
-    _filled(block, result, rows, (*X, *constants))
+    _filled(block, result, rows, (*X, *_numbers(constants)))
     result = result.transpose(-1, *range(len(shape)))
     return result[0] if np.ndim(states[0]) == 1 else result
 
@@ -195,12 +203,11 @@ def _package(*arrays):
             "pip install array-api-compat"
         ) from error
     try:
-        return _Arrays(array_namespace(*others), others)
+        package = array_namespace(*others)
     except TypeError as error:
         packages = " and ".join(sorted({type(x).__module__.partition(".")[0] for x in others}))
-        if " and " not in packages:
-            raise
         raise TypeError(f"arrays of {packages}; expected states and X of one package") from error
+    return _Arrays(package, others)
 
 
 class _Arrays:
@@ -272,8 +279,16 @@ class _Symbols:
     def __init__(self):
         import casadi as ca
 
-        self.package, self.maximum, self.minimum, self.rows = ca, ca.fmax, ca.fmin, ca.vertsplit
-        self.parameters = ca.vertsplit
+        self.package, self.maximum, self.minimum = ca, ca.fmax, ca.fmin
+
+    def rows(self, x, count=1):
+        rows = self.package.vertsplit(x)
+        if len(rows) != count:
+            raise ValueError(f"a column of {len(rows)} rows; expected {count}")
+        return rows
+
+    def parameters(self, X):
+        return self.rows(X, 4)
 
     def __getattr__(self, name):
         return getattr(self.package, name)
@@ -300,7 +315,7 @@ class _Symbols:
     def solve(self, A, b):
         """A = L diag(d) L', L unit lower triangular; A symmetric positive definite."""
         n = len(JOINTS)
-        L, d, x = self.package.SX.eye(n), [A[j, j] for j in range(n)], self.rows(b)
+        L, d, x = self.package.SX.eye(n), [A[j, j] for j in range(n)], self.rows(b, n)
         for j in range(n):
             for k in range(j):
                 d[j] -= L[j, k]**2*d[k]
@@ -324,9 +339,9 @@ def casadi(name: str, *, frame: int | None = None) -> "casadi.Function":
     """
     import casadi as ca
 
-    of = name.removesuffix("_derivatives")
+    of = str(name).removesuffix("_derivatives")
     if of not in _OUTPUTS:
-        raise ValueError(f"casadi({name!r}); there is {', '.join(_OUTPUTS)}, and NAME_derivatives")
+        raise ValueError(f"casadi({of[:40]!r}); there is {', '.join(_OUTPUTS)}, and NAME_derivatives")
     columns, names = [text.split() for text in _OUTPUTS[of]]
     sizes = {"X": 4, "standard": 14}
     columns = {x: ca.SX.sym(x, sizes.get(x, 1)) for x in columns}
@@ -381,7 +396,10 @@ def base_parameters(standard: "Array", *, g: float = 9.81) -> "Array":
         standard = [standard.get(name) for name in STANDARD_PARAMETERS]
         xp = _package(*standard)
     else:
-        shape = tuple(standard.shape if hasattr(standard, "shape") else np.shape(standard))
+        try:
+            shape = tuple(standard.shape if hasattr(standard, "shape") else np.shape(standard))
+        except ValueError:  # rows of several lengths
+            shape = ()
         if shape[:1] != (14,):
             raise ValueError(
                 f"standard of shape {shape}; expected (14,) in the order of "
@@ -435,10 +453,10 @@ def _stored(q, qd, qdd, out, constants):
     N = len(states[0])
     out = store(N) if out is None else out
     if not (isinstance(out, Store) and out.ready and out.shape == (4, 1, N)):
-        kind = f"{type(out).__name__} of shape {np.shape(out)}"
+        kind = f"{type(out).__name__} of shape {getattr(out, 'shape', ())}"
         raise ValueError(f"out: expected store({N}) of shape {(4, 1, N)}, found {kind}")
     D = out.view(np.ndarray)
-    return xp, _filled(_regressor_block, D, states, constants)
+    return xp, _filled(_regressor_block, D, states, _numbers(constants))
 
 
 def inverse_dynamics(
@@ -507,16 +525,16 @@ def jacobian(q: "Array", *, frame: int | None = None, g: float = 9.81) -> "Array
     frame 0, per joint rate. Shape (N, 6, 1).
     """
     frame = 1 if frame is None else frame
-    if frame not in range(1, 2):
-        raise ValueError(f"frame {frame!r}; expected 1 to 1")
-    return _evaluated(_jacobian_block, (6, 1), (q,), (), (frame, (), ()))
+    if type(frame) is bool or not isinstance(frame, int | np.integer) or not 0 < frame <= 1:
+        raise ValueError(f"frame {repr(frame).split(chr(10))[0]:.40}; expected 1 to 1")
+    return _evaluated(_jacobian_block, (6, 1), (q,), (), (frame,))
 
 
-def _jacobian_block(xp, q, J, frame, posing, moving):
+def _jacobian_block(xp, q, J, frame, *constants):
     """Fill J, shape (6, 1, N): z x (P_frame - P_j) and z of the joints below the frame."""
     T = dict.fromkeys(np.ndindex(1, 4, 4), 0.0)
-    _frame_poses_block(xp, q, T, *posing)
-    joints, columns, j = _moving(xp, *moving), {}, frame
+    _frame_poses_block(xp, q, T, *constants[:0])
+    joints, columns, j = _moving(xp, *constants[0:]), {}, frame
     while j:
         antecedent, sigma, rates = joints[j]
         z = [T[j - 1, k, 2] for k in range(3)]

@@ -75,7 +75,7 @@ with probability below 6e-15; base_parameters, regressor, observation_matrix, in
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints, elements
 at random states, parameters and random constants agree with Lagrange's equations and products of
 frames to 1e-09, on NumPy's arrays.
-sha256 of all but these lines: 888123e5bd0146169d90d4bd8dd2f6971be6ecf94a00ce6c8c931421fdaaf939
+sha256 of all but these lines: ee2e2b616f4ec5d1cfe9bc0d78a0f130ea110e360d058a3ad856ddf7cc7f227a
 """
 
 import numpy as np
@@ -146,12 +146,20 @@ def _real(x, name):
     try:
         array = np.asarray(x)
     except Exception as error:
-        raise ValueError(f"{name}: {type(x).__name__} with rows of several lengths") from error
+        raise ValueError(f"{name}: {type(x).__name__}, no numbers in rows of one length") from error
     masked = array is not x and np.ma.is_masked(x)
-    if array.dtype.kind not in "iuf" or masked:
+    if array.dtype.kind not in "iuf" or masked or hasattr(x, "units") or hasattr(x, "unit"):
         kind = "a masked array" if masked else f"{type(x).__name__} of {array.dtype}"
         raise ValueError(f"{name}: {kind}; expected real numbers")
     return array.astype(float, copy=False)
+
+
+def _numbers(constants):
+    """The constants; ValueError unless each is a real number."""
+    for x in constants:
+        if type(x) is not float and _real(x, "a constant").ndim:
+            raise ValueError(f"a constant: {type(x).__name__}; expected a real number")
+    return constants
 
 
 def _states(*arrays):
@@ -195,7 +203,7 @@ def _evaluated(block, shape, states, X, constants, closing=None):
     rows, X = _states(*states), [_parameters(_real(x, "X")) for x in X]
     rows = _closed(rows, closing)
     result = np.zeros((*shape, len(rows[0])))
-    _filled(block, result, rows, (*X, *constants))
+    _filled(block, result, rows, (*X, *_numbers(constants)))
     result = result.transpose(-1, *range(len(shape)))
     return result[0] if np.ndim(states[0]) == 1 else result
 
@@ -206,6 +214,7 @@ def elements(
     """{parameter: (kind, direction of motion, row or form)} of the elements: row G of s = G q as
     {j: G_j}, form q'Bq as {(i, j): B_ij}, i <= j.
     """
+    _numbers((L1, g))
     return {
         'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}),
         'FS1': ('coulomb', 'both', {1: 1.0}), 'OFFSET1': ('offset', 'both', {1: 1.0}),
@@ -228,7 +237,10 @@ def base_parameters(
             raise ValueError(f"standard: no value of {', '.join(rest)}")
         standard = [standard.get(name) for name in STANDARD_PARAMETERS]
     else:
-        shape = tuple(standard.shape if hasattr(standard, "shape") else np.shape(standard))
+        try:
+            shape = tuple(standard.shape if hasattr(standard, "shape") else np.shape(standard))
+        except ValueError:  # rows of several lengths
+            shape = ()
         if shape[:1] != (34,):
             raise ValueError(
                 f"standard of shape {shape}; expected (34,) in the order of "
@@ -278,10 +290,10 @@ def _stored(q, qd, qdd, out, constants, closing=None):
     N = len(states[0])
     out = store(N) if out is None else out
     if not (isinstance(out, Store) and out.ready and out.shape == (11, 1, N)):
-        kind = f"{type(out).__name__} of shape {np.shape(out)}"
+        kind = f"{type(out).__name__} of shape {getattr(out, 'shape', ())}"
         raise ValueError(f"out: expected store({N}) of shape {(11, 1, N)}, found {kind}")
     D = out.view(np.ndarray)
-    return _filled(_regressor_block, D, states, constants)
+    return _filled(_regressor_block, D, states, _numbers(constants))
 
 
 def inverse_dynamics(
@@ -364,17 +376,17 @@ def jacobian(
     frame 0, per joint rate. Shape (N, 6, 1).
     """
     frame = 5 if frame is None else frame
-    if frame not in range(1, 6):
-        raise ValueError(f"frame {frame!r}; expected 1 to 5")
-    return _evaluated(_jacobian_block, (6, 1), (q,), (), (frame, (L0, L1, L2, L3), ()),
+    if type(frame) is bool or not isinstance(frame, int | np.integer) or not 0 < frame <= 5:
+        raise ValueError(f"frame {repr(frame).split(chr(10))[0]:.40}; expected 1 to 5")
+    return _evaluated(_jacobian_block, (6, 1), (q,), (), (frame, L0, L1, L2, L3),
         closing=((L0, L1, L2, L3), (L1, L2, L3)))
 
 
-def _jacobian_block(xp, q, qd, qdd, G, J, frame, posing, moving):
+def _jacobian_block(xp, q, qd, qdd, G, J, frame, *constants):
     """Fill J, shape (6, 1, N): z x (P_frame - P_j) and z of the joints below the frame."""
     T = dict.fromkeys(np.ndindex(5, 4, 4), 0.0)
-    _frame_poses_block(xp, q, qd, qdd, G, T, *posing)
-    joints, columns, j = _moving(xp, *moving), {}, frame
+    _frame_poses_block(xp, q, qd, qdd, G, T, *constants[:4])
+    joints, columns, j = _moving(xp, *constants[4:]), {}, frame
     while j:
         antecedent, sigma, rates = joints[j]
         z = [T[j - 1, k, 2] for k in range(3)]
@@ -435,6 +447,7 @@ def _closed(states, constants):
     """Joints of the closed mechanism, actuated then tied: q, qd, qdd (N, 3), and G (N, 2*1),
     rates of the tied ones. `constants` are those of `_closure`, then those of `_curvature`.
     """
+    _numbers([x for part in constants for x in part])
     q, qd, qdd = (*states, *[np.zeros_like(states[0])] * (3 - len(states)))
     N = len(q)
     q = np.concatenate([q, _assembled(q, constants[0])], axis=1)

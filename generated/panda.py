@@ -81,7 +81,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: e29377ddd0f53c9ebcbde73ee333178566ef773c793952d5d30012a83f41eefe
+sha256 of all but these lines: bdd003e3d816857be9cd8a001a6b4e6d2462ed64c58679ffca0bf8dc63d10979
 """
 
 import numpy as np
@@ -183,12 +183,20 @@ def _real(x, name):
     try:
         array = np.asarray(x)
     except Exception as error:
-        raise ValueError(f"{name}: {type(x).__name__} with rows of several lengths") from error
+        raise ValueError(f"{name}: {type(x).__name__}, no numbers in rows of one length") from error
     masked = array is not x and np.ma.is_masked(x)
-    if array.dtype.kind not in "iuf" or masked:
+    if array.dtype.kind not in "iuf" or masked or hasattr(x, "units") or hasattr(x, "unit"):
         kind = "a masked array" if masked else f"{type(x).__name__} of {array.dtype}"
         raise ValueError(f"{name}: {kind}; expected real numbers")
     return array.astype(float, copy=False)
+
+
+def _numbers(constants):
+    """The constants; ValueError unless each is a real number."""
+    for x in constants:
+        if type(x) is not float and _real(x, "a constant").ndim:
+            raise ValueError(f"a constant: {type(x).__name__}; expected a real number")
+    return constants
 
 
 def _states(*arrays):
@@ -234,7 +242,7 @@ def _evaluated(block, shape, states, X, constants):
         return _gathered(xp, {}, block, shape, states, X, constants)
     rows, X = _states(*states), [_parameters(_real(x, "X")) for x in X]
     result = np.zeros((*shape, len(rows[0])))
-    _filled(block, result, rows, (*X, *constants))
+    _filled(block, result, rows, (*X, *_numbers(constants)))
     result = result.transpose(-1, *range(len(shape)))
     return result[0] if np.ndim(states[0]) == 1 else result
 
@@ -269,12 +277,11 @@ def _package(*arrays):
             "pip install array-api-compat"
         ) from error
     try:
-        return _Arrays(array_namespace(*others), others)
+        package = array_namespace(*others)
     except TypeError as error:
         packages = " and ".join(sorted({type(x).__module__.partition(".")[0] for x in others}))
-        if " and " not in packages:
-            raise
         raise TypeError(f"arrays of {packages}; expected states and X of one package") from error
+    return _Arrays(package, others)
 
 
 class _Arrays:
@@ -346,8 +353,16 @@ class _Symbols:
     def __init__(self):
         import casadi as ca
 
-        self.package, self.maximum, self.minimum, self.rows = ca, ca.fmax, ca.fmin, ca.vertsplit
-        self.parameters = ca.vertsplit
+        self.package, self.maximum, self.minimum = ca, ca.fmax, ca.fmin
+
+    def rows(self, x, count=7):
+        rows = self.package.vertsplit(x)
+        if len(rows) != count:
+            raise ValueError(f"a column of {len(rows)} rows; expected {count}")
+        return rows
+
+    def parameters(self, X):
+        return self.rows(X, 69)
 
     def __getattr__(self, name):
         return getattr(self.package, name)
@@ -374,7 +389,7 @@ class _Symbols:
     def solve(self, A, b):
         """A = L diag(d) L', L unit lower triangular; A symmetric positive definite."""
         n = len(JOINTS)
-        L, d, x = self.package.SX.eye(n), [A[j, j] for j in range(n)], self.rows(b)
+        L, d, x = self.package.SX.eye(n), [A[j, j] for j in range(n)], self.rows(b, n)
         for j in range(n):
             for k in range(j):
                 d[j] -= L[j, k]**2*d[k]
@@ -398,9 +413,9 @@ def casadi(name: str, *, frame: int | None = None) -> "casadi.Function":
     """
     import casadi as ca
 
-    of = name.removesuffix("_derivatives")
+    of = str(name).removesuffix("_derivatives")
     if of not in _OUTPUTS:
-        raise ValueError(f"casadi({name!r}); there is {', '.join(_OUTPUTS)}, and NAME_derivatives")
+        raise ValueError(f"casadi({of[:40]!r}); there is {', '.join(_OUTPUTS)}, and NAME_derivatives")
     columns, names = [text.split() for text in _OUTPUTS[of]]
     sizes = {"X": 69, "standard": 98}
     columns = {x: ca.SX.sym(x, sizes.get(x, 7)) for x in columns}
@@ -438,6 +453,7 @@ def elements(
     """{parameter: (kind, direction of motion, row or form)} of the elements: row G of s = G q as
     {j: G_j}, form q'Bq as {(i, j): B_ij}, i <= j.
     """
+    _numbers((RL3, D4, RL5, D7, g))
     return {
         'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}),
         'FS1': ('coulomb', 'both', {1: 1.0}), 'OFFSET1': ('offset', 'both', {1: 1.0}),
@@ -473,7 +489,10 @@ def base_parameters(
         standard = [standard.get(name) for name in STANDARD_PARAMETERS]
         xp = _package(*standard)
     else:
-        shape = tuple(standard.shape if hasattr(standard, "shape") else np.shape(standard))
+        try:
+            shape = tuple(standard.shape if hasattr(standard, "shape") else np.shape(standard))
+        except ValueError:  # rows of several lengths
+            shape = ()
         if shape[:1] != (98,):
             raise ValueError(
                 f"standard of shape {shape}; expected (98,) in the order of "
@@ -481,6 +500,8 @@ def base_parameters(
             )
         xp = _package(standard)
         standard = standard if xp is np else [standard[k] for k in range(98)]
+    if xp is np:
+        _numbers((RL3, D4, RL5, D7, g))
     (
         _, _, _, _, _, ZZ1, _, _, _, _, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2,
         MX2, MY2, _, _, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3,
@@ -564,10 +585,10 @@ def _stored(q, qd, qdd, out, constants):
     N = len(states[0])
     out = store(N) if out is None else out
     if not (isinstance(out, Store) and out.ready and out.shape == (69, 7, N)):
-        kind = f"{type(out).__name__} of shape {np.shape(out)}"
+        kind = f"{type(out).__name__} of shape {getattr(out, 'shape', ())}"
         raise ValueError(f"out: expected store({N}) of shape {(69, 7, N)}, found {kind}")
     D = out.view(np.ndarray)
-    return xp, _filled(_regressor_block, D, states, constants)
+    return xp, _filled(_regressor_block, D, states, _numbers(constants))
 
 
 def inverse_dynamics(
@@ -656,16 +677,16 @@ def jacobian(
     frame 0, per joint rate. Shape (N, 6, 7).
     """
     frame = 7 if frame is None else frame
-    if frame not in range(1, 8):
-        raise ValueError(f"frame {frame!r}; expected 1 to 7")
-    return _evaluated(_jacobian_block, (6, 7), (q,), (), (frame, (RL1, RL3, D4, RL5, D7), ()))
+    if type(frame) is bool or not isinstance(frame, int | np.integer) or not 0 < frame <= 7:
+        raise ValueError(f"frame {repr(frame).split(chr(10))[0]:.40}; expected 1 to 7")
+    return _evaluated(_jacobian_block, (6, 7), (q,), (), (frame, RL1, RL3, D4, RL5, D7))
 
 
-def _jacobian_block(xp, q, J, frame, posing, moving):
+def _jacobian_block(xp, q, J, frame, *constants):
     """Fill J, shape (6, 7, N): z x (P_frame - P_j) and z of the joints below the frame."""
     T = dict.fromkeys(np.ndindex(7, 4, 4), 0.0)
-    _frame_poses_block(xp, q, T, *posing)
-    joints, columns, j = _moving(xp, *moving), {}, frame
+    _frame_poses_block(xp, q, T, *constants[:5])
+    joints, columns, j = _moving(xp, *constants[5:]), {}, frame
     while j:
         antecedent, sigma, rates = joints[j]
         z = [T[j - 1, k, 2] for k in range(3)]

@@ -89,7 +89,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 0a3b46be0ad9d691dea788a1f2a534ce3118091d482987b099ca00b20a153e31
+sha256 of all but these lines: aadf14d8eb715b225925e5f43bc53ec477bc32bc66b38cd4c5d3790b4ad73e5a
 """
 
 import numpy as np
@@ -190,12 +190,20 @@ def _real(x, name):
     try:
         array = np.asarray(x)
     except Exception as error:
-        raise ValueError(f"{name}: {type(x).__name__} with rows of several lengths") from error
+        raise ValueError(f"{name}: {type(x).__name__}, no numbers in rows of one length") from error
     masked = array is not x and np.ma.is_masked(x)
-    if array.dtype.kind not in "iuf" or masked:
+    if array.dtype.kind not in "iuf" or masked or hasattr(x, "units") or hasattr(x, "unit"):
         kind = "a masked array" if masked else f"{type(x).__name__} of {array.dtype}"
         raise ValueError(f"{name}: {kind}; expected real numbers")
     return array.astype(float, copy=False)
+
+
+def _numbers(constants):
+    """The constants; ValueError unless each is a real number."""
+    for x in constants:
+        if type(x) is not float and _real(x, "a constant").ndim:
+            raise ValueError(f"a constant: {type(x).__name__}; expected a real number")
+    return constants
 
 
 def _states(*arrays):
@@ -241,7 +249,7 @@ def _evaluated(block, shape, states, X, constants):
         return _gathered(xp, {}, block, shape, states, X, constants)
     rows, X = _states(*states), [_parameters(_real(x, "X")) for x in X]
     result = np.zeros((*shape, len(rows[0])))
-    _filled(block, result, rows, (*X, *constants))
+    _filled(block, result, rows, (*X, *_numbers(constants)))
     result = result.transpose(-1, *range(len(shape)))
     return result[0] if np.ndim(states[0]) == 1 else result
 
@@ -276,12 +284,11 @@ def _package(*arrays):
             "pip install array-api-compat"
         ) from error
     try:
-        return _Arrays(array_namespace(*others), others)
+        package = array_namespace(*others)
     except TypeError as error:
         packages = " and ".join(sorted({type(x).__module__.partition(".")[0] for x in others}))
-        if " and " not in packages:
-            raise
         raise TypeError(f"arrays of {packages}; expected states and X of one package") from error
+    return _Arrays(package, others)
 
 
 class _Arrays:
@@ -361,8 +368,16 @@ class _Symbols:
     def __init__(self):
         import casadi as ca
 
-        self.package, self.maximum, self.minimum, self.rows = ca, ca.fmax, ca.fmin, ca.vertsplit
-        self.parameters = ca.vertsplit
+        self.package, self.maximum, self.minimum = ca, ca.fmax, ca.fmin
+
+    def rows(self, x, count=6):
+        rows = self.package.vertsplit(x)
+        if len(rows) != count:
+            raise ValueError(f"a column of {len(rows)} rows; expected {count}")
+        return rows
+
+    def parameters(self, X):
+        return self.rows(X, 60)
 
     def __getattr__(self, name):
         return getattr(self.package, name)
@@ -391,7 +406,7 @@ class _Symbols:
     def solve(self, A, b):
         """A = L diag(d) L', L unit lower triangular; A symmetric positive definite."""
         n = len(JOINTS)
-        L, d, x = self.package.SX.eye(n), [A[j, j] for j in range(n)], self.rows(b)
+        L, d, x = self.package.SX.eye(n), [A[j, j] for j in range(n)], self.rows(b, n)
         for j in range(n):
             for k in range(j):
                 d[j] -= L[j, k]**2*d[k]
@@ -415,9 +430,9 @@ def casadi(name: str, *, frame: int | None = None) -> "casadi.Function":
     """
     import casadi as ca
 
-    of = name.removesuffix("_derivatives")
+    of = str(name).removesuffix("_derivatives")
     if of not in _OUTPUTS:
-        raise ValueError(f"casadi({name!r}); there is {', '.join(_OUTPUTS)}, and NAME_derivatives")
+        raise ValueError(f"casadi({of[:40]!r}); there is {', '.join(_OUTPUTS)}, and NAME_derivatives")
     columns, names = [text.split() for text in _OUTPUTS[of]]
     sizes = {"X": 60, "standard": 104}
     columns = {x: ca.SX.sym(x, sizes.get(x, 6)) for x in columns}
@@ -456,6 +471,7 @@ def elements(
     """{parameter: (kind, direction of motion, row or form)} of the elements: row G of s = G q as
     {j: G_j}, form q'Bq as {(i, j): B_ij}, i <= j.
     """
+    _numbers((D2, D3, D4, RL4, D8, g))
     return {
         'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}),
         'FS1': ('coulomb', 'both', {1: 1.0}), 'OFFSET1': ('offset', 'both', {1: 1.0}),
@@ -489,7 +505,10 @@ def base_parameters(
         standard = [standard.get(name) for name in STANDARD_PARAMETERS]
         xp = _package(*standard)
     else:
-        shape = tuple(standard.shape if hasattr(standard, "shape") else np.shape(standard))
+        try:
+            shape = tuple(standard.shape if hasattr(standard, "shape") else np.shape(standard))
+        except ValueError:  # rows of several lengths
+            shape = ()
         if shape[:1] != (104,):
             raise ValueError(
                 f"standard of shape {shape}; expected (104,) in the order of "
@@ -497,6 +516,8 @@ def base_parameters(
             )
         xp = _package(standard)
         standard = standard if xp is np else [standard[k] for k in range(104)]
+    if xp is np:
+        _numbers((D2, D3, D4, RL4, D8, g))
     (
         _, _, _, _, _, ZZ1, _, _, _, _, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2,
         MX2, MY2, _, M2, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3,
@@ -577,10 +598,10 @@ def _stored(q, qd, qdd, out, constants):
     N = len(states[0])
     out = store(N) if out is None else out
     if not (isinstance(out, Store) and out.ready and out.shape == (60, 6, N)):
-        kind = f"{type(out).__name__} of shape {np.shape(out)}"
+        kind = f"{type(out).__name__} of shape {getattr(out, 'shape', ())}"
         raise ValueError(f"out: expected store({N}) of shape {(60, 6, N)}, found {kind}")
     D = out.view(np.ndarray)
-    return xp, _filled(_regressor_block, D, states, constants)
+    return xp, _filled(_regressor_block, D, states, _numbers(constants))
 
 
 def inverse_dynamics(
@@ -667,16 +688,16 @@ def jacobian(
     frame 0, per joint rate. Shape (N, 6, 6).
     """
     frame = 10 if frame is None else frame
-    if frame not in range(1, 11):
-        raise ValueError(f"frame {frame!r}; expected 1 to 10")
-    return _evaluated(_jacobian_block, (6, 6), (q,), (), (frame, (D2, D3, D4, RL4, D8), ()))
+    if type(frame) is bool or not isinstance(frame, int | np.integer) or not 0 < frame <= 10:
+        raise ValueError(f"frame {repr(frame).split(chr(10))[0]:.40}; expected 1 to 10")
+    return _evaluated(_jacobian_block, (6, 6), (q,), (), (frame, D2, D3, D4, RL4, D8))
 
 
-def _jacobian_block(xp, q, J, frame, posing, moving):
+def _jacobian_block(xp, q, J, frame, *constants):
     """Fill J, shape (6, 6, N): z x (P_frame - P_j) and z of the joints below the frame."""
     T = dict.fromkeys(np.ndindex(10, 4, 4), 0.0)
-    _frame_poses_block(xp, q, T, *posing)
-    joints, columns, j = _moving(xp, *moving), {}, frame
+    _frame_poses_block(xp, q, T, *constants[:5])
+    joints, columns, j = _moving(xp, *constants[5:]), {}, frame
     while j:
         antecedent, sigma, rates = joints[j]
         z = [T[j - 1, k, 2] for k in range(3)]

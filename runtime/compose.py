@@ -3,6 +3,7 @@
     STEPS      Problem -> Problem: changes of a problem before its rows are made, in this order
     READERS    Record, Signals -> States: signals.reader of a study (`runtime.core.signals.reader`)
     METHODS    Observation -> rows of a least squares -> their fit: estimate.method of a study
+    CORRECTIONS  Identification -> Identification: deviations, by what the model lacks
     EXTRAS     Identification -> Part: further analyses of the records
     QUESTIONS  Identification -> Check: what the verdict asks; a part asks its own
 
@@ -12,17 +13,20 @@ function of the package. A feature is one file and one line of a list.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields, replace
-from functools import partial
+from functools import partial, wraps
+from inspect import signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from types import NoneType
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from runtime.advisor.advice import NoAdvice
 from runtime.core import identify as identification
 from runtime.core.automatic import automatic_cutoff
 from runtime.core.essential import Essential, essential_of
-from runtime.core.identify import Extra, OnRequest
+from runtime.core.identify import Correction, Extra, OnRequest
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import LinearOptions, ordinary
 from runtime.core.least_squares.method import Method
@@ -61,6 +65,7 @@ from runtime.rest import STATIC, poses_at_rest
 from runtime.speeds import recorded_speeds
 from runtime.study import Study, study_of, study_schema
 from runtime.threads import alone_each, single_threaded
+from runtime.unmodelled import with_lacking
 from runtime.verdict import questions
 from runtime.verdict.verdict import Ask, of_parts, verdict
 
@@ -129,6 +134,7 @@ METHODS: Listed[Method] = Listed(
         "didim": "runtime.loop.didim:METHOD",
     }
 )
+CORRECTIONS: list[Correction] = [with_lacking]
 EXTRAS: list[Extra] = [
     PartWhen(
         Late("runtime.packets.packets:packets_told"),
@@ -199,6 +205,48 @@ judged = partial(verdict, on_record=RECORD_QUESTIONS, on_parameters=QUESTIONS)
 
 Records = Record | Sequence[Record]
 T = TypeVar("T")
+P = ParamSpec("P")
+R = TypeVar("R")
+
+ARGUMENTS: dict[str, tuple[tuple[type, ...], str]] = {
+    "unseen": ((Record, list, tuple), RECORD_EXPECTED),
+    "further": ((Record, list, tuple, NoneType), RECORD_EXPECTED),
+    "loaded": ((Record, list, tuple, NoneType), RECORD_EXPECTED),
+    "map": ((Callable,), "a function like the built-in map"),  # type: ignore[dict-item]
+    "progress": ((Callable, NoneType), "a function of two numbers"),  # type: ignore[dict-item]
+    "readers": ((list, tuple, NoneType), "a list of names, such as ['counts']"),
+    "provenance": ((Mapping, NoneType), "a mapping of names to data"),
+    "folder": ((str, Path, NoneType), "the name of a folder"),
+    "name": ((str, NoneType), "a text"),
+    "physical": ((bool,), "True or False"),
+    "friction": ((bool,), "True or False"),
+    "ideal": ((bool,), "True or False"),
+    "missing": ((bool,), "True or False"),
+    "plausible": ((bool, NoneType), "True, False or None"),
+}
+"""Types of the further arguments of the public functions, which have one meaning in all of them."""
+
+
+def entry(function: Callable[P, R]) -> Callable[P, R]:
+    """Wrap a public function: its arguments are checked, and it runs with one BLAS thread.
+
+    InputError, in one sentence, for an argument of another type than in `ARGUMENTS`.
+    """
+
+    @wraps(function)
+    def checked(*args: P.args, **kwargs: P.kwargs) -> R:
+        for name, given in signature(function).bind(*args, **kwargs).arguments.items():
+            if name in ARGUMENTS:
+                require_kind(given, ARGUMENTS[name][0], name, ARGUMENTS[name][1])
+            if name == "variants" and given is not None:
+                require_emitted(given, name)
+            if name == "simulator" and not (given is None or hasattr(given, "run")):
+                raise InputError(
+                    f"simulator is {kind_of(given)}; expected a runtime.loop.simulation.Simulator"
+                )
+        return single_threaded(function)(*args, **kwargs)
+
+    return checked
 
 
 def require_study(study: Study | None) -> Study:
@@ -220,8 +268,17 @@ def list_records(records: Records) -> tuple[Record, ...]:
     """
     if isinstance(records, Record):
         return (records,)
-    require_kind(records, Sequence, "records", RECORD_EXPECTED)
+    require_kind(records, (list, tuple), "records", RECORD_EXPECTED)
+    for record in records:
+        require_kind(record, Record, "a record", RECORD_EXPECTED)
     return tuple(records)
+
+
+def with_records(problem: Problem) -> Problem:
+    """Return the problem; raise InputError if it has no record to fit."""
+    if not problem.records:
+        raise InputError(f"no record; expected {RECORD_EXPECTED}")
+    return problem
 
 
 def complete_study(study: Study) -> Study:
@@ -283,6 +340,7 @@ def state_problem(
     )
 
 
+@entry
 def problem(
     model: GeneratedModel,
     records: Records,
@@ -327,6 +385,7 @@ def records_of(
     return read_records(settings, model, folder=folder, missing=missing)
 
 
+@entry
 def read_record(
     path: str | Path | RecordSettings,
     model: GeneratedModel | None = None,
@@ -357,13 +416,13 @@ def read_record(
         Files that cannot be read or have other content, several records, or one record that
         `resample` splits.
     """
-    bare = False
+    bare, folder = False, folder or "."
     if isinstance(path, RecordSettings):
         settings: tuple[RecordSettings, ...] = (path,)
     else:
         require_kind(path, (str, Path), "path", "the name of a file, or RecordSettings")
         named = Path(folder) / path
-        study, folder = study_of(named if named.exists() else path)
+        study, folder = study_of(named if os.path.exists(named) else path)  # noqa: PTH110 (any length)
         bare = is_measured(named)
         settings = study.record
         missing = missing or reader_of(study.signals).missing
@@ -378,7 +437,7 @@ def read_record(
     return replace(record, origin=replace(record.origin, sides=None)) if bare else record
 
 
-@single_threaded
+@entry
 def observe(
     model: GeneratedModel,
     records: Records,
@@ -393,7 +452,7 @@ def observe(
     return observe_rows(problem(model, records, study, simulator=simulator))
 
 
-@single_threaded
+@entry
 def estimate(
     model: GeneratedModel,
     records: Records,
@@ -436,16 +495,20 @@ def estimate_of(
     *,
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
+    corrected: bool = True,
 ) -> Estimate:
     """Estimate the parameters of given rows Y = W X + rho by the method of `settings`.
 
-    The default method is ols.
+    The default method is ols. Without `corrected`, `sigma_corrected` is nan: on a long record it
+    takes most of the time.
     """
     settings = settings or EstimateSettings()
-    return estimate_by(observation, settings, METHODS, model=model, provenance=provenance)
+    return estimate_by(
+        observation, settings, METHODS, model=model, provenance=provenance, corrected=corrected
+    )
 
 
-@single_threaded
+@entry
 def essential(
     model: GeneratedModel,
     records: Records,
@@ -467,7 +530,7 @@ def essential(
     )
 
 
-@single_threaded
+@entry
 def identify(
     model: GeneratedModel,
     records: Records,
@@ -530,10 +593,12 @@ def identify(
     if plausible or (plausible is None and variants is not None):
         asked["plausible"] = {"variants": variants}
     whole = _with_loaded(model, records, study, further, loaded, simulator)
-    return identification.identify(whole, extras(asked), judged, provenance=provenance)
+    return identification.identify(
+        whole, extras(asked), judged, corrections=CORRECTIONS, provenance=provenance
+    )
 
 
-@single_threaded
+@entry
 def assess(
     model: GeneratedModel,
     records: Records,
@@ -559,11 +624,16 @@ def assess(
     whole = _with_loaded(model, records, study, None, None, None)
     progress("identification")
     return identification.identify(
-        whole, extras(asked, attempted=True), judged, provenance=provenance, progress=progress
+        whole,
+        extras(asked, attempted=True),
+        judged,
+        corrections=CORRECTIONS,
+        provenance=provenance,
+        progress=progress,
     )
 
 
-@single_threaded
+@entry
 def compare(
     model: GeneratedModel,
     candidates: Mapping[str, Study | tuple[Study, Records, Records]],
@@ -598,7 +668,7 @@ def compare(
     return comparing.compare(problems, extras({}), judged, of_the_best)
 
 
-@single_threaded
+@entry
 def cestac(
     model: GeneratedModel,
     records: Records,
@@ -625,7 +695,7 @@ def cestac(
     )
 
 
-@single_threaded
+@entry
 def advise(
     model: GeneratedModel,
     records: Records,
@@ -645,13 +715,15 @@ def advise(
 
     whole = problem(model, records, study)
     suited = {name: reader for name, reader in READERS.items() if reader.reads_encoders}
+    for name in readers or ():
+        require_kind(name, str, "a reader", "its name, such as 'counts'")
     chosen = {name: _named(suited, name, ("signals", "reader")) for name in readers or ()}
     if not chosen:
         chosen = advisor.readers_of_law(whole, READERS)
     return advisor.advise(whole, readers=chosen, **options)
 
 
-@single_threaded
+@entry
 def plausibility(
     model: GeneratedModel,
     records: Records,
@@ -665,10 +737,11 @@ def plausibility(
     """
     from runtime.plausible import plausibility as checks
 
-    return checks.plausibility(problem(model, records, study), variants=variants)
+    whole = with_records(problem(model, records, study))
+    return checks.plausibility(whole, variants=variants)
 
 
-@single_threaded
+@entry
 def delay(
     model: GeneratedModel, record: Record, study: Study | None = None, **options: Any
 ) -> Delay:
@@ -678,10 +751,10 @@ def delay(
     """
     from runtime.plausible import delay as delays
 
-    return delays.delay(problem(model, record, study), **options)
+    return delays.delay(with_records(problem(model, record, study)), **options)
 
 
-@single_threaded
+@entry
 def payload(
     model: GeneratedModel, records: Records, study: Study, *, loaded: Sequence[Record] | None = None
 ) -> PayloadStudy:
@@ -696,7 +769,7 @@ def payload(
     return loads.payload_study(whole, () if note is None else note.result)
 
 
-@single_threaded
+@entry
 def excite(
     model: GeneratedModel,
     records: Records = (),
@@ -716,7 +789,7 @@ def excite(
     return search.excite(whole, map=alone_each(map), progress=progress)
 
 
-@single_threaded
+@entry
 def static_poses(
     model: GeneratedModel, records: Records = (), study: Study | None = None
 ) -> StaticPoses:
@@ -730,7 +803,7 @@ def static_poses(
     return poses.static_poses(problem(model, records, study))
 
 
-@single_threaded
+@entry
 def repair(
     model: GeneratedModel,
     records: Records,
@@ -776,7 +849,7 @@ def repair(
     study = require_study(study)
     if further is None:
         further = records_of(study.validate.record, model, study, folder=folder)
-    whole = problem(model, records, study, unseen=further)
+    whole = with_records(problem(model, records, study, unseen=further))
     stated = study if study.record else replace(study, record=(RecordSettings(),))
     given = list_records(records)
     return repairing.repair(whole, stated, records=given, variants=variants, folder=folder)
@@ -798,6 +871,7 @@ def extras(asked: Mapping[str, Mapping[str, Any]], attempted: bool = False) -> l
     return chosen
 
 
+@entry
 def simulate(
     model: GeneratedModel,
     study: Study,
@@ -903,6 +977,7 @@ def _candidate(model: GeneratedModel, candidate: Study | tuple[Study, Records, R
 
 
 __all__ = [
+    "CORRECTIONS",
     "EXTRAS",
     "METHODS",
     "QUESTIONS",

@@ -159,7 +159,8 @@ class ExpectedError(Part):
     @cached_property
     def lacking(self) -> Lacking | None:
         """Laws of load, position or time that the model lacks; None if nothing can be said."""
-        return lacking_of(self.result)
+        found = self.result.lacking
+        return found if found is not None else lacking_of(self.result)
 
     def checks(self) -> tuple[Check, ...]:
         """Return the questions on what the model lacks, and on the expected error if it is known."""

@@ -69,8 +69,9 @@ def report(
         The folder cannot be written.
     """
     require_kind(folder, (str, Path, Results), "folder", "the name of a folder")
+    require_kind(study, (Study, type(None)), "study", "a Study, or None")
     place = folder.folder if isinstance(folder, Results) else Path(folder)
-    files = files_of(result, place, study or Study())
+    files = files_of(result, place, study if study is not None else Study())
     return folder.write_all(files) if isinstance(folder, Results) else write_all(place, files)
 
 

@@ -168,9 +168,12 @@ def _fit_of_last_pass(start: Beginning, W: Array, fit: Robust) -> Fitted:
     A = np.column_stack(
         [W * rows[:, None] * bend, (observation.Y - W @ fit.X) * rows * fit.w / bend]
     )
-    blocks = split_rows(A, observation.blocks(options.block))
-    bands = (split_rows(A, groups) for groups in observation.bands(W @ fit.X))
-    corrected = corrected_deviations(blocks, bands, np.zeros(b), fit.T / bend)
+
+    def corrected() -> Array:
+        blocks = split_rows(A, observation.blocks(options.block))
+        bands = (split_rows(A, groups) for groups in observation.bands(W @ fit.X))
+        return corrected_deviations(blocks, bands, np.zeros(b), fit.T / bend)
+
     shares = {
         label: float(np.mean(fit.w[observation.joint(j)] < DOWN_WEIGHTED))
         for j, label in enumerate(labels_of(start.model, observation.n))

@@ -22,7 +22,7 @@ Reference: White (1980) and Arellano (1987) for C_a.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -267,6 +267,21 @@ def lacking_of(result: Identification) -> Lacking | None:
                 F = columns_of(kind, order, q[rows], sign[rows], sign[rows])
             candidates.append(Candidate(j, kind, order, rows, F / size[j]))
     return search(own, candidates, size, measured)
+
+
+def with_lacking(result: Identification) -> Identification:
+    """Find the laws that the model lacks, and widen the deviations by what they move.
+
+    The deviation of a parameter becomes sqrt(s^2 + dX^2): X is off by dX if the parameter is that of
+    a model with the laws, which no resampling of this record shows, since every part of the record
+    has the same laws.
+    """
+    lacking = lacking_of(result)
+    if lacking is None:
+        return result
+    moves = dict(zip(result.estimate.names, map(float, lacking.dX), strict=True))
+    sets = result.sets.wider(moves) if lacking.laws else result.sets
+    return replace(result, sets=sets, lacking=lacking)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ are attributes.
 from __future__ import annotations
 
 import copyreg
+from collections.abc import Iterable
 from typing import Any
 
 LONGEST = 2000  # characters of a message: a file may hold names of any length
@@ -38,6 +39,34 @@ def printable(text: str) -> str:
         if not text.isprintable():
             text = "".join(c if c.isprintable() or c == "\n" else f"\\x{ord(c):02x}" for c in text)
     return text
+
+
+def require(given: object, kinds: type | tuple[type, ...], name: str, expected: str) -> None:
+    """Raise SymgenError, in one sentence, unless the argument `name` has one of these types.
+
+    True and False are no numbers here. `expected` says which values there are.
+    """
+    allowed = kinds if isinstance(kinds, tuple) else (kinds,)
+    if not isinstance(given, allowed) or (isinstance(given, bool) and bool not in allowed):
+        shown = repr(given) if isinstance(given, str | int | float | complex | None) else ""
+        what = f"{shown:.40} ({type(given).__name__})" if shown else f"a {type(given).__name__}"
+        raise SymgenError(f"{name} is {what}; expected {expected}")
+
+
+def require_names(given: object, known: Iterable[str], name: str) -> None:
+    """Raise SymgenError unless the argument `name` is a list of names among `known`."""
+    known = tuple(known)
+    require(given, (list, tuple, dict, set, frozenset), name, f"a list of {', '.join(known)}")
+    for x in given:  # type: ignore[attr-defined]  # checked
+        require_name(x, known, name)
+
+
+def require_name(given: object, known: Iterable[str], name: str) -> None:
+    """Raise SymgenError unless the argument `name` is one of the names `known`."""
+    known = tuple(known)
+    if not isinstance(given, str) or given not in known:
+        shown = f"{given!r:.40}" if isinstance(given, str) else f"a {type(given).__name__}"
+        raise SymgenError(f"{name} is {shown}; expected one of {', '.join(known)}")
 
 
 class CertificateError(SymgenError):
@@ -81,7 +110,8 @@ class DescriptionError(SymgenError):
         line: int | None = None,
     ) -> None:
         self.message, self.path, self.file, self.line = message, path, file, line
-        place = "" if file is None else f" ({file}{'' if line is None else f', line {line}'})"
+        name = " ".join((file or "").split("\n"))
+        place = "" if file is None else f" ({name}{'' if line is None else f', line {line}'})"
         super().__init__(message + place)
 
 

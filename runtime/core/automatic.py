@@ -3,6 +3,10 @@
 Each fitted record gets the cut-off that it would have alone, since its rate and the noise of its
 positions are its own. The study gets the cut-off of all these records together: it stands for a
 record that is too short or does not move, and is the highest for a record that is predicted.
+
+Contacts shake a robot at all frequencies. Near the cut-off, the filter takes part of this motion from
+W and not from Y, which biases the parameters. So `decimate.factor: auto` keeps every third row of eq.
+(13) where contacts are measured: rows of frequencies at which the filter is 1.
 """
 
 from __future__ import annotations
@@ -12,13 +16,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from runtime.core.problem import SIGNALS, Note, Problem
+from runtime.core.problem import CONTACTS, SIGNALS, Note, Problem
 from runtime.core.provenance import record_names
 from runtime.core.record import Record
+from runtime.core.rows.prepared import study_of_record
 from runtime.core.rows.selection import excerpt
 from runtime.core.signals.cutoff import Choice, chosen_cutoff, lines_of
+from runtime.core.signals.filters import decimation_factor
 from runtime.ground.limits import LIMIT
 
+FEWER = 3
+"""Rows of eq. (13) of which one is kept where contacts shake the robot."""
 NAMED = 3
 """Records with the same cut-off that are named; more are counted."""
 
@@ -32,9 +40,11 @@ def automatic_cutoff(problem: Problem) -> Problem:
     signals = problem.settings.signals
     low = signals.lowpass
     if low is None or low.cutoff != "auto":
-        return problem.changed(
-            records=tuple(record.cut_at(None) for record in problem.records),
-            unseen=tuple(record.cut_at(None) for record in problem.unseen),
+        return _below_the_filter(
+            problem.changed(
+                records=tuple(record.cut_at(None) for record in problem.records),
+                unseen=tuple(record.cut_at(None) for record in problem.unseen),
+            )
         )
     common, own = _choices(problem, problem.records)
     fitted = [one if one.decided else common for one in own]
@@ -55,7 +65,7 @@ def automatic_cutoff(problem: Problem) -> Problem:
             for record, hertz in zip(records, cutoffs, strict=True)
         )
 
-    return problem.changed(
+    changed = problem.changed(
         Note(SIGNALS, text),
         records=cut(problem.records, [one.hertz for one in fitted]),
         unseen=cut(problem.unseen, highest),
@@ -63,6 +73,22 @@ def automatic_cutoff(problem: Problem) -> Problem:
             problem.settings, signals=replace(signals, lowpass=replace(low, cutoff=common.hertz))
         ),
     )
+    return _below_the_filter(changed)
+
+
+def _below_the_filter(problem: Problem) -> Problem:
+    """Keep fewer rows, of lower frequencies, if contacts are measured and the factor is automatic."""
+    signals, records = problem.settings.signals, problem.records
+    how, low = signals.decimate, signals.lowpass
+    if problem.noted(CONTACTS) is None or how is None or low is None or how.factor != "auto":
+        return problem
+    factors = [
+        decimation_factor(study_of_record(problem.settings, record).signals, record.rate)
+        for record in records or problem.unseen
+    ]
+    decimate = replace(how, factor=FEWER * max(factors, default=1))
+    settings = replace(problem.settings, signals=replace(signals, decimate=decimate))
+    return problem.changed(settings=settings)
 
 
 def _choices(problem: Problem, records: Sequence[Record]) -> tuple[Choice, list[Choice]]:

@@ -81,6 +81,11 @@ def settings_of_axes(settings: Study, n: int, axes: int, torques: bool, methods:
     return settings
 
 
+def touches(problem: Problem) -> bool:
+    """Whether the world acts on the robot of a record: a wrench is measured that is not zero."""
+    return any(map(_acts, (*problem.records, *problem.unseen)))
+
+
 def on_links(problem: Problem) -> dict[str, Any]:
     """Take the wrenches of the world on the links into the torques of the records.
 

@@ -25,6 +25,8 @@ Judge: TypeAlias = Callable[[Identification], Checklist]
 """A function that answers the questions of the verdict (`runtime.verdict`)."""
 Extra: TypeAlias = Callable[[Identification], Part | None]
 """A function that makes a Part of an identification, or None if it has nothing to say."""
+Correction: TypeAlias = Callable[[Identification], Identification]
+"""A function that changes the deviations of an identification, by what the model lacks."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,7 @@ def identify(
     extras: Sequence[Extra],
     judge: Judge,
     *,
+    corrections: Sequence[Correction] = (),
     provenance: Mapping[str, Any] | None = None,
     progress: Callable[[str], None] = lambda label: None,
 ) -> Identification:
@@ -78,6 +81,8 @@ def identify(
         Further analyses, made in this order.
     judge : function of Identification
         Answers the questions of the verdict.
+    corrections : sequence of Correction
+        Changes of the deviations, made in this order before the analyses.
     provenance : mapping, optional
         Further entries that help to reproduce the result; names of the records, hashes and versions
         are added.
@@ -122,6 +127,8 @@ def identify(
         judge=judge,
         missing=missing,
     )
+    for correction in corrections:
+        result = correction(result)
     return with_parts(result, extras, progress)
 
 

@@ -7,7 +7,9 @@ emitted and certified it, or with trust=True (`runtime.core.loading`).
 
 from __future__ import annotations
 
+import ast
 import copyreg
+import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -112,6 +114,8 @@ def load_model(
     ModelError
         There is no such file, it was not emitted here, or it is not a model.
     """
+    require_kind(folder, (str, Path, type(None)), "folder", "the name of a folder")
+    require_kind(trust, bool, "trust", "True or False")
     if isinstance(model, ModuleType):
         return checked_model(model)
     require_kind(
@@ -120,25 +124,26 @@ def load_model(
     path = Path(model)
     if isinstance(model, str) and re.fullmatch(r"\w+", model):
         path = Path(folder or FOLDER) / f"{model}.py"
-    if not path.is_file():
+    if not os.path.isfile(path):  # noqa: PTH113 (a name of any length)
         present = (
             sorted(p.stem for p in path.parent.glob("*.py") if p.stem != "__init__")
             if path.parent.is_dir()
             else []
         )
+        shown = " ".join(str(path).split("\n"))
         raise ModelError(
-            f"there is no generated model {path} ({path.parent} contains "
+            f"there is no generated model {shown} ({path.parent} contains "
             f"{', '.join(present) or 'none'}); generate the model with "
-            f"`symgen generate {path.stem}`"
+            f"`symgen generate {Path(shown).stem}`"
         )
     return checked_model(module_of(path, trust=trust))
 
 
-def require_emitted(model: Any) -> None:
-    """Raise InputError unless `model` is an emitted model or has its interface."""
+def require_emitted(model: Any, label: str = "model") -> None:
+    """Raise InputError unless the argument `label` is an emitted model or has its interface."""
     if not all(hasattr(model, name) for name in ("NAME", "JOINTS", "DRIVES")):
         raise InputError(
-            f"model is {kind_of(model)}; expected a generated model, such as symgen.model('arm.urdf') "
+            f"{label} is {kind_of(model)}; expected a generated model, such as symgen.model('arm.urdf') "
             "or runtime.load_model('arm.py')"
         )
 
@@ -146,10 +151,11 @@ def require_emitted(model: Any) -> None:
 def _reduced(module: ModuleType) -> tuple[Callable[..., ModuleType], tuple[Any, ...]]:
     """Return the function and the arguments from which pickle rebuilds a module in another process.
 
-    An emitted module is sent as its text.
+    An emitted module is sent as its text, as it was loaded.
 
     The receiving process trusts the sending one. Any other module is imported by its name. Raise
-    InputError for an emitted module without a file.
+    InputError for an emitted module without a file, and for one that was imported from a file that
+    has changed since: the docstring has the hash of the text.
     """
     if not hasattr(module, "SOURCE_SHA256"):
         return import_module, (module.__name__,)
@@ -160,7 +166,25 @@ def _reduced(module: ModuleType) -> tuple[Callable[..., ModuleType], tuple[Any, 
         )
     loader = getattr(getattr(module, "__spec__", None), "loader", None)
     text = getattr(loader, "text", None)  # that runs here, whatever stands in the file by now
-    return run, (text or Path(file).read_text(encoding="utf-8"), Path(file))
+    if text is None:
+        text = _text_as_loaded(Path(file), module)
+    return run, (text, Path(file))
+
+
+def _text_as_loaded(file: Path, module: ModuleType) -> str:
+    """Read the text of a module that Python has imported from a file; InputError if it changed."""
+    try:
+        text = file.read_text(encoding="utf-8")
+        same = ast.get_docstring(ast.parse(text), clean=False) == module.__doc__
+    except (OSError, ValueError, SyntaxError):
+        same = False
+    if not same:
+        raise InputError(
+            "the file has changed since it was imported, so that other processes would run another "
+            "model; start Python again, or use one process",
+            file=str(file),
+        )
+    return text
 
 
 copyreg.pickle(ModuleType, _reduced)

@@ -17,9 +17,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from runtime.core.contacts import on_links
+from runtime.core.contacts import on_links, touches
 from runtime.core.model import GeneratedModel, base_rows, joint_units
-from runtime.core.problem import Problem
+from runtime.core.problem import CONTACTS, Note, Problem
 from runtime.core.record import (
     BASE_GRAVITY,
     BASE_IMU,
@@ -125,7 +125,8 @@ def moved_base(problem: Problem) -> Problem:
     for part in ("records", "unseen"):
         records = changed.get(part, getattr(problem, part))
         changed[part] = tuple(_with_gravity(record, g) for record in records)
-    return problem.changed(model=cast(GeneratedModel, MovingModel(model)), **changed)
+    notes = [Note(CONTACTS, "")] if touches(problem) else []
+    return problem.changed(*notes, model=cast(GeneratedModel, MovingModel(model)), **changed)
 
 
 def _require_motion(model: GeneratedModel, record: Record, moves: bool) -> None:

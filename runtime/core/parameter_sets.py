@@ -105,6 +105,23 @@ class Sets(Mapping[SetName, Estimate]):
         """Name of the set that is written where every base parameter needs a value."""
         return whole_set(self, self.used) if self else "all"
 
+    def wider(self, moves: Mapping[str, float]) -> Sets:
+        """Return the sets with deviations sqrt(s^2 + dX^2), s those of now.
+
+        moves : dX by parameter, SI, what the parameter moves by if the model had what it lacks.
+        """
+
+        def own(fit: Estimate) -> Estimate:
+            dX = np.array([moves.get(name, 0.0) for name in fit.names])
+            return replace(fit, sigma_corrected=np.hypot(fit.sigma_corrected, dX))
+
+        return replace(
+            self,
+            all=own(self.all),
+            essential=None if self.essential is None else own(self.essential),
+            feasible=None if self.feasible is None else own(self.feasible),
+        )
+
     def estimate(self, name: SetName) -> Estimate:
         """Return the estimate of one set; that of all parameters if the method is not linear."""
         return self.get(name, self.all)

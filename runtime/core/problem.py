@@ -33,6 +33,8 @@ from runtime.ground.errors import InputError, SettingsError
 RECORD_EXPECTED = (
     "a Record, or a list of them: runtime.Record(t, q, tau), runtime.read_record(file)"
 )
+CONTACTS = "contacts"
+"""Kind of the note that contacts of the robot with the world are measured."""
 SIGNALS = "signals"
 """Kind of the notes on settings of signals that were automatic."""
 
@@ -226,13 +228,17 @@ def estimated(
     rows: Observation,
     settings: EstimateSettings | None = None,
     provenance: Mapping[str, Any] | None = None,
+    corrected: bool = True,
 ) -> Estimate:
     """Estimate the parameters X of a problem from given rows Y = W X + rho of its records.
 
     settings : method of estimation; default: the settings of the problem.
+    corrected : as for `estimate_of`.
     """
-    settings = settings or problem.settings.estimate
-    return estimate_of(rows, settings, problem.methods, model=problem.model, provenance=provenance)
+    settings, model = settings or problem.settings.estimate, problem.model
+    return estimate_of(
+        rows, settings, problem.methods, model=model, provenance=provenance, corrected=corrected
+    )
 
 
 def estimate_of(
@@ -242,6 +248,7 @@ def estimate_of(
     *,
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
+    corrected: bool = True,
 ) -> Estimate:
     """Estimate X of Y = W X + rho by the method that `settings` names.
 
@@ -257,21 +264,30 @@ def estimate_of(
         Model that gives units, joint numbers and the hash of the robot file.
     provenance : mapping, optional
         Further entries for Estimate.provenance (a seed, the study file).
+    corrected : bool
+        Whether to compute `sigma_corrected`; without it, nan, for a fit of which only X is used.
     """
     method = method_of(settings, methods)
     system = method.system(observation, settings)
     solution = system.solve()
     if method.fit is None or (solution.rank < len(system.names) and not method.any_rank):
-        return assemble(system, solution, model=model, provenance=provenance)
+        return assemble(system, solution, model=model, provenance=provenance, corrected=corrected)
     rows, options = observation.columns(system.names), method.checked(settings)
     fitted = method.fit(Beginning(rows, settings, options, system, solution, model))
-    estimate = assemble(fitted.system, fitted.solution, model=model, provenance=provenance)
+    estimate = assemble(
+        fitted.system,
+        fitted.solution,
+        model=model,
+        provenance=provenance,
+        corrected=corrected and fitted.corrected is None,
+    )
+    own = fitted.corrected() if corrected and fitted.corrected else estimate.sigma_corrected
     C = estimate.covariance if fitted.covariance is None else fitted.covariance
     return replace(
         estimate,
         covariance=C,
         sigma=estimate.sigma if fitted.covariance is None else np.sqrt(np.diag(C)),
-        sigma_corrected=estimate.sigma_corrected if fitted.corrected is None else fitted.corrected,
+        sigma_corrected=own,
         status=fitted.status if estimate.status == "ok" else estimate.status,
         message=" ".join(note for note in (estimate.message, fitted.message) if note),
         details=fitted.details,

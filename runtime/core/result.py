@@ -71,6 +71,9 @@ class Identification:
         Results of further analyses, in the order in which they are printed.
     missing : tuple of str
         Analyses that were requested and failed, each with its reason.
+    lacking : object or None
+        What the model lacks, found before the parts are made (`runtime.unmodelled`); the deviations
+        of the sets include it.
     """
 
     problem: Problem
@@ -85,6 +88,7 @@ class Identification:
     unseen_rows: Mapping[str, Observation] = field(default_factory=dict)
     parts: tuple[Part, ...] = ()
     missing: tuple[str, ...] = ()
+    lacking: Any = None
 
     def part(self, name: str) -> Any:
         """Return the part (result of a further analysis) with this name; None if there is none."""

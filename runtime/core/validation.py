@@ -254,7 +254,9 @@ def cross_validation(
             estimate = (
                 known
                 if known is not None
-                else estimated(problem, fit, point_estimate(settings, problem.methods))
+                else estimated(
+                    problem, fit, point_estimate(settings, problem.methods), corrected=False
+                )
             )
         except InputError as e:
             missing.append(f"validation of {columns} parameters, fitted on {name}: {e}")

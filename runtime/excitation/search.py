@@ -178,7 +178,7 @@ def _known_estimate(problem: Problem, settings: ExcitationSettings) -> Known:
         return Known(X, "values of the robot file", weights, without_values=bare)
     observation = observe_rows(problem)
     system = weighted_system(observation)
-    fit = assemble(system, system.solve(), model=model)
+    fit = assemble(system, system.solve(), model=model, corrected=False)
     if fit.status == "rank-deficient":
         raise InputError(
             f"the record does not determine {', '.join(' '.join(group) for group in fit.groups)}; "

@@ -19,6 +19,7 @@ from runtime.ground.errors import InputError, first_line
 Array = np.ndarray
 
 CURES = {
+    "b": "truth values; give numbers",
     "M": "dates; give seconds, (t - t[0]) / np.timedelta64(1, 's')",
     "m": "time spans; give seconds, t / np.timedelta64(1, 's')",
     "c": "complex numbers; give their real part",
@@ -57,6 +58,12 @@ def real(x: Any, label: str, file: str | None = None) -> Array:
             "is read as counts)",
             file=file,
         )
+    if units := getattr(x, "units", getattr(x, "unit", None)):
+        raise InputError(
+            f"{label} has units ({units!s:.40}); give plain numbers in SI and rad, such as "
+            f"{label}.to('rad').magnitude",
+            file=file,
+        )
     try:
         array = np.asarray(x)
         kind = array.dtype.kind
@@ -79,7 +86,10 @@ def real_number(x: Any, label: str, file: str | None = None) -> float:
     """Return x as a float; raise InputError if x is not a real number."""
     if not _is_real(x):
         raise InputError(f"{label} is {kind_of(x)}; expected a number", file=file)
-    return float(x)
+    try:
+        return float(x)
+    except OverflowError:
+        raise InputError(f"{label} is beyond 1e308; expected a smaller number", file=file) from None
 
 
 def _is_real(x: Any) -> bool:

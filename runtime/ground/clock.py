@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from runtime.ground.errors import InputError, instant
+from runtime.ground.settings import LARGEST
 
 Array = np.ndarray
 
@@ -66,6 +67,18 @@ class Stamps:
     jitter: float = JITTER
 
 
+def require_rate(t: Array, file: str | None = None) -> None:
+    """Raise InputError for time stamps, s, whose mean rate no record has: t is then not in seconds."""
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        rate = (len(t) - 1) / (t[-1] - t[0])
+    if not 1 / LARGEST <= abs(rate) <= LARGEST:
+        raise InputError(
+            f"the time stamps have a mean rate of {rate:g} Hz; expected {1 / LARGEST:g} to {LARGEST:g} "
+            "Hz: give t in seconds",
+            file=file,
+        )
+
+
 def rate_of(stamps: Stamps, t: Array) -> float:
     """Compute the sampling rate, Hz, from uniform time stamps t, shape (N,), s.
 
@@ -86,6 +99,7 @@ def rate_of(stamps: Stamps, t: Array) -> float:
         place = int(np.argmax(step <= 0)) + 1
         message = f"time goes from {instant(t[place - 1])} s to {instant(t[place])} s; expected increasing time"
     else:
+        require_rate(t, stamps.file)
         rate = (N - 1) / float(t[-1] - t[0])
         tolerance = RATE_TOLERANCE + 2 * stamps.jitter / (N - 1)
         off_grid = np.abs(t - t[0] - np.arange(N) / rate).max() * rate

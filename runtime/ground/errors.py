@@ -71,8 +71,9 @@ class InputError(ValueError):
         self.message = printable(message)
         self.file, self.column, self.row = file, column, row
         self.remedy = remedy
+        named = None if file is None else " ".join(file.split("\n"))
         place = ", ".join(
-            part for part in (file, None if column is None else f"column {column!r}", row) if part
+            part for part in (named, None if column is None else f"column {column!r}", row) if part
         )
         super().__init__(printable(f"{place}: {self.message}" if place else self.message))
 

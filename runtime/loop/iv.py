@@ -93,7 +93,7 @@ def fit(start: Beginning) -> Fitted:
         system,
         replace(least, X=X),
         fixed.step.covariance,
-        np.linalg.norm(U, axis=0),
+        lambda: np.asarray(np.linalg.norm(U, axis=0)),
         status,
         message,
         {**details, **quality, "hausman": test},

@@ -195,7 +195,7 @@ def fit(start: Beginning) -> Fitted:
     return Fitted(
         system,
         replace(free, X=X, residual_norm=residual_norm(system.weighted, X)),
-        corrected=np.hypot(assemble(system, free).sigma_corrected, X - free.X),
+        corrected=lambda: np.hypot(assemble(system, free).sigma_corrected, X - free.X),
         status="not-converged" if violated else "ok",
         message=" ".join(part for part in parts if part),
         details=details,

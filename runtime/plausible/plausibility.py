@@ -44,6 +44,7 @@ from runtime.plausible.physics import (
 )
 from runtime.plausible.registers import signed
 from runtime.plausible.samples import excerpts, filtered, samples_of
+from runtime.plausible.sampling import sampled
 from runtime.plausible.sizes import (
     accelerations,
     inertias,
@@ -66,6 +67,7 @@ CHECKS: tuple[Callable[[Case], Check | None], ...] = (
     lengths,
     inertias,
     rest,
+    sampled,
     recorded_speeds,
     motion_excites,
     not_asked,

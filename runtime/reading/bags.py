@@ -6,10 +6,7 @@ give the columns:
     t                        s from the first message that is read
     shoulder.position        of the joint `shoulder`; so velocity and effort
 
-In `record.columns` the name of the joint is enough: q means position, tau effort. Each message
-names its joints, so that their order may change from message to message. If several nodes publish
-on a topic, such as those of an arm and of its gripper, messages without any of the requested joints
-are skipped and counted; a message with only some of them is an error.
+`runtime.reading.joint_states` makes the columns of the messages.
 
 Messages are decoded by the definition of JointState in ROS, never by a definition in the bag,
 because rosbags would convert that to code and run it. A bag with another JointState is refused.
@@ -19,20 +16,18 @@ Time is the stamp of the header, or the time of the log if every stamp is zero.
 from __future__ import annotations
 
 import re
-import warnings
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from runtime.documents.files import require_file
-from runtime.ground.errors import InputError, RecordWarning, printable
+from runtime.ground.errors import InputError, printable
 from runtime.ground.limits import LIMIT
 from runtime.reading.files import sha256, sha256_of
-from runtime.reading.publishers import Sent, counted_senders, of_one_publisher
-from runtime.reading.table import Array, Options, Table, damage_named
+from runtime.reading.joint_states import NANOSECONDS, JointState, JointTable, table_of
+from runtime.reading.publishers import counted_senders
+from runtime.reading.table import Options, damage_named
 
 MESSAGE = "sensor_msgs/msg/JointState"
 HASHES = (  # of this message: MD5 in ROS 1, RIHS01 in ROS 2 (nothing before Iron)
@@ -44,121 +39,6 @@ FIELDS = [
     *(word for x in ("position", "velocity", "effort") for word in ("float64[]", x)),
 ]
 STORED_NAME = re.compile(r"[\w.+ -]{1,255}")
-QUANTITIES = ("position", "velocity", "effort")
-NANOSECONDS = 1_000_000_000  # per second
-
-
-@dataclass(frozen=True)
-class JointState:
-    """One message JointState of a bag: its time, the names of the joints, and their values.
-
-    Attributes
-    ----------
-    number : int
-        Number of the message on its topic, from 1.
-    stamp : int, ns
-        Time.
-    joints : tuple of str
-        Names of the joints.
-    position, velocity, effort : ndarray
-        One value per joint (rad or m, rad/s or m/s, N m or N), or none.
-    sender : str
-        What the bag says of the publisher.
-    """
-
-    number: int
-    stamp: int
-    joints: tuple[str, ...]
-    position: Array
-    velocity: Array
-    effort: Array
-    sender: str = ""
-
-    def value(self, joint: str, quantity: str) -> float:
-        """Return one value of a joint, nan if the message does not have exactly one."""
-        values = getattr(self, quantity)
-        if self.joints.count(joint) != 1 or len(values) != len(self.joints):
-            return np.nan
-        return float(values[self.joints.index(joint)])
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class JointTable(Table):
-    """Table of the JointState messages of a ROS topic; `chosen` reads columns from the messages."""
-
-    messages: tuple[JointState, ...]
-
-    def chosen(self, names: Sequence[str]) -> Table:
-        """Make a table of the named columns; messages without any of their joints are left out.
-
-        If no message contains such a joint, all messages are used, so that the error names the
-        missing joint.
-        """
-        joints = {name.rpartition(".")[0] for name in names} - {""}
-        some = [message for message in self.messages if joints.intersection(message.joints)]
-        skipped = len(self.messages) - len(some or self.messages)
-        notes = [
-            f"{skipped} of {len(self.messages)} messages on {self.topic} have none of these joints and are skipped"
-        ] * bool(skipped)
-        messages = some or list(self.messages)
-        kept, note = of_one_publisher(self._sent(messages, names))
-        if note:
-            warnings.warn(f"{self.file}: {note}", RecordWarning, stacklevel=2)
-            notes.append(note)
-        messages = [message for message, keep in zip(messages, kept, strict=True) if keep]
-        columns: dict[str, Array] = {}
-        for name in names:
-            joint, _, quantity = name.rpartition(".")
-            if name == "t":
-                first = messages[0].stamp
-                stamps = np.array([message.stamp - first for message in messages], dtype=np.int64)
-                columns[name] = stamps / NANOSECONDS
-            elif joint and quantity in QUANTITIES:
-                values = [self._value(message, joint, quantity) for message in messages]
-                columns[name] = np.array(values)
-        return Table(
-            file=self.file,
-            columns={**dict.fromkeys(self.columns, np.empty(0)), **columns},
-            row=lambda i: self._row(messages[i]),
-            joints=self.joints,
-            topic=self.topic,
-            note=". ".join(notes),
-            what=self.what,
-            digest=self.digest,
-        )
-
-    def _sent(self, messages: Sequence[JointState], names: Sequence[str]) -> Sent:
-        """Return what the messages tell of their publishers, with the columns `names`."""
-        pairs = [name.rpartition(".")[::2] for name in dict.fromkeys(names)]
-        asked = [(joint, word) for joint, word in pairs if joint and word in QUANTITIES]
-        values = [message.value(*pair) for message in messages for pair in asked]
-        return Sent(
-            self.topic,
-            self.file,
-            tuple(message.sender for message in messages),
-            np.array([message.stamp for message in messages], dtype=np.int64),
-            np.array(values).reshape(len(messages), len(asked)),
-            np.array([word == "effort" for _, word in asked], dtype=bool),
-        )
-
-    def _row(self, message: JointState) -> str:
-        return f"message {message.number} of {self.topic}"
-
-    def _value(self, message: JointState, joint: str, quantity: str) -> float:
-        values = getattr(message, quantity)
-        if joint not in message.joints:
-            reason = f"no joint {joint} among the joints {', '.join(message.joints) or 'none'}"
-        elif len(values) != len(message.joints):
-            reason = f"{len(values)} values of {quantity} for {len(message.joints)} joints"
-        elif message.joints.count(joint) > 1:
-            reason = f"joint {joint} more than once"
-        else:
-            return float(values[message.joints.index(joint)])
-        raise InputError(
-            f"{reason}; every message must contain the joints and quantities of record.columns",
-            file=self.file,
-            row=self._row(message),
-        )
 
 
 def read_bag(path: Path, options: Options) -> JointTable:
@@ -181,22 +61,7 @@ def read_bag(path: Path, options: Options) -> JointTable:
             f"no message on topic {topic}; give a bag with messages, or another record.topic",
             file=path.name,
         )
-    names = {"t": None}
-    joints: dict[str, None] = {}
-    for message in messages:
-        for joint in message.joints:
-            if joint not in joints:
-                joints[joint] = None
-                held = [x for x in QUANTITIES if len(getattr(message, x))]
-                names |= dict.fromkeys(f"{joint}.{x}" for x in held)
-    return JointTable(
-        file=path.name,
-        columns=dict.fromkeys(names, np.empty(0)),
-        joints=tuple(joints),
-        topic=topic,
-        what="a bag",
-        messages=messages,
-    )
+    return table_of(path.name, messages, topic, "a bag")
 
 
 def digest_of(path: Path) -> str:

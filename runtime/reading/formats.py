@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -81,7 +82,7 @@ def read_table(path: Path, topic: str | None = None, decimal: str = ".") -> Tabl
         raise InputError(
             "a bag compressed as .gz is not supported; uncompress the file", file=str(path)
         )
-    if not path.exists():
+    if not os.path.exists(path):  # noqa: PTH110 (a name of any length)
         raise InputError(
             "the file cannot be read, because there is no such file; check its name and folder",
             file=str(path),
@@ -116,7 +117,8 @@ def endings(*, packed: bool | None = None) -> tuple[str, ...]:
 
 def is_measured(path: Path) -> bool:
     """Whether a path is a folder (perhaps a ROS 2 bag) or has the ending of a measured file."""
-    return path.is_dir() or any(suffix.lower() in endings() for suffix in path.suffixes)
+    folder = os.path.isdir(path)  # noqa: PTH112 (a name of any length)
+    return folder or any(suffix.lower() in endings() for suffix in path.suffixes)
 
 
 def format_of(path: Path) -> Format:

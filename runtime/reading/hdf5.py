@@ -2,10 +2,18 @@
 
 A data set in groups has the name observations.qpos. Vectors and matrices of numbers are read;
 images and other arrays of more dimensions are not. A file that MATLAB wrote is read as such.
+
+Groups that differ by a number, such as data/demo_0, data/demo_1 ... of robomimic, are episodes: their
+data sets, one after the other, are the columns data.demo.obs.joint_pos, and each episode is a record of
+its own. data.demo_0.obs.joint_pos is the data set of one episode.
 """
 
 from __future__ import annotations
 
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +26,10 @@ from runtime.reading.table import WIDEST, Array, Options, Table, damage_named, i
 
 TITLE = "an HDF5 file"
 DEEPEST = 8  # groups in one another
+NUMBERED = re.compile(r"(.*?)[_-]?(\d+)")  # name of a group
+EPISODE = re.compile(
+    r"(?i)demo(nstration)?|ep(isode)?|traj(ectory)?|rollout|run|trial|take|seq(uence)?|rec(ord(ing)?)?"
+)
 
 
 def read_hdf5(path: Path, options: Options) -> Table:
@@ -39,7 +51,87 @@ def read_hdf5(path: Path, options: Options) -> Table:
         )
         for name, what in others.items()
     }
-    return Table(file=path.name, columns=columns, refused=refused)
+    return _by_episodes(Table(file=path.name, columns=columns, refused=refused))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class EpisodeTable(Table):
+    """Table of a file with episodes; `columns` are those of all episodes together.
+
+    Attributes
+    ----------
+    single : mapping of str to ndarray
+        Columns of single episodes, which a study may name.
+    joined : frozenset of str
+        Names of the columns of all episodes.
+    """
+
+    single: Mapping[str, Array]
+    joined: frozenset[str]
+
+    def chosen(self, names: Sequence[str]) -> Table:
+        """Return a table of the named columns, with the starts of the episodes if it has all."""
+        own = {name: self.single[name] for name in names if name in self.single}
+        starts = self.starts if self.joined.intersection(names) else ()
+        return Table(
+            file=self.file,
+            columns={**self.columns, **own},
+            refused=self.refused,
+            note=f"{len(starts) + 1} episodes" if starts else "",
+            digest=self.digest,
+            starts=starts,
+        )
+
+
+def _by_episodes(table: Table) -> Table:
+    """Join the data sets of groups that are episodes; without episodes, return the table unchanged."""
+    found: dict[tuple[str, str], dict[int, dict[str, str]]] = {}
+    for name in table.columns:
+        parts = name.split(".")
+        for k, part in enumerate(parts[:-1]):
+            if match := NUMBERED.fullmatch(part):
+                episodes = found.setdefault((".".join(parts[:k]), match[1]), {})
+                episodes.setdefault(int(match[2]), {})[".".join(parts[k + 1 :])] = name
+                break
+    for (prefix, stem), episodes in found.items():
+        names = [episodes[number] for number in sorted(episodes)]
+        lengths = _lengths(table, names, stem)
+        if not lengths:
+            continue
+        joined = {}
+        for rest in names[0]:
+            several = [table.columns[one[rest]] for one in names]
+            own = [len(x) if x.ndim else 0 for x in several]
+            if own == lengths and len({x.shape[1:] for x in several}) == 1:
+                joined[".".join(filter(None, (prefix, stem, rest)))] = np.concatenate(several)
+        single = {name: table.columns[name] for one in names for name in one.values()}
+        others = {name: x for name, x in table.columns.items() if name not in single}
+        return EpisodeTable(
+            file=table.file,
+            columns={**others, **joined},
+            refused=table.refused,
+            starts=tuple(int(start) for start in np.cumsum(lengths)[:-1]),
+            single=single,
+            joined=frozenset(joined),
+        )
+    return table
+
+
+def _lengths(table: Table, names: Sequence[Mapping[str, str]], stem: str) -> list[int]:
+    """Return the numbers of samples of groups that are episodes; an empty list if they are none.
+
+    Groups of the same length are episodes only if their name says so: they may be joints.
+    """
+    if len(names) < 2 or len({frozenset(one) for one in names}) > 1:
+        return []
+    lengths = []
+    for one in names:
+        sizes = Counter(len(table.columns[x]) for x in one.values() if table.columns[x].ndim)
+        if not sizes:
+            return []
+        lengths.append(sizes.most_common(1)[0][0])
+    alike = len({*lengths}) == 1
+    return [] if alike and not EPISODE.fullmatch(stem) else lengths
 
 
 def _collect(

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -339,7 +340,12 @@ def _uniform(
                 "no time column and no rate; set record.rate (Hz) or record.columns.t",
                 file=table.file,
             )
-        return [Stretch(np.arange(len(signals[0])) / settings.rate, signals)], settings.rate, ""
+        t = np.arange(len(signals[0])) / settings.rate
+        if table.starts:
+            return _by_episodes(settings, columns, table, t, signals)
+        return [Stretch(t, signals)], settings.rate, ""
+    if settings.resample is None and table.starts:
+        return _by_episodes(settings, columns, table, t, signals)
     if settings.resample is None:
         stamps = Stamps(table.file, columns.t, table.row, settings.rate, settings.jitter)
         rate = rate_of(stamps, t)
@@ -362,6 +368,32 @@ def _uniform(
             column=columns.t,
         ) from None
     return stretches, rate, f"{regularity.to_text(table.row)}; {done}"
+
+
+def _by_episodes(
+    settings: RecordSettings, columns: Columns, table: Table, t: Array, signals: Sequence[Array]
+) -> tuple[list[Stretch], float, str]:
+    """Cut samples at the starts of the episodes of a file; return the episodes, and the rate, Hz.
+
+    The time stamps of each episode must be uniform. Episodes that are too short are left out.
+    """
+    cuts = [0, *table.starts, len(t)]
+    long = [(a, b) for a, b in pairwise(cuts) if b - a >= LIMIT.FEWEST_SAMPLES]
+    if not long:
+        raise InputError(
+            f"every episode is shorter than {LIMIT.FEWEST_SAMPLES} samples", file=table.file
+        )
+    stretches = [Stretch(t[a:b], tuple(x[a:b] for x in signals)) for a, b in long]
+    stamps = Stamps(table.file, columns.t, table.row, settings.rate, settings.jitter)
+    rates = [rate_of(stamps, stretch.t) for stretch in stretches]
+    if max(rates) > (1 + IRREGULAR) * min(rates):
+        raise InputError(
+            f"the episodes have rates of {min(rates):.6g} to {max(rates):.6g} Hz; expected one rate",
+            file=table.file,
+        )
+    short = len(cuts) - 1 - len(long)
+    left = f"{short} episodes shorter than {LIMIT.FEWEST_SAMPLES} samples left out" if short else ""
+    return stretches, settings.rate or float(np.median(rates)), left
 
 
 def _places(settings: RecordSettings, tables: Sequence[Table]) -> tuple[Table, Table, Table]:

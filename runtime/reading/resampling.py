@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from runtime.ground.arrays import real
-from runtime.ground.clock import GAP, TimeStamps, remedy_text, resolution, time_stamps
+from runtime.ground.clock import GAP, TimeStamps, remedy_text, require_rate, resolution, time_stamps
 from runtime.ground.errors import InputError
 from runtime.ground.limits import LIMIT
 from runtime.ground.settings import structure
@@ -97,6 +97,8 @@ def resample(
     settings = structure(
         Resample, {"rate": rate, "method": method, "longest": longest, "shortest": 0.0}, ()
     )
+    if t[-1] != t[0]:  # else they are told below
+        require_rate(t)
     stamps = time_stamps(t, gap=settings.longest)
     if method not in ("cubic", "linear"):
         raise InputError(f"unknown method {method!r}; expected cubic or linear")

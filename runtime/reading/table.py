@@ -61,6 +61,8 @@ class Table:
         Kind of the file, in messages.
     digest : str
         SHA-256 of the uncompressed bytes.
+    starts : tuple of int
+        First samples of the episodes of the file, after the first episode.
     """
 
     file: str
@@ -74,6 +76,7 @@ class Table:
     has_header: bool = False
     what: str = "the file"
     digest: str = ""
+    starts: tuple[int, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:

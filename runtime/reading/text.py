@@ -4,6 +4,8 @@ Columns are separated by commas, semicolons, tabs or blanks. There is one header
 `#` starts a comment. Decimals have a point, or a comma if the settings say so. The text is UTF-8, or
 UTF-16 if it starts with the bytes ff fe or fe ff.
 
+The text of `ros2 topic echo --csv` is told by its first line (`runtime.reading.echoed`).
+
 NumPy parses a file whose fields are all numbers. Other files are read field by field: a column with
 other texts raises an error only if it is used, with the first line of such a text.
 """
@@ -22,6 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from runtime.ground.errors import InputError
+from runtime.reading.echoed import is_echo, read_echo
 from runtime.reading.files import opened
 from runtime.reading.table import WIDEST, Array, Options, Table
 
@@ -50,6 +53,8 @@ def read_text(path: Path, options: Options) -> Table:
     _, first = next(_lines(path), (0, ""))
     if not first:
         raise InputError("the file has no line of numbers; expected one line per sample", file=file)
+    if is_echo(first):
+        return read_echo(file, _lines(path))
     delimiter = next((mark for mark in ";\t," if mark in first and mark != decimal), None)
     if _width(first, delimiter) > WIDEST:
         raise InputError(

@@ -29,8 +29,11 @@ END = "sha256 of all but these lines: "
 CERTIFICATE = re.compile(
     rf"\A(?P<mark>\S{{1,2}} ){HEAD}.*\n((?P=mark).*\n)*?(?P=mark){END}[0-9a-f]{{64}}\n"
     rf'|\n\n{HEAD}[^"\\]*\n{END}[0-9a-f]{{64}}(?=\n"""\n)'
+    rf"|\n% {HEAD}.*\n(% .*\n)*?% {END}[0-9a-f]{{64}}\n\Z"
 )
-"""The lines of a certificate: comments at the head of a text, or the end of a docstring."""
+"""The lines of a certificate: comments at the head of a text, the end of a docstring, or comments at
+the end of a MATLAB text.
+"""
 
 
 def cache_folder() -> Path:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 from symgen.certify.certificate import Certificate, certify_formulas, hair_off
@@ -11,17 +12,18 @@ from symgen.certify.importing import cached_path, stored_path
 from symgen.certify.texts import text_check, with_certificate
 from symgen.certify.witness import Witness, ungrouped
 from symgen.derive.doubts import nearly_round
+from symgen.derive.models import OPTIONS
 from symgen.description.robot import Robot
 from symgen.description.values import WITHIN
 from symgen.emit.generate import generate_files
-from symgen.emit.targets import TARGETS
-from symgen.errors import CertificateError
-from symgen.regroup.regrouping import Regrouping, regroup
+from symgen.emit.targets import TARGETS, target_of
+from symgen.errors import CertificateError, require, require_names
+from symgen.regroup.regrouping import Regrouping, regroup, regrouping_of
 from symgen.time_limit import limited
 
 
 def certify(
-    regrouping: Regrouping,
+    robot: str | Path | Robot | Regrouping,
     files: Mapping[str, str] | None = None,
     options: Sequence[str] = (),
 ) -> Certificate:
@@ -29,8 +31,8 @@ def certify(
 
     Parameters
     ----------
-    regrouping : Regrouping
-        Base parameters with their formulas.
+    robot : str, Path, Robot or Regrouping
+        A robot as for `symgen.model`, or its base parameters.
     files : mapping, optional
         Source texts by file name. Default: the NumPy module.
     options : sequence of str
@@ -41,15 +43,24 @@ def certify(
     DescriptionError
         The loops close in too few random states.
     """
+    regrouping = regrouping_of(robot)
     robot = regrouping.robot
-    target = {t.file.format(robot.name): name for name, t in reversed(TARGETS.items())}
+    require_names(options, OPTIONS, "options")
+    if files is not None:
+        require(files, Mapping, "files", "{file name: text}")
+        known = [t.file.format(robot.name, "*") for t in TARGETS.values()]
+        strange = {file for file in files if not any(fnmatchcase(str(file), x) for x in known)}
+        require_names(strange, known, "files")
+        for name, text in files.items():
+            require(text, str, f"files[{name!r}]", "the text of the file")
     with limited(f"the certificate of {robot.name}"):
         certificate = certify_formulas(regrouping)
     with limited(f"the derivation of {robot.name}"):
         files = generate_files(robot, regrouping=regrouping) if files is None else files
         witness = Witness(regrouping, options=options)
         texts = {
-            file: text_check(file, text, target[file], witness) for file, text in files.items()
+            file: text_check(file, text, target_of(file), witness, files)
+            for file, text in files.items()
         }
     certificate = replace(certificate, texts=texts)
     unsaid = not certificate.valid and not certificate.failures

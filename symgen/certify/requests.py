@@ -22,11 +22,13 @@ from symgen.certify.importing import (
     key_of,
     without_certificate,
 )
+from symgen.derive.models import OPTIONS
 from symgen.description.bodies import impossible_links
 from symgen.description.expression import Expression
-from symgen.description.files import load_robot, on_base
+from symgen.description.files import on_base, robot_of
 from symgen.description.mounts import mounts
 from symgen.description.robot import Robot
+from symgen.errors import require_names
 from symgen.version import VERSION
 
 
@@ -65,8 +67,8 @@ def model(
 
         return certified_path(robot, options)
 
-    robot = robot if isinstance(robot, Robot) else load_robot(robot)
-    return module_of(on_base(robot, base), options, derived)
+    require_names(options, OPTIONS, "options")
+    return module_of(on_base(robot_of(robot), base), options, derived)
 
 
 def module_of(robot: Robot, request: object, derived: Callable[[Robot], Path]) -> ModuleType:

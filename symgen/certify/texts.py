@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from symgen.certify import call_c
+from symgen.certify import call_c, call_octave
 from symgen.certify.importing import END, HEAD, imported, without_certificate
 from symgen.certify.witness import STATES, Check, Witness
 from symgen.derive.exact import Array
@@ -34,6 +34,7 @@ from symgen.derive.loops import close
 from symgen.derive.models import MODELS
 from symgen.derive.regressor import acting, element_names
 from symgen.emit.generate import EMITTERS
+from symgen.emit.matlab_target import MODEL
 from symgen.emit.spec import STATES as STATE_NAMES
 from symgen.emit.targets import TARGETS
 from symgen.errors import SymgenError
@@ -42,6 +43,7 @@ from symgen.version import VERSION
 TOLERANCE = 1e-9  # of the largest entry: rounding of some thousand operations, and closed loops
 C_FLAGS = ("-std=c99", "-O0", "-ffp-contract=off", "-shared", "-fPIC")
 LONGEST_RUN = 300  # s, of the compiler and of the functions
+IN_OCTAVE, PASSIVE = "in Octave", "passive_joints"
 HELPERS = {"store", "casadi"}
 """Public names that are no models."""
 NUMPY, STACKED, CASADI = "on NumPy's arrays", "stacked as for other packages", "by CasADi"
@@ -123,6 +125,8 @@ class TextCheck:
         if self.not_run:
             return self.not_run
         uses = ", ".join(self.uses)
+        if {*self.errors} == {MODEL}:
+            return f"names and values are those of the robot file, {uses}"
         return (
             f"{', '.join(self.errors)} at random states, parameters and {self.constants} agree with "
             f"Lagrange's equations and products of frames to {TOLERANCE:g}"
@@ -131,13 +135,22 @@ class TextCheck:
         )
 
 
-def text_check(file: str, text: str, target: str, witness: Witness) -> TextCheck:
+def text_check(
+    file: str,
+    text: str,
+    target: str,
+    witness: Witness,
+    beside: Mapping[str, str] | None = None,
+) -> TextCheck:
     """Run every function of a source file and compare the results with independent values.
 
-    The lines of a certificate in the text are removed first.
+    The lines of a certificate in the text are removed first. `beside` are the texts of files whose
+    functions this file may call, by file name.
     """
     text = without_certificate(text)
     key = sha256(text.encode("utf-8")).hexdigest()
+    if file.endswith(".m"):
+        return octave_check(file, text, target, key, {**(beside or {}), file: text}, witness)
     compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc")
     if file.endswith(".h"):
         return TextCheck(
@@ -168,13 +181,15 @@ def text_check(file: str, text: str, target: str, witness: Witness) -> TextCheck
 def with_certificate(text: str, check: TextCheck, formulas: str) -> str:
     """Add the certificate to a source text: in the docstring of a Python module, else in comments.
 
-    In a docstring the certificate stands at the end; comments stand before the text.
+    In a docstring the certificate stands at the end; comments stand before the text, in MATLAB
+    behind it, because its help is the first comment.
     """
     said = f"{HEAD}{VERSION}: formulas {formulas}; {check.sentence}."
     if not text.startswith('"""'):
         mark = f"{EMITTERS[check.target].language.comment} "
         lines = [*wrap(said, 98 - len(mark)), f"{END}{check.sha256}"]
-        return "".join(f"{mark}{line}\n" for line in lines) + text
+        comment = "".join(f"{mark}{line}\n" for line in lines)
+        return f"{text}\n{comment}" if check.target == "matlab" else comment + text
     docstring, end, rest = text.partition('\n"""\n')
     lines = ["", "", *wrap(said, 98), f"{END}{check.sha256}"]
     return docstring + "\n".join(lines) + end + rest
@@ -401,6 +416,118 @@ def same_elements(table: Any, constants: Mapping[str, float], witness: Witness) 
         if any(abs(row[i] - c) > TOLERANCE * abs(c) for i, c in right.items()):
             return False
     return True
+
+
+# --- MATLAB ---
+
+
+def octave_check(
+    file: str, text: str, target: str, key: str, texts: Mapping[str, str], witness: Witness
+) -> TextCheck:
+    """Run the function of a MATLAB file in Octave and compare its results with independent values.
+
+    The function may call those of the other `texts`.
+    """
+    name = file.removeprefix(f"{witness.robot.name}_").removesuffix(".m")
+    if call_octave.octave() is None:
+        return TextCheck(target, key, not_run="not run: there is no Octave")
+    if name in witness.left_out:
+        return TextCheck(target, key, not_run=f"not run: {name} has no meaning for this robot")
+    try:
+        error, message = _octave_error(file.removesuffix(".m"), name, texts, witness)
+    except call_octave.OctaveError as failure:
+        error, message = float("inf"), str(failure)
+    raised = {name: message} if message else {}
+    return TextCheck(target, key, {name: error}, witness.drawn, (), (IN_OCTAVE,), raised=raised)
+
+
+def _octave_error(
+    function: str, name: str, texts: Mapping[str, str], witness: Witness
+) -> tuple[float, str]:
+    """Return the largest error of a MATLAB function over all its test calls, and its error message."""
+    if name == MODEL:
+        (values,) = call_octave.called(texts, [call_octave.Call(function, [])])
+        return (0.0 if _has_names(values, witness) else float("inf")), ""
+    checks = witness.checks.get(name, [])
+    drawn, defaults = (
+        [np.array([*k.values()])] * bool(k) for k in (witness.keywords, witness.defaults)
+    )
+    calls = [
+        call_octave.Call(function, [*_rows(name, c), *drawn], _outputs(name, c)) for c in checks
+    ]
+    calls += [  # constants that are not given are those of the robot file
+        call_octave.Call(function, [*_rows(name, c), *last], _outputs(name, c))
+        for c in checks[:1]
+        for last in (defaults, [])
+    ]
+    *results, given, left_out = call_octave.called(texts, calls)
+    if any(not np.array_equal(a, b, equal_nan=True) for a, b in zip(given, left_out, strict=True)):
+        return float("inf"), "values without given constants differ from those with constants"
+    return max(_error_of_rows(name, c, r) for c, r in zip(checks, results, strict=True)), ""
+
+
+def _outputs(name: str, check: Check) -> int:
+    """Return how many results a test call of a MATLAB function asks for."""
+    return len(check.arguments) if name == PASSIVE else 1
+
+
+def _rows(name: str, check: Check) -> list[Array]:
+    """Return the arguments of a test call of a MATLAB function: all states, and the frame."""
+    given = [*check.arguments]
+    if name == PASSIVE:
+        given += [0 * given[0]] * (3 - len(given))
+    if name in MODELS and MODELS[name].of_frames:
+        given.append(np.array([*check.keywords.values()]))  # empty: the default
+    return given
+
+
+def _error_of_rows(name: str, check: Check, results: list[Array]) -> float:
+    """Compare the results of a MATLAB function, which have no last axes of length 1."""
+    value = np.stack(results, axis=1) if len(results) > 1 else results[0]
+    alone = check.arguments[0].ndim == 1 and name != "base_parameters"
+    shape = (1, *check.expected.shape) if alone else check.expected.shape
+    long, expected = (list(x) for x in (value.shape, shape))
+    for axes in (long, expected):
+        while axes[-1:] == [1]:
+            axes.pop()
+    if long != expected:
+        return float("inf")
+    value = value.reshape(shape)
+    return difference(check.compared(value[0] if alone else value), check.expected, check.scale)
+
+
+def _has_names(values: list[Array], witness: Witness) -> bool:
+    """Whether the names and values of a MATLAB model are those of the robot."""
+    regrouping, robot = witness.regrouping, witness.robot
+    keys = [call_octave.text_of(x) for x in values[::2]]
+    found = dict(zip(keys, values[1::2], strict=True))
+    words = {
+        "base_parameters": regrouping.names,
+        "standard_parameters": robot.parameters,
+        "constants": tuple(regrouping.constants),
+    }
+    known = [b.combination for b in regrouping.base]
+    has_X = {name for row in known for name in row} <= {*robot.values}
+    numbers: dict[str, list[float]] = {
+        "joints": [*robot.joints],
+        "constant_values": [*regrouping.constants.values()],
+        "standard_values": [robot.values.get(name, np.nan) for name in robot.parameters],
+        "X": [
+            sum(c.value(robot.constants) * robot.values[name] for name, c in row.items())
+            for row in known
+        ]
+        if has_X
+        else [],
+    }
+    if {*keys} != {*words, *numbers}:
+        return False
+    right = [call_octave.text_of(found[key]).split() == [*names] for key, names in words.items()]
+    right += [
+        len(found[key].ravel()) == len(x)
+        and np.allclose(found[key].ravel(), x, rtol=TOLERANCE, atol=0, equal_nan=True)
+        for key, x in numbers.items()
+    ]
+    return all(right)
 
 
 # --- C ---

@@ -25,14 +25,14 @@ from typing import Any
 
 from symgen.certify.requests import module_of
 from symgen.description.expression import Expression
-from symgen.description.files import load_robot
+from symgen.description.files import on_base, robot_of
 from symgen.description.robot import PRISMATIC, REVOLUTE, Frame, Robot
 
 FREE = "free_"
 """Prefix of the names of freed entries: free_alpha4, free_d3, free_gx."""
 
 
-def variants(robot: str | Path | Robot) -> ModuleType:
+def variants(robot: str | Path | Robot, *, base: str | None = None) -> ModuleType:
     """Make the module of a robot whose frame table and gravity are constants that can be changed.
 
     The columns of its regressor are all standard parameters.
@@ -41,13 +41,15 @@ def variants(robot: str | Path | Robot) -> ModuleType:
     ----------
     robot : str, Path or Robot
         As for `symgen.model`.
+    base : str, optional
+        `fixed`, `moving` or `free`, as for `load_robot`. Default: that of the file.
 
     Returns
     -------
     module
         The constants of the robot file, and free_alpha1, free_d1, free_theta1, free_r1 ... (gamma
         and b if a frame has them), free_gx, free_gy, free_gz. Their defaults are the values in the
-        robot file.
+        robot file. No function reads gravity on a base that moves, whose a0 has it.
     """
 
     def derived(robot: Robot) -> Path:
@@ -55,7 +57,7 @@ def variants(robot: str | Path | Robot) -> ModuleType:
 
         return ungrouped_path(robot)
 
-    robot = freed(robot if isinstance(robot, Robot) else load_robot(robot))
+    robot = freed(on_base(robot_of(robot), base))
     return module_of(robot, "standard parameters", derived)
 
 

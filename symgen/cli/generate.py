@@ -36,7 +36,8 @@ def generate(
         typer.Option(
             help="What to generate; separate several by commas, as in numpy,c. Choices: "
             + ", ".join(
-                f"{name} ({t.language}, {t.file.format('NAME')})" for name, t in TARGETS.items()
+                f"{name} ({t.language}, {t.file.format('NAME', '*')})"
+                for name, t in TARGETS.items()
             )
             + "."
         ),
@@ -124,7 +125,7 @@ def emitted(
                 )
                 typer.echo(f"{robot.name}: {said}", err=True)
             elif target.use:
-                file = target.file.format(robot.name)
+                file = target.file.format(robot.name, "*")
                 typer.echo(f"{file}: {target.use.format(robot.name)}", err=True)
         if robot.loaded:
             typer.echo(

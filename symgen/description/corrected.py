@@ -16,10 +16,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from symgen.description.files import load_robot
+from symgen.description.files import robot_of
 from symgen.description.robot import Robot
-from symgen.description.yaml import data_of, robot_of
-from symgen.errors import DescriptionError
+from symgen.description.yaml import data_of, described
+from symgen.errors import DescriptionError, SymgenError
 
 
 def corrected(robot: str | Path | Robot, study: Any) -> Robot:
@@ -43,7 +43,12 @@ def corrected(robot: str | Path | Robot, study: Any) -> Robot:
     DescriptionError
         An entry that no robot file may have; the message names it.
     """
-    robot = robot if isinstance(robot, Robot) else load_robot(robot)
+    robot = robot_of(robot)
+    if not (study is None or isinstance(study, Mapping) or hasattr(study, "robot")):
+        raise SymgenError(
+            f"study is a {type(study).__name__}; expected a Study, or a mapping such as "
+            '{"gravity": [0, 0, -9.81]}'
+        )
     given = _plain(study if isinstance(study, Mapping) else getattr(study, "robot", None))
     given = {key: x for key, x in (given or {}).items() if x}
     if not given:
@@ -63,7 +68,7 @@ def corrected(robot: str | Path | Robot, study: Any) -> Robot:
     text = json.dumps(given, sort_keys=True)
     end = hashlib.sha256(text.encode()).hexdigest()[:12]
     try:
-        new = robot_of(data, robot.file, f"{robot.sha256}+{end}")
+        new = described(data, robot.file, f"{robot.sha256}+{end}")
     except DescriptionError as error:
         message = f"the section `robot` of the study: {error.message}"
         raise DescriptionError(message, path=error.path, file=robot.file) from error

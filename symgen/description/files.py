@@ -11,13 +11,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from symgen.description.angles import NotReadWarning
 from symgen.description.fields import located
 from symgen.description.par import read_par
 from symgen.description.robot import INERTIAL, Robot, parameter
 from symgen.description.yaml import parse_robot, write_yaml
-from symgen.errors import DescriptionError
+from symgen.errors import DescriptionError, require
 
 TREES = (".urdf", ".xml", ".mjcf")  # suffixes of the formats of links and joints by name
 BASES = ("fixed", "moving", "free")
@@ -78,14 +79,30 @@ def load_robot(
     return on_base(read_robot(source, keep_fixed=keep_fixed, exact=exact)[0], base)
 
 
+def robot_of(robot: str | Path | Robot) -> Robot:
+    """Return a robot as it is, or that of a packaged name or a file.
+
+    Parameters
+    ----------
+    robot : str, Path or Robot
+        Name of a packaged robot, path of a robot file (.yaml, .par, .urdf, MJCF), or a Robot.
+
+    Raises
+    ------
+    DescriptionError
+        As in `load_robot`; also if `robot` is of another type.
+    """
+    return robot if isinstance(robot, Robot) else load_robot(robot)
+
+
 def on_base(robot: Robot, base: str | None) -> Robot:
     """Return the robot with a fixed, moving or free base; None leaves that of the file."""
     if base is None:
         return robot
-    if base not in BASES:
-        raise DescriptionError(
-            f"base {base!r:.40}; expected {', '.join(BASES[:-1])} or {BASES[-1]}"
-        )
+    if not isinstance(base, str) or base not in BASES:
+        shown = repr(base) if isinstance(base, str) else f"a {type(base).__name__}"
+        expected = f"{', '.join(BASES[:-1])} or {BASES[-1]}"
+        raise DescriptionError(f"base is {shown:.40}; expected {expected}")
     values = dict(robot.values)
     if base == "free":
         values = {**robot.of_base, **values}
@@ -151,9 +168,13 @@ def _read(
     """Read a robot file in the format of its suffix, without the warning of `read_robot`."""
     if not isinstance(source, str | Path):
         raise DescriptionError(
-            f"robot is {source!r:.40} ({type(source).__name__}); expected the name of a packaged "
-            "robot, or the path of a robot file"
+            f"robot is a {type(source).__name__}; expected the name of a packaged robot, the path of "
+            "a robot file, or a Robot"
         )
+    require(exact, bool, "exact", "True or False")
+    require(keep_fixed, bool, "keep_fixed", "True or False")
+    require(lock, (Mapping, type(None)), "lock", "{joint name: position}")
+    require(chain, (tuple, list, type(None)), "chain", "the names of a base link and a tip link")
     suffix = "" if source in packaged_robots() else Path(source).suffix.lower()
     if (lock or chain) and suffix not in TREES:
         raise DescriptionError(
@@ -181,7 +202,10 @@ def _read(
         from symgen.description.tree_robot import read_tree
 
         part = TreePart(lock or {}, chain)
-        return read_tree(content, path.name, exact=exact, keep_fixed=keep_fixed, part=part)
+        beside = loops_beside(path)
+        return read_tree(
+            content, path.name, exact=exact, keep_fixed=keep_fixed, part=part, loops=beside
+        )
     return parse_robot(content, path.name), ()
 
 
@@ -209,6 +233,23 @@ def _beside(path: Path) -> Callable[[str, int], bytes]:
         return content_of(included)
 
     return read
+
+
+def loops_beside(path: Path) -> Any:
+    """Return the LoopsText of the file with the loops of a URDF or MJCF, or None if there is none.
+
+    It is NAME.loops.yaml in the same folder, or loop_closures.yaml there; of a file in a folder
+    `urdf`, also in the folder that holds it, or in `config` there.
+    """
+    from symgen.description.loops_file import EXPORTED, LoopsText  # numpy
+
+    folders = [path.parent]
+    if path.resolve().parent.name == "urdf":
+        above = path.resolve().parent.parent
+        folders += [above, above / "config"]
+    places = [path.with_suffix(".loops.yaml"), *(folder / EXPORTED for folder in folders)]
+    found = next((place for place in places if place.is_file()), None)
+    return None if found is None else LoopsText(found.name, content_of(found))
 
 
 def write_robot(
@@ -248,7 +289,7 @@ def content_of(path: Path) -> bytes:
 
     Raises DescriptionError if the file cannot be read.
     """
-    names = ", ".join(packaged_robots())
+    names, shown = ", ".join(packaged_robots()), " ".join(str(path).split("\n"))
     try:
         if path.exists() and not path.is_file():  # a pipe may never answer, a device never end
             raise OSError(0, "the path is a folder, a pipe or a device")
@@ -256,11 +297,12 @@ def content_of(path: Path) -> bytes:
             return stream.read(MAX_BYTES + 1)
     except FileNotFoundError as error:
         raise DescriptionError(
-            f"no file {path} and no packaged robot of that name; packaged are {names}",
+            f"no file {shown} and no packaged robot of that name; packaged are {names}",
             file=path.name,
         ) from error
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise DescriptionError(
-            f"cannot read {path}: {reason}; expected a robot file or one of {names}", file=path.name
+            f"cannot read {shown}: {reason}; expected a robot file or one of {names}",
+            file=path.name,
         ) from error

@@ -25,6 +25,7 @@ Array = np.ndarray
 MAX_JOINTS, SHOWN = 200, 20  # of a file; names in a message
 DROPPED = "not read:"  # how the note on elements that are left out starts
 EARTH = 9.81  # m/s^2, along -z of the root link
+HINGE = "hinge"  # kind of a loop: revolute, about the direction of all other hinges around it
 MOVING, FIXED_TYPE, FREE_TYPE = ("revolute", "continuous", "prismatic"), "fixed", "free"
 
 
@@ -129,8 +130,8 @@ class TreeLoop:
     name : str
         Name in the file.
     kind : str
-        The motion that the loop leaves free: revolute (about z), prismatic (along z), spherical
-        (any rotation), or fixed (none).
+        The motion that the loop leaves free: revolute (about z), HINGE, prismatic (along z),
+        spherical (any rotation), or fixed (none).
     links : two str
         Names of both links.
     poses : two ndarrays, shape (4, 4)

@@ -14,6 +14,7 @@ about z (revolute), along z (prismatic), any rotation (spherical) or none (fixed
   three hinges without mass, M = Rot(z, a) Rot(x, pi/2) Rot(z, b) Rot(x, pi/2) Rot(z, c), and the
   last is cut. They are singular where the first and the last axis are parallel, so these axes are
   those of the hinges of the two links, if these have different directions.
+- Two points that the same links share are a hinge, three a fixed loop.
 - A fixed loop (weld) makes one body of both links. The passive joint nearest to one of them is cut
   in its place, and the links between are turned over: a joint from parent to child, with the pose T
   and the axis a, leads from child to parent with the axis -a, followed by T^-1.
@@ -32,6 +33,7 @@ import numpy as np
 from symgen.description.tree import (
     FIXED_TYPE,
     FREE_TYPE,
+    HINGE,
     SHOWN,
     Array,
     Joint,
@@ -44,6 +46,9 @@ from symgen.errors import DescriptionError
 
 PARALLEL = 1e-12  # sine of the angle between the axes of parallel hinges
 OBLIQUE = 0.5  # sine of the angle from which two directions are different
+CLOSED = 1e-3  # m, or an entry of a rotation: ends that are closer coincide
+ROUNDED = 1e-3  # sine of the angle to which the direction of a planar loop may be rounded
+APART = 1e-6  # m: points that are closer are one
 FLAT = 1e-4  # m: distance along the hinges to which two ends of a planar loop may be rounded
 TOLD = 1e-9  # m: a smaller one is not told
 QUARTER = transform((0, 0, math.pi / 2, 0, 0, 0))  # Rot(x, pi/2)
@@ -83,7 +88,7 @@ def cut_open(tree: Tree) -> tuple[Tree, tuple[Cut, ...]]:
     Raises DescriptionError, with the line of the loop, if the loop joins a link to itself, if a
     link does not exist, or if no passive joint is left to be cut.
     """
-    tree = _merged(tree)
+    tree = _merged(_of_several_points(tree))
     cuts: list[Cut] = []
     for loop in tree.loops:
         _require_links(tree, loop)
@@ -131,7 +136,7 @@ def passive_names(tree: Tree, cuts: tuple[Cut, ...]) -> frozenset[str]:
         shown = ", ".join(f"{name!a:.60}" for name in names[:SHOWN])
         raise DescriptionError(
             f"loop {cut.loop.name!a:.60}: the file does not say which of the joints {shown} have "
-            f"motors; write {tree.motor_line.format(*names[:1] or ['JOINT'])} for each of them",
+            f"motors; write {tree.motor_line.format(*names[:1] or ['JOINT'])}",
             line=cut.loop.line or None,
         )
     moving = {joint.name for joint in tree.joints if joint.kind != FIXED_TYPE}
@@ -141,22 +146,27 @@ def passive_names(tree: Tree, cuts: tuple[Cut, ...]) -> frozenset[str]:
 def start_of(tree: Tree, cut: Cut) -> dict[str, float]:
     """Return positions of the joints around a loop, by name, near which it is closed.
 
-    They are those of `tree.start`; those of the cut joint, and of turns before it, follow from them.
+    They are those of `tree.start`, by default 0. Those of the cut joint, and of turns before it, follow
+    from them, if the loop is closed there.
     """
     around = [j for j in _around(tree, cut.child, cut.link) if j.kind != FIXED_TYPE]
-    positions = {joint.name: tree.start.get(joint.name, 0.0) for joint in around}
+    names = [j.name for j in around if j.name not in cut.added]
+    positions = {name: tree.start.get(name, 0.0) for name in names}
     joint = next(joint for joint in around if joint.name == cut.joint)
-    pose = link_poses(tree, {name: x for name, x in positions.items() if name not in cut.added})
+    pose = link_poses(tree, positions)
+    M = np.linalg.inv(pose[joint.parent] @ joint.pose) @ pose[cut.link] @ cut.pose
+    turns = {**positions, cut.joint: math.atan2(M[1, 0], M[0, 0])}
+    if joint.kind == "prismatic":
+        turns[cut.joint] = float(M[2, 3])
     if len(cut.added) == 3:
         first = next(joint for joint in around if joint.name == cut.added[0])
-        R = (pose[first.parent] @ first.pose)[:3, :3].T @ (pose[cut.link] @ cut.pose)[:3, :3]
-        b = math.atan2(math.hypot(R[0, 2], R[1, 2]), -R[2, 2])
-        turns = math.atan2(R[1, 2], R[0, 2]), b, math.atan2(-R[2, 1], R[2, 0])
-        return positions | dict(zip(cut.added, turns, strict=True))
-    M = np.linalg.inv(pose[joint.parent] @ joint.pose) @ pose[cut.link] @ cut.pose
-    prismatic = joint.kind == "prismatic"
-    own = float(M[2, 3]) if prismatic else math.atan2(M[1, 0], M[0, 0])
-    return positions | {cut.joint: own}
+        M = np.linalg.inv(pose[first.parent] @ first.pose) @ pose[cut.link] @ cut.pose
+        b = math.atan2(math.hypot(M[0, 2], M[1, 2]), -M[2, 2])
+        angles = math.atan2(M[1, 2], M[0, 2]), b, math.atan2(-M[2, 1], M[2, 0])
+        turns |= dict(zip(cut.added, angles, strict=True))
+    pose = link_poses(tree, turns)
+    apart = np.abs(pose[cut.child] - pose[cut.link] @ cut.pose).max()
+    return turns if apart < CLOSED else positions
 
 
 # --- links and joints ---
@@ -213,21 +223,26 @@ def _cut(tree: Tree, loop: TreeLoop, around: list[Joint]) -> tuple[Tree, Cut]:
     names = {joint.name for joint in tree.joints}
     name = own.name if own else _new(names, loop.name)
     child = _new(tree.links, f"{name} (cut)")
-    if kind == "spherical":
-        pose = link_poses(tree, tree.start)
-        axes = _directions(around, pose)
-        if (axis := _common(axes)) is not None:
-            P, Q, notes = _in_the_plane(loop, pose, axis)
-            kind = "revolute"
-        else:
-            P, Q = _three_turns(tree, loop, pose)
-            parent, at = first, P
-            for k in (1, 2):
-                link = _new(tree.links, f"{name}_turn{k}")
-                turn = _new(names, f"{name}_turn{k}")
-                turns.append(Joint(turn, "revolute", parent, link, at, Z, loop.line))
-                parent, at = link, QUARTER
-            first, P = parent, QUARTER
+    pose = link_poses(tree, tree.start)
+    axis = _common(_directions(around, pose))
+    if axis is not None and _turns_about(loop, pose, axis):
+        P, Q, notes = _in_the_plane(loop, pose, axis)
+        kind = "revolute"
+    elif kind == HINGE:
+        raise DescriptionError(
+            f"loop {loop.name!a:.60}: the hinges around it are not parallel, so that the direction of "
+            "its own hinge must be given; write its axis",
+            line=loop.line or None,
+        )
+    elif kind == "spherical":
+        P, Q = _three_turns(tree, loop, pose)
+        parent, at = first, P
+        for k in (1, 2):
+            link = _new(tree.links, f"{name}_turn{k}")
+            turn = _new(names, f"{name}_turn{k}")
+            turns.append(Joint(turn, "revolute", parent, link, at, Z, loop.line))
+            parent, at = link, QUARTER
+        first, P = parent, QUARTER
     cut = Joint(name, kind, first, child, P, Z, loop.line)
     if own:
         cut = replace(own, parent=first, child=child, pose=P, axis=Z)
@@ -260,6 +275,22 @@ def _common(axes: list[Array]) -> Array | None:
     return axes[0] if apart < PARALLEL else None
 
 
+def _turns_about(loop: TreeLoop, pose: Mapping[str, Array], axis: Array) -> bool:
+    """Whether a loop among hinges parallel to `axis` leaves a rotation about this direction only.
+
+    The direction of a revolute loop may be rounded by ROUNDED.
+    """
+    if loop.kind in ("spherical", HINGE):
+        return True
+    if loop.kind != "revolute" or loop.joint is not None:
+        return False
+    ends = zip(loop.links, loop.poses, strict=True)
+    return all(
+        float(np.linalg.norm(np.cross(pose[link][:3, :3] @ P[:3, 2], axis))) < ROUNDED
+        for link, P in ends
+    )
+
+
 def _in_the_plane(
     loop: TreeLoop, pose: Mapping[str, Array], axis: Array
 ) -> tuple[Array, Array, tuple[str, ...]]:
@@ -281,6 +312,13 @@ def _in_the_plane(
     ends[1][:3, 3] -= pose[loop.links[1]][:3, :3].T @ axis * apart
     told = f"loop {loop.name!a:.60}: its ends are {abs(apart):.2g} m apart along the hinges, taken as 0"
     return ends[0], ends[1], (told,) if abs(apart) > TOLD else ()
+
+
+def frame_along(axis: Array) -> Array:
+    """Return a pose, shape (4, 4), without translation, whose z axis is the unit vector `axis`."""
+    T = np.eye(4)
+    T[:3, :3] = _along(axis)
+    return T
 
 
 def _along(axis: Array) -> Array:
@@ -311,6 +349,74 @@ def _three_turns(tree: Tree, loop: TreeLoop, pose: Mapping[str, Array]) -> tuple
         F[:3, :3], F[:3, 3] = _along(pose[link][:3, :3].T @ axis), P[:3, 3]
         ends.append(F)
     return ends[0], ends[1]
+
+
+# --- loops of several points ---
+
+
+def _of_several_points(tree: Tree) -> Tree:
+    """Make one loop of the points that the same two links share: a hinge of two, a weld of three.
+
+    Among parallel hinges, two points beside each other along the hinges are one, and two others are
+    a weld.
+    """
+    pairs: dict[frozenset[str], list[TreeLoop]] = {}
+    for loop in tree.loops:
+        if loop.kind == "spherical":
+            pairs.setdefault(frozenset(loop.links), []).append(loop)
+    loops = list(tree.loops)
+    for shared in pairs.values():
+        if len(shared) < 2:
+            continue
+        for loop in shared:
+            _require_links(tree, loop)
+        joined = _joined(tree, shared)
+        loops = [
+            joined if x is shared[0] else x for x in loops if not any(x is y for y in shared[1:])
+        ]
+    return replace(tree, loops=tuple(loops))
+
+
+def _joined(tree: Tree, shared: list[TreeLoop]) -> TreeLoop:
+    first, pose = shared[0], link_poses(tree, tree.start)
+    points = [
+        [
+            (loop.poses if loop.links == first.links else loop.poses[::-1])[side][:3, 3]
+            for loop in shared
+        ]
+        for side in (0, 1)
+    ]
+    p = np.array(points[0])
+    far = p[int(np.linalg.norm(p - p[0], axis=1).argmax())] - p[0]
+    if not np.linalg.norm(far) > APART:
+        return first
+    beside = np.linalg.norm(np.cross(p - p[0], far), axis=1) / np.linalg.norm(far)
+    third = int(beside.argmax())
+    second = int(np.linalg.norm(p - p[0], axis=1).argmax())
+    line = pose[first.links[0]][:3, :3] @ far / np.linalg.norm(far)
+    axis = _common(_directions(_around(tree, *first.links), pose))
+    hinge = axis is None or float(np.linalg.norm(np.cross(line, axis))) < ROUNDED
+    frames = []
+    for link, own in zip(first.links, points, strict=True):
+        x = own[second] - own[0]
+        if beside[third] > APART:
+            y = own[third] - own[0]
+        elif hinge:
+            y = _along(x / np.linalg.norm(x))[:, 0]
+        else:
+            y = np.cross(pose[link][:3, :3].T @ axis, x)
+        x = x / np.linalg.norm(x)
+        z = np.cross(x, y) / np.linalg.norm(np.cross(x, y))
+        F = np.eye(4)
+        F[:3, :3] = np.column_stack([x, np.cross(z, x), z])
+        F[:3, 3] = own[0]
+        frames.append(F)
+    if hinge and not beside[third] > APART:
+        turned = transform((0, 0, 0, 0, 0, 0))
+        turned[:3, :3] = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]])  # z along the line
+        frames = [F @ turned for F in frames]
+        return replace(first, kind="revolute", poses=(frames[0], frames[1]))
+    return replace(first, kind=FIXED_TYPE, poses=(frames[0], frames[1]))
 
 
 # --- loops that leave no motion: two links become one body ---
@@ -354,8 +460,7 @@ def _weld(tree: Tree, loop: TreeLoop) -> Tree:
     tree = replace(tree, joints=(*tree.joints, tie))
     if cut.kind == FREE_TYPE:
         return tree
-    S = np.eye(4)
-    S[:3, :3] = _along(cut.axis)
+    S = frame_along(cut.axis)
     kind = "prismatic" if cut.kind == "prismatic" else "revolute"
     opened = TreeLoop(
         loop.name, kind, (cut.parent, cut.child), (cut.pose @ S, S), loop.line, joint=cut

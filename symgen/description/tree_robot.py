@@ -37,6 +37,7 @@ import numpy as np
 
 from symgen.description.expression import ONE, PI, ZERO, Expression, twelfths
 from symgen.description.fields import located
+from symgen.description.loops_file import LoopsText, with_loops
 from symgen.description.mjcf import parse_mjcf
 from symgen.description.mounts import rows_of
 from symgen.description.naming import is_label
@@ -170,7 +171,8 @@ def _close(table: Table, cut: Cut) -> None:
     free = cut.added == (cut.joint,) and table.frames[j - 1].sigma == REVOLUTE
     twin, theta = _keep(table, holder, pose, free=free)
     positions = start_of(table.tree, cut)
-    positions[cut.joint] -= theta if free else 0.0
+    if free and cut.joint in positions:
+        positions[cut.joint] -= theta
     start = {number[name]: round(x, START_DIGITS) + 0.0 for name, x in positions.items()}
     table.loops.append(Loop(j, twin, start))
 
@@ -360,6 +362,7 @@ def read_tree(
     exact: bool = False,
     keep_fixed: bool = False,
     part: TreePart = WHOLE_TREE,
+    loops: LoopsText | None = None,
 ) -> tuple[Robot, tuple[str, ...]]:
     """Return the Robot of a URDF or MJCF file, and notes for the user.
 
@@ -384,6 +387,8 @@ def read_tree(
         belongs to that body in both cases.
     part : TreePart
         Joints held at a position, and the chain whose joints move.
+    loops : LoopsText, optional
+        A file with the loops of the robot.
 
     Raises
     ------
@@ -392,18 +397,30 @@ def read_tree(
         fixed base; the message names file and line.
     """
     with located(file):
-        tree = part_of(parse_tree(content, file, exact=exact, sites=keep_fixed), part)
-        return robot_of_tree(tree, file, hashlib.sha256(content).hexdigest(), keep_fixed=keep_fixed)
+        tree = parse_tree(content, file, exact=exact, sites=keep_fixed, loops=loops)
+        text = content + (loops.content if loops and tree.loops else b"")
+        sha256 = hashlib.sha256(text).hexdigest()
+        return robot_of_tree(part_of(tree, part), file, sha256, keep_fixed=keep_fixed)
 
 
-def parse_tree(content: bytes, file: str, *, exact: bool = False, sites: bool = False) -> Tree:
+def parse_tree(
+    content: bytes,
+    file: str,
+    *,
+    exact: bool = False,
+    sites: bool = False,
+    loops: LoopsText | None = None,
+) -> Tree:
     """Read the links and joints of a URDF or MJCF file; the suffix of `file` selects the format.
 
-    If `sites` is true, the sites of an MJCF become links too.
+    If `sites` is true, the sites of an MJCF become links too. `loops` has loops that a file beside
+    it gives.
     """
     if file.lower().endswith(".urdf"):
-        return parse_urdf(content, file, exact=exact)
-    return parse_mjcf(content, file, exact=exact, sites=sites)
+        tree = parse_urdf(content, file, exact=exact)
+    else:
+        tree = parse_mjcf(content, file, exact=exact, sites=sites)
+    return with_loops(tree, loops)
 
 
 def robot_of_tree(

@@ -39,16 +39,19 @@ from symgen.description.tree import (
     DROPPED,
     FIXED_TYPE,
     FREE_TYPE,
+    HINGE,
     MAX_JOINTS,
     MOVING,
     Inertial,
     Joint,
     Tree,
+    TreeLoop,
     inertial_of,
     rotation,
     transform,
     turn,
 )
+from symgen.description.tree_loops import frame_along, link_poses
 from symgen.description.xml_text import LARGEST, Array, XmlElement, read_elements
 from symgen.errors import DescriptionError
 
@@ -108,7 +111,9 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
         )
     rotors, unread = _rotors(root)
     joints = [replace(joint, armature=rotors.get(joint.name, 0.0)) for joint in joints]
-    base = _root(links, joints, root.line)
+    driven = _driven(root)
+    joints, second = _first_parents(joints, driven)
+    base = _root(links, [*joints, *second], joints, root.line)
     other = Counter(_left_out(root))
     notes: tuple[str, ...] = (
         (f"{DROPPED} {', '.join(f'{other[tag]} <{tag:.40}>' for tag in sorted(other))}",)
@@ -137,7 +142,7 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
         if points
         else ()
     )
-    return Tree(
+    tree = Tree(
         root.attrib.get("name", ""),
         links,
         tuple(joints),
@@ -146,7 +151,171 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
         notes=notes,
         angles=angles_text,
         not_read=(*_not_read(root), *unread),
+        driven=driven,
+        motor_line=f"`actuated: [{{}}]` into {loops_name(file)} beside the file",
     )
+    return replace(tree, loops=(*map(_second_parent, second), *_loops(root, tree, angles)))
+
+
+def loops_name(file: str) -> str:
+    """Return the name of the file that has the loops of a URDF or MJCF: arm.loops.yaml of arm.urdf."""
+    return f"{file.rpartition('.')[0]}.loops.yaml"
+
+
+def _driven(root: XmlElement) -> frozenset[str]:
+    """Return the names of the joints that a <transmission> or a command of <ros2_control> drives."""
+    driven = {
+        joint.attrib.get("name", "")
+        for tag in ("transmission", "ros2_control")
+        for e in root.own(tag)
+        for joint in e.iter("joint")
+        if tag == "transmission" or joint.find("command_interface") is not None
+    }
+    return frozenset(driven - {""})
+
+
+def _first_parents(joints: list[Joint], driven: frozenset[str]) -> tuple[list[Joint], list[Joint]]:
+    """Divide the joints into one for each child link, which make the tree, and those that close
+    loops because their child has a parent already.
+
+    Of two parents of one link, a joint with a motor belongs to the tree.
+    """
+    first: dict[str, Joint] = {}
+    for joint in joints:
+        before = first.get(joint.child)
+        if before is None or (joint.name in driven and before.name not in driven):
+            first[joint.child] = joint
+    tree = [joint for joint in joints if first[joint.child] is joint]
+    return tree, [joint for joint in joints if first[joint.child] is not joint]
+
+
+def _second_parent(joint: Joint) -> TreeLoop:
+    """Return the loop that a joint closes, whose child link another joint holds."""
+    if joint.kind == FREE_TYPE:
+        raise DescriptionError(
+            f"joint {joint.name!r}: link {joint.child!r} has a parent already, so that this free joint "
+            "ties nothing; remove this joint",
+            line=joint.line,
+        )
+    kind = "revolute" if joint.kind == "continuous" else joint.kind
+    own = None if kind == FIXED_TYPE else joint
+    S = frame_along(joint.axis)
+    ends = (joint.parent, joint.child)
+    return TreeLoop(joint.name, kind, ends, (joint.pose @ S, S), joint.line, own)
+
+
+# the ends of a loop: tags of both links, of their frames (in <ROBOT>, or in the link), and of the axis
+_LOOP_TAGS = {
+    "loop_joint": (("link1", "link2"), None, "axis"),
+    "loop": (("predecessor", "successor"), ("origin", "origin"), "axis"),
+    "constraint": (("parent", "child"), ("parent_origin", "child_origin"), "parent_axis"),
+}
+_LOOP_KINDS = {
+    "revolute": "revolute", "continuous": "revolute", "hinge": "revolute", "prismatic": "prismatic",
+    "spherical": "spherical", "ball": "spherical", "fixed": FIXED_TYPE,
+}  # fmt: skip
+
+
+def _loop_tag(e: XmlElement) -> str:
+    return e.tag.rpartition(":")[2]
+
+
+def _is_loop(e: XmlElement) -> bool:
+    """Whether an element of <robot> closes a loop, in a form that is read."""
+    tags = _LOOP_TAGS.get(_loop_tag(e))
+    if tags is None or e.attrib.get("type") not in _LOOP_KINDS:
+        return False
+    ends = [e.find(tag) for tag in tags[0]]
+    frames = tags[1] if _loop_tag(e) == "constraint" else ()
+    return all(end is not None and "link" in end.attrib for end in ends) and all(
+        e.find(tag) is not None for tag in frames or ()
+    )
+
+
+def _is_sdf_loop(e: XmlElement) -> bool:
+    """Whether an element of <gazebo> is a joint between two links, of a kind that is read."""
+    ends = e.tag == "joint" and all(e.find(tag) is not None for tag in ("parent", "child"))
+    return ends and e.attrib.get("type") in _LOOP_KINDS
+
+
+def _loops(root: XmlElement, tree: Tree, angles: Angles) -> Iterator[TreeLoop]:
+    """Yield the loops of the elements <loop_joint>, <loop> (URDF+), <constraint>, and of SDF joints
+    in <gazebo>.
+    """
+    for e in root:
+        if _is_loop(e):
+            yield _loop(e, angles)
+    for gazebo in root.own("gazebo"):
+        for e in gazebo:
+            if _is_sdf_loop(e):
+                yield _sdf_loop(e, tree, angles)
+
+
+def _loop(e: XmlElement, angles: Angles) -> TreeLoop:
+    (first, second), frames, axis_tag = _LOOP_TAGS[_loop_tag(e)]
+    name, links, poses = e.attrib.get("name", "loop"), [], []
+    for k, tag in enumerate((first, second)):
+        end = e.find(tag)
+        assert end is not None
+        links.append(end.word("link"))
+        holder = end
+        if frames is not None:
+            found = (end if _loop_tag(e) == "loop" else e).find(frames[k])
+            holder = XmlElement("origin", {}, e.line, e.byte) if found is None else found
+        poses.append(_placed(holder, f"loop {name!a:.60} (line {holder.line})", angles))
+    given = e.find(axis_tag)
+    axis = None if given is None else given.numbers("xyz", 3, "1 0 0")
+    return _loop_about(e, name, (links[0], links[1]), poses, axis)
+
+
+def _sdf_loop(e: XmlElement, tree: Tree, angles: Angles) -> TreeLoop:
+    """Read a joint of SDF: its <pose> is in the child, and both links are placed as at zero."""
+    name, ends = e.attrib.get("name", "loop"), []
+    for tag in ("parent", "child"):
+        end = e.find(tag)
+        assert end is not None
+        ends.append(end.attrib.get("link", end.content.strip()))
+        if ends[-1] == "world" and "world" not in tree.links:
+            ends[-1] = tree.root
+        if ends[-1] not in tree.links:
+            raise DescriptionError(
+                f"joint {name!r} in <gazebo>: there is no link {ends[-1]!a:.60}", line=e.line
+            )
+    pose = e.find("pose")
+    words = "0 0 0 0 0 0" if pose is None else " ".join(pose.content.split())
+    six = XmlElement("pose", {"": words}, e.line, e.byte).numbers("", 6)
+    Q = np.eye(4)
+    Q[:3, :3] = rotation(six[3:].tolist(), f"joint {name!a:.60} (line {e.line})", angles)
+    Q[:3, 3] = six[:3]
+    at_zero = link_poses(tree, {})
+    P = np.linalg.inv(at_zero[ends[0]]) @ at_zero[ends[1]] @ Q
+    axis, given = e.find("axis"), None
+    if axis is not None and (xyz := axis.find("xyz")) is not None:
+        given = XmlElement("xyz", {"": xyz.content}, xyz.line, xyz.byte).numbers("", 3)
+    return _loop_about(e, name, (ends[0], ends[1]), [P, Q], given)
+
+
+def _placed(e: XmlElement, what: str, angles: Angles) -> Array:
+    T = np.eye(4)
+    T[:3, :3] = rotation(e.numbers("rpy", 3, "0 0 0").tolist(), what, angles)
+    T[:3, 3] = e.numbers("xyz", 3, "0 0 0")
+    return T
+
+
+def _loop_about(
+    e: XmlElement, name: str, links: tuple[str, str], poses: list[Array], axis: Array | None
+) -> TreeLoop:
+    """Make a loop whose free motion is about or along `axis`, in both frames; None if not given."""
+    kind = _LOOP_KINDS[e.word("type")]
+    if kind in ("revolute", "prismatic") and axis is None:
+        kind = HINGE if kind == "revolute" else kind
+        axis = np.array([1.0, 0.0, 0.0])
+    if kind in ("revolute", "prismatic"):
+        assert axis is not None
+        if not np.linalg.norm(axis) > 1e-6:
+            raise DescriptionError(f"loop {name!r}: its axis has no direction", line=e.line)
+        poses = [pose @ frame_along(axis / np.linalg.norm(axis)) for pose in poses]
+    return TreeLoop(name, kind, links, (poses[0], poses[1]), e.line)
 
 
 def _rotors(root: XmlElement) -> tuple[dict[str, float], list[str]]:
@@ -191,13 +360,14 @@ def _not_read(root: XmlElement) -> Iterator[str]:
     for e in (root, *root):
         known = READ.get(e.tag, set()) | HARMLESS.get(e.tag, set())
         for child in e if e.tag in READ else ():
-            if child.tag not in known:
+            if child.tag not in known and not (e is root and _is_loop(child)):
                 yield _named(child)
     for gazebo in root.own("gazebo"):
         of = f" in <gazebo reference={gazebo.word('reference', '')!a:.60}>"
         of = of if "reference" in gazebo.attrib else " in <gazebo>"
         for child in gazebo:
             closes = child.tag == "joint" and child.find("parent") is not None
+            closes = closes and not _is_sdf_loop(child)
             acts = child.tag in FORCES and child.content.strip() not in FORCES[child.tag]
             if closes or acts:
                 yield _named(child, of)
@@ -311,35 +481,35 @@ def _joint(e: XmlElement, angles: Angles) -> Joint:
     return Joint(name, kind, *links, pose, axis, e.line, limits, damping, friction)
 
 
-def _root(links: dict[str, Inertial | None], joints: list[Joint], line: int) -> str:
+def _root(
+    links: dict[str, Inertial | None], every: list[Joint], joints: list[Joint], line: int
+) -> str:
     """Find the base, the only link without a parent, and check the joints.
 
-    Raises DescriptionError if a joint names a link that does not exist, or if a link has two
-    parents.
+    `joints` are those of the tree. Raises DescriptionError if one of `every` joint names a link that
+    does not exist.
     """
-    parent: dict[str, str] = {}
+    parent = {joint.child: joint.parent for joint in joints}
     names: set[str] = set()
-    for joint in joints:
+    for joint in every:
         for link in (joint.parent, joint.child):
             if link not in links:
                 raise DescriptionError(
                     f"joint {joint.name!r}: there is no link {link[:60]!r}", line=joint.line
                 )
-        if joint.child in parent:
-            raise DescriptionError(
-                (
-                    f"joint {joint.name!r}: link {joint.child!r} has a parent already; in a URDF a "
-                    "link has only one parent joint"
-                ),
-                line=joint.line,
-            )
         if joint.name in names:
             raise DescriptionError(
                 f"joint {joint.name!r} is given twice; keep one", line=joint.line
             )
         names.add(joint.name)
-        parent[joint.child] = joint.parent
     roots = [link for link in links if link not in parent]
+    second = next((j for j in every if not any(j is one for one in joints)), None)
+    if len(roots) > 1 and second is not None:  # rather a slip than a loop
+        raise DescriptionError(
+            f"joint {second.name!r}: link {second.child!r} has a parent already, and "
+            f"{', '.join(map(repr, roots[1:5]))} has none; correct the child",
+            line=second.line,
+        )
     if len(roots) != 1:
         none = "none: the joints form a cycle" if links else "none: there is no <link>"
         roots_text = ", ".join(map(repr, roots[:5])) or none

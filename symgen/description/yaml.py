@@ -30,7 +30,7 @@ from symgen.description.fields import Declared, Given, Path, dotted, located
 from symgen.description.naming import check_identifier
 from symgen.description.parts import GEOMETRY, Form, Row
 from symgen.description.robot import Robot
-from symgen.errors import DescriptionError, SymgenError
+from symgen.errors import DescriptionError, SymgenError, require
 
 SCHEMA = 1  # version of the robot file
 READER = TypeAdapter(Robot)  # its validators are built when the first file is read
@@ -83,6 +83,7 @@ def parse_robot(content: bytes, file: str) -> Robot:
             f"content is of type {type(content).__name__}; expected the bytes of a robot file "
             "(for a text: text.encode()); use load_robot to read a file by its path"
         )
+    require(file, str, "file", "the name of the file, a text")
     lines: dict[Path, int] = {}
 
     def line(path: Path) -> int:
@@ -90,9 +91,9 @@ def parse_robot(content: bytes, file: str) -> Robot:
         return next((lines[place] for place in places if place in lines), 1)
 
     with located(file, line):
-        data = _document(content, lines)
+        data = document(content, lines)
         _check_version(data)
-        return robot_of(data, file, hashlib.sha256(content).hexdigest())
+        return described(data, file, hashlib.sha256(content).hexdigest())
 
 
 def _check_version(data: Any) -> None:
@@ -110,7 +111,7 @@ def _check_version(data: Any) -> None:
         )
 
 
-def _document(content: bytes, lines: dict[Path, int]) -> Any:
+def document(content: bytes, lines: dict[Path, int]) -> Any:
     """Parse `content` as one YAML document and return its data as Python objects.
 
     `lines` receives the line number of every key path.
@@ -207,7 +208,7 @@ def _scalar(node: ScalarNode, line: int) -> Any:
 # --- plain data to a robot ---
 
 
-def robot_of(data: Mapping[str, Any], file: str, sha256: str) -> Robot:
+def described(data: Mapping[str, Any], file: str, sha256: str) -> Robot:
     """Build the Robot from the data of a robot file, and check all fields.
 
     Raises DescriptionError with the path of the wrong field.
@@ -430,8 +431,8 @@ def tables_of(robot: Robot) -> dict[str, Any]:
 
 
 def data_of(robot: Robot) -> dict[str, Any]:
-    """Return the data of a robot file that describes `robot`, of which `robot_of` makes it again."""
-    data: dict[str, Any] = _document(write_yaml(robot).encode(), {})
+    """Return the data of a robot file that describes `robot`, of which `described` makes it again."""
+    data: dict[str, Any] = document(write_yaml(robot).encode(), {})
     return data
 
 

@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 from symgen.derive.loops import close
+from symgen.derive.models import OPTIONS
+from symgen.description.files import robot_of
 from symgen.description.robot import Robot
-from symgen.emit import c_target, python_target
+from symgen.emit import c_target, matlab_target, python_target
 from symgen.emit.c_target import C
+from symgen.emit.matlab_target import MATLAB
 from symgen.emit.printers import PYTHON, Language
 from symgen.emit.spec import ModuleSpec, module_spec, spec_of
 from symgen.emit.targets import TARGETS
-from symgen.errors import SymgenError
+from symgen.errors import SymgenError, require, require_names
 from symgen.regroup.regrouping import Regrouping
 
 
 class Emitter(NamedTuple):
-    """Code generator for one kind of file, such as C: its language and its writing function."""
+    """Code generator for one kind of file, such as C: its language and its writing function.
+
+    A function `render` that returns {function: text} writes a file for each function.
+    """
 
     language: Language
-    render: Callable[..., str]
+    render: Callable[..., str | Mapping[str, str]]
 
 
 _PYTHON = Emitter(PYTHON, python_target.render)
@@ -30,11 +37,22 @@ EMITTERS = {
     "xp": _PYTHON,
     "c": Emitter(C, c_target.render),
     "h": Emitter(C, c_target.render_header),
+    "matlab": Emitter(MATLAB, matlab_target.render),
 }
 
 
-def generate_module(robot: Robot, *, command: str | None = None) -> str:
-    """Return the source text of the NumPy module of `robot`."""
+def generate_module(robot: str | Path | Robot, *, command: str | None = None) -> str:
+    """Return the source text of the NumPy module of a robot.
+
+    Parameters
+    ----------
+    robot : str, Path or Robot
+        As for `symgen.model`.
+    command : str, optional
+        As for `generate_files`.
+    """
+    robot = robot_of(robot)
+    require(command, (str, type(None)), "command", "the argument of `symgen generate`, a text")
     return generate_files(robot, command=command)[TARGETS["numpy"].file.format(robot.name)]
 
 
@@ -67,14 +85,20 @@ def generate_files(
     dict
         {file name: text}. The same robot file and the same version give the same bytes.
     """
+    require_names(targets, TARGETS, "targets")
+    require_names(options, OPTIONS, "options")
     _require_base(robot, targets)
     spec: ModuleSpec = (
         spec_of(robot, tuple(options)) if regrouping is None else module_spec(regrouping, options)
     )
     targets = [*targets, *["h"] * ("c" in targets)]
     served = [name for name in targets if TARGETS[name].iterates or not spec.tied]
-    file = {TARGETS[name].file.format(robot.name): name for name in served}
-    return {path: EMITTERS[name].render(spec, command=command) for path, name in file.items()}
+    files: dict[str, str] = {}
+    for pattern, name in {TARGETS[name].file: name for name in served}.items():
+        made = EMITTERS[name].render(spec, command=command)
+        texts = {"": made} if isinstance(made, str) else made
+        files |= {pattern.format(robot.name, function): text for function, text in texts.items()}
+    return files
 
 
 def _require_base(robot: Robot, targets: Sequence[str]) -> None:

@@ -21,7 +21,7 @@ from string import ascii_lowercase
 from typing import NamedTuple
 
 from symgen.derive.graph import ADD, CONST, COS, INV, MUL, POS, SIN, SYM, Node, Scalar, reachable
-from symgen.description.expression import FUNCTIONS, Expression, decimal
+from symgen.description.expression import FUNCTIONS, decimal
 from symgen.description.naming import Namespace
 
 SAYABLE = 3  # factors of a name that is made of them
@@ -43,6 +43,8 @@ class Language(NamedTuple):
         Text of max(x, 0) and of min(x, 0), with {} for x.
     pi, one, square : str
         Text of pi, of the 1 in 1/x, and of the square of {0}.
+    times, over, power : str
+        Operators of a product, a quotient and a power.
     number : callable
         Writes a rational number.
     comment : str
@@ -51,6 +53,8 @@ class Language(NamedTuple):
         Marks at the start and at the end of a text of several lines.
     breaks : bool
         Whether a line may be broken at every space, or only within brackets.
+    continues : str
+        Text at the end of a line of code that goes on in the next line.
     step, entry : str
         Line that gives a name to a value, and line that assigns a value to an entry of a result; {}
         stands for the name, then for the value.
@@ -66,19 +70,29 @@ class Language(NamedTuple):
     pi: str
     one: str = "1"
     square: str = "{0}**2"
+    times: str = "*"
+    over: str = "/"
+    power: str = "**"
     number: Callable[[Fraction], str] = number
     comment: str = "#"
     prose: tuple[str, str] = ('"""', '"""')
     breaks: bool = False
+    continues: str = ""
     step: str = "{} = {}"
     entry: str = "{} = {}"
     chained: bool = True
     is_word: Callable[[str], bool] = lambda name: False
 
-    def expression(self, e: Expression) -> str:
-        """Write an expression of constants, or a linear expression of joint positions, as code."""
+    def expression(self, e: object) -> str:
+        """Write an expression of constants, a linear expression of joint positions, or a formula of
+        parameters as code: its text in the grammar of robot files.
+        """
         text = re.sub(r"\b(cos|sin|sqrt)\(", lambda name: f"{self.calls[name[1]]}(", str(e))
-        return re.sub(r"\bpi\b", self.pi, text)
+        text = re.sub(r"\bpi\b", self.pi, text)
+        if self.times == "*":
+            return text
+        operators = {"**": self.power, "*": self.times, "/": self.over}
+        return re.sub(r"\*\*|[*/]", lambda operator: operators[operator[0]], text)
 
     def entries(self, targets: Sequence[str], value: str, remark: str) -> list[str]:
         """Write the lines that assign a value to array entries, each line with a comment after a
@@ -339,7 +353,7 @@ class Text:
                 text = form.format(self._operand(x if x.sign > 0 else -x))
                 return text if (s.sign > 0) == (x.sign > 0) else "-" + text
             case "inv":
-                return f"{minus}{language.one}/{self._divisor(node.operands[0])}"
+                return f"{minus}{language.one}{language.over}{self._divisor(node.operands[0])}"
         operands = ", ".join(map(self._operand, node.operands))
         return f"{minus}{language.calls[node.op]}({operands})"
 
@@ -370,7 +384,7 @@ class Text:
             own = self._own_sign(x.node)
             sign *= x.sign * own
             factors.append(self._factor(self._positive(x.node, own)))
-        return ("-" if sign < 0 else "") + "*".join(factors)
+        return ("-" if sign < 0 else "") + self.language.times.join(factors)
 
     def _own_sign(self, node: Node) -> int:
         """Return the sign with which a node is written without a minus, as min(x, 0) is."""

@@ -67,31 +67,33 @@ def lines_that_fit(lines: Iterable[str], language: Language) -> Iterator[str]:
         opens = not prose and line.lstrip().startswith(start)
         code, remark, comment = line.partition(f"  {mark}")
         if len(line) > WIDTH and remark and not prose and not opens and code.strip():
-            yield from _fitted(f"{before}{mark}{comment}", before + mark, True, True)
+            yield from _fitted(f"{before}{mark}{comment}", before + mark, True, True, "")
             line = code.rstrip()
         if prose or opens:
             more = before + " " * (3 if opens and start != end else 0)
         else:
             more = before + (mark if line.lstrip().startswith(mark) else "    ")
         words = prose or opens or line.lstrip().startswith(mark)
-        yield from _fitted(line, more, words, words or language.breaks)
+        continues = "" if words else language.continues
+        yield from _fitted(line, more, words, words or language.breaks, continues)
         marks = line.count(start) if start == end else line.count(start) - line.count(end)
         prose = prose ^ (marks % 2 == 1) if start == end else prose + marks > 0
 
 
-def _fitted(line: str, more: str, words: bool, free: bool) -> Iterator[str]:
-    """Yield the parts of a line; all but the first start with `more`.
+def _fitted(line: str, more: str, words: bool, free: bool, continues: str) -> Iterator[str]:
+    """Yield the parts of a line; all but the first start with `more`, all but the last end with
+    `continues`.
 
     `words` says whether the line is a comment, `free` whether it may be broken outside brackets.
     """
-    while len(line) > WIDTH and (end := _end(line, more, words, free)):
-        yield line[:end].rstrip()
+    while len(line) > WIDTH and (end := _end(line, more, words, free, WIDTH - len(continues))):
+        yield line[:end].rstrip() + continues
         line = f"{more}{line[end:].lstrip()}"
     yield line
 
 
-def _end(line: str, more: str, words: bool, free: bool) -> int:
-    """Find the column at which to break a line: its last suitable space within 100 columns.
+def _end(line: str, more: str, words: bool, free: bool, width: int) -> int:
+    """Find the column at which to break a line: its last suitable space within `width` columns.
 
     A space outside inner brackets is better, if it leaves no short line. Spaces inside strings do
     not count, in a comment all do. The result is 0 without such a space.
@@ -99,7 +101,7 @@ def _end(line: str, more: str, words: bool, free: bool) -> int:
     start = len(more) if line.startswith(more) else len(line) - len(line.lstrip())
     depth, quote = 0, ""
     ends: dict[int, int] = {}  # the last space at each depth of brackets
-    for k, c in enumerate(line[: WIDTH + 1]):
+    for k, c in enumerate(line[: width + 1]):
         if quote:
             quote = "" if c == quote else quote
         elif c in "\"'" and not words:
@@ -110,5 +112,5 @@ def _end(line: str, more: str, words: bool, free: bool) -> int:
             depth -= 1
         elif c == " " and k > start + 4 and (free or depth > 0):
             ends[0 if words else depth] = k
-    good = [end for _, end in sorted(ends.items()) if end > WIDTH // 2]
+    good = [end for _, end in sorted(ends.items()) if end > width // 2]
     return [*good, *ends.values(), 0][0]

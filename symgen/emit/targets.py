@@ -5,6 +5,7 @@ Nothing is derived or printed here, so that the import of this module is fast.
 
 from __future__ import annotations
 
+from pathlib import PurePath
 from typing import NamedTuple
 
 
@@ -14,7 +15,8 @@ class Target(NamedTuple):
     Attributes
     ----------
     file : str
-        Name of the file; {} stands for the name of the robot.
+        Name of the file; {} stands for the name of the robot. Where each function has a file of its
+        own, a second {} stands for the function.
     language : str
         Language of the file, or the arrays for which it is written.
     use : str
@@ -33,23 +35,30 @@ class Target(NamedTuple):
     bases: tuple[str, ...] = ("fixed", "moving", "free")
 
 
-IN_C = ("fixed", "moving")
+JOINT_ROWS = ("fixed", "moving")
 TARGETS = {
     "numpy": Target("{}.py", "NumPy", iterates=True),
     "casadi": Target(
         "{}.py", "CasADi", 'in CasADi {}.casadi("inverse_dynamics") is a casadi.Function of columns'
     ),
-    "c": Target("{}.c", "C", iterates=True, bases=IN_C),
+    "c": Target("{}.c", "C", iterates=True, bases=JOINT_ROWS),
     "h": Target(
         "{}.h",
         "C",
         "{0}.h declares what {0}.c has; --target c writes both",
         iterates=True,
-        bases=IN_C,
+        bases=JOINT_ROWS,
     ),
+    "matlab": Target("{}_{}.m", "MATLAB and Octave", bases=JOINT_ROWS),
     "xp": Target(
         "{}.py",
         "arrays of any package",
         "functions of {} take arrays of CuPy, JAX, PyTorch too (pip install symgen[gpu])",
     ),
 }
+
+
+def target_of(file: str) -> str:
+    """Return the first target whose files end as the name `file` does, such as c for tx40.c."""
+    suffix = PurePath(file).suffix
+    return next(name for name, target in TARGETS.items() if target.file.endswith(suffix))

@@ -12,6 +12,7 @@ that moved the parameter: a general rule (`rules`), or a relation of this robot 
 
 from __future__ import annotations
 
+import pathlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -21,7 +22,7 @@ from symgen.description.expression import ONE, ZERO
 from symgen.description.fields import Path, dotted
 from symgen.description.robot import PRISMATIC, REVOLUTE, Robot
 from symgen.description.yaml import flow, tables_of
-from symgen.regroup.regrouping import Formula, Regrouping
+from symgen.regroup.regrouping import Formula, Regrouping, regrouping_of
 from symgen.regroup.rules import Transfer
 
 OF_REVOLUTE = {  # family: the relation of `rules`, in words
@@ -88,11 +89,17 @@ class BaseDifference:
         return f"{edits}: {'; '.join(effects) or 'the base parameters stay'}"
 
 
-def absorptions(regrouping: Regrouping) -> tuple[Absorption, ...]:
+def absorptions(robot: str | pathlib.Path | Robot | Regrouping) -> tuple[Absorption, ...]:
     """Explain why each standard parameter is part of a base parameter named after another one.
 
     The reasons are in the order of eq. (4).
+
+    Parameters
+    ----------
+    robot : str, Path, Robot or Regrouping
+        A robot as for `symgen.model`, or its base parameters.
     """
+    regrouping = regrouping_of(robot)
     own, particular = set(regrouping.own), set(Transfer(regrouping.robot).remaining)
     into = {
         name: {b.name: b.combination[name] for b in regrouping.base if name in b.combination}
@@ -134,11 +141,19 @@ def _rule(robot: Robot, name: str) -> str:
     return f"frame {j} is fixed in {i}: its link is part of {i}"
 
 
-def base_difference(before: Regrouping, after: Regrouping) -> BaseDifference:
+def base_difference(
+    before: str | pathlib.Path | Robot | Regrouping, after: str | pathlib.Path | Robot | Regrouping
+) -> BaseDifference:
     """Compare two robots: the edits between their files, and the effect on the base parameters.
 
     `str` of the result is one line: alpha of frame 2: 0 -> pi/2: MX1R appears; ...
+
+    Parameters
+    ----------
+    before, after : str, Path, Robot or Regrouping
+        As for `absorptions`.
     """
+    before, after = regrouping_of(before), regrouping_of(after)
     old, new = ({b.own: b for b in r.base} for r in (before, after))
     texts = [
         {own: own if b.name == own else f"{b.name} = {b.formula}" for own, b in base.items()}

@@ -15,6 +15,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,7 +28,9 @@ from symgen.description.angles import InertiaWarning
 from symgen.description.bodies import impossible_links
 from symgen.description.element import OWN_LAWS
 from symgen.description.expression import ONE, ZERO, Expression, simplified, with_known_cosines
+from symgen.description.files import robot_of
 from symgen.description.robot import INERTIAL, PRISMATIC, Robot, parameter
+from symgen.errors import require
 from symgen.regroup.finite_field import rref
 from symgen.regroup.floats import float_relations, numeric_coefficients
 from symgen.regroup.rules import Combination, Step, Transfer
@@ -181,13 +184,13 @@ class Regrouping:
         return len(self.base)
 
 
-def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
+def regroup(robot: str | Path | Robot, *, seed: int = 1) -> Regrouping:
     """Derive the base parameters of a robot with their formulas.
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
+    robot : str, Path or Robot
+        As for `symgen.model`.
     seed : int
         Seed of the random numbers over F_p; it never changes the result.
 
@@ -199,10 +202,17 @@ def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
         A general loop closes in too few states near its start, or the derivation needs more
         processor time than its limit.
     """
+    robot = robot_of(robot)
+    require(seed, int, "seed", "a whole number")
     with limited(f"the regrouping of {robot.name}"):
         regrouping = _regrouped(robot, seed)
     _warn(regrouping)
     return regrouping
+
+
+def regrouping_of(robot: str | Path | Robot | Regrouping) -> Regrouping:
+    """Return a regrouping as it is, or that of a robot; the robot as for `regroup`."""
+    return robot if isinstance(robot, Regrouping) else regroup(robot)
 
 
 def _warn(regrouping: Regrouping) -> None:

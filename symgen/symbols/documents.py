@@ -23,7 +23,7 @@ from symgen.description.expression import Expression
 from symgen.description.robot import Robot
 from symgen.emit.header import frame_table, informative_columns, wrap_text
 from symgen.emit.render import WIDTH
-from symgen.errors import SymgenError
+from symgen.errors import SymgenError, require_name
 from symgen.regroup.regrouping import Formula, Regrouping
 from symgen.symbols import expressions
 from symgen.symbols.expressions import Tree
@@ -94,9 +94,8 @@ def printed(model: SymbolicModel, form: str, language: str) -> str:
     Raises SymgenError if the form or the format is unknown, or if the model does not have this form
     or has too many terms in it.
     """
-    for what, given, known in (("form", form, FORMS), ("format", language, FORMATS)):
-        if given not in known:
-            raise SymgenError(f"unknown {what} {given!r}; expected one of {', '.join(known)}")
+    require_name(form, FORMS, "form")
+    require_name(language, FORMATS, "format")
     writers = (text, latex_document, latex_fragment, sympy_lines, json_text)
     return dict(zip(FORMATS, writers, strict=True))[language](model, form)
 

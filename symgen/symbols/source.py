@@ -26,7 +26,7 @@ from symgen.description.expression import ONE, Expression
 from symgen.description.grammar import parse
 from symgen.description.robot import Robot
 from symgen.description.values import at_values, exact, substituted
-from symgen.errors import SymgenError
+from symgen.errors import SymgenError, require_name
 from symgen.regroup.regrouping import Formula, Regrouping, regroup
 from symgen.symbols.expressions import in_decimals
 
@@ -130,7 +130,7 @@ def source_of(
     The parameters are explained in `symgen.symbolic`. `regrouping` is the regrouping of the robot,
     if it is already computed.
     """
-    _one_of("parameters", parameters, PARAMETERS)
+    require_name(parameters, PARAMETERS, "parameters")
     formulas: dict[str, Formula]
     if parameters == "base":
         regrouping = regrouping or regroup(robot)
@@ -154,7 +154,7 @@ def source_of(
     relations = close(robot)
     closure = relations
     if passive is not None:
-        _one_of("passive", passive, PASSIVE)
+        require_name(passive, PASSIVE, "passive")
         if passive == "functions" and relations.tied:
             tied = ", ".join(f"q{u}" for u in relations.tied)
             raise SymgenError(
@@ -165,11 +165,6 @@ def source_of(
         if passive == "symbols":
             closure = open_tree(robot)
     return Source(robot, closure, relations, own, formulas, given, parameters, decimals)
-
-
-def _one_of(what: str, given: str, known: Iterable[str]) -> None:
-    if given not in known:
-        raise SymgenError(f"{what}={given!r}; expected one of {', '.join(known)}")
 
 
 def _parsed(

@@ -10,9 +10,9 @@ from typing import Any
 
 from symgen.derive.models import SYMBOLIC
 from symgen.derive.names import Names
-from symgen.description.files import load_robot
+from symgen.description.files import robot_of
 from symgen.description.robot import Robot
-from symgen.errors import SymgenError
+from symgen.errors import SymgenError, require, require_name
 from symgen.symbols.documents import Formulas, printed
 from symgen.symbols.expressions import symbol
 from symgen.symbols.source import Source, source_of
@@ -64,9 +64,11 @@ def symbolic(
         If a value is given for an unknown symbol, or if "functions" is requested and passive joints
         have no linear relation.
     """
-    described = robot if isinstance(robot, Robot) else load_robot(robot)
+    require(values, (Mapping, type(None)), "values", "{symbol: number or text}")
+    require(limit, int, "limit", "a number of terms")
+    require(decimals, bool, "decimals", "True or False")
     return SymbolicRobot(
-        source_of(described, parameters, values, passive, decimals=decimals), limit
+        source_of(robot_of(robot), parameters, values, passive, decimals=decimals), limit
     )
 
 
@@ -93,8 +95,10 @@ class SymbolicRobot:
         SymgenError
             If the model or the frame does not exist.
         """
-        if name not in SYMBOLIC:
-            raise SymgenError(f"no model is called {name!r}; expected one of {', '.join(SYMBOLIC)}")
+        require_name(name, SYMBOLIC, "name")
+        require(of, (int, type(None)), "of", "the number of a frame")
+        require(frame, int, "frame", "the number of a frame")
+        require(rows, (list, tuple, range, type(None)), "rows", "a list of numbers")
         robot = self.source.robot
         if (of is not None or frame) and not SYMBOLIC[name].of_frames:
             raise SymgenError(

@@ -25,10 +25,10 @@ from runtime.core.model import load_model
 from runtime.documents.estimates import load_whole_estimate
 from runtime.physical.inertia import PhysicalModel, physical_model
 from symgen.certify.requests import model as emitted
-from symgen.description.files import content_of, on_base, read_robot, warn_not_read
+from symgen.description.files import content_of, on_base, robot_of, warn_not_read
 from symgen.description.robot import Robot, one_joint_parameters, parameter
 from symgen.description.tree import Array, TreePart
-from symgen.errors import DescriptionError
+from symgen.errors import DescriptionError, require
 from symgen.update.applied import Applied, Change
 from symgen.update.nearest import NONE, Nearest, nearest, strange
 from symgen.update.places import NUMBERS, FileLink, RobotText, read_text, require_same_frames
@@ -188,7 +188,7 @@ def apply(
     estimate: Estimate | str | Path | Any,
     model: str | Path,
     *,
-    robot: str | Path | None = None,
+    robot: str | Path | Robot | None = None,
     lock: Mapping[str, float] | None = None,
     chain: tuple[str, str] | None = None,
     exact: bool = False,
@@ -204,8 +204,8 @@ def apply(
         essential set is in use (`Identification.whole_estimate`).
     model : str or Path
         The file: .urdf, or .xml and .mjcf (MJCF).
-    robot : str or Path, optional
-        Robot file that was identified, if it is not `model` itself: a file converted from `model`,
+    robot : str, Path or Robot, optional
+        Robot that was identified, if it is not `model` itself: a file converted from `model`,
         perhaps with other elements or drives.
     lock, chain, exact
         As in `read_robot`, with the same values as when the robot was identified or converted.
@@ -217,14 +217,20 @@ def apply(
     DescriptionError
         The estimate is of another robot, no physical robot has it, or the file has no place for it.
     """
+    if not isinstance(model, str | Path):
+        raise DescriptionError(
+            f"model is a {type(model).__name__}; expected the path of a URDF or MJCF file, whose text "
+            "gets the values"
+        )
+    require(exact, bool, "exact", "True or False")
+    require(lock, (Mapping, type(None)), "lock", "{joint name: position}")
+    require(chain, (tuple, list, type(None)), "chain", "the names of a base link and a tip link")
     path = Path(model)
     content = content_of(path)
     part = TreePart(lock or {}, chain)
     text = read_text(content, path, exact, part)
-    described, of = (
-        (text.robot, text.file) if robot is None else (read_robot(robot)[0], Path(robot).name)
-    )
-    described = on_base(described, base)
+    described = on_base(text.robot if robot is None else robot_of(robot), base)
+    of = text.file if robot is None else described.file or described.name
     text = text.on(described.base)
     require_same_frames(text, described, of)
     warn_not_read(text.robot)

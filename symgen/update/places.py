@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from symgen.description.fields import located
-from symgen.description.files import TREES, on_base
+from symgen.description.files import TREES, loops_beside, on_base
 from symgen.description.mjcf import DEEPEST, ORIENTATION
 from symgen.description.robot import FIXED, Robot
 from symgen.description.tree import (
@@ -469,7 +469,7 @@ def read_text(content: bytes, path: Path, exact: bool, part: TreePart) -> RobotT
                 "apply writes URDF (.urdf) and MJCF (.xml, .mjcf) files; for a robot file use "
                 "`symgen convert --estimate`"
             )
-        whole = parse_tree(content, path.name, exact=exact)
+        whole = parse_tree(content, path.name, exact=exact, loops=loops_beside(path))
         attributes = URDF if suffix == ".urdf" else MJCF
         tree = part_of(whole, part)
         robot, table = robot_of_tree(tree, path.name, "")[0], placed(tree)

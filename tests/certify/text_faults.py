@@ -18,17 +18,20 @@ from dataclasses import dataclass
 from functools import cache
 
 from certify.printed import evaluated
+from octave import has_octave
 
 from symgen.certify.texts import text_check
 from symgen.certify.witness import Witness
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files
-from symgen.emit.targets import TARGETS
+from symgen.emit.targets import TARGETS, target_of
 from symgen.regroup.regrouping import regroup
 
 ROBOTS = ("tx40", "scara", "sr400", "four_bar", "haptic")
 NAME = r"[A-Za-z_]\w*"
-TERM = re.compile(r" [+-] [^+\-=()\[\],]+?(?= [+-] |;|\s*$|\s+[#/])")
+ENTRY = r"^(\w+\[[\w, ]+\]|AT\(\w+, \d+\)|\w+\(:, [\d, ]+\)|X\(\d+\))$"
+OCTAVE = has_octave()
+TERM = re.compile(r" [+-] [^+\-=()\[\],]+?(?= [+-] |;|\s*$|\s+[#/%])")
 
 
 SAME = (  # changed lines that change no value, and why
@@ -60,6 +63,9 @@ SAME = (  # changed lines that change no value, and why
         "haptic, torques: the term cancels, they are the same to 2e-16",
     ),
     (r"residual = -0;", "minus zero is zero"),
+    (r"twist = \[axis, zeros\(N, 4\)\];", "a column more than is read"),
+    (r"^haptic_\w+\.m +VS?P24 = ", "haptic: the term cancels, as in its other texts"),
+    (r"^haptic_bias\.m +ZZ2R = ", "haptic: ZZ2R cancels in the bias, to 2e-16"),
 )
 # Survivors that are no such thing: they change the way to a solution, not what is accepted as one.
 WAYS = (
@@ -113,6 +119,11 @@ WAYS = (
 )
 
 
+def robot_of(file: str) -> str:
+    """Name of the robot of a file; that of a MATLAB file ends with its function."""
+    return max((name for name in ROBOTS if file.startswith(name)), key=len)
+
+
 @dataclass(frozen=True)
 class Fault:
     """One changed line."""
@@ -131,8 +142,7 @@ def texts(name: str) -> tuple[Witness, dict[str, tuple[str, str]]]:
     """The witness of a robot, and {file: (target, text)}."""
     regrouping = regroup(load_robot(name))
     files = generate_files(regrouping.robot, targets=tuple(TARGETS), regrouping=regrouping)
-    target = {t.file.format(name): key for key, t in TARGETS.items()}
-    return Witness(regrouping), {file: (target[file], text) for file, text in files.items()}
+    return Witness(regrouping), {file: (target_of(file), text) for file, text in files.items()}
 
 
 def code_lines(text: str, c: bool) -> Iterator[tuple[str, int, str]]:
@@ -161,6 +171,22 @@ def code_lines(text: str, c: bool) -> Iterator[tuple[str, int, str]]:
         stripped = line.strip()
         idle = r'(#|"""|/\*|def |raise|class |import|from|\) ->|\):|extern)|.*(raise |expected|""")'
         if inside and not (quoted or ends) and stripped and not re.match(idle, stripped):
+            yield inside, number, line
+
+
+def lines_of(text: str, target: str) -> Iterator[tuple[str, int, str]]:
+    """(function or table, number, line) of lines that compute, in any language."""
+    if target != "matlab":
+        yield from code_lines(text, target == "c")
+        return
+    inside, refusing = "", False
+    for number, line in enumerate(text.splitlines()):
+        if found := re.match(rf"function .*?({NAME})(\(.*)?$", line):
+            inside = found[1]
+        # where an error is raised is that of arguments which no robot has
+        refusing = line.startswith("if ~") or (refusing and line != "end")
+        idle = r"(function |%|end$|model\.| {4}')|if (numel|nargin|~)"
+        if inside and line.strip() and not refusing and not re.match(idle, line):
             yield inside, number, line
 
 
@@ -202,11 +228,16 @@ def other_constant(line: str, rng: random.Random) -> str:
 
 def other_operator(line: str, rng: random.Random) -> str:
     """A product becomes a sum, a square a cube, cos sin."""
-    places = list(re.finditer(r"(?<=[\w)])\*\*2|(?<=[\w)])\*(?=[\w(])|\b(cos|sin)(?=\()", line))
+    places = list(
+        re.finditer(
+            r"(?<=[\w)])\.\^2|(?<=[\w)])\.\*(?=[\w(])|(?<=[\w)])\*\*2|(?<=[\w)])\*(?=[\w(])|\b(cos|sin)(?=\()",
+            line,
+        )
+    )
     if not places or "**{" in line or "(*" in line:
         return line
     m = rng.choice(places)
-    new = {"**2": "**3", "*": " + ", "cos": "sin", "sin": "cos"}[m[0]]
+    new = {"**2": "**3", "*": " + ", "cos": "sin", "sin": "cos", ".^2": ".^3", ".*": " + "}[m[0]]
     return line[: m.start()] + new + line[m.end() :]
 
 
@@ -228,7 +259,7 @@ def dropped_term(line: str, rng: random.Random) -> str:
 
 
 def dropped_row(line: str, rng: random.Random) -> str:
-    if re.match(r"\s+([A-Z]\w*\[[\d, ]+\]|AT\(\w+, \d+\)) = ", line):
+    if re.match(r"\s*([A-Z]\w*\[[\d, ]+\]|AT\(\w+, \d+\)|[A-Z]\w*\(:, [\d, ]+\)) = ", line):
         return re.match(r"\s*", line)[0] + (
             ";" if line.rstrip().endswith(";") or ";  " in line else "pass"
         )
@@ -254,19 +285,25 @@ KINDS: tuple[Callable[[str, random.Random], str], ...] = (
 
 
 def faults(count: int, seed: int) -> list[Fault]:
-    """Random faults, texts, functions and kinds alike."""
+    """Random faults, texts, functions and kinds alike; the files of MATLAB are one text."""
     rng, found = random.Random(seed), []
-    places = [(name, file) for name in ROBOTS for file in texts(name)[1] if not file.endswith(".h")]
+    places: list[tuple[str, list[str]]] = []
+    for name in ROBOTS:
+        files = [file for file in texts(name)[1] if not file.endswith(".h")]
+        places += [(name, [file]) for file in files if not file.endswith(".m")]
+        if OCTAVE and (of_matlab := [file for file in files if file.endswith(".m")]):
+            places.append((name, of_matlab))
     while len(found) < count:
-        name, file = places[len(found) % len(places)]
+        name, several = places[len(found) % len(places)]
+        file = rng.choice(several)
         target, text = texts(name)[1][file]
         by_function: dict[str, list[tuple[int, str]]] = {}
-        for function, number, line in code_lines(text, target == "c"):
+        for function, number, line in lines_of(text, target):
             by_function.setdefault(function, []).append((number, line))
         function = rng.choice(sorted(by_function))
         number, line = rng.choice(by_function[function])
         kind = rng.choice(KINDS)
-        code, _, comment = re.match(r"(.*?)(\s*(?:#|/\*).*)?$", line).group(1, 2, 2)
+        code, _, comment = re.match(r"(.*?)(\s*(?:#|/\*|% ).*)?$", line).group(1, 2, 2)
         new = kind(code, rng) + (comment or "")
         if new != line:
             found.append(Fault(file, target, function, kind.__name__, number, line, new))
@@ -275,12 +312,13 @@ def faults(count: int, seed: int) -> list[Fault]:
 
 def refused(fault: Fault) -> bool:
     """Whether the certificate refuses a text with the fault."""
-    name = fault.file.partition(".")[0]
-    witness, files = texts(name)
+    witness, files = texts(robot_of(fault.file))
     lines = files[fault.file][1].splitlines()
     assert lines[fault.line] == fault.old
     lines[fault.line] = fault.new
-    return not text_check(fault.file, "\n".join(lines) + "\n", fault.target, witness).valid
+    beside = {file: text for file, (target, text) in files.items() if target == "matlab"}
+    changed = "\n".join(lines) + "\n"
+    return not text_check(fault.file, changed, fault.target, witness, beside).valid
 
 
 def equivalent(fault: Fault) -> str:
@@ -289,13 +327,12 @@ def equivalent(fault: Fault) -> str:
         (parts(line, fault.target == "c") for line in (fault.old, fault.new)),
         fault.target,
     )
-    name = fault.file.partition(".")[0]
-    text = texts(name)[1][fault.file][1]
-    body = [line for f, _, line in code_lines(text, c == "c") if f == fault.function]
+    text = texts(robot_of(fault.file))[1][fault.file][1]
+    body = [line for f, _, line in lines_of(text, c) if f == fault.function]
     if old[0] == new[0] and re.fullmatch(NAME, old[0]):
         below = [
             parts(line, c == "c")
-            for f, number, line in code_lines(text, c == "c")
+            for f, number, line in lines_of(text, c)
             if f == fault.function and number > fault.line
         ]
         again = [k for k, (left, _) in enumerate(below) if left == old[0]]  # the next loop's own
@@ -317,8 +354,13 @@ def equivalent(fault: Fault) -> str:
             a, b = ([evaluated([("x", e)], v)["x"] for v in values] for e in (old[1], new[1]))
             if all(abs(x - y) < 1e-12 * abs(x) for x, y in zip(a, b, strict=True)):
                 return "the same expression in another order"
-        except (SyntaxError, ValueError, KeyError, ZeroDivisionError):
+        except (SyntaxError, ValueError, KeyError, ZeroDivisionError, TypeError):  # or a list
             pass
+    if fault.old.strip().startswith("constants = ["):  # the defaults of MATLAB
+        defaults = [re.findall(r"[\d.]+", line) for line in (fault.old, fault.new)]
+        changed = [k for k, (x, y) in enumerate(zip(*defaults, strict=True), 1) if x != y]
+        if not any(f"constants(:, {k})" in line for k in changed for line in body):
+            return "the default of a constant that this function does not read"
     return next(
         (reason for pattern, reason in SAME if re.search(pattern, f"{fault.file} {fault.new}")), ""
     )
@@ -326,11 +368,11 @@ def equivalent(fault: Fault) -> str:
 
 def parts(line: str, c: bool) -> tuple[str, str]:
     """What is assigned, and the expression."""
-    line = re.sub(r"(#|/\*).*", "", line).strip().rstrip(";")
+    line = re.sub(r"(#|/\*|% ).*", "", line).strip().rstrip(";")
     left, _, right = line.removeprefix("const real ").partition(" = ")
-    return re.sub(r"^(\w+\[[\w, ]+\]|AT\(\w+, \d+\))$", "entry", left), right.replace(
-        "np.", ""
-    ).replace("ca.", "")
+    return re.sub(ENTRY, "entry", left), right.replace("np.", "").replace("ca.", "").replace(
+        ".*", "*"
+    ).replace("./", "/").replace(".^", "**")
 
 
 def main() -> None:

@@ -59,3 +59,11 @@ def test_python_runs_the_command_where_the_shell_does_not_find_it():
         [sys.executable, "-m", "symgen", "--version"], capture_output=True, text=True, check=True
     )
     assert said.stdout.strip() == f"symgen {VERSION}"
+
+
+@pytest.mark.parametrize("option", [["-o", ""], ["--output", ""], ["--output="]])
+def test_an_empty_output_is_refused(option, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = run("generate", "planar_2r", *option)
+    assert result.exit_code == 2 and "-o is empty" in result.stderr
+    assert not list(tmp_path.iterdir())

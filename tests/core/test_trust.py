@@ -3,6 +3,8 @@ reader trusts it. What is loaded is then checked.
 """
 
 import pickle
+import sys
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +14,7 @@ from typer.testing import CliRunner
 
 import symgen
 from runtime import load_model
-from runtime.ground.errors import ModelError
+from runtime.ground.errors import InputError, ModelError
 from symgen.cli.main import app
 
 EMITTED = Path(__file__).parents[2] / "generated"
@@ -131,3 +133,20 @@ def test_workers_run_the_text_that_the_cache_held(generated):
         assert pickle.loads(pickle.dumps(model)).NAME == "planar_2r"  # noqa: S301
     finally:
         file.write_text(held, encoding="utf-8")
+
+
+def test_an_imported_module_travels_as_it_was_loaded_or_not_at_all(generated, monkeypatch):
+    """`from generated import planar_2r`: Python itself has read the file, which may change."""
+    monkeypatch.syspath_prepend(generated)
+    monkeypatch.delitem(sys.modules, "planar_2r", raising=False)
+    model = import_module("planar_2r")
+    monkeypatch.delitem(sys.modules, "planar_2r")
+    assert pickle.loads(pickle.dumps(model)).NAME == "planar_2r"  # noqa: S301
+    file = generated / "planar_2r.py"
+    text = file.read_text(encoding="utf-8")
+    file.write_text(text.replace("sha256 of all", "sha256 of"), encoding="utf-8")
+    with pytest.raises(InputError, match="has changed since it was imported"):
+        pickle.dumps(model)
+    file.unlink()
+    with pytest.raises(InputError, match="has changed since it was imported"):
+        pickle.dumps(model)

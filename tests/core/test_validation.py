@@ -144,3 +144,26 @@ def test_each_fifth_is_predicted_by_the_others():
         total, by_joint = prediction_errors(whole.where(number == p), others)
         assert (prediction.relative_error, prediction.per_joint) == (total, by_joint)
     assert result.errors() == {"all": max(p.relative_error for p in result.predictions)}
+
+
+@pytest.mark.parametrize("method", ["ols", "wls", "irls"])
+def test_fits_of_which_only_x_is_used_have_no_corrected_deviations(method, monkeypatch):
+    """They took most of the time of a long record, and nobody read them."""
+    seen = observation(noise=(0.3, 0.05), seed=1)
+    weights = {"wls": {"weights": "joint"}}.get(method, {})
+    settings = EstimateSettings(method=method, **weights)
+    whole = estimate_of(seen, settings)
+    assert np.isfinite(whole.sigma_corrected).all()
+
+    def refused(*_):
+        raise AssertionError("computed, and not used")
+
+    monkeypatch.setattr("runtime.core.least_squares.linear.corrected_deviations", refused)
+    monkeypatch.setattr("runtime.robust.corrected_deviations", refused)
+    alone = estimate_of(seen, settings, corrected=False)
+    assert np.isnan(alone.sigma_corrected).all()
+    assert np.array_equal(alone.X, whole.X) and np.array_equal(alone.sigma, whole.sigma)
+    assert alone.status == whole.status
+    found = cross_validation(PROBLEM, seen, {"again": seen}, {"all": settings})
+    errors = [prediction.relative_error for prediction in found.predictions]
+    np.testing.assert_allclose(errors, whole.relative_error, rtol=1e-9)

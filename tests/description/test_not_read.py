@@ -35,7 +35,7 @@ LOOPS = (
         "<loop_joint> 'l' (line 7)",
     ),
     (
-        '<gazebo><joint name="g" type="revolute"><parent>a</parent><child>b</child></joint></gazebo>',
+        '<gazebo><joint name="g" type="screw"><parent>a</parent><child>b</child></joint></gazebo>',
         "<joint> 'g' in <gazebo> (line 7)",
     ),
     (

@@ -24,6 +24,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import jsonschema
+import numpy as np
 import pytest
 from campaign import campaign, some
 from hang import HANG
@@ -32,6 +33,8 @@ from typer.main import get_command
 
 from runtime.study import study_from_text
 from symgen.cli.main import app
+from symgen.description.loops_file import LoopsText, with_loops
+from symgen.description.tree import Joint, Tree
 from symgen.description.yaml import json_schema
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -231,9 +234,21 @@ def test_yaml_blocks_are_what_the_program_reads() -> None:
 
 
 def read(text: str, name: str) -> None:
-    """A robot file, some sections of one, or a study."""
+    """A robot file, some sections of one, the loops of a URDF, or a study."""
     keys = set(YAML(typ="safe", pure=True).load(text))
-    if "frames" in keys or keys <= set(json_schema()["properties"]) - {"symgen"}:
+    if "actuated" in keys:
+        data = YAML(typ="safe", pure=True).load(text)
+        links = dict.fromkeys(["base", *(x for row in data["loops"] for x in row["links"])])
+        z = np.array([0.0, 0.0, 1.0])
+        names = iter(data["actuated"])
+        joints = tuple(
+            Joint(next(names, f"to {x}"), "revolute", "base", x, np.eye(4), z, 1)
+            for x in links
+            if x != "base"
+        )
+        tree = with_loops(Tree("arm", links, joints, "base"), LoopsText(name, text.encode()))
+        assert len(tree.loops) == len(data["loops"]) and tree.driven == {*data["actuated"]}
+    elif "frames" in keys or keys <= set(json_schema()["properties"]) - {"symgen"}:
         sections = json.loads(json.dumps(YAML(typ="safe", pure=True).load(text)))
         jsonschema.validate(
             {"symgen": 1, "name": "arm", "gravity": [0, 0, 0], "frames": {}} | sections,

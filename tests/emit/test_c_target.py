@@ -138,6 +138,14 @@ def test_agrees_as_users_compile_it(name: str, tmp_path: Path) -> None:
 
 
 @needs_compiler
+@pytest.mark.parametrize("level", ["-O1", "-O2", "-O3", "-Os"])
+@pytest.mark.parametrize("name", ["planar_2r", pytest.param("five_bar", marks=campaign)])
+def test_no_warnings_of_two_joints(name: str, level: str, tmp_path: Path) -> None:
+    """gcc -O1 warned of 4 steps of a loop that has at most one (-Waggressive-loop-optimizations)."""
+    compiled(tmp_path, files(name)[f"{name}.c"], COMPILERS[0], [*FLAGS, level, "-shared", "-fPIC"])
+
+
+@needs_compiler
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("name", [pytest.param("panda", marks=campaign), "sr400"])
 def test_portable_path(name: str, compiler: str, tmp_path: Path) -> None:

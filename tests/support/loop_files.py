@@ -204,7 +204,12 @@ KINDS = (
     "welded five-bar",
     "welded spatial crank",
     "welded hand",
+    "four-bar of two points",
+    "welded five-bar of two points",
+    "spatial loop of two points",
+    "welded spatial crank of three points",
 )
+ENDS = (" of two points", " of three points")
 
 
 def random_file(kind: str, seed: int) -> tuple[str, list[str]]:
@@ -214,7 +219,7 @@ def random_file(kind: str, seed: int) -> tuple[str, list[str]]:
     for k in range(200):
         text, driven = _drawn(kind, np.random.default_rng([91, KINDS.index(kind), seed, k]))
         oracle = ClosedMuJoCo(text, driven)
-        if oracle.regularity() > REGULAR:
+        if oracle.regularity() > REGULAR / (1 + 15 * kind.endswith(ENDS)):  # points are near
             return text, driven
     raise AssertionError(kind)
 
@@ -239,7 +244,8 @@ def _drawn(kind: str, rng: np.random.Generator) -> tuple[str, list[str]]:
     A, B, C, D = near(0, 0, 0), near(0.1, 0.02, 0.25), near(0.6, 0.05, 0.4), near(0.5, 0.03, 0)
     driven = ["crank"]
     rest: list[str] = []
-    planar = kind.removeprefix("welded ")
+    several = 1 + kind.endswith(ENDS[0]) + 2 * kind.endswith(ENDS[1])
+    planar = kind.removeprefix("welded ").removesuffix(ENDS[0]).removesuffix(ENDS[1])
     if planar in ("four-bar", "parallelogram", "four-bar on a turret"):
         if planar == "parallelogram":
             D, C = A + [0.5, 0.03, 0.1], B + [0.5, 0.03, 0.1]
@@ -276,6 +282,14 @@ def _drawn(kind: str, rng: np.random.Generator) -> tuple[str, list[str]]:
         crank = Body(rng, "crank", A, hinge("crank", a, A, False), held=[rod])
         rocker = Body(rng, "rocker", D, hinge("rocker", d, D))
         roots, ends, point = [crank, rocker], ("rod", "rocker"), C
+    elif planar == "spatial loop":  # of six hinges: 7 with that of the two points
+        hinges = [hinge(f"rod{k}", v, B + 0.1 * v) for k, v in enumerate(rotation(rng))]
+        rod = Body(rng, "rod", B, *hinges)
+        crank = Body(rng, "crank", A, hinge("crank", rotation(rng)[0], A, False), held=[rod])
+        rocker = Body(
+            rng, "rocker", D, *(hinge(f"rocker{k}", v, D) for k, v in enumerate(rotation(rng)[:2]))
+        )
+        roots, ends, point = [crank, rocker], ("rod", "rocker"), C
     elif planar == "ankle":
         foot = Body(
             rng, "foot", [0, 0, 0], hinge("pitch", y, [0, 0, 0]), hinge("roll", x, [0, 0, 0])
@@ -309,10 +323,13 @@ def _drawn(kind: str, rng: np.random.Generator) -> tuple[str, list[str]]:
     text = "".join(root.text(world=W) for root in roots)
     equality = ""
     ties = ties if kind == "ankle" else [(*ends, point)]
+    if several > 1:
+        beside = rotation(rng) if "spatial" in kind else [x, z] if "welded" in kind else [y]
+        ties += [(*rng.permutation(ends), point + 0.07 * beside[k]) for k in range(several - 1)]
     for k, (one, other, at) in enumerate(ties):
         first, second = bodies[one], bodies[other]
         anchor = words((W @ first.R).T @ (W @ (np.asarray(at) - first.point)))
-        if not kind.startswith("welded"):
+        if not kind.startswith("welded") or several > 1:
             if rng.random() < 0.4:
                 for body in (first, second):
                     local = words((W @ body.R).T @ (W @ (np.asarray(at) - body.point)))

@@ -380,7 +380,9 @@ def _estimated(task: Task, observation: Observation) -> Array:
         return method.system(observation, task.estimate).solve().X
     try:
         settings = point_estimate(task.estimate, task.methods)
-        estimate = estimate_of(observation, settings, task.methods, model=task.model)
+        estimate = estimate_of(
+            observation, settings, task.methods, model=task.model, corrected=False
+        )
         if estimate.status in USABLE:
             return estimate.X
     except InputError:

@@ -172,17 +172,20 @@ def assemble(
     *,
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
+    corrected: bool = True,
 ) -> Estimate:
     """Make the Estimate of a solved system: parameters, statistics, and the fit of every joint.
 
     model : gives units, names of the joints and the hash of the robot file.
+    corrected : whether to compute `sigma_corrected`, most of the time of a long record; else nan.
     """
     observation, names = system.observation, system.names
     sigma_rho, C = standard_deviations(system, fit)
-    corrected = np.full(len(names), np.nan)  # as without redundancy
-    if system.raw.rows > len(names):
-        corrected = corrected_deviations(system.block_rows(), system.band_rows(fit.X), fit.X, fit.T)
-    corrected[_undetermined(system, fit)] = np.nan
+    deviations = np.full(len(names), np.nan)  # as without redundancy
+    if corrected and system.raw.rows > len(names):
+        blocks, bands = system.block_rows(), system.band_rows(fit.X)
+        deviations = corrected_deviations(blocks, bands, fit.X, fit.T)
+    deviations[_undetermined(system, fit)] = np.nan
     norms, measured = system.norms(fit.X)
     share = 1 - fit.rank / system.raw.rows
     per_joint = tuple(
@@ -209,7 +212,7 @@ def assemble(
         X=fit.X,
         sigma=np.sqrt(np.diag(C)),
         covariance=C,
-        sigma_corrected=corrected,
+        sigma_corrected=deviations,
         sigma_rho=sigma_rho,
         cond=condition(system.weighted, fit.rank),
         cond_unit=fit.cond_unit,

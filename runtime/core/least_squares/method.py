@@ -66,9 +66,9 @@ class Fitted:
         Solution with the X of the method.
     covariance : ndarray, shape (b, b), or None
         Covariance of X; default: eq. (10) of `system`.
-    corrected : ndarray, shape (b,), or None
-        Standard deviations without the assumption of independent residuals; default: those of
-        `system`.
+    corrected : callable or None
+        Function that computes the standard deviations, shape (b,), without the assumption of
+        independent residuals; default: those of `system`. Trials do not call it.
     status, message : str
         Outcome, if the rows are good.
     details : mapping
@@ -77,7 +77,7 @@ class Fitted:
     system: System
     solution: Solution
     covariance: Array | None = None
-    corrected: Array | None = None
+    corrected: Callable[[], Array] | None = None
     status: Status = "ok"
     message: str = ""
     details: Mapping[str, Any] = field(default_factory=dict)

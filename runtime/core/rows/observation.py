@@ -328,8 +328,12 @@ class Observation:
             return
         row_weights = np.repeat(weights, self.rows)
         for rows in rows_by_block(groups):
-            A = np.column_stack([self.W[rows][:, kept], self.Y[rows]])
-            yield A * row_weights[rows, None]
+            A = np.empty((len(kept) + 1, len(rows)))  # column by column
+            for k, column in enumerate(kept):
+                np.take(self.W[:, column], rows, out=A[k], mode="clip")
+            A[-1] = self.Y[rows]
+            A *= row_weights[rows]
+            yield A.T
 
     def block_rows(
         self, names: Sequence[str], weights: Array, length: float, covariance: Array | None = None

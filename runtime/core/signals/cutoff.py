@@ -140,9 +140,14 @@ def noise_share(q: Array, rate: float, low: Lowpass, median: int = 1) -> Array:
     q : shape (N, n), rad or m. rate : Hz. low : low-pass with its cut-off as a number.
     """
     f, motion, noise = spectra(q, rate, median)
-    power = _gain(f, rate, low, np.array([low.hertz]))[0] ** 2
+    power = lowpass_gain(f, rate, low) ** 2
     whole = power @ (motion + noise)
     return np.asarray(power @ noise / np.where(whole > 0, whole, 1.0))
+
+
+def lowpass_gain(f: Array, rate: float, low: Lowpass) -> Array:
+    """Compute the gain of the low-pass filter on accelerations at the frequencies f, shape (m,)."""
+    return np.asarray(_gain(f, rate, low, np.array([low.hertz]))[0])
 
 
 def _gain(f: Array, rate: float, low: Lowpass, cutoffs: Array) -> Array:
