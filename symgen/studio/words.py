@@ -20,16 +20,18 @@ PLACES = {
     "(--method feasible)": "(feasible on Solve)",
     " with --lock": " fixed",
     "symgen identify then builds": "Solve then builds",
-    "--base moving (symgen.model(ROBOT, base='moving'))": "--base moving in a terminal",
+    " (symgen.model(ROBOT, base='moving'))": "",
     "; exact=True or --exact keeps them": "; --exact in a terminal keeps them",
 }
 """What messages say, and what a page says instead."""
 ELSEWHERE = re.compile(r"(?<!terminal: )symgen (?=excite|convert|show)")
 """Commands that no page has."""
+BASE = re.compile(r"--base (\w+)")
 
 
 def on_page(text: str) -> str:
     """Return a message as a page says it; other texts stay as they are."""
     for words, place in PLACES.items():
         text = text.replace(words, place)
+    text = BASE.sub(r"base: \1 in the robot file", text)
     return ELSEWHERE.sub("in a terminal: symgen ", text)
