@@ -173,8 +173,23 @@ def _close(table: Table, cut: Cut) -> None:
     positions = start_of(table.tree, cut)
     if free and cut.joint in positions:
         positions[cut.joint] -= theta
+    if table.tree.floats and not _below(table, j) & _below(table, twin):
+        raise DescriptionError(
+            f"loop {cut.loop.name!a:.60} closes on the free base, which is read only for loops inside "
+            "one of its limbs; hold the base: symgen convert --lock, with the name of its joint and =0",
+            line=cut.loop.line or None,
+        )
     start = {number[name]: round(x, START_DIGITS) + 0.0 for name, x in positions.items()}
     table.loops.append(Loop(j, twin, start))
+
+
+def _below(table: Table, j: int) -> set[int]:
+    """Return the numbers of the frames from frame j down to the base, which is not included."""
+    frames = set()
+    while j:
+        frames.add(j)
+        j = table.frames[j - 1].ant
+    return frames
 
 
 def _keep(table: Table, ant: int, pose: Array, *, free: bool = False) -> tuple[int, float]:

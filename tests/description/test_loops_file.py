@@ -62,3 +62,13 @@ def test_the_hash_is_that_of_both_files(tmp_path):
         assert len(robot.loops) == 1 and "loops of bars.loops.yaml" in notes
         seen.add(robot.sha256)
     assert len(seen) == 2
+
+
+def test_a_loop_on_a_free_base_is_refused_with_what_to_do(tmp_path):
+    free = '<link name="world"/><joint name="root" type="floating"><parent link="world"/><child link="base"/></joint>'
+    file = tmp_path / "bars.urdf"
+    file.write_text(URDF.replace('<link name="base"/>', f'<link name="base">{BODY}</link>{free}'))
+    (tmp_path / "bars.loops.yaml").write_text(f"loops: [{LOOP}]\nactuated: [j1]\n")
+    with pytest.raises(DescriptionError, match=r"closes on the free base.*convert --lock"):
+        load_robot(file)
+    assert len(read_robot(file, lock={"root": 0.0})[0].loops) == 1
