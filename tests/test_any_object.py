@@ -137,7 +137,7 @@ def _table(folder: Path) -> dict[str, Row]:
                 "name": set(), "of": {"None", "whole"}, "frame": {"whole"}, "rows": NOTHING,
             },
         ),
-        "variants": (symgen.variants, robot, named),
+        "variants": (symgen.variants, robot, {**named, "base": NOTHING}),
         "apply": (
             symgen.apply,
             {"estimate": "none", "model": "none.urdf"},
