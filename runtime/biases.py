@@ -6,7 +6,7 @@ torques are linear in X and depend on b through the motion of the base. By Gauss
     Y = W(b) X + S db + rho,    S = d(W X)/db,    b <- b + db ,
 
 with each joint weighed by its residual. W is of second degree in b_w and of first in b_f, so that
-central differences of W are exact. One set of biases holds for all records. A prior of deviation
+central differences of W X are exact. One set of biases holds for all records. A prior of deviation
 PRIOR about the start, wider than the bias of any sensor, keeps a bias that the records do not show.
 
 The deviations of b are those of the linear problem [W S], with blocks of time as independent. Those
@@ -17,16 +17,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from runtime.core.least_squares.block_covariance import block_covariance
+from runtime.core.model import GeneratedModel
 from runtime.core.problem import Note, Problem
 from runtime.core.record import BASE_BIASES, Record
 from runtime.core.result import Identification
-from runtime.core.rows.observation import Observation, split_rows
-from runtime.core.rows.prepared import stacked
+from runtime.core.rows.observation import Observation, split_rows, stack
+from runtime.core.rows.prepared import observation_of, stacked
+from runtime.core.rows.regressor import Columns
 from runtime.ground.errors import SettingsError
 from runtime.ground.part import Part
 from runtime.ground.progress import at
@@ -41,7 +43,7 @@ UNITS = ("rad/s",) * 3 + ("m/s**2",) * 3
 PRIOR = np.array([0.2] * 3 + [2.0] * 3)  # deviations, rad/s and m/s**2
 LOOSE = 0.3  # of PRIOR: a larger deviation says that the records do not show the bias
 PASSES = 8  # of Gauss-Newton
-DONE = 0.01  # of the deviation of a bias: a smaller change ends the passes
+DONE = 0.1  # of the deviation of a bias: a smaller change ends the passes
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,8 +162,8 @@ class _Pass:
         X = np.linalg.lstsq(W, Y, rcond=1e-10)[0]
         S = np.empty((len(Y), 6))
         for k, h in enumerate(PRIOR):
-            ahead, behind = (_rows(problem, b + s * h * np.eye(6)[k]).W for s in (1, -1))
-            S[:, k] = (ahead - behind) @ X / (2 * h) / scale
+            ahead, behind = (_torques(problem, b + s * h * np.eye(6)[k], X) for s in (1, -1))
+            S[:, k] = (ahead - behind) / (2 * h) / scale
         prior = np.hstack([np.zeros((6, W.shape[1])), np.diag(1 / PRIOR)])
         whole = np.hstack([W, S])
         T = _inverse_root(np.vstack([whole, prior]))
@@ -186,6 +188,43 @@ def _rows(problem: Problem, b: Array) -> Observation:
     columns = problem.settings.estimate.columns
     moved = _with_biases(problem, b)
     return stacked(moved.model, moved.prepared, None if columns == "all" else tuple(columns))
+
+
+class _OneColumn:
+    """A model whose only column of W is the torque of the parameters X of another model."""
+
+    BASE_PARAMETERS = ("torque",)
+
+    def __init__(self, model: GeneratedModel, X: Array) -> None:
+        self._model, self._X, n = model, X, len(model.JOINTS)
+        self.STRUCTURE = np.ones((1, n), dtype=bool)
+
+    def __getattr__(self, name: str) -> Any:
+        if not name.isupper():
+            raise AttributeError(name)
+        return getattr(self._model, name)
+
+    def store(self, N: int) -> Array:
+        return np.zeros((1, len(self.STRUCTURE[0]), N))
+
+    def regressor(self, q: Array, qd: Array, qdd: Array, out: Any = None, **further: Any) -> Array:
+        return np.asarray(self._model.inverse_dynamics(q, qd, qdd, self._X, **further))[..., None]
+
+
+def _torques(problem: Problem, b: Array, X: Array) -> Array:
+    """Compute W(b) X of the fitted records, X of the columns that the study fits, shape (r,)."""
+    moved, columns = _with_biases(problem, b), problem.settings.estimate.columns
+    names = list(moved.model.BASE_PARAMETERS)
+    whole = np.zeros(len(names))
+    whole[[names.index(name) for name in (names if columns == "all" else columns)]] = X
+    model = cast(GeneratedModel, _OneColumn(moved.model, whole))
+    parts = [
+        observation_of(
+            Columns(model), replace(own.states, errors=None), own.torque, own.certain(moved.model)
+        )
+        for own in moved.prepared
+    ]
+    return stack(parts).W[:, 0]
 
 
 def _with_biases(problem: Problem, b: Array) -> Problem:

@@ -104,11 +104,11 @@ STEPS: list[Step] = [
     recorded_speeds,
     automatic_cutoff,
     poses_at_rest,
+    When(Late("runtime.laws.transmitted:transmitted_torque"), lambda p: bool(channels_of(p.model))),
     When(
         Late("runtime.biases:fitted_biases"),
         lambda p: any(BASE_BIASES in r.channels for r in p.records),
     ),
-    When(Late("runtime.laws.transmitted:transmitted_torque"), lambda p: bool(channels_of(p.model))),
     When(Late("runtime.laws.scalars:fitted_scalars"), lambda p: hasattr(p.model, "FIT")),
     When(
         Late("runtime.controller.fitted:law_of_controller"),
