@@ -94,6 +94,21 @@ class Biases(Part):
         ]
         return f"Biases of the sensor on the base (± 95 %): {', '.join(said)}"
 
+    def warnings(self) -> tuple[str, ...]:
+        """Say that biases are larger than those of a sensor, which another mounting would explain."""
+        large = [
+            f"{axis} {b:.3g} {unit}"
+            for axis, b, most, unit in zip(AXES, self.values, PRIOR, UNITS, strict=True)
+            if abs(b) > most
+        ]
+        if not large:
+            return ()
+        return (
+            f"Fitted biases are larger than those of any sensor ({', '.join(large)}): check mounting, "
+            "units and sign in record.base; without biases: fit, the result names another mounting "
+            "that explains the record.",
+        )
+
     def summary(self) -> dict[str, Any]:
         """Return the biases as a mapping for JSON."""
         return {

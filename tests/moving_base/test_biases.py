@@ -89,6 +89,20 @@ def test_a_bias_that_no_torque_shows_stays():
     assert "accelerometer z not determined" in told.brief()
 
 
+def test_a_bias_that_no_sensor_has_tells_of_the_mounting(case):  # noqa: F811
+    """The sensor is turned by 90 degrees about x, so that gravity looks like two biases."""
+    _, module, _, _ = case
+    right, wrong = record_of(case, 1), record_of(case, 1)
+    imu = wrong.channels["base_imu"][:, [0, 2, 1, 3, 5, 4, 6, 7, 8]] * [1, 1, -1, 1, 1, -1, 1, 1, 1]
+    wrong = runtime.Record(
+        wrong.t, wrong.q, wrong.tau, channels={**wrong.channels, "base_imu": imu}
+    )
+    assert problem(module, right).noted("biases").result.warnings() == ()
+    (told,) = problem(module, wrong).noted("biases").result.warnings()
+    assert "accelerometer y 9." in told
+    assert "check mounting, units and sign in record.base" in told
+
+
 def test_a_study_asks_for_biases(case, tmp_path: Path):  # noqa: F811
     _, module, _, (t, q, tau, base) = case
     head = ["t", *(f"q{j}" for j in range(1, 7)), *(f"tau{j}" for j in range(1, 7))]
