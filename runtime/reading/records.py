@@ -23,6 +23,7 @@ from runtime.core.missing import COUNTS, Missing, bridged
 from runtime.core.model import GeneratedModel, drives_of, joint_labels
 from runtime.core.quaternions import continued
 from runtime.core.record import (
+    BASE_BIASES,
     BASE_IMU,
     BASE_QUATERNION,
     JOINT_CHANNELS,
@@ -158,6 +159,8 @@ def _pieces(
         channels = (*JOINT_CHANNELS, *further, *settings.base.columns, "law_v")
         if columns.flies:
             piece[f"{WRENCH}0"], channels = np.zeros((len(stretch.t), 6)), (*channels, f"{WRENCH}0")
+        if settings.base.biases:
+            piece[BASE_BIASES], channels = np.zeros((len(stretch.t), 6)), (*channels, BASE_BIASES)
         record = Record(
             stretch.t,
             piece["q"],

@@ -201,6 +201,9 @@ class BaseColumns(Settings):
         m/s**2 or g (9.80665 m/s**2).
     specific_force : bool
         Whether the accelerometer reads + g along the upward axis at rest; false: - g.
+    biases : str or None
+        fit: constant biases of gyroscope and accelerometer are fitted together with the parameters,
+        one set for all records. Default: the sensor has none.
     delay : float, s
         Time by which the signals of the base were recorded later than the positions of the joints.
     """
@@ -215,6 +218,7 @@ class BaseColumns(Settings):
     gyroscope_unit: Literal["rad/s", "deg/s"] = "rad/s"
     accelerometer_unit: Literal["m/s**2", "g"] = "m/s**2"
     specific_force: Flag = True
+    biases: Literal["fit"] | None = None
     delay: Real = 0.0
 
     def __post_init__(self) -> None:
@@ -228,6 +232,11 @@ class BaseColumns(Settings):
             bool(self.gyroscope) == bool(self.accelerometer),
             "gyroscope and accelerometer belong together; give both",
             "gyroscope",
+        )
+        require(
+            self.biases is None or bool(self.gyroscope),
+            "only gyroscope and accelerometer have biases; give their columns, or remove biases",
+            "biases",
         )
         require(
             bool(self.position) == bool(self.quaternion),
