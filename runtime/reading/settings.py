@@ -103,12 +103,13 @@ class Columns(Settings):
     channels : mapping of str to str
         Column of each channel.NAME in the laws of the robot file, without conversion, in the file of
         the positions: {temperature: T_motor}.
-    wrench : mapping of int to six str
+    wrench : mapping of int or str to six str
         Three forces and three moments of a sensor in the axes of a frame, about its origin, by the
         number of the frame, in the file of the positions, N and N m: {0: [fx, fy, fz, mx, my, mz]}
         below the robot, {7: [...]} ahead of link 7. In addition to tau, or in place of tau. Of a
         robot whose base moves or is free: the force and the moment by which the world acts on the
-        link of the frame; none: nothing acts, it flies.
+        link of the frame, which may be the name of a link or site of the robot file, {foot: [...]},
+        in its axes about its origin; none: nothing acts, it flies.
     """
 
     t: Text | None = None
@@ -121,7 +122,7 @@ class Columns(Settings):
     tau_ff: Names = ()
     tau_known: Names = ()
     channels: Mapping[Text, Text] = field(default_factory=dict)
-    wrench: Literal["none"] | Mapping[Annotated[int, Field(ge=0)], Names] = field(
+    wrench: Literal["none"] | Mapping[Annotated[int, Field(ge=0)] | Text, Names] = field(
         default_factory=dict
     )
 
