@@ -58,8 +58,8 @@ def frames_text(robot: Any) -> str:
     values = f", but `values` of {robot.file or robot.name} in those of its classic table"
     return (
         "parameters are in Khalil's frames, frame j at joint j"
-        f"{values if robot.values else ', not in those of the classic table'}: "
-        "one name, such as MX2, has another number there"
+        f"{values if robot.values else ', not in those of the classic table'}: one name, such as MX2, "
+        "has another number in each. Numbers under `values` are converted"
     )
 
 

@@ -172,10 +172,9 @@ class Applied:
             sigma = self.placeless_sigma[name]
             value, deviation = interval(x, sigma)
             lines.append(
-                f"{name} = {value}{f' ± {deviation}' if isfinite(sigma) else ''} "
-                f"{self.units.get(name, '')}".rstrip()
+                f"{name} = {value} {self.units.get(name, '')}".rstrip()
                 + (f" ({self.joints[name]})" if name in self.joints else "")
-                + ("" if isfinite(sigma) else ", determined only in sums")
+                + (f", sigma {deviation}" if isfinite(sigma) else ", determined only in sums")
             )
         return lines
 

@@ -379,14 +379,12 @@ def _determined_names(
 def _root(result: Estimate, names: Sequence[str]) -> Array:
     """Compute a matrix square root (b, b) of the covariance of the determined base parameters.
 
-    Corrected standard deviations are used if they are larger. The result is zero if the covariance
-    is unknown.
+    Its standard deviations are the corrected ones where there are any. The result is zero if the
+    covariance is unknown.
     """
     at = [result.names.index(name) for name in names]
     C = np.nan_to_num(result.covariance[np.ix_(at, at)])
     with np.errstate(divide="ignore", invalid="ignore"):
-        factor = np.nan_to_num(
-            np.fmax(result.sigma_corrected[at] / result.sigma[at], 1.0), nan=1.0, posinf=1.0
-        )
+        factor = np.nan_to_num(result.sigma_corrected[at] / result.sigma[at], nan=1.0, posinf=1.0)
     values, V = np.linalg.eigh(C * np.outer(factor, factor))
     return np.asarray(V * np.sqrt(np.maximum(values, 0.0)))

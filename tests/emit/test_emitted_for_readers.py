@@ -58,7 +58,9 @@ def test_the_head_says_what_was_not_read_and_whose_values_differ(target: str) ->
     plain, told = [" ".join(text.split()) for text in texts[:: len(texts) // 2][:2]]
     assert "Not read" not in plain and "classic table" not in plain
     assert "Not read forces of a fluid" in told
-    assert "Values parameters are in Khalil's frames" in told and "has another number there" in told
+    assert (
+        "Values parameters are in Khalil's frames" in told and "has another number in each" in told
+    )
 
 
 def test_signs_are_called_signs() -> None:

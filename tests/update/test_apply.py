@@ -133,9 +133,9 @@ def test_what_is_added_is_told(tmp_path) -> None:
         "Ia2",
         "OFFSET1",
         "OFFSET2",
-    } == applied.placeless.keys() - {"Ia1"} and "Ia2 = 0.2000 ± 0.0010 kg*m**2 (elbow)\n" in str(
-        applied
-    )
+    } == applied.placeless.keys() - {
+        "Ia1"
+    } and "Ia2 = 0.2000 kg*m**2 (elbow), sigma 0.0010\n" in str(applied)
     row = next(c for c in applied.changes if c.place == "joint 'elbow'" and c.number == "damping")
     assert (
         (row.before, row.told_by) == (0.0, "record")

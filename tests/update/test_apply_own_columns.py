@@ -80,7 +80,7 @@ def test_each_value_goes_to_its_place_or_is_named(arm) -> None:
     )
     rotors = {"Ia1": 0.0, "Ia2": 0.0} if path.suffix == ".urdf" else {}
     assert applied.placeless == pytest.approx({"STR1": 1.0, "STR2": 0.7} | rotors)
-    assert not applied.strange and "STR1 = 1.0000 ± 0.0010" in str(applied)
+    assert not applied.strange and "STR1 = 1.0000, sigma 0.0010" in str(applied)
     again = tmp_model(applied, path)
     states = motion(2, 5, 2.0)[1:]
     D = model.regressor(*states)
