@@ -101,15 +101,15 @@ def expected_off(likely: Expected) -> Answer | None:
     if np.isnan(likely.error):
         return None
     limit = LIMIT.EXPECTED_ERROR
+    interval = f"{100 * (EXPECTED_INTERVAL[1] - EXPECTED_INTERVAL[0]):g}"
     return Answer(
         "good" if likely.high <= limit else "no" if likely.low > limit else "doubtful",
-        f"The expected error is {likely.error:.2g} % of the torques"
+        f"On {likely.motions}, expect an error of {likely.error:.2g} % of the torques"
         + (
-            f", {likely.low:.2g} to {likely.high:.2g} % likely if the model is right,"
+            f" ({interval} % interval {likely.low:.2g} to {likely.high:.2g} %, if the model is right)"
             if likely.low < likely.high
             else ""
-        )
-        + f" in {likely.motions}",
+        ),
     )
 
 
@@ -225,9 +225,9 @@ def expected_error(
     part = np.array([1.0, *STEPS_MOVE]) * inertial * steps / (1 + steps)
     errors = 100 * np.sqrt(open_part * times + part**2 + lacks**2)
     motions = (
-        "motions over limits.q of the robot file at up to half of limits.qd"
+        "other motions (over limits.q of the robot file, up to half of limits.qd)"
         if limits_of(model)
-        else "motions over the range of this record at its speeds (the robot file has no "
+        else "other motions (of the range and speeds of this record, since the robot file has no "
         f"{missing_limits(model)})"
     )
     error, low, high = np.minimum(errors, LIMIT.LARGEST_EXPECTED).tolist()

@@ -35,7 +35,7 @@ from runtime.loop.settings import CestacSettings, Controller
 from runtime.mending.settings import Corrections
 from runtime.payload.settings import PayloadSettings
 from runtime.reading.datasets import DATASETS, dataset_study
-from runtime.reading.formats import endings, is_measured, read_table
+from runtime.reading.formats import file_extensions, is_measured, read_table
 from runtime.reading.likely_columns import (
     QUANTITIES,
     candidates,
@@ -181,7 +181,7 @@ def study_of(record: str | Path) -> tuple[Study, Path]:
         return Study(record=(RecordSettings(files=(path.name,)),)), path.parent
     raise InputError(
         f"there is no record {str(record)!r}; expected a dataset ({', '.join(DATASETS)}), a study "
-        f"file (.yaml) or a measured file ({', '.join(endings())}, the folder of a ROS 2 bag)"
+        f"file (.yaml) or a measured file ({', '.join(file_extensions())}, the folder of a ROS 2 bag)"
     )
 
 

@@ -90,7 +90,7 @@ class Ranking:
             "treatment",
             "parameters",
             "fit %",
-            "unseen, rows of all treatments %",
+            "unseen, mean %",
             *(f"unseen, {name} %" for name in ORDER),
             "use",
         )
@@ -112,7 +112,8 @@ class Ranking:
             "Treatments of the records, the best first",
             header,
             rows,
-            note="Unseen by set of parameters: on the treatment's own rows.",
+            note="Unseen, mean: error on the validation record, geometric mean over the rows of each treatment. "
+            "Unseen by set of parameters: on the treatment's own rows.",
         )
 
     def summary(self) -> dict[str, Any]:

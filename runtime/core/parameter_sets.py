@@ -196,10 +196,8 @@ def best_set(errors: Mapping[Any, float], essential: bool = False) -> SetName:
 def whole_set(names: Collection[SetName], model_columns: SetName) -> SetName:
     """Return the name of the set of parameters to use where every base parameter needs a value.
 
-    A robot file, for instance, needs all of them.
-
-    This is `model_columns`, the set that is used. If that is the essential set, it is the physical
-    set if `names` has it, else "all".
+    A robot file, for instance, needs all of them. The set is the one in use, `model_columns`; if
+    that is the essential set, the physical one, or "all" if `names` has no physical set.
     """
     if model_columns != "essential":
         return model_columns

@@ -395,7 +395,7 @@ class Identification:
         notes = [*self.observation.findings, *self.own_warnings, *self.missing]
         if len(notes) > LIMIT.NOTES_PRINTED:
             more = len(notes) - LIMIT.NOTES_PRINTED + 1
-            notes = [*notes[:-more], f"{more} more by --verbose"]
+            notes = [*notes[:-more], f"{more} more notes: --verbose"]
         head = "\n".join([*first, self.checklist.to_text()])
         rest = [
             "\n".join(f"note: {note}" for note in notes),
@@ -432,17 +432,24 @@ class Identification:
             for one in fit.per_joint
             if one.rows
         )
-        head = (
-            f"{len(names)} of {len(self.estimate.names)} parameters ({self.model_columns}) by "
-            f"{fit.method}, +- 95 %{self.of_intervals}"
-        )
-        head += f"; {more} more by --verbose" if more else ""
-        head += f"; {unknown} smaller than their intervals by --verbose" if unknown else ""
+        head = f"{self.fitted}; value +- half of the 95 % interval{self.of_intervals}."
+        head += f" {more} more: --verbose." if more else ""
+        head += f" {unknown} smaller than their intervals: --verbose." if unknown else ""
         return "\n".join([head, *lines[:room], f"Unexplained by joint: {by_joint}"])
 
     @property
+    def fitted(self) -> str:
+        """Which of the base parameters the final model has, and how they were fitted."""
+        names, of = self.model_estimate.names, len(self.estimate.names)
+        count = f"All {of}" if len(names) == of else f"{len(names)} of {of}"
+        chosen = ", the essential ones" if self.model_columns == "essential" else ""
+        method = self.model_estimate.method
+        how = "under physical constraints" if method == "feasible" else f"by {method}"
+        return f"{count} base parameters{chosen}, fitted {how}"
+
+    @property
     def of_intervals(self) -> str:
-        """Words after "95 %": the condition of the intervals of an essential set, or their measure."""
+        """Words after "95 % interval": the condition of the intervals of an essential set, or their measure."""
         known = self.problem.method.intervals
         if self.model_columns == "essential":
             return " if the others are zero"

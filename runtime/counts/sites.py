@@ -120,7 +120,8 @@ def smoothed(
 
     uneven : standard deviation of the encoder lines from even spacing, in steps, used as a lower
         limit; None: estimated.
-    start : results for the same motion at another phase; default: everything is searched.
+    start : result for the same motion at another phase, from which the search starts; default: a
+        global search.
 
     Raises InputError if no motion agrees with the counts.
     """
@@ -302,7 +303,7 @@ class Counts:
         """Find single changes of the count that are too large for a smooth motion of the encoder.
 
         Returns the sample and the number of counts of each. The change differs from a parabola
-        through its neighbours by more than LEAP times as much as these do.
+        through its neighbours by more than LEAP times as much as the neighbours do.
         """
         y, known = self.y, self.measured
         change = np.diff(y[known])

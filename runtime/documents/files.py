@@ -93,7 +93,7 @@ def settings_from_text(kind: type[T], text: str, *, file: str) -> T:
 
 
 @contextmanager
-def lines_of(path: str | Path) -> Iterator[None]:
+def locating_errors(path: str | Path) -> Iterator[None]:
     """Add file name and line to a SettingsError that is raised in the block, and raise it again.
 
     path : the study file whose setting is wrong.

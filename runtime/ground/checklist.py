@@ -58,7 +58,7 @@ class Checklist(Result):
         if self.worst is not None:
             return f"{self.worst.question} {self.worst.finding}."
         unanswered = [check.question for check in self.checks if check.state == "open"]
-        return f"none. Not judged: {' '.join(unanswered)}" if unanswered else "none."
+        return f"none. Open questions: {' '.join(unanswered)}" if unanswered else "none."
 
     @property
     def next(self) -> str:
@@ -67,7 +67,7 @@ class Checklist(Result):
             return f"{self.worst.remedy}."
         asked = [c.remedy for c in self.checks if c.state == "open" and c.remedy][:1]
         use = "use these parameters together, with their intervals"
-        return "; for what was not judged, ".join([use, *asked]) + "."
+        return "; for the open questions, ".join([use, *asked]) + "."
 
     def _repr_html_(self) -> str:
         rows = [

@@ -129,7 +129,7 @@ class Projection:
     def __init__(self, problem: LawProblem, rows: Array, scale: Array) -> None:
         self.problem, self.rows = problem, rows
         self.scale = scale[rows]
-        self.Q = basis(problem.W[rows][:, problem.fixed] / self.scale[:, None])
+        self.Q = orthonormal_basis(problem.W[rows][:, problem.fixed] / self.scale[:, None])
         Y = problem.Y[rows] / self.scale
         self.Y = Y - self.Q @ (self.Q.T @ Y)
 
@@ -145,7 +145,7 @@ class Projection:
         p = self.problem
         V = np.column_stack([p.column(c, u)[self.rows] for c in p.moving]) / self.scale[:, None]
         V = self._off(V)
-        B = basis(V)
+        B = orthonormal_basis(V)
         X = np.linalg.lstsq(V, self.Y, rcond=1e-10)[0]
         return self.Y - B @ (B.T @ self.Y), B, X
 
@@ -240,7 +240,7 @@ def _valleys(starts: Sequence[Array], costs: Sequence[float], counts: Sequence[i
     return found[:4]
 
 
-def basis(A: Array) -> Array:
+def orthonormal_basis(A: Array) -> Array:
     """Compute an orthonormal basis of the column space of A, as columns."""
     size = np.linalg.norm(A, axis=0)
     A = A[:, size > 0] / size[size > 0]

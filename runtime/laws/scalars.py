@@ -26,7 +26,7 @@ from runtime.ground.errors import InputError
 from runtime.ground.part import Part
 from runtime.ground.progress import at
 from runtime.ground.table import Table, number
-from runtime.laws.projection import LawProblem, Projection, basis
+from runtime.laws.projection import LawProblem, Projection, orthonormal_basis
 from runtime.laws.transmitted import transmitted_torque
 
 Array = np.ndarray
@@ -264,7 +264,7 @@ def _joint_deviations(problem: LawProblem, u: Array, scale: Array) -> tuple[Arra
 
 
 def _squares(A: Array, Y: Array, scale: Array) -> float:
-    Q, y = basis(A / scale[:, None]), Y / scale
+    Q, y = orthonormal_basis(A / scale[:, None]), Y / scale
     r = y - Q @ (Q.T @ y)
     return float(r @ r)
 

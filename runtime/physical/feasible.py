@@ -157,7 +157,8 @@ def fit(start: Beginning) -> Fitted:
             found = held_out_weight(observation, system, physical, options)
             searched = replace(options, weight=found)
         known = isinstance(searched.weight, float)
-        at(f"feasible, weight of the prior {searched.weight:g}" if known else "feasible")
+        weighted = f", weight of the prior {searched.weight:g}" if known else ""
+        at(f"fitting physical parameters{weighted}")
         chi, weight = solve_with_weight(system.weighted, physical, searched, without_prior)
         X = physical.rows(system.names) @ chi
     if weight == 0:  # nothing was pulled: chi is one of many
@@ -291,7 +292,7 @@ def held_out_weight(
     ]  # of this part and those after it
     K = physical.rows(system.names)
 
-    at("feasible, the weight of the prior by held-out error")
+    at("choosing the weight of the prior by cross-validation")
 
     def error(weight: float, best: float) -> float:
         fixed, product = replace(options, weight=weight), 0.0

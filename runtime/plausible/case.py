@@ -99,7 +99,7 @@ class Case:
         given = np.asarray(dict(getattr(self.model, "LIMITS", {}) or {}).get(key, ()), dtype=float)
         return given if given.shape == (self.samples.n, *shape) else None
 
-    def joints(self, chosen: Array) -> str:
+    def joint_labels(self, chosen: Array) -> str:
         """List the labels of the joints that the mask `chosen` selects, separated by commas."""
         return ", ".join(self.labels[j] for j in np.flatnonzero(chosen))
 
@@ -166,7 +166,7 @@ class Case:
         if self.samples.constant().any():
             return "a torque never changes"
         if (passive := self.samples.without_motor()).any():
-            return f"joint {self.joints(passive)} has no motor: its torque is zero throughout"
+            return f"joint {self.joint_labels(passive)} has no motor: its torque is zero throughout"
         return ""
 
     @cached_property

@@ -49,7 +49,7 @@ def friction(case: Case) -> Answer | None:
     if not shown.any():
         return Answer("good", "Friction that the robot file lacks explains little of the torques")
     j = int(np.argmax(np.where(shown, before - after, 0.0)))
-    of = "" if lacking.all() else f" of joint {case.joints(lacking)}"
+    of = "" if lacking.all() else f" of joint {case.joint_labels(lacking)}"
     state: State = "no" if before[j] > LIMIT.JOINT_ERROR[1] else "doubtful"
     return Answer(
         state,

@@ -106,7 +106,7 @@ def frozen_encoder(case: Case, course: Course) -> Answer | None:
     k = int(np.flatnonzero(frozen.any(axis=0))[0])
     return Answer(
         "no",
-        f"Joint {case.joints(np.asarray(frozen.any(axis=1)))} moves, but its position suddenly "
+        f"Joint {case.joint_labels(np.asarray(frozen.any(axis=1)))} moves, but its position suddenly "
         f"stays at one value at {instant(course.record.t[k])} s",
         "an encoder froze: leave this time out (rows.window), or repair the record",
     )
@@ -122,7 +122,9 @@ def jumping_joints(case: Case, course: Course) -> Answer | None:
     sizes = zip(course.steps[k], case.units, jumping, strict=True)
     by = ", ".join(f"{size:.3g} {unit}" for size, unit, own in sizes if own)
     one = np.count_nonzero(jumping) == 1
-    who = f"{'Joint' if one else 'Joints'} {case.joints(jumping)} {'jumps' if one else 'jump'}"
+    who = (
+        f"{'Joint' if one else 'Joints'} {case.joint_labels(jumping)} {'jumps' if one else 'jump'}"
+    )
     text = f"{who} by {by} at {instant(course.record.t[k])} s"
     if more := len(first) - 1:
         text += f", and at {more} more {'instant' if more == 1 else 'instants'}"

@@ -73,8 +73,11 @@ def rest(case: Case) -> Answer:
     lost = slow > per_joint(study.rows.slow, case.samples.n, "rows.low_speed")
     lost &= [not friction_determined(model, without, j) for j in range(len(lost))]
     if lost.any():
-        text += f", but do not determine the friction of joint {case.joints(lost)}"
-        remedy, change = f"move joint {case.joints(lost)} in both directions, at several speeds", {}
+        text += f", but do not determine the friction of joint {case.joint_labels(lost)}"
+        remedy, change = (
+            f"move joint {case.joint_labels(lost)} in both directions, at several speeds",
+            {},
+        )
     state: State = "doubtful" if after < 0.8 * before else "good"
     if after < 0.5 * before and before > LIMIT.TOTAL_ERROR[0]:  # else friction of that joint alone
         state = "no"

@@ -168,7 +168,7 @@ def values(case: Case) -> Answer | None:
         ratio = case.robot_values.weight[other][0]
         return Answer(
             "doubtful",
-            f"The weight on the slide of joint {case.joints(other)} is {ratio:.2g} times that of the "
+            f"The weight on the slide of joint {case.joint_labels(other)} is {ratio:.2g} times that of the "
             "values; no record shows a factor of this force, because the mass hides it",
             "check torque constant, ratio and unit of this joint, and the number of its motors; or "
             "correct the masses of the robot file",
@@ -203,7 +203,7 @@ def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
     own, gain = certain_joints(case), late.before - late.after
     which, shift, sigma = "Torques are", np.array([late.common]), late.sigma_common
     if own.any() and not own.all():
-        which = f"Torques of joint {case.joints(own)} are"
+        which = f"Torques of joint {case.joint_labels(own)} are"
         shift, sigma = late.shift[own], float(late.sigma[own].max())
     first = not named or late_gain(case) >= gain_of_alternative(case, named[0])
     state: State = "good" if not own.any() else "doubtful" if first else "open"
@@ -220,8 +220,9 @@ def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
     return Answer(
         state,
         f"{which} {sense} by {each} ms, deviation {1e3 * sigma:.1f} ms{beyond}"
-        + _from_to(
-            f"correcting the delays changes the error that free parameters leave of joint {late.joints[j]}",
+        + _instead(
+            "with these delays corrected, free parameters leave",
+            late.joints[j],
             late.before[j],
             late.after[j],
         ),
@@ -238,13 +239,17 @@ def explained(before: float, after: float) -> float:
     return max(0.0, 1.0 - float(after) / float(before)) if before > 0 else 0.0
 
 
-def _from_to(text: str, before: float, after: float) -> str:
-    """Write how an error changes, for instance "; the error goes from 8.1 to 2.0 %".
+def _instead(leaves: str, joint: str, before: float, after: float) -> str:
+    """Write how an error changes: "; with ... leaves 2.0 instead of 8.1 % of the torque ... unexplained".
 
     An empty string if both errors are printed alike.
     """
     a, b = f"{before:.1f}", f"{after:.1f}"
-    return "" if a == b else f"; {text} from {a} to {b} %"
+    return (
+        ""
+        if a == b
+        else f"; {leaves} {b} instead of {a} % of the torque of joint {joint} unexplained"
+    )
 
 
 def late_joints(late: Delay) -> Array:
@@ -322,9 +327,8 @@ def better(case: Case, named: Sequence[Trial]) -> Answer:
     text = f"{'Friction alone' if friction else 'No'}: {cause}" + (
         f" (or: {'; '.join(others)})" if others else ""
     )
-    fit = f"the error that a physical robot leaves of joint {case.labels[j]}"
-    fit += f" through a low-pass of {case.samples.cutoff:.2g} Hz goes"
-    text += _from_to(fit, before[j], after[j]) or (
+    band = f"{case.labels[j]} (below {case.samples.cutoff:.2g} Hz)"
+    text += _instead("with this change, a physical robot leaves", band, before[j], after[j]) or (
         "; the errors do not change, but the parameters are nearer to the values of the robot file"
     )
     first = named[0].cause

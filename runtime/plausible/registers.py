@@ -57,7 +57,7 @@ def signed(case: Case) -> Answer | None:
         if bare.any():
             return Answer(
                 "no",
-                f"The torque of joint {case.joints(bare)} is never below zero and turns back at zero "
+                f"The torque of joint {case.joint_labels(bare)} is never below zero and turns back at zero "
                 f"{int(kinks[bare].max())} times, although the joint reverses: it is a magnitude",
                 "log torques with their sign; a magnitude does not determine the parameters",
             )

@@ -61,7 +61,7 @@ def standing(case: Case) -> Answer | None:
     )
     return Answer(
         "doubtful",
-        f"Joint{'s' * (not one)} {case.joints(still)} {move} not move ({rms:.1g} "
+        f"Joint{'s' * (not one)} {case.joint_labels(still)} {move} not move ({rms:.1g} "
         f"{case.units[int(np.argmax(still))]} rms): hold {them} with --lock",
         f"symgen convert ROBOT held.yaml {held}, with a study that reads the columns of the others "
         f"(record.columns: {{{columns}}}); if {it} {move} move, check record.columns.q",
@@ -173,7 +173,7 @@ def torques(case: Case) -> Answer:
     """
     limits = case.limits("tau")
     if (flat := case.samples.constant()).any():
-        text = f"The torque of joint {case.joints(flat)} is constant"
+        text = f"The torque of joint {case.joint_labels(flat)} is constant"
         return Answer("no", text, limit="torques that change")
     if limits is None:
         return Answer(

@@ -102,7 +102,7 @@ def read_table(path: Path, topic: str | None = None, decimal: str = ".") -> Tabl
         ) from e
 
 
-def endings(*, packed: bool | None = None) -> tuple[str, ...]:
+def file_extensions(*, packed: bool | None = None) -> tuple[str, ...]:
     """Return the file endings of all formats.
 
     packed : True for formats that may be compressed by gzip only, False for the others only.
@@ -118,7 +118,7 @@ def endings(*, packed: bool | None = None) -> tuple[str, ...]:
 def is_measured(path: Path) -> bool:
     """Whether a path is a folder (perhaps a ROS 2 bag) or has the ending of a measured file."""
     folder = os.path.isdir(path)  # noqa: PTH112 (a name of any length)
-    return folder or any(suffix.lower() in endings() for suffix in path.suffixes)
+    return folder or any(suffix.lower() in file_extensions() for suffix in path.suffixes)
 
 
 def format_of(path: Path) -> Format:
@@ -129,6 +129,6 @@ def format_of(path: Path) -> Format:
         if kind in format_.endings:
             return format_
     raise InputError(
-        f"unknown kind of file {kind!r}; expected {', '.join(endings(packed=True))}, plain or with .gz, {', '.join(endings(packed=False))} or the folder of a ROS 2 bag",
+        f"unknown kind of file {kind!r}; expected {', '.join(file_extensions(packed=True))}, plain or with .gz, {', '.join(file_extensions(packed=False))} or the folder of a ROS 2 bag",
         file=str(path),
     )

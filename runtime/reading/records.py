@@ -37,7 +37,7 @@ from runtime.ground.errors import InputError, ModelError
 from runtime.ground.limits import LIMIT
 from runtime.reading.columns import Conversion, column_names, conversion, require_alike
 from runtime.reading.datasets import fetch
-from runtime.reading.formats import endings, read_table
+from runtime.reading.formats import file_extensions, read_table
 from runtime.reading.late_torques import delays_of, inside, on_time
 from runtime.reading.resampling import Stretch, resampled
 from runtime.reading.settings import NONE, Columns, RecordSettings, each_record
@@ -505,5 +505,5 @@ def labels(settings: Sequence[RecordSettings]) -> list[Label]:
 def stem(file: str) -> str:
     """Return the name of a measured file without its ending: log.1 of log.1.csv.gz."""
     name = file[:-3] if file.lower().endswith(".gz") else file
-    ending = next((ending for ending in endings() if name.lower().endswith(ending)), "")
+    ending = next((ending for ending in file_extensions() if name.lower().endswith(ending)), "")
     return name[: len(name) - len(ending)] or file

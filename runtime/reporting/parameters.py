@@ -58,8 +58,7 @@ def parameter_section(result: Identification) -> Section:
     ]
     condition = ", ± 95 % if the others are zero" * (result.model_columns == "essential")
     table = Table(
-        f"{len(fit.names)} of {len(result.estimate.names)} base parameters "
-        f"({result.model_columns}) by {fit.method}{condition}",
+        f"{result.fitted}{condition}",
         ("parameter", "value", "± 95 %", "unit"),
         rows,
         sortable=True,

@@ -60,10 +60,10 @@ def cestac(
     at one of the encoder or torque steps.
 
     With --advise, exit code 1 if the estimate would be biased at one of the steps of --delta, or if
-    the runs contradict the prediction. Encoders are read both as positions and as counts; --reader
-    chooses one, and lowpass takes a sixth of the time.
+    the runs contradict the prediction. --advise tries both readers of encoders,
+    positions and counts; --reader lowpass alone is six times faster.
 
-    Parameters named by --columns are judged within the fit of the essential ones.
+    With --columns, all essential parameters are fitted, and only the named ones decide the verdict.
 
     A long study with -o saves its runs in DIR/runs.npz as it goes. If it was interrupted or killed,
     the same command continues it.

@@ -24,8 +24,8 @@ def schema(
         ),
     ] = "robot",
 ) -> None:
-    """Print the JSON Schema of one kind of file. A file of `symgen new` names, in its first line,
-    robot.schema.json, the schema of robot files, in the folder of this file.
+    """Print the JSON Schema of one kind of file. Robot files from `symgen new` refer to the
+    schema of robot files as robot.schema.json, beside them.
     """
     if of not in KINDS:
         fail(f"--of {of}; expected one of {', '.join(KINDS)}")

@@ -260,14 +260,14 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
     recorded : whether the study must name a record.
     """
     from runtime import compose
-    from runtime.documents.files import lines_of
+    from runtime.documents.files import locating_errors
     from runtime.ground.errors import InputError
     from runtime.reading.formats import is_measured
     from runtime.study import located, study_of
 
     stated, folder = study_of(records[0])
     if Path(records[0]).suffix.lower() in (".yaml", ".yml"):
-        with lines_of(records[0]):
+        with locating_errors(records[0]):
             stated = compose.complete_study(stated)
     study = located(stated, folder)
     if recorded:

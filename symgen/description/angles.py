@@ -75,14 +75,14 @@ class Angles:
         ]
         if not changes:
             return "", ()
-        near = f"{len(changes)} angle{'s' * (len(changes) > 1)} near multiples of pi/12"
+        count = f"{len(changes)} angle{'s' * (len(changes) > 1)}"
         if self.exact:
-            return f"{near} are those of {file}", ()
+            return f"{count} near multiples of pi/12 are those of {file}", ()
         most, name, angle, k = max(changes, key=lambda change: abs(change[0]))
         farthest = f"{name} from {angle:.12g} to {PI * Fraction(k, 12)}, by {most:.1e} rad"
         if len(changes) > 1:
             farthest += f", and {len(changes) - 1} by less"
-        text = f"{near} taken as these"
+        text = f"{count} rounded to multiples of pi/12 (15 deg)"
         message = f"{file}: {text}; exact=True or --exact keeps them: {farthest}"
         warnings.warn(message, AngleWarning, stacklevel=7)
         return text, (f"{SNAPPED} {farthest}",)

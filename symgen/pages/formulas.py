@@ -66,7 +66,7 @@ def _page(regrouping: Regrouping, formulas: list[str]) -> list[str]:
         *([""] if relations else []),
         *formulas,
         "",
-        *wrap_text("as they are: " + alone, ""),
+        *wrap_text("identified singly: " + alone, ""),
         "",
         *wrap_text("no effect: " + (" ".join(regrouping.no_effect) or "none"), ""),
     ]

@@ -32,7 +32,7 @@ from runtime.ground.errors import InputError
 from runtime.ground.settings import to_mapping
 from runtime.reading.bags import stored_files
 from runtime.reading.datasets import DATASETS
-from runtime.reading.formats import endings, is_measured
+from runtime.reading.formats import file_extensions, is_measured
 from runtime.reporting.result_files import write_all
 from runtime.study import located, study_from_text, study_of, study_text
 from symgen.description import packaged_robots
@@ -177,8 +177,10 @@ class WorkFolder:
         part : the uploaded file.
         """
         name = measured_name(name)
-        if not (part.is_dir() or name.lower().removesuffix(".gz").endswith(endings())):
-            raise InputError(f"{name}: expected a measured file: {', '.join(endings())}, or .gz")
+        if not (part.is_dir() or name.lower().removesuffix(".gz").endswith(file_extensions())):
+            raise InputError(
+                f"{name}: expected a measured file: {', '.join(file_extensions())}, or .gz"
+            )
         if kind == "record":
             self.keep("study")
             self._keep_record()

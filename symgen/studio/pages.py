@@ -22,7 +22,7 @@ from starlette.routing import Route
 
 from runtime.ground.errors import InputError, SettingsError
 from runtime.reading.datasets import DATASETS
-from runtime.reading.formats import endings
+from runtime.reading.formats import file_extensions
 from symgen.derive.models import SYMBOLIC
 from symgen.description import packaged_robots
 from symgen.description.files import TREES, content_of
@@ -287,7 +287,7 @@ class Pages:
 
     async def _readable(self, part: Path) -> None:
         """Refuse a file that is no table, before it replaces one; which topic of a bag counts is asked later."""
-        if not part.name.lower().removesuffix(".gz").endswith(endings(packed=True)):
+        if not part.name.lower().removesuffix(".gz").endswith(file_extensions(packed=True)):
             return
         value = await self.server.view(views.preview, str(part), {"topic": None, "joints": ()})
         if "error" in value:

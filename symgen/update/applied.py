@@ -18,7 +18,7 @@ SOURCES = {"record": "record", "sum": "sums", "file": "physics"}
 LEGEND = {
     "record": "record: the record determines the number; sigma is its standard deviation",
     "sum": "sums: the record determines only sums with other numbers; this number is the one nearest to the file, so it has no sigma",
-    "file": "physics: no torque depends on the number; without the change no physical link was left",
+    "file": "physics: no joint torque depends on the number; changed only to keep the link physical",
 }
 
 
@@ -185,17 +185,17 @@ class Applied:
         notes += [f"added: {'; '.join(self.added)}"] if self.added else []
         if self.spread:
             notes.append(
-                "links on fixed joints that changed too, no physical link was left otherwise: "
+                "changed only to keep the robot physical, links on fixed joints: "
                 f"{', '.join(self.spread)}"
             )
         if self.lost:
             notes.append(
-                f"not in the estimate, or not shown by the record: {', '.join(self.lost)}; the "
-                "values of the file stay"
+                "kept from your file (not in the estimate, or not shown by the record): "
+                f"{', '.join(self.lost)}"
             )
         if self.undetermined:
             notes.append(
-                "on which no torque of this robot depends, hence of the file: "
+                "kept from your file (no joint torque depends on them): "
                 f"{_by_place(self.undetermined)}"
             )
         return notes

@@ -208,7 +208,8 @@ frames:
 def test_at_values_prints_coefficients_as_decimals(tmp_path, form):
     (tmp_path / "arm.yaml").write_text(DECIMAL_ANGLES)
     out = run(tmp_path / "arm.yaml", "--at-values", *form).stdout
-    assert "cos" not in out and "sin" not in out
+    words = out.replace("singly", "")
+    assert "cos" not in words and "sin" not in words
     assert max(len(digits) for digits in re.findall(r"\.0*([1-9]\d*)", out)) == 15
 
 

@@ -46,7 +46,7 @@ def test_load_robot_tells_how_many_and_the_farthest(tmp_path):
     assert "3 angles" in message and "\n" not in message
     assert "roll of joint 'elbow' (line 8) from -1.5707 to -pi/2, by -9.6e-05 rad" in message
     assert "exact=True or --exact" in message
-    assert "taken as these" in robot.angles and str(robot.frame(2).alpha) == "-pi/2"
+    assert "rounded to multiples" in robot.angles and str(robot.frame(2).alpha) == "-pi/2"
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         exact = load_robot(file, exact=True)
@@ -68,7 +68,7 @@ def test_angles_off_by_less_than_1e_9_are_taken_in_silence():
         robot, notes = read_tree(arm(1.57079632679, -1.5707963268, 0.523598775), "arm.urdf")
     assert robot.angles == "" and not any("snapped" in note for note in notes)
     assert str(robot.frame(2).alpha) == "-pi/2"
-    with pytest.warns(AngleWarning, match="1 angle near"):
+    with pytest.warns(AngleWarning, match="1 angle rounded"):
         read_tree(arm(1.57079632679, -1.570796, 0.523598775), "arm.urdf")
 
 
@@ -86,10 +86,10 @@ MJCF = b"""<mujoco model="arm"><compiler angle="radian"/><worldbody>
 
 def test_rotations_of_an_mjcf_are_taken_alike(tmp_path):
     """However written; torques stay near MuJoCo's."""
-    with pytest.warns(AngleWarning, match="3 angles near"):
+    with pytest.warns(AngleWarning, match="3 angles rounded"):
         robot, notes = read_tree(MJCF, "arm.xml", keep_fixed=True)
     angles = [str(getattr(f, key)) for f in robot.frames for key in ("gamma", "alpha", "theta")]
-    assert not any("." in angle for angle in angles) and "taken as these" in robot.angles
+    assert not any("." in angle for angle in angles) and "rounded to multiples" in robot.angles
     assert difference(MJCF.decode(), robot, notes, 1) < 1e-4
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -102,9 +102,9 @@ def test_verbs_note_it_and_keep_the_file_when_told_to(tmp_path):
     file.write_bytes(ROUNDED)
     for verb in (["check"], ["show"], ["generate", "-o", str(tmp_path)]):
         result = CliRunner().invoke(app, [verb[0], str(file), *verb[1:]])
-        assert "note: arm.urdf: 3 angles near" in result.stderr, result.stderr
+        assert "note: arm.urdf: 3 angles rounded" in result.stderr, result.stderr
         result = CliRunner().invoke(app, [verb[0], str(file), *verb[1:], "--exact"])
-        assert "near multiples" not in result.stderr
+        assert "multiples of pi" not in result.stderr
     assert "generate arm.urdf --exact" in (tmp_path / "arm.py").read_text()
 
 
@@ -119,4 +119,4 @@ def test_verbs_on_records_keep_the_file_too(tmp_path):
         result = CliRunner().invoke(
             app, ["identify", str(file), str(record), "--no-plausible", *options]
         )
-        assert ("3 angles near" in result.stderr) == noted, result.stderr
+        assert ("3 angles rounded" in result.stderr) == noted, result.stderr

@@ -16,6 +16,7 @@ from runtime.compose import judged
 from runtime.core.essential import lost_joints
 from runtime.core.least_squares.estimate import Estimate, JointFit
 from runtime.core.model import load_model
+from runtime.core.result import Identification
 from runtime.core.study import Decimate
 from runtime.core.validation import JointComparison
 from runtime.expected import Expected, expected_off
@@ -214,7 +215,7 @@ def test_verdict_is_the_worst_answer(estimate, unseen, state, question):
         == {"good": "Yes, as far as judged", "doubtful": "With care", "no": "No"}[state]
     )
     if question is None:
-        assert checklist.worst is None and "Not judged" in checklist.doubt
+        assert checklist.worst is None and "Open questions" in checklist.doubt
     else:
         assert (
             question in checklist.worst.question
@@ -361,13 +362,19 @@ def identified(robot_file=(1.0, 0.01)):
         FORMULAS={"A1": "A1"},
         base_parameters=lambda chi: chi,
     )
-    return SimpleNamespace(
+    made = SimpleNamespace(
         model=model, model_estimate=used, estimate=every, model_columns="essential"
     )
+    made.fitted = Identification.fitted.fget(made)
+    return made
 
 
 def test_values_have_the_digits_of_their_intervals():
     (table,) = parameter_section(identified()).tables
+    words = (
+        "1 of 2 base parameters, the essential ones, fitted by ols, ± 95 % if the others are zero"
+    )
+    assert table.caption == words
     assert table.header == ("parameter", "value", "± 95 %", "unit")
     assert table.rows == [(symbol("A1"), "1.235", "0.039", "")]
 

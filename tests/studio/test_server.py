@@ -377,8 +377,8 @@ def test_an_angle_that_is_rounded_is_no_warning(studio: Any) -> None:
     urdf = f'<robot name="arm"><link name="a"/><link name="b"/>{joint}{origin}</robot>'
     studio.upload("robot", "arm.urdf", urdf.encode())
     text = studio.get("robot").text
-    assert text.count("1 angle near multiples of pi/12 taken as these") == 1
-    assert re.search(r'<p class="note">[^<]*1 angle near multiples', text)
+    assert text.count("1 angle rounded to multiples of pi/12 (15 deg)") == 1
+    assert re.search(r'<p class="note">[^<]*1 angle rounded to', text)
 
 
 def test_comments_after_an_edited_part_stay(studio: Any) -> None:

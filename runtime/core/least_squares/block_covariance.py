@@ -64,8 +64,8 @@ def corrected_deviations(
     """Compute standard deviations of X, shape (b,), corrected for slow noise and unmodelled
     friction.
 
-    They are from the jackknife over blocks of time, or over one kind of bands where that is clearly
-    larger. nan where only one block determines a parameter.
+    The deviations come from the jackknife over blocks of time; over one kind of bands where that
+    deviation is clearly larger. nan where only one block determines a parameter.
 
     Parameters
     ----------

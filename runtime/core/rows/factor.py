@@ -47,7 +47,7 @@ class JointFactor:
 
     R'R is the Gram matrix of [W_j[:, columns] Y_j].
 
-    columns : ndarray of int, shape (c,), their numbers in the names of the Factor.
+    columns : ndarray of int, shape (c,), indices in the names of the Factor.
     R : ndarray, shape (k, c + 1), k <= c + 1 after factoring; not triangular once columns were
     deleted.
     rows : number of rows of this joint.
