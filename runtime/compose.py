@@ -43,7 +43,7 @@ from runtime.core.problem import (
     prepared,
 )
 from runtime.core.problem import estimate_of as estimate_by
-from runtime.core.record import BASE_IMU, WRENCH, Record
+from runtime.core.record import BASE_BIASES, BASE_IMU, WRENCH, Record
 from runtime.core.rows.observation import Observation
 from runtime.core.signals.reader import LOWPASS, Reader
 from runtime.core.study import EstimateSettings, Signals
@@ -105,6 +105,10 @@ STEPS: list[Step] = [
     automatic_cutoff,
     poses_at_rest,
     When(Late("runtime.laws.transmitted:transmitted_torque"), lambda p: bool(channels_of(p.model))),
+    When(
+        Late("runtime.biases:fitted_biases"),
+        lambda p: any(BASE_BIASES in r.channels for r in p.records),
+    ),
     When(Late("runtime.laws.scalars:fitted_scalars"), lambda p: hasattr(p.model, "FIT")),
     When(
         Late("runtime.controller.fitted:law_of_controller"),
@@ -134,11 +138,15 @@ METHODS: Listed[Method] = Listed(
         "didim": "runtime.loop.didim:METHOD",
     }
 )
-CORRECTIONS: list[Correction] = [with_lacking]
+CORRECTIONS: list[Correction] = [Late("runtime.biases:with_biases"), with_lacking]
 EXTRAS: list[Extra] = [
     PartWhen(
         Late("runtime.packets.packets:packets_told"),
         lambda r: r.problem.noted(PACKETS) is not None,
+    ),
+    PartWhen(
+        Late("runtime.biases:told_biases"),
+        lambda r: any(BASE_BIASES in record.channels for record in r.records),
     ),
     PartWhen(
         Late("runtime.sensor_axes:sensor_axes"),

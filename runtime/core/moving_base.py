@@ -21,6 +21,7 @@ from runtime.core.contacts import on_links, touches
 from runtime.core.model import GeneratedModel, base_rows, joint_units
 from runtime.core.problem import CONTACTS, Note, Problem
 from runtime.core.record import (
+    BASE_BIASES,
     BASE_GRAVITY,
     BASE_IMU,
     BASE_MOTION,
@@ -144,7 +145,12 @@ def _require_motion(model: GeneratedModel, record: Record, moves: bool) -> None:
             "--base moving (symgen.model(ROBOT, base='moving')), or remove record.base",
             file=record.file,
         )
-    widths = {BASE_MOTION: 9, BASE_POSITION: 3, BASE_QUATERNION: 4, BASE_IMU: 9}
+    if BASE_BIASES in record.channels and BASE_IMU not in given:
+        raise InputError(
+            f"the record has {BASE_BIASES}, but no {BASE_IMU}; give both, or remove {BASE_BIASES}",
+            file=record.file,
+        )
+    widths = {BASE_MOTION: 9, BASE_POSITION: 3, BASE_QUATERNION: 4, BASE_IMU: 9, BASE_BIASES: 6}
     for name, width in widths.items():
         if name in record.channels and record.channels[name].shape[1] != width:
             raise InputError(

@@ -31,6 +31,8 @@ BASE_MOTION, BASE_POSITION, BASE_QUATERNION = "base_motion", "base_position", "b
 """Channels of a record: w0, wd0, a0 (N, 9); p (N, 3), m; Q (N, 4), scalar first."""
 BASE_IMU = "base_imu"
 """Channel with w0 (rad/s), f (m/s**2) and r (m) in the axes of frame 0, (N, 9)."""
+BASE_BIASES = "base_biases"
+"""Channel with the biases of w0 and f in BASE_IMU, (N, 6), which are subtracted, and fitted."""
 BASE_GRAVITY = "base_gravity"
 """Channel with the acceleration of gravity in the axes of the world, (N, 3), m/s**2."""
 

@@ -23,6 +23,7 @@ from runtime.core.missing import COUNTS, Missing, bridged
 from runtime.core.model import GeneratedModel, drives_of, joint_labels
 from runtime.core.quaternions import continued
 from runtime.core.record import (
+    BASE_BIASES,
     BASE_IMU,
     BASE_QUATERNION,
     JOINT_CHANNELS,
@@ -42,6 +43,7 @@ from runtime.reading.resampling import Stretch, resampled
 from runtime.reading.settings import NONE, Columns, RecordSettings, each_record
 from runtime.reading.table import Array, Table
 from runtime.reading.units import time_unit
+from runtime.reading.wrench_places import in_frames, wrench_places
 
 IRREGULAR = 0.05
 """Between the rate of the settings and the median step of stamps that are resampled."""
@@ -100,6 +102,7 @@ def _pieces(
             "it, or use --base free",
             file=", ".join(hashes),
         )
+    places = wrench_places(columns, model)
     signals = _signals(columns, settings.base.columns, first, last, other, missing)
     n = signals["q"].values.shape[1]
     _require_shapes(columns, signals, first, last)
@@ -110,7 +113,7 @@ def _pieces(
         )
     drives = None if model is None else drives_of(model)
     side = conversion(settings, drives, first, last, n)
-    samples = _joint_side(settings, columns, signals, side, missing)
+    samples = in_frames(_joint_side(settings, columns, signals, side, missing), places)
     table = signals["q"].table
     command = side.command if "tau" in signals else ""
     notes = [signal.table.note for signal in signals.values() if signal.table.note]
@@ -151,9 +154,13 @@ def _pieces(
             stretch, piece = _without_delay(stretch, piece, late_base, "record.base.delay")
         if law is not None:
             piece = law.signals(stretch.t, piece, rate)
-        channels = (*JOINT_CHANNELS, *columns.further, *settings.base.columns, "law_v")
+        wrenches = (f"{WRENCH}{j}" for j, _ in places.values())
+        further = (*columns.further, *wrenches)
+        channels = (*JOINT_CHANNELS, *further, *settings.base.columns, "law_v")
         if columns.flies:
             piece[f"{WRENCH}0"], channels = np.zeros((len(stretch.t), 6)), (*channels, f"{WRENCH}0")
+        if settings.base.biases:
+            piece[BASE_BIASES], channels = np.zeros((len(stretch.t), 6)), (*channels, BASE_BIASES)
         record = Record(
             stretch.t,
             piece["q"],

@@ -103,12 +103,13 @@ class Columns(Settings):
     channels : mapping of str to str
         Column of each channel.NAME in the laws of the robot file, without conversion, in the file of
         the positions: {temperature: T_motor}.
-    wrench : mapping of int to six str
+    wrench : mapping of int or str to six str
         Three forces and three moments of a sensor in the axes of a frame, about its origin, by the
         number of the frame, in the file of the positions, N and N m: {0: [fx, fy, fz, mx, my, mz]}
         below the robot, {7: [...]} ahead of link 7. In addition to tau, or in place of tau. Of a
         robot whose base moves or is free: the force and the moment by which the world acts on the
-        link of the frame; none: nothing acts, it flies.
+        link of the frame, which may be the name of a link or site of the robot file, {foot: [...]},
+        in its axes about its origin; none: nothing acts, it flies.
     """
 
     t: Text | None = None
@@ -121,7 +122,7 @@ class Columns(Settings):
     tau_ff: Names = ()
     tau_known: Names = ()
     channels: Mapping[Text, Text] = field(default_factory=dict)
-    wrench: Literal["none"] | Mapping[Annotated[int, Field(ge=0)], Names] = field(
+    wrench: Literal["none"] | Mapping[Annotated[int, Field(ge=0)] | Text, Names] = field(
         default_factory=dict
     )
 
@@ -200,6 +201,9 @@ class BaseColumns(Settings):
         m/s**2 or g (9.80665 m/s**2).
     specific_force : bool
         Whether the accelerometer reads + g along the upward axis at rest; false: - g.
+    biases : str or None
+        fit: constant biases of gyroscope and accelerometer are fitted together with the parameters,
+        one set for all records. Default: the sensor has none.
     delay : float, s
         Time by which the signals of the base were recorded later than the positions of the joints.
     """
@@ -214,6 +218,7 @@ class BaseColumns(Settings):
     gyroscope_unit: Literal["rad/s", "deg/s"] = "rad/s"
     accelerometer_unit: Literal["m/s**2", "g"] = "m/s**2"
     specific_force: Flag = True
+    biases: Literal["fit"] | None = None
     delay: Real = 0.0
 
     def __post_init__(self) -> None:
@@ -227,6 +232,11 @@ class BaseColumns(Settings):
             bool(self.gyroscope) == bool(self.accelerometer),
             "gyroscope and accelerometer belong together; give both",
             "gyroscope",
+        )
+        require(
+            self.biases is None or bool(self.gyroscope),
+            "only gyroscope and accelerometer have biases; give their columns, or remove biases",
+            "biases",
         )
         require(
             bool(self.position) == bool(self.quaternion),

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from symgen.cli import mended, options, session
+from symgen.cli.each import identify_each
 
 
 def identify(
@@ -62,6 +64,14 @@ def identify(
             help="Search several errors of the study at once, judge them on rows that were not used, and write the mended study; then identify with it. The given files stay as they are."
         ),
     ] = None,
+    each: Annotated[
+        bool,
+        typer.Option(
+            "--each",
+            help="Identify from each record alone, not from all together; the results of each are in a folder of FOLDER, and are kept if the command is repeated.",
+        ),
+    ] = False,
+    workers: options.Workers = 0,
     at: options.At = None,
     json: options.Json = False,
 ) -> None:
@@ -69,7 +79,12 @@ def identify(
     The exit code is 0 for the verdicts Yes and With care, 1 for No, and 1 if --suggest leaves
     settings to be filled in.
     """
-    with session.progress_lines(), session.results_in(output) as results:
+    if each and (output is None or repair is not None or json or verbose):
+        session.fail("--each needs -o FOLDER, and goes without --repair, --json and --verbose")
+    if workers > 1 and not each:
+        session.fail("--workers is for --each; one identification runs in one process")
+    stages = nullcontext() if each else session.progress_lines()
+    with stages, session.results_in(None if each else output) as results:
         import runtime
         from runtime.compose import records_of
         from runtime.core.provenance import processor
@@ -80,6 +95,12 @@ def identify(
         robot_file, described = described, session.corrected(described, study)
         model = session.model_of(described, study=study)
         study = study if suggest is None else session.suggested_study(study, model, suggest)
+        asked: dict[str, Any] = {"physical": physical, "friction": friction, "plausible": plausible}
+        if each and output is not None:
+            variants = session.variants_of(described) if plausible else None
+            good = identify_each(model, study, output, workers, variants=variants, **asked)
+            session.end(good=good)
+            return
         records = records_of(study.record, model, study)
         found = None
         if repair is not None:
@@ -91,11 +112,9 @@ def identify(
             model,
             records,
             study,
-            physical=physical,
-            friction=friction,
             variants=session.variants_of(described) if plausible else None,
-            plausible=plausible,
             provenance={"processor": processor()},
+            **asked,
         )
         if results is not None:
             runtime.report(result, results)

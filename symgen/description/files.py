@@ -289,7 +289,7 @@ def content_of(path: Path) -> bytes:
 
     Raises DescriptionError if the file cannot be read.
     """
-    names, shown = ", ".join(packaged_robots()), " ".join(str(path).split("\n"))
+    names, shown = ", ".join(packaged_robots()), str(path).replace("\n", "\\n")
     try:
         if path.exists() and not path.is_file():  # a pipe may never answer, a device never end
             raise OSError(0, "the path is a folder, a pipe or a device")

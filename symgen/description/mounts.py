@@ -1,4 +1,4 @@
-"""Named places of a robot on which a load is mounted: links of its file, sites, fixed frames."""
+"""Named places of a robot, of loads and contacts: links of its file, sites, fixed frames."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ def mounts(robot: Robot) -> dict[str, tuple[int, Rows]]:
     """Return the places of a robot by name: number of the link, and pose (4, 4) in its frame.
 
     A URDF or MJCF has the links, bodies and sites of its moving bodies, in the order of the file,
-    each with the frame that the file gives it. Another robot has its fixed frames, by their labels
-    or as "frame 7".
+    each with the frame that the file gives it; a base that moves has those of link 0, too. Another
+    robot has its fixed frames, by their labels or as "frame 7".
     """
     if robot.mounts:
-        return {name: (j, rows) for name, j, rows in robot.mounts}
+        moves = robot.base != "fixed"
+        return {name: (j, rows) for name, j, rows in robot.mounts if j or moves}
     found = {}
     for f in robot.frames:
         if f.sigma != FIXED or f.j in robot.cut:

@@ -559,9 +559,9 @@ def _about_centre(own: Inertial) -> tuple[str, float, tuple[float, ...], Any]:
 
 
 def _mounts(table: Table) -> tuple[tuple[str, int, Any], ...]:
-    """List the links and sites of the moving bodies, with their poses in the frames of the bodies."""
+    """List the links and sites of the base and of the moving bodies, with their poses in the frames."""
     tree, found = table.tree, []
-    for j in table.joint:
+    for j in (*table.joint, 0):
         body = table.bodies[j]
         for name, X in body.links.items():
             if name not in tree.bare:

@@ -2,6 +2,9 @@
 go from file to file.
 """
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -13,7 +16,11 @@ from symgen.description.robot import INERTIAL
 from symgen.description.tree import TreePart
 from symgen.description.tree_robot import read_tree
 from symgen.description.yaml import write_yaml
+from symgen.emit.generate import generate_module
 from symgen.errors import DescriptionError
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
+from trees import TREES
 
 TEXT = robot(
     "two_arms",
@@ -128,3 +135,28 @@ def test_labels_that_name_nothing_are_refused(labels, words):
     text = write_yaml(found).split("labels:")[0] + f"labels: {labels}\n"
     with pytest.raises(DescriptionError, match=words):
         parse_robot(text.encode(), "arms.yaml")
+
+
+def humanoid(joints) -> bytes:
+    """URDF of these joints of the humanoid of 30, and of the links that they move."""
+    ants = [frame.ant for frame in parse_robot(TREES["humanoid"](30), file="whole.yaml").frames]
+    parts = [link("l0")]
+    for j in joints:
+        axis = ("0 0 1", "0 1 0", "1 0 0")[j % 3]
+        parts += [
+            link(f"l{j}", 1 + j / 10, "0.01 0.02 0.05"),
+            joint(f"j{j}", "revolute", f"l{ants[j - 1]}", f"l{j}", "0 0.05 0.3", axis=axis),
+        ]
+    return robot("part", *parts).encode()
+
+
+def test_locked_joints_are_not_derived():
+    """The module of a humanoid with 24 locked joints is that of its leg, line by line."""
+    leg = range(4, 10)
+    rest = TreePart({f"j{j}": 0.1 for j in range(1, 31) if j not in leg})
+    held, _ = read_tree(humanoid(range(1, 31)), "part.urdf", part=rest)
+    alone, _ = read_tree(humanoid(leg), "part.urdf")
+    texts = [generate_module(found).splitlines() for found in (held, alone)]
+    computing, of_leg = ([x for x in text if "sha256" not in x.lower()] for text in texts)
+    assert len(held.frames) == len(leg)
+    assert computing == of_leg and len(computing) > 300

@@ -279,3 +279,78 @@ def test_a_sensor_that_is_mounted_or_read_otherwise_is_told(case, rpy, sign, uni
         np.testing.assert_allclose(found, R, atol=1e-3)
     else:
         assert turned_back is None
+
+
+PLACES = {
+    "pad": ("tool0", (0.02, -0.05, 0.11), (0.4, -0.7, 1.9)),
+    "eye": ("base", (-0.1, 0.06, 0.2), (-0.5, 0.3, 2.2)),
+}
+
+
+def with_places(text: str) -> str:
+    """Add a link at each of PLACES, on a fixed joint, to a URDF."""
+    more = "".join(
+        f'<link name="{name}"/><joint name="to_{name}" type="fixed"><parent link="{parent}"/>'
+        f'<child link="{name}"/><origin xyz="{" ".join(map(str, xyz))}" '
+        f'rpy="{" ".join(map(str, rpy))}"/></joint>'
+        for name, (parent, xyz, rpy) in PLACES.items()
+    )
+    return text.replace("</robot>", f"{more}</robot>")
+
+
+def test_wrenches_at_named_links_are_those_of_pinocchio(case, tmp_path: Path):
+    """A pad on the last link, an eye on the base: their forces in their axes, about their origins."""
+    _, _, _, (t, q, tau, base) = case
+    t, q, tau, base = (x[:300] for x in (t, q, tau, base))
+    file = tmp_path / "ur5.urdf"
+    file.write_text(with_places(ur5()), encoding="utf-8")
+    module = symgen.model(file, base="free")
+    rng = np.random.default_rng(4)
+    pushes = {name: rng.normal(size=(len(t), 6)) * [30, 20, 40, 3, 4, 5] for name in PLACES}
+    model = pin.buildModelFromXML(with_places(ur5()), pin.JointModelFreeFlyer())
+    data, left = model.createData(), tau.copy()
+    for k in range(len(t)):
+        Q = np.concatenate([np.zeros(6), [1.0], q[k]])
+        for name, x in pushes.items():
+            left[k] -= pin.computeFrameJacobian(model, data, Q, model.getFrameId(name)).T @ x[k]
+    columns = {
+        "q": q,
+        "tau": left[:, 6:],
+        "b": base,
+        "w": left[:, :6],  # of what holds the base, about the origin of frame 0
+        **pushes,
+    }
+    heads = [f"{key}{k}" for key, x in columns.items() for k in range(1, x.shape[1] + 1)]
+    table = np.column_stack([t, *columns.values()])
+    text = ",".join(["t", *heads])
+    np.savetxt(tmp_path / "arm.csv", table, delimiter=",", header=text, comments="", fmt="%.17g")
+    six = {key: "[" + ", ".join(f"{key}{k}" for k in range(1, 7)) + "]" for key in ("w", *PLACES)}
+    study = tmp_path / "study.yaml"
+
+    def read(wrench: str, model=module) -> runtime.Record:
+        study.write_text(
+            f"symgen: 1\nrecord:\n  files: [arm.csv]\n  columns: {{wrench: {{{wrench}}}}}\n"
+            f"  base: {{motion: [{', '.join(f'b{k}' for k in range(1, 10))}]}}\n",
+            encoding="utf-8",
+        )
+        return runtime.read_record(study, model)
+
+    record = read(f"0: {six['w']}, pad: {six['pad']}, eye: {six['eye']}")
+    assert {c for c in record.channels if c.startswith("wrench")} == {"wrench0", "wrench6"}
+    pin.framesForwardKinematics(model, data, Q)
+    of_link = np.linalg.inv(module.frame_poses(q[-1])[5])  # the last link by its number
+    pose = pin.SE3(of_link @ data.oMf[model.getFrameId("pad")].homogeneous)
+    turned = pose.act(pin.Force(pushes["pad"][-1])).vector
+    np.testing.assert_allclose(record.channels["wrench6"][-1], turned, atol=1e-12)
+    torque = problem(module, record).records[0].torque
+    np.testing.assert_allclose(torque, np.hstack([tau[:, 6:], tau[:, :6]]), atol=1e-9)
+    with pytest.raises(InputError, match=r"'pod' is no link, site or fixed frame of .*'pad'"):
+        read(f"0: {six['w']}, pod: {six['pad']}")
+    with pytest.raises(
+        InputError, match="'pad' is the name of a place, but the base of ur5 is fixed"
+    ):
+        read(f"pad: {six['pad']}", symgen.model(file))
+    with pytest.raises(InputError, match="only a robot file with links, sites or fixed frames"):
+        read(f"pad: {six['pad']}", None)
+    with pytest.raises(InputError, match=r"wrench\.pad: 5 columns; expected 6"):
+        read(f"0: {six['w']}, pad: [pad1, pad2, pad3, pad4, pad5]")

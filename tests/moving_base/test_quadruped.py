@@ -10,6 +10,7 @@ from moving_base.go2 import FILE, simulated
 
 import runtime
 import symgen
+from runtime.compose import problem
 from runtime.ground.errors import InputError
 from symgen.derive.regressor import inertial_names
 
@@ -64,10 +65,12 @@ def record_of(module, simulation, seed, torques=True):
     return runtime.Record(np.arange(N) * 0.005, q, tau * torques, channels=channels)
 
 
+WHOLE = replace(runtime.Study(), rows=replace(runtime.Study().rows, low_speed=0.0))
+"""No row is left out as that of a joint at rest: the simulation has no dry friction."""
+
+
 def fitted(model, records):
-    """No row is left out as that of a joint at rest: the simulation has no dry friction."""
-    study = runtime.Study()
-    return runtime.estimate(model, records, replace(study, rows=replace(study.rows, low_speed=0.0)))
+    return runtime.estimate(model, records, WHOLE)
 
 
 def deviations(fit, truth):
@@ -102,18 +105,35 @@ def test_the_mass_is_found_on_the_floor_alone(module, simulations):
     assert abs(mass / truth - 1) < 0.02
 
 
+BIAS = np.array([0.01, -0.005, 0.008, 0.1, -0.05, 0.15])
+
+
+def biased(module, simulations, fit=False):
+    """Two records, hung and on the floor, whose sensor has the BIAS."""
+    records = []
+    for k, kind in enumerate(("hung", "floor")):
+        own = record_of(module, simulations[kind], 3 + k)
+        imu = own.channels["base_imu"] + np.r_[BIAS, 0, 0, 0]
+        start = {"base_biases": np.zeros((len(own), 6))} if fit else {}
+        channels = {**own.channels, "base_imu": imu, **start}
+        records.append(runtime.Record(own.t, own.q, own.tau, channels=channels))
+    return records
+
+
 def test_biases_of_the_sensor_leave_the_mass_within_two_percent(module, simulations):
-    records = [
-        record_of(module, simulations[kind], 3 + k) for k, kind in enumerate(("hung", "floor"))
-    ]
-    biased = []
-    for record in records:
-        bias = np.array([0.01, -0.005, 0.008, 0.1, -0.05, 0.15, 0, 0, 0])
-        channels = {**record.channels, "base_imu": record.channels["base_imu"] + bias}
-        biased.append(runtime.Record(record.t, record.q, record.tau, channels=channels))
-    fit = fitted(module, biased)
+    fit = fitted(module, biased(module, simulations))
     mass, truth = dict(zip(fit.names, fit.X, strict=True))["M0R"], truth_of(module)["M0R"]
     assert abs(mass / truth - 1) < 0.02
+
+
+def test_biases_of_the_sensor_are_fitted(module, simulations):
+    """Within three deviations; .94 of the parameters lie within theirs, .88 without the fit."""
+    records = biased(module, simulations, fit=True)
+    told = problem(module, records, WHOLE).noted("biases").result
+    assert (np.abs(told.values - BIAS) < 3 * told.sigma).all()
+    assert (told.sigma < [0.02] * 3 + [0.003] * 3).all()
+    z = deviations(fitted(module, records), truth_of(module))
+    assert np.mean(np.abs(z) < 2) > 0.9
 
 
 def test_a_fall_tells_the_mass_by_the_torques_of_the_joints(module, simulations):

@@ -32,8 +32,12 @@ from runtime.core.signals.filters import States, median_filtered
 from runtime.core.signals.reader import Reader
 from runtime.core.study import Study
 from runtime.ground.errors import InputError
+from runtime.ground.memory import require_memory
 
 Array = np.ndarray
+
+COPIES = 2
+"""Copies of W while rows are made and factored; 1.8 were measured without decimation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,9 +242,19 @@ def stacked(
     """Build one system Y = W X + rho from the rows of several records.
 
     columns : names of the columns; default: all.
+
+    InputError if there is no record, or if W is larger than the memory.
     """
     if not records:
         raise InputError("no record is given; expected at least one")
+    b = len(model.BASE_PARAMETERS if columns is None else columns)
+    rows = sum(int(record.selection.mask.sum()) for record in records)
+    require_memory(
+        8.0 * COPIES * rows * b,
+        f"{rows:,} rows of {b} columns",
+        "decimate (signals.decimate), use a piece of the record (rows.window), or a robot of fewer "
+        "columns (symgen convert --lock)",
+    )
     return stack([record.observation(model, columns) for record in records])
 
 

@@ -13,6 +13,7 @@ reads f, the acceleration there minus gravity:
 
     wd0 = dw0/dt,   a0 = f - wd0 x r - w0 x (w0 x r)
 
+Constant biases of both, which no filter changes, are subtracted (`runtime.biases`).
 The filters are those of the joints: p and Q pass them like positions, the others like velocities.
 The filtered Q = r u has a length r near 1, which vec(Q* Qd)/r**2 = vec(u* ud) takes out.
 """
@@ -25,6 +26,7 @@ import numpy as np
 
 from runtime.core.quaternions import continued, motion_of_pose
 from runtime.core.record import (
+    BASE_BIASES,
     BASE_GRAVITY,
     BASE_IMU,
     BASE_MOTION,
@@ -53,7 +55,8 @@ def base_motion(channels: Mapping[str, Array], rate: float, signals: Signals) ->
     if BASE_MOTION in channels:
         x = _filtered(channels[BASE_MOTION], rate, signals)
     elif BASE_IMU in channels:
-        w, f = np.hsplit(_filtered(channels[BASE_IMU][:, :6], rate, signals), 2)
+        read = _filtered(channels[BASE_IMU][:, :6], rate, signals)
+        w, f = np.hsplit(read - channels.get(BASE_BIASES, np.zeros(6)), 2)
         wd, r = derivative(w, rate, signals.ends), channels[BASE_IMU][:, 6:]
         x = np.hstack([w, wd, f - np.cross(wd, r) - np.cross(w, np.cross(w, r))])
     elif BASE_POSITION in channels:
