@@ -4,7 +4,7 @@ README; the campaign runs every block of every page.
 A page becomes one script in an empty folder: its Python blocks share a namespace, its commands run
 with `symgen` on PATH, a YAML block whose first line is `# NAME.yaml` is written to that file. `#
 exit code 1` at the end of a block of commands says what its last command ends with. ```text is not
-run.
+run; those of README are, by test_readme_commands.
 """
 
 from __future__ import annotations
