@@ -355,7 +355,7 @@ def test_angles_are_typed_as_a_textbook_prints_them(studio: Any, typed: str, wri
     ("old", "new", "place"),
     [
         ("values:", "loops: [{cut: 1, twin: 2}]\nvalues:", ""),
-        ("ant: 1", "ant: 1, gamma: 1", 'id="wrong-2">'),
+        ("ant: 1", "ant: 1, gamma: 1", 'id="wrong-2"> <span class="wrong" role="alert">'),
         ("convention: distal", "convention: classic", 'id="wrong-convention">'),
     ],
 )
