@@ -213,7 +213,8 @@ def nearest(
     A = K[:, :count] @ part.slope(u) * S
     inverse = np.linalg.pinv(A, rcond=1e-12)
     gain[:count] = S[:, None] * inverse
-    told[:count] = np.linalg.norm(np.eye(count) - inverse @ A, axis=1) < NEAR
+    A = K[:, :count] @ part.slope(u) * np.where(part.masses, 0.0, part.size)  # rotors as links
+    told[:count] = np.linalg.norm(np.eye(count) - np.linalg.pinv(A, rcond=1e-12) @ A, axis=1) < NEAR
     return Nearest(
         found,
         whole.u0,

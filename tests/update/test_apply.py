@@ -170,6 +170,20 @@ def test_armature_stays_armature(tmp_path) -> None:
         assert_allclose(list(found), [chi[k] for k in rotors], rtol=1e-6)
 
 
+def test_a_rotor_that_turns_as_its_link_is_told_in_sums(tmp_path) -> None:
+    """Torques of one hinge hold ZZ1 + Ia1 alone: the armature had a deviation of its own."""
+    path = tmp_path / "pendulum.xml"
+    path.write_text(
+        '<mujoco model="pendulum"><worldbody><body name="arm"><joint name="j" axis="1 0 0"/><inertial '
+        'pos="0 0 -0.1" mass="0.9" diaginertia="0.006 0.006 0.002"/></body></worldbody></mujoco>'
+    )
+    model = symgen.model(path)
+    applied = symgen.apply(exact(model, dict(model.VALUES) | {"Ia1": 0.02}), path)
+    [armature] = [c for c in applied.changes if c.number == "armature"]
+    assert armature.after == pytest.approx(0.02)
+    assert armature.told_by == "sum" and np.isnan(armature.sigma)
+
+
 def test_what_is_absurd_is_told(tmp_path) -> None:
     """A fore arm that the estimate makes five times as heavy, with its centre behind the axis."""
     path = written(tmp_path, "arm.urdf")
