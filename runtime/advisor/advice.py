@@ -632,7 +632,7 @@ def answer(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer
     return Answer(
         state_of(error, LIMIT.NEGLIGIBLE, LIMIT.BIASED),
         f"{text}; at {labels} the largest change is {error:.{0 if error >= 10 else 1}f} % ({name})",
-        "a finer encoder, or an estimator that simulates the closed loop (estimate.method: iv, didim)",
+        "a finer encoder; with a section `controller` of the study, also estimate.method: iv or didim",
     )
 
 
