@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import groupby, pairwise
 from pathlib import Path
 from shutil import get_terminal_size
 from textwrap import wrap
@@ -163,12 +164,50 @@ def show(
 
 
 def on_terminal(text: str, width: int, verdict: Any = None) -> str:
-    """Wrap a text to the width of the terminal, and colour the verdict (Yes, With care, No)."""
-    text = "\n".join(_wrapped(line, width) for line in text.split("\n"))
+    """Wrap a text to the width of the terminal, and colour the verdict (Yes, With care, No).
+
+    A table that is wider than the terminal and than a line is printed in parts, each with the first
+    column.
+    """
+    from runtime.ground.table import LINE
+
+    lines: list[str] = []
+    for tabular, group in groupby(text.split("\n"), lambda line: bool(re.search(r"\S  +\S", line))):
+        block = list(group)
+        wide = tabular and max(map(len, block)) > max(width, LINE)
+        lines += _in_parts(block, width) if wide else block
+    text = "\n".join(_wrapped(line, width) for line in lines)
     if verdict is None:
         return text
     answer = typer.style(verdict.answer, fg=COLOURS.get(verdict.state), bold=True)
     return re.sub(rf"^{verdict.answer}(?=\.)", answer, text, count=1, flags=re.MULTILINE)
+
+
+def _in_parts(table: list[str], width: int) -> list[str]:
+    """Split a table of aligned columns into tables of at most `width`, if it has a first column.
+
+    Columns are where at least two blanks stand above each other in all lines.
+    """
+    full = max(map(len, table))
+    padded = [line.ljust(full) for line in table]
+    blank = "".join(" " if all(line[k] == " " for line in padded) else "x" for k in range(full))
+    ends = [match.end() for match in re.finditer(r"x  +", blank)]
+    if len(ends) < 2 or len(table) < 2:
+        return table
+    first, *rest = pairwise([0, *ends, full])
+    parts: list[list[tuple[int, int]]] = []
+    for column in rest:
+        used = first[1] + sum(b - a for a, b in parts[-1]) if parts else width
+        fits = used + len(blank[slice(*column)].rstrip()) <= width
+        if parts and fits:
+            parts[-1].append(column)
+        else:
+            parts.append([column])
+    lines: list[str] = []
+    for part in parts:
+        lines += [""] if lines else []
+        lines += ["".join(row[a:b] for a, b in [first, *part]).rstrip() for row in padded]
+    return lines
 
 
 def _wrapped(line: str, width: int) -> str:

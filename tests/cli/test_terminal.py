@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from runtime.ground.table import interval, with_intervals
+from runtime.ground.table import aligned, interval, with_intervals
 from symgen.cli import session
 
 TEXT = "With care. " + "The model leaves a part unexplained. " * 4 + "\nZZ1R 1.79 +- 0.02"
@@ -21,6 +21,17 @@ def test_lines_end_between_words_where_the_terminal_does() -> None:
     assert all(len(line) <= 60 for line in plain) and len(plain) == 4
     words = " ".join(line.strip() for line in plain).split()
     assert words == TEXT.split()
+
+
+def test_a_wide_table_is_printed_in_parts_with_its_first_column() -> None:
+    header = ["encoder", *(f"change of parameter {k}, %" for k in range(5))]
+    rows = [[f"joint {j}", *(f"{j}.{k}" for k in range(5))] for j in range(3)]
+    text = session.on_terminal("A caption\n" + aligned([header, *rows]), 80)
+    lines = text.splitlines()
+    assert max(map(len, lines)) <= 80 and lines[0] == "A caption"
+    assert sum(line.startswith("joint 2") for line in lines) == 3
+    cells = [cell for line in lines if line.startswith("joint 2") for cell in line.split()[2:]]
+    assert cells == rows[2][1:]
 
 
 def test_a_pipe_gets_the_lines_as_they_are(capsys: pytest.CaptureFixture) -> None:
