@@ -136,7 +136,8 @@ def _require_motion(model: GeneratedModel, record: Record, moves: bool) -> None:
         raise InputError(
             f"the base of {model.NAME} moves, but the record does not say how; give record.base: "
             "{motion: [nine columns]}, {position: [...], quaternion: [...]} or {gyroscope: [...], "
-            "accelerometer: [...]} in the study, or use a model with base: fixed",
+            "accelerometer: [...]} in the study (a record of validate or payload needs its own "
+            "`base`), or use a model with base: fixed",
             file=record.file,
         )
     if given and not moves:

@@ -428,7 +428,9 @@ class Identification:
             per_line = -(-len(shown) // len(lines))
             more = len(names) - unknown - min(len(shown), per_line * room)
         by_joint = ", ".join(
-            f"{one.joint} {one.relative_error:.1f} %" if one.has_motor else f"{one.joint} no motor"
+            f"{one.joint} {one.relative_error:.1f} %"
+            if one.has_motor
+            else f"{one.joint} {'zero' if one.is_axis else 'no motor'}"
             for one in fit.per_joint
             if one.rows
         )

@@ -227,6 +227,17 @@ def test_a_study_names_wrenches_or_flight(case, tmp_path: Path):
         runtime.read_record(file, symgen.model("tx40"))
 
 
+def test_a_wrench_that_is_zero_is_called_so():
+    """The six rows of a robot that flies were printed as "FX0 no motor"."""
+    model = symgen.model("planar_2r", base="free")
+    rng, t = np.random.default_rng(5), np.arange(0, 6, 0.01)
+    q, base = (np.sin(np.outer(t, rng.uniform(1, 6, n))) for n in (2, 9))
+    channels = {"base_motion": base, "wrench0": np.zeros((len(t), 6))}
+    tau = rng.standard_normal((len(t), 2))
+    brief = runtime.identify(model, runtime.Record(t, q, tau, channels=channels)).brief()
+    assert "FX0 zero" in brief and "no motor" not in brief
+
+
 def test_identified_values_of_link_0_are_written_into_the_file(case, tmp_path: Path):
     _, module, truth, (t, q, tau, base) = case
     rng = np.random.default_rng(12)

@@ -177,7 +177,7 @@ def test_a_sensor_on_the_base_is_read_at_its_place_and_in_its_axes(case, tmp_pat
 
 def test_a_base_that_moves_needs_its_motion_and_a_fixed_one_has_none(case):
     robot, module, _, (t, q, tau, base, pose) = case
-    with pytest.raises(InputError, match=r"the record does not say how; give record\.base"):
+    with pytest.raises(InputError, match=r"give record\.base: .*payload needs its own `base`"):
         runtime.estimate(module, runtime.Record(t, q, tau))
     moved = runtime.Record(t, q, tau, channels={"base_motion": base})
     with pytest.raises(InputError, match="the base of ur5 is fixed; use --base moving"):

@@ -286,7 +286,7 @@ def test_estimates_of_other_robots_are_refused(tmp_path) -> None:
     with pytest.raises(DescriptionError, match=r"no base parameters of arm\.urdf.*--robot"):
         symgen.apply(exact(tx40, dict(tx40.VALUES)), path)
     with pytest.raises(
-        DescriptionError, match=r"frames 1, 2, 3, 4, 5, 6 of tx40.yaml and arm\.urdf differ"
+        DescriptionError, match=r"frames 1, 2, 3, 4, 5, 6 of tx40\.yaml and arm\.urdf differ"
     ):
         symgen.apply(exact(tx40, dict(tx40.VALUES)), path, robot="tx40")
     named = replace(
