@@ -1,7 +1,7 @@
 """What a base that moves costs: operations of the models, and times of the regressor in NumPy and C
 beside pinocchio's.
 
-    python benchmarks/moving_base.py [ROBOT or ROBOT:BASE ...] [--samples 7103] [--rounds 9] [--write]
+    python benchmarks/base_cost.py [ROBOT or ROBOT:BASE ...] [--samples 7103] [--rounds 9] [--write]
 
 Default: tx40 on a fixed, a moving and a free base. ROBOT is a packaged robot or a file; without BASE,
 all kinds. For each, all parameters of the robot file take part, friction and drives too; pinocchio has
@@ -14,7 +14,7 @@ in rotated order:
                base moves; results are not kept. Its 10 columns a link are not combined to base columns.
 
 Before timing, every column of pinocchio is compared with D K, K = d base parameters / d standard, 1e-10 of
-the column: of a moving base in the rows of the joints. --write puts the table into moving_base.md.
+the column: of a moving base in the rows of the joints. --write puts the table into base_cost.md.
 """
 
 from __future__ import annotations
@@ -179,7 +179,7 @@ def main() -> None:
     text = f"""\
 # What a base that moves costs
 
-Written by `python benchmarks/moving_base.py {" ".join(Path(x).name for x in given.robots)} --write`.
+Written by `python benchmarks/base_cost.py {" ".join(Path(x).name for x in given.robots)} --write`.
 Multiplications + additions of one sample, all parameters of the robot file; rows: torques, of a free base with force and moment.
 
 {table(HEAD, operations)}
@@ -192,7 +192,7 @@ Before timing, all its columns agree with those of NumPy to 1e-10, and NumPy wit
 """
     print(text)
     if given.write:
-        (HERE / "moving_base.md").write_text(text, encoding="utf-8")
+        (HERE / "base_cost.md").write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
