@@ -446,7 +446,8 @@ class Identification:
         count = f"All {of}" if len(names) == of else f"{len(names)} of {of}"
         chosen = ", the essential ones" if self.model_columns == "essential" else ""
         method = self.model_estimate.method
-        how = "under physical constraints" if method == "feasible" else f"by {method}"
+        physical = self.problem.methods[method].physical
+        how = "under physical constraints" if physical else f"by {method}"
         return f"{count} base parameters{chosen}, fitted {how}"
 
     @property
