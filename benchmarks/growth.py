@@ -2,11 +2,12 @@
 figure.
 
     python benchmarks/growth.py [-o benchmarks/growth.png] [--quick]
+    python benchmarks/growth.py --trees [--joints 10 30 60 100]         # writes benchmarks/growth.md
 
 Samples: the TX40 regressor into a reused store and the distinct signals through the decimation;
-largest resident set of `symgen identify`. Joints, 2 to 30: revolute chains and binary trees with
-friction; generation from the robot file to the text of the module, and the regressor of each. Runs,
-columns, workers: a resolution study of the TX40 with 9000 samples.
+largest resident set of `symgen identify`. Joints: the trees of `trees.py`; `symgen show` and `symgen
+generate --target numpy` as processes, their processor seconds and largest resident set, and the size
+of each module. Runs, columns, workers: a resolution study of the TX40 with 9000 samples.
 
 One core, one BLAS thread, CPU time, the least of three after a warm-up; workers: every core,
 elapsed time. The least of three under an unknown load is good for slopes, which is what the figure
@@ -24,6 +25,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from importlib import metadata
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -33,6 +36,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
+from trees import TREES
 
 from runtime.compose import cestac
 from runtime.core.model import GeneratedModel, load_model
@@ -42,11 +46,12 @@ from runtime.core.signals.filters import States, decimation_plan
 from runtime.core.study import Decimate
 from runtime.parallel.processes import processes
 from runtime.study import CestacSettings, Study
-from symgen.description import load_robot, parse_robot
-from symgen.emit.generate import generate_files, generate_module
+from symgen.description import load_robot
+from symgen.emit.generate import generate_files
 
 SAMPLES = (1_000, 10_000, 100_000, 1_000_000)
-JOINTS = (2, 4, 6, 9, 12, 16, 20, 30)
+JOINTS = (10, 30, 60)
+STAGES = ("show, s", "generate, s", "generate, peak MB", "module, KB")
 RUNS = (4, 16, 64, 256)
 COLUMNS = (3, 6, 12, 24, 60)
 WORKERS = (1, 2, 4, 8)  # as many as there are cores
@@ -97,11 +102,25 @@ def by_samples(models: dict[str, GeneratedModel], samples: tuple[int, ...]) -> C
     return found
 
 
-def memory(folder: Path, model: GeneratedModel, samples: tuple[int, ...]) -> Curves:
-    """MB of `symgen identify`, the largest of the processes so far: samples ascend; and what W
-    would take at every sample.
+def process(folder: Path, *arguments: str, codes: tuple[int, ...] = (0,)) -> tuple[float, float]:
+    """Processor seconds of a `symgen` command, and its largest resident set in MB; at least that of
+    this process, which it inherits.
     """
-    identify = "from symgen.cli.main import main; main()"
+    started = subprocess.Popen(
+        [sys.executable, "-m", "symgen", *arguments],
+        cwd=folder,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    _, status, used = os.wait4(started.pid, 0)
+    started.returncode = os.waitstatus_to_exitcode(status)
+    if started.returncode not in codes:
+        raise RuntimeError(f"symgen {' '.join(arguments)} ended with {started.returncode}")
+    return used.ru_utime + used.ru_stime, used.ru_maxrss * 1024 / 1e6
+
+
+def memory(folder: Path, model: GeneratedModel, samples: tuple[int, ...]) -> Curves:
+    """MB of `symgen identify`, and what W would take at every sample."""
     path, columns = folder / "record.npz", np.arange(1, 7)
     found: Curves = {"identification": [], "W at every sample (never formed)": []}
     for N in samples:
@@ -113,56 +132,72 @@ def memory(folder: Path, model: GeneratedModel, samples: tuple[int, ...]) -> Cur
             f"tau{j}": tau[:, j - 1] for j in columns
         }
         np.savez(path, t=t, **named)
-        subprocess.run(
-            [sys.executable, "-c", identify, "identify", "tx40", str(path), "--no-plausible"],
-            capture_output=True,
-            check=False,  # the verdict may be no
+        _, peak = process(  # the verdict may be no
+            folder, "identify", "tx40", str(path), "--no-plausible", codes=(0, 1)
         )
-        peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024
-        found["identification"].append((N, peak / 1e6))
+        found["identification"].append((N, peak))
         W = 8 * 6 * len(model.BASE_PARAMETERS) * N
         found["W at every sample (never formed)"].append((N, W / 1e6))
     return found
 
 
-def arm(n: int, tree: bool) -> bytes:
-    """Robot file of n revolute joints, a chain or a binary tree, axes at right angles in turn,
-    viscous and Coulomb friction.
-    """
-    frames, constants = [], ["g: 9.81"]
-    for j in range(1, n + 1):
-        ant = (j // 2 if j > 2 else j - 1) if tree else j - 1
-        length = f"L{j}"
-        constants.append(f"{length}: {0.2 + 0.01 * j:.2f}")
-        d, r = (length, "0") if j % 2 else ("0", length)
-        frames.append(
-            f"  {j}: {{ant: {ant}, sigma: 0, alpha: {('0', '-pi/2', 'pi/2')[j % 3]}, d: {d}, "
-            f"theta: q{j}, r: {r}}}"
-        )
-    elements = "elements:\n  FV: {kind: viscous, along: all}\n  FS: {kind: coulomb, along: all}\n"
-    head = (
-        f"symgen: 1\nname: arm{n}\ngravity: [0, 0, -g]\nconstants: "
-        f"{{{', '.join(constants)}}}\nframes:\n"
-    )
-    return (head + "\n".join(frames) + "\n" + elements).encode()
+def least_peak() -> float:
+    """Largest resident set of this process, MB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
 
 
-def by_joints(folder: Path, joints: tuple[int, ...], N: int = 4000) -> tuple[Curves, Curves]:
-    """Seconds of generation, and nanoseconds of a regressor per sample."""
-    generation: Curves = {}
-    speed: Curves = {}
-    for tree in (False, True):
-        shape = "tree" if tree else "chain"
+def by_joints(folder: Path, joints: tuple[int, ...]) -> dict[str, Curves]:
+    """Seconds and MB of commands, and KB of the module, of every tree."""
+    found: dict[str, Curves] = {name: {} for name in STAGES}
+    for shape, written in TREES.items():
         for n in joints:
-            robot = parse_robot(arm(n, tree), file="arm.yaml")
-            generation.setdefault(shape, []).append((n, least(lambda: generate_module(robot), 1)))  # noqa: B023
-            own = folder / f"{shape}{n}"
-            own.mkdir()
-            for file, text in generate_files(robot, targets=("numpy",)).items():
-                (own / file).write_text(text, encoding="utf-8")
-            model = load_model(f"arm{n}", folder=own, trust=True)
-            speed.setdefault(shape, []).append((n, 1e9 * evaluation(model, motion(N, n)) / N))
-    return generation, speed
+            (folder / f"{shape}.yaml").write_bytes(written(n))
+            show, _ = process(folder, "show", f"{shape}.yaml")
+            seconds, peak = process(
+                folder, "generate", f"{shape}.yaml", "--target", "numpy", "-o", f"{shape}{n}"
+            )
+            (text,) = (folder / f"{shape}{n}").glob("*.py")
+            sizes = show, seconds, peak, text.stat().st_size / 1e3
+            for name, size in zip(STAGES, sizes, strict=True):
+                found[name].setdefault(shape, []).append((n, size))
+            print(shape, n, *(f"{x:.3g}" for x in sizes), flush=True)
+    return found
+
+
+def table_of_trees(found: dict[str, Curves], load: str) -> str:
+    """The page growth.md."""
+    lines = [
+        "# Growth with the joints",
+        "",
+        "Written by `python benchmarks/growth.py --trees`, which says what is measured; the trees are those of `trees.py`.",
+        f"One run of each command, two virtual cores, load average {load}; a process shows at least the {least_peak():.0f} MB of the one that starts it.",
+        "Exponents are those of the two largest trees; the start of Python, some 0.3 s, is in all seconds.",
+        "",
+        f"| tree | joints | {' | '.join(STAGES)} |",
+        "|---|---|" + "---|" * len(STAGES),
+    ]
+    for shape in TREES:
+        columns = [found[name][shape] for name in STAGES]
+        for row in zip(*columns, strict=True):
+            sizes = " | ".join(f"{size:.3g}" for _, size in row)
+            lines.append(f"| {shape} | {row[0][0]:g} | {sizes} |")
+        exponents = " | ".join(f"{slope(points[-2:]):.2f}" for points in columns)
+        lines.append(f"| {shape} | exponent, last two | {exponents} |")
+    lines += ["", peer(), ""]
+    return "\n".join(lines)
+
+
+def peer() -> str:
+    """Whether pinocchio can generate code of its regressor by CasADi here."""
+    version = metadata.version("pin") if find_spec("pinocchio") else None
+    if version is None:
+        return "pinocchio is not installed: no ratio to its code generation."
+    has = find_spec("pinocchio.casadi") is not None
+    return (
+        f"pinocchio {version} {'has' if has else 'has no'} module `pinocchio.casadi`"
+        f"{'; this file does not measure it' if has else ', so it generates no code of its regressor here'}:"
+        " no ratio."
+    )
 
 
 def study_record() -> Record:
@@ -244,7 +279,7 @@ def panel(axes: object, curves: Curves, x: str, y: str) -> None:
     axes.set(xlabel=x, ylabel=y)  # type: ignore[attr-defined]
     if not x.startswith("samples"):
         counts = (
-            [2, 4, 8, 16, 30]
+            [10, 30, 60, 100]
             if x == "joints"
             else [count for count, _ in next(iter(curves.values()))]
         )
@@ -262,11 +297,13 @@ def main() -> None:
     )
     parser.add_argument("-o", "--output", type=Path, default=Path("benchmarks/growth.png"))
     parser.add_argument("--quick", action="store_true", help="few points, to see whether it runs")
+    parser.add_argument("--trees", action="store_true", help="only the trees, into growth.md")
+    parser.add_argument("--joints", type=int, nargs="+", default=JOINTS, metavar="N")
     arguments = parser.parse_args()
     samples, joints, runs, columns = (
-        (SAMPLES[:3], (2, 6), RUNS[:2], COLUMNS[-3:])
+        (SAMPLES[:3], (10, 20), RUNS[:2], COLUMNS[-3:])
         if arguments.quick
-        else (SAMPLES, JOINTS, RUNS, COLUMNS)
+        else (SAMPLES, tuple(arguments.joints), RUNS, COLUMNS)
     )
     cores = os.sched_getaffinity(0)
     workers = (
@@ -277,6 +314,13 @@ def main() -> None:
     os.sched_setaffinity(0, {max(cores)})
     with TemporaryDirectory() as name:
         folder = Path(name)
+        trees = by_joints(folder, joints)  # first, like the next
+        if arguments.trees:
+            load = "{:.1f}, {:.1f}, {:.1f}".format(*os.getloadavg())
+            page = Path(__file__).with_name("growth.md")
+            page.write_text(table_of_trees(trees, load), encoding="utf-8")
+            print(page)
+            return
         model = emitted("tx40", folder)
         models = {"NumPy": model}
         peaks = memory(
@@ -299,14 +343,8 @@ def main() -> None:
             f"columns, {runs[-2]} runs, TX40",
             "CPU time of a resolution study, s",
         )
-        generation, speed = by_joints(folder, joints)
-        panel(
-            axes[4],
-            generation,
-            "joints",
-            "CPU time of generation, s",
-        )
-        panel(axes[5], speed, "joints", "regressor, ns a sample")
+        panel(axes[4], trees["generate, s"], "joints", "CPU time of symgen generate, s")
+        panel(axes[5], trees["generate, peak MB"], "joints", "peak memory of symgen generate, MB")
         os.sched_setaffinity(0, cores)
         elapsed = by_workers(models, record, workers, runs[-1])
         panel(
