@@ -326,6 +326,7 @@ def test_formula_opens_by_key(shown):
 def test_a_figure_on_a_phone_is_as_wide_as_the_page(browser, page):
     """Its panels take four fifths of the page, and no label is cut."""
     browser.open(page, 390)
+    browser.run(FRAME)
     lefts = (
         "[...document.querySelectorAll('.plot text')].map((n) => n.getBoundingClientRect().left)"
     )
