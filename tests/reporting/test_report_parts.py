@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from runtime.advisor.advice import answer
-from runtime.compose import judged
+from runtime.compose import METHODS, judged
 from runtime.core.essential import lost_joints
 from runtime.core.least_squares.estimate import Estimate, JointFit
 from runtime.core.model import load_model
@@ -365,6 +365,7 @@ def identified(robot_file=(1.0, 0.01)):
     made = SimpleNamespace(
         model=model, model_estimate=used, estimate=every, model_columns="essential"
     )
+    made.problem = SimpleNamespace(methods=METHODS)
     made.fitted = Identification.fitted.fget(made)
     return made
 
