@@ -110,7 +110,7 @@ class DescriptionError(SymgenError):
         line: int | None = None,
     ) -> None:
         self.message, self.path, self.file, self.line = message, path, file, line
-        name = " ".join((file or "").split("\n"))
+        name = (file or "").replace("\n", "\\n")
         place = "" if file is None else f" ({name}{'' if line is None else f', line {line}'})"
         super().__init__(message + place)
 
