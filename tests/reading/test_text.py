@@ -134,6 +134,6 @@ def test_a_field_in_quotation_marks_may_contain_the_separator(tmp_path):
 def test_a_file_of_zeros_is_told_in_one_sentence(tmp_path):
     path = tmp_path / "run.csv"
     path.write_bytes(bytes(100_000))
-    with pytest.raises(InputError, match="not a text file.*zeros") as e:
+    with pytest.raises(InputError, match=r"not a text file.*zeros") as e:
         read_table(path)
     assert len(str(e.value)) < 200
