@@ -88,6 +88,19 @@ def identify_each(
     InputError
         The folder cannot be written. An error of `map`, for example of a worker that died, is
         raised with a note that names the record and says how many records are finished.
+
+    Examples
+    --------
+    >>> import tempfile, numpy as np, runtime, symgen
+    >>> folder, t = tempfile.mkdtemp(), np.arange(0, 10, 0.001)
+    >>> for k, mass in enumerate((95, 105)):
+    ...     q, tau = np.sin(t), 200 * np.cos(t) - mass * np.sin(t) + 20 * np.sign(np.cos(t))
+    ...     np.savez(f"{folder}/run{k}.npz", t=t, q1=q, tau1=tau)
+    >>> files = {"files": [f"{folder}/run0.npz"], "also": [[f"{folder}/run1.npz"]]}
+    >>> model, study = symgen.model("emps"), runtime.Study(record=files)
+    >>> rows = runtime.identify_each(model, study, f"{folder}/results")
+    >>> [(row["record"], row["kept"]) for row in rows]
+    [('run0', False), ('run1', False)]
     """
     require_emitted(model)
     place = Path(folder).absolute()
