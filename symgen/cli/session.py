@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import typer
 
-from symgen.cli.told import as_json, counter, error_data, tell
+from symgen.cli.told import as_json, counter, error_data, lines_of, tell
 from symgen.update.models import corrected as corrected
 from symgen.update.models import model_of as model_of
 from symgen.update.models import variants_of as variants_of
@@ -447,10 +447,13 @@ def progress_bar(what: str) -> Iterator[Any]:
     """Show a progress bar of `what` on the error stream for the duration of the block.
 
     Yield a function of the number of finished steps and the number of all steps, which updates the
-    bar.
+    bar. Where the error stream is no terminal, a line every ten seconds takes its place.
     """
     if as_json():
         yield counter()
+        return
+    if not sys.stderr.isatty():
+        yield lines_of(what)
         return
     from rich import progress as rich
     from rich.console import Console

@@ -54,7 +54,7 @@ def test_logs_of_learning_are_read(case: str) -> None:
 def test_stamps_rounded_and_in_nanoseconds(file: str, tmp_path: Path) -> None:
     """Rounded to 10 ms at 200 Hz: counted, never interpolated; nanoseconds by their size."""
     study = tmp_path / "study.yaml"
-    code, text, said = identified(
+    code, text, _ = identified(
         CASES / "stamps" / "two.urdf", CASES / "stamps" / file, "--suggest", study
     )
     assert code == 0 and "study.yaml is written" in text
