@@ -95,13 +95,13 @@ def tables(rows: Sequence[dict[str, Any]]) -> str:
     for key, title in (("new", "By the interval"), ("chapter", "By 1 % and 5 %")):
         kinds = [kind for kind in (*VERDICTS, "not judged") if any(r[key] == kind for r in rows)]
         lines = [line(kind, [r for r in rows if r[key] == kind]) for kind in kinds]
-        out += [f"## {title}\n", markdown(head, lines)]
+        out += [f"## {title}", markdown(head, lines)]
     pairs = sorted({(r["chapter"], r["new"]) for r in rows if r["chapter"] != r["new"]})
     lines = [
         line(f"{a}, now {b}", [r for r in rows if (r["chapter"], r["new"]) == (a, b)])
         for a, b in pairs
     ]
-    return "\n".join([*out, "## Where the rules differ\n", markdown(head, lines)])
+    return "\n\n".join([*out, "## Where the rules differ", markdown(head, lines)])
 
 
 if __name__ == "__main__":
