@@ -169,9 +169,7 @@ class Applied:
             )
         if not self.placeless:
             return [*lines, f"Everything identified has a place in the {self.format}."]
-        lines.append(
-            f"Not written, without a place in the {self.format}; set these in your program:"
-        )
+        lines.append("Not written; set these in your program:")
         return lines + [f"  {line}" for line in self._rest()]
 
     def _rest(self) -> list[str]:

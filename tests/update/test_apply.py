@@ -519,7 +519,7 @@ def test_the_answer_comes_first_and_fits_the_terminal(tmp_path) -> None:
     lines = str(applied).split("\n")
     assert max(map(len, lines)) <= 80
     assert "Both together leave 1.3 % of the torques" in " ".join(" ".join(lines[:2]).split())
-    assert "Without a place in the URDF, set these in your program:" in lines
+    assert "Not written; set these in your program:" in lines
     for name in applied.placeless:
         assert sum(line.startswith(f"  {name} = ") for line in lines) == 1
     assert lines.count("link 'fore'") == 1 and lines.count("joint 'elbow'") == 1
