@@ -117,7 +117,7 @@ def reader_advice(
 
 def parts_of_reader(groups: Sequence[EncoderGroup], confirm: bool) -> int:
     """Guess the parts of the work for one reader: steps of a curve and two limits, by group."""
-    return len(groups) * (LIMIT.READER_DOWN + len(LIMITS) * confirm)
+    return len(groups) * (int(LIMIT.READER_DOWN) + len(LIMITS) * confirm)
 
 
 def curves(
