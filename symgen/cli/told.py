@@ -51,10 +51,10 @@ def lines_of(what: str) -> Callable[[int, int], None]:
     def count(done: int, total: int) -> None:
         nonlocal last
         now = monotonic()
-        if done and now - last > LINE_PAUSE:
+        if 0 < done < total and now - last > LINE_PAUSE:
             last = now
             left = (now - start) / done * (total - done)
-            tell(f"  {what}: {done} of about {total}, about {left:.0f} s left")
+            tell(f"  {what}: {done} of {total}, about {left:.0f} s left")
 
     return count
 
