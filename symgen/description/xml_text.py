@@ -17,6 +17,7 @@ import numpy as np
 from symgen.errors import DescriptionError
 
 Array = np.ndarray
+EXPAND = "this file is a xacro macro; expand it first (xacro FILE > robot.urdf)"
 MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS, LARGEST = 5_000_000, 30, 50_000, 1e9
 
 
@@ -67,8 +68,11 @@ class XmlElement(ElementTree.Element):
         except ValueError:
             values = []
         if len(words) != n or len(values) != n or not all(abs(x) <= largest for x in values):
+            remedy = (
+                f"; {EXPAND}" if "$" in text else "; put blanks in place of commas" * ("," in text)
+            )
             raise DescriptionError(
-                f"<{self.tag} {name}={text[:60]!r}>: expected {n} number{'s' * (n > 1)} of magnitude at most {largest:g}",
+                f"<{self.tag} {name}={text[:60]!r}>: expected {n} number{'s' * (n > 1)} of magnitude at most {largest:g}{remedy}",
                 line=self.line,
             )
         return np.array(values)
@@ -102,7 +106,7 @@ def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> XmlElement:
             )
         if tag.startswith("xacro:"):
             raise DescriptionError(
-                f"<{tag}>: this file is a xacro macro; expand it first (xacro FILE > robot.urdf)",
+                f"<{tag}>: {EXPAND}",
                 line=line,
             )
         open_.append(XmlElement(tag, attributes, line, parser.CurrentByteIndex))

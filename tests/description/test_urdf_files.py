@@ -222,6 +222,21 @@ def test_joints_that_move_are_counted(kind):
             read_tree(text.encode(), "skin.urdf")
 
 
+@pytest.mark.parametrize(
+    ("xyz", "remedy"),
+    [
+        ("${length} 0 0", "expand it first (xacro FILE > robot.urdf)"),
+        ("$(arg x) 0 0", "expand it first (xacro FILE > robot.urdf)"),
+        ("0.07, 0, -0.69", "put blanks in place of commas"),
+    ],
+)
+def test_numbers_of_another_notation_name_the_remedy(xyz, remedy):
+    link = '<link name="base"/><link name="arm"/>'
+    joint = f'<joint name="j" type="continuous"><parent link="base"/><child link="arm"/><origin xyz="{xyz}"/></joint>'
+    with pytest.raises(DescriptionError, match=re.escape(remedy)):
+        read_tree(f'<robot name="r">{link}{joint}</robot>'.encode(), "r.urdf")
+
+
 @settings(max_examples=150, deadline=None)
 @given(st.data())
 def test_mangled_files_raise_nothing_else(data):
