@@ -320,5 +320,5 @@ def content_of(path: Path) -> bytes:
         reason = getattr(error, "strerror", None) or error
         raise DescriptionError(
             f"cannot read {shown}: {reason}; expected a robot file or one of {names}",
-            file=path.name,
+            file=path.name or shown,  # the folder . has no name
         ) from error
