@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from symgen.cli import options, session
+from symgen.update.models import corrected, model_of, variants_of
 
 
 def compare(
@@ -43,9 +44,9 @@ def compare(
         candidates = {
             Path(one).stem if short else one: session.study_of_arguments([one]) for one in study
         }
-        described = session.corrected(described, next(iter(candidates.values())))
-        model = session.model_of(described)
-        ranking = runtime.compare(model, candidates, variants=session.variants_of(described))
+        described = corrected(described, next(iter(candidates.values())))
+        model = model_of(described)
+        ranking = runtime.compare(model, candidates, variants=variants_of(described))
         if results is not None:
             runtime.report(ranking, results)
         checklist = ranking.best.checklist
