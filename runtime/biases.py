@@ -30,6 +30,7 @@ from runtime.core.rows.observation import Observation, split_rows, stack
 from runtime.core.rows.prepared import observation_of, stacked
 from runtime.core.rows.regressor import Columns
 from runtime.ground.errors import SettingsError
+from runtime.ground.limits import LIMIT
 from runtime.ground.part import Part
 from runtime.ground.progress import at
 from runtime.ground.table import Table
@@ -40,8 +41,7 @@ KIND = "biases"
 """Kind of the note that holds the Biases of a problem."""
 AXES = tuple(f"{sensor} {axis}" for sensor in ("gyroscope", "accelerometer") for axis in "xyz")
 UNITS = ("rad/s",) * 3 + ("m/s**2",) * 3
-PRIOR = np.array([0.2] * 3 + [2.0] * 3)  # deviations, rad/s and m/s**2
-LOOSE = 0.3  # of PRIOR: a larger deviation says that the records do not show the bias
+PRIOR = np.repeat(LIMIT.BIAS_PRIOR, 3)  # deviations, rad/s and m/s**2
 PASSES = 8  # of Gauss-Newton
 DONE = 0.1  # of the deviation of a bias: a smaller change ends the passes
 
@@ -68,7 +68,7 @@ class Biases(Part):
     @property
     def known(self) -> Array:
         """Whether the records show each bias, shape (6,)."""
-        return self.sigma < LOOSE * PRIOR
+        return np.asarray(self.sigma < LIMIT.BIAS_LOOSE * PRIOR)
 
     @property
     def intervals(self) -> list[str]:

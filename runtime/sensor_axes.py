@@ -22,14 +22,12 @@ from runtime.core.record import BASE_IMU
 from runtime.core.result import Identification
 from runtime.core.rows.prepared import Prepared
 from runtime.core.signals.base import INPUTS
+from runtime.ground.limits import LIMIT
 from runtime.ground.part import Doubt
 
 Array = np.ndarray
-DOUBTED = 10.0  # % of the torques: less unexplained needs no other reading
 INSTANTS = 300  # of all records
 STANDARD_GRAVITY = 9.80665  # m/s**2
-STILL, HEAVY = 3.0, 40.0  # m/s**2: medians of |f| outside are of another unit
-FAST = 20.0  # rad/s: a base that turns faster is read in deg/s
 RIDGE = 1e-12  # of the largest eigenvalue of W'W
 
 
@@ -39,7 +37,7 @@ def sensor_axes(result: Identification) -> Doubt | None:
     None without a sensor, or if no other reading halves the error.
     """
     owned = [own for own in result.problem.prepared if BASE_IMU in own.record.channels]
-    if not owned or result.estimate.relative_error < DOUBTED:
+    if not owned or result.estimate.relative_error < LIMIT.AXES_DOUBTED:
         return None
     samples = [_sampled(own, INSTANTS // len(owned)) for own in owned]
     readings = list(product(ROTATIONS, (1.0, -1.0), _factors(samples)))
@@ -94,8 +92,9 @@ def _factors(samples: list[_Samples]) -> list[tuple[float, float]]:
     """List factors of the gyroscope and of the accelerometer that the size of the signals suggests."""
     f = float(np.median([np.median(np.linalg.norm(s.f, axis=1)) for s in samples]))
     w = max(float(np.abs(s.w).max()) for s in samples)
-    of_f = STANDARD_GRAVITY if f < STILL else 1 / STANDARD_GRAVITY if f > HEAVY else 1.0
-    return [*dict.fromkeys(product((1.0, *([np.pi / 180] * (w > FAST))), (1.0, of_f)))]
+    least, most = LIMIT.FORCE_OF_SI
+    of_f = STANDARD_GRAVITY if f < least else 1 / STANDARD_GRAVITY if f > most else 1.0
+    return [*dict.fromkeys(product((1.0, *([np.pi / 180] * (w > LIMIT.FAST_BASE))), (1.0, of_f)))]
 
 
 def _error(

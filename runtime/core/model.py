@@ -310,28 +310,19 @@ def require_no_channels(model: GeneratedModel, what: str) -> None:
         )
 
 
-def require_no_wrench(model: GeneratedModel, what: str) -> None:
-    """Raise InputError if the model has axes of force sensors, which no motor moves.
+def require_no_axes(model: GeneratedModel, what: str) -> None:
+    """Raise InputError if the model has axes that no motor moves: force sensors, or a free base.
 
-    what : name of the caller, which plans motions of joints.
-    """
-    if any(is_axis(joint) for joint in model.JOINTS):
-        raise InputError(
-            f"{what} does not support force sensors; remove record.columns.wrench from the study, or "
-            "the channels wrench0 ... from the records"
-        )
-
-
-def axes_of(model: GeneratedModel) -> tuple[str, str] | None:
-    """Return what gives a model axes that no motor moves, and how a study does without it.
-
-    None: the model has no such axes.
+    what : name of the caller.
     """
     if not any(is_axis(joint) for joint in model.JOINTS):
-        return None
+        return
     if base_rows(model):
-        return "a free base", "with --base moving"
-    return "force sensors", "without record.columns.wrench"
+        raise InputError(f"{what} does not support a free base; use the robot with --base moving")
+    raise InputError(
+        f"{what} does not support force sensors; remove record.columns.wrench from the study, or the "
+        "channels wrench0 ... from the records"
+    )
 
 
 def joint_labels(model: GeneratedModel) -> tuple[str, ...]:

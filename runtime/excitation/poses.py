@@ -19,7 +19,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from runtime.core.model import GeneratedModel, joint_labels, require_no_channels, require_no_wrench
+from runtime.core.model import GeneratedModel, joint_labels, require_no_axes, require_no_channels
 from runtime.core.problem import Problem
 from runtime.core.rows.prepared import stacked
 from runtime.core.rows.selection import per_joint
@@ -111,7 +111,7 @@ def static_poses(problem: Problem) -> StaticPoses:
     """
     model, settings = problem.model, cast(Any, problem.settings).excitation or ExcitationSettings()
     require_no_channels(model, "the search for poses")
-    require_no_wrench(model, "the search for poses")
+    require_no_axes(model, "the search for poses")
     if problem.records and not problem.reader.at_rest:
         raise InputError(
             "new poses can be added only to a record of poses at rest; set signals: {reader: static}"

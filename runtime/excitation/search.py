@@ -25,8 +25,8 @@ from runtime.core.model import (
     GeneratedModel,
     base_columns,
     require,
+    require_no_axes,
     require_no_channels,
-    require_no_wrench,
 )
 from runtime.core.problem import Problem, observe_rows
 from runtime.core.rows.predicted import Weights, kept_correlation
@@ -74,7 +74,7 @@ def excite(
     model = problem.model
     study: Any = problem.settings
     require_no_channels(model, "the search for a motion")
-    require_no_wrench(model, "the search for a motion")
+    require_no_axes(model, "the search for a motion")
     problem.require_motion("the search for a motion (poses: excitation: {poses: N})")
     settings = study.excitation or ExcitationSettings()
     limits = limits_of(model, settings.limits, problem.records)

@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from runtime.core.model import GeneratedModel, axes_of, joint_labels
+from runtime.core.model import GeneratedModel, joint_labels, require_no_axes
 from runtime.core.problem import Problem
 from runtime.core.record import Record
 from runtime.core.rows.observation import LoopRows, Observation, stack
@@ -251,10 +251,7 @@ def observed_loop(problem: Problem, simulator: Simulator | None = None) -> Obser
     `controller` of the settings; without this section no loop is attached.
     """
     settings: Any = problem.settings
-    if (axes := axes_of(problem.model)) is not None:
-        raise InputError(
-            f"estimate.method: {settings.estimate.method} does not support {axes[0]}; use another method, or identify {axes[1]}"
-        )
+    require_no_axes(problem.model, f"estimate.method: {settings.estimate.method}")
     if simulator is None and settings.controller is not None:
         from runtime.loop.simulation import Simulator as FromController
 

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.model import axes_of, drives_of
+from runtime.core.model import drives_of, require_no_axes
 from runtime.core.problem import Problem
 from runtime.core.record import Record
 from runtime.ground.check import Check
@@ -263,8 +263,7 @@ def repair(
 def _case(problem: Problem, variants: Any) -> Case:
     """Prepare the data of a repair; InputError for records that are broken or do not suit."""
     problem.require_motion("a repair")
-    if (axes := axes_of(problem.model)) is not None:
-        raise InputError(f"a study with {axes[0]} is not repaired; repair it {axes[1]}")
+    require_no_axes(problem.model, "the repair of a study")
     for record in (*problem.records, *problem.unseen):
         if record.origin.whole:
             raise InputError(

@@ -21,9 +21,7 @@ def apply(
             help="File into which the values are written: .urdf, or MJCF as .xml or .mjcf."
         ),
     ],
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="File to write; MODEL stays as it is.")
-    ] = None,
+    output: Annotated[Path | None, options.output("File to write; MODEL stays as it is.")] = None,
     in_place: Annotated[
         bool, typer.Option("--in-place", help="Overwrite MODEL instead of writing another file.")
     ] = False,

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from symgen.cli import options, session
+from symgen.update.models import corrected, model_of
 
 
 def cestac(
@@ -92,8 +93,8 @@ def cestac(
             estimate={"method": method},
             signals={"reader": reader},
         )
-        described = session.corrected(described, study)
-        model = session.model_of(described, study=study)
+        described = corrected(described, study)
+        model = model_of(described, study=study)
         if study.cestac.place == "record":
             session.require_record(study, record[0])
         records = records_of(study.record, model, study)

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from symgen.cli import options, session
+from symgen.update.models import corrected, model_of, variants_of
 
 
 def compare(
@@ -45,9 +46,9 @@ def compare(
             Path(one).stem if short else one: session.study_of_arguments([one]) for one in study
         }
         first = next(iter(candidates.values()))
-        described = session.corrected(described, first)
-        model = session.model_of(described, study=first)
-        ranking = runtime.compare(model, candidates, variants=session.variants_of(described))
+        described = corrected(described, first)
+        model = model_of(described, study=first)
+        ranking = runtime.compare(model, candidates, variants=variants_of(described))
         if results is not None:
             runtime.report(ranking, results)
         checklist = ranking.best.checklist

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from symgen.cli import options, session
+from symgen.update.models import corrected, model_of
 
 
 def excite(
@@ -82,7 +83,7 @@ def excite(
                 "seed": seed,
             },
         )
-        model = session.model_of(session.corrected(described, study))
+        model = model_of(corrected(described, study))
         records = records_of(study.record, model, study)
         with session.progress_bar("starts") as progress, processes(workers) as own_map:
             seek: Any = partial(runtime.excite, map=own_map, progress=progress)

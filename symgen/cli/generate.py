@@ -31,9 +31,9 @@ def generate(
             ),
         ),
     ],
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="Folder into which the files are written.")
-    ] = Path("generated"),
+    output: Annotated[Path, options.output("Folder into which the files are written.")] = Path(
+        "generated"
+    ),
     target: Annotated[
         str,
         typer.Option(

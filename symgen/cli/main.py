@@ -11,7 +11,6 @@ import signal
 import sys
 from difflib import get_close_matches
 from importlib import import_module
-from itertools import pairwise
 from typing import Any
 
 import typer
@@ -58,16 +57,6 @@ WENT = {
 """Verbs of earlier versions, with the sentence that names what to use instead."""
 
 
-class Verb(TyperCommand):
-    """A command, which refuses an empty -o: it would write into the folder where one stands."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> Any:
-        for option, value in pairwise([*args, "-"]):
-            if "--output=" in (option, value) or (option in ("-o", "--output") and not value):
-                ctx.fail("-o is empty; name a folder or file, or leave out -o")
-        return super().parse_args(ctx, args)
-
-
 class Verbs(TyperGroup):
     """The `symgen` command group, which imports a command only when the command is called.
 
@@ -93,7 +82,7 @@ class Verbs(TyperGroup):
         verb = typer.Typer(
             add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None
         )
-        verb.command(cmd_name, cls=Verb)(getattr(import_module(f"symgen.cli.{cmd_name}"), cmd_name))
+        verb.command(cmd_name)(getattr(import_module(f"symgen.cli.{cmd_name}"), cmd_name))
         return get_command(verb)
 
     def format_help(self, ctx: Any, formatter: Any) -> None:

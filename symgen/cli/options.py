@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -11,7 +12,21 @@ Text = str | None
 
 def folder(files: str) -> Any:
     """Make the option -o of a command; `files` names the written files in the help text."""
-    return typer.Option("-o", "--output", help=f"Folder for {files}.")
+    return output(f"Folder for {files}.")
+
+
+def output(text: str) -> Any:
+    """Make the option -o of a command with the help `text`.
+
+    An empty -o is refused: it would mean the folder where one stands.
+    """
+    return typer.Option("-o", "--output", parser=_place, metavar="PATH", help=text)
+
+
+def _place(given: str | Path) -> Path:
+    if not str(given):
+        raise typer.BadParameter("-o is empty; name a folder or file, or leave out -o")
+    return Path(given)
 
 
 RobotFile = Annotated[

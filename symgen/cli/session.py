@@ -22,9 +22,6 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import typer
 
 from symgen.cli.told import as_json, counter, error_data, lines_of, tell, time_left
-from symgen.update.models import corrected as corrected
-from symgen.update.models import model_of as model_of
-from symgen.update.models import variants_of as variants_of
 
 if TYPE_CHECKING:
     from runtime.core.model import GeneratedModel

@@ -103,7 +103,7 @@ def show(
     ] = False,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="File of the page. Default: <name>.html."),
+        options.output("File of the page. Default: <name>.html."),
     ] = None,
     packaged: Annotated[
         bool,

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from symgen.cli import options, session
+from symgen.update.models import corrected, model_of
 
 
 def simulate(
@@ -44,7 +45,7 @@ def simulate(
 
         described = session.robot_of(robot, trust=trust, exact=exact)
         settings = session.study_of_arguments([study], recorded=False)
-        model = session.model_of(session.corrected(described, settings))
+        model = model_of(corrected(described, settings))
         if settings.controller is None:
             session.fail(
                 f"{study} has no section `controller`; add this section, with law, rate and reference "

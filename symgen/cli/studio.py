@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from symgen.cli import options
 from symgen.cli.session import fail, reported_errors
 
 WATCHED = "from symgen.studio.child import watched; watched(); "
@@ -28,10 +29,8 @@ def studio(
     ] = None,
     output: Annotated[
         Path,
-        typer.Option(
-            "-o",
-            "--output",
-            help="Folder in which the studio saves robot files, study files and results, and opens them again.",
+        options.output(
+            "Folder in which the studio saves robot files, study files and results, and opens them again."
         ),
     ] = Path("symgen-studio"),
     port: Annotated[
