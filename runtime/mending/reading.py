@@ -272,7 +272,7 @@ class Reading:
         own = np.round(delay, 4)
         return replace(
             self,
-            study=delayed(self.study, own),
+            study=delayed(self.study, own - self.delay),
             delay=own,
             steps=(*self.steps, Step(says, delay=own)),
             named=self.named and named,
