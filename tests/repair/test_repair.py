@@ -197,7 +197,7 @@ def test_blocks_set_aside_do_not_matter_to_the_search(made: Any) -> None:
     from runtime.ground.settings import to_mapping
     from runtime.mending import repair as mending
     from runtime.mending.reading import Reading
-    from runtime.mending.search import search
+    from runtime.mending.search import Search
     from runtime.plausible.plausibility import case_of
     from runtime.reading.settings import RecordSettings
 
@@ -213,7 +213,9 @@ def test_blocks_set_aside_do_not_matter_to_the_search(made: Any) -> None:
         )
         other = np.where(data.aside[:, None], factor, 1.0) * data.samples.tau
         data = replace(data, samples=replace(data.samples, tau=other))
-        found = search(Reading.given(data, to_mapping(study)), lambda: 0.0)
-        numbers.append((found.best.key, found.best.error, found.best.unseen_error))
+        found = Search(Reading.given(data, to_mapping(study)), lambda: 0.0)
+        found.from_start()
+        best = found.settled(found.best)
+        numbers.append((best.key, best.error, best.unseen_error))
     assert numbers[0][:2] == numbers[1][:2]
     assert numbers[1][2] > 20 * numbers[0][2]
