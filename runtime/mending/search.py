@@ -9,7 +9,9 @@ wrong one may gain more. Where the error is small, only named causes are tried.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from runtime.ground.limits import limits
 from runtime.ground.progress import at
@@ -192,7 +194,10 @@ def further(reading: Reading) -> tuple[list[Reading], tuple[Cause, ...]]:
         causes += [(t.cause, False) for t in others[: LIMIT.TRIALS_TAKEN]]
         causes += [(cause, False) for cause in (*reversed_torques(reading), *other_rates(reading))]
     if (tilt := tilted(reading)) is not None:
-        causes.append((tilt, True))
+        turned = baseline.trial(tilt)
+        turned = replace(turned, gain=turned.gain - np.log(baseline.N))  # of two angles
+        sure = bool(decisive([turned], baseline, case.noise_floor, None, reading.alone))
+        causes += [(tilt, sure)] if sure or not good else []
     made = [reading.changed(cause, named=sure) for cause, sure in causes]
     if (late := late_torques(reading)) is not None:
         made.append(reading.late(*late, named=True) if reading.short(late[0]) else None)
