@@ -55,7 +55,7 @@ from runtime.study import load_study, located, study_from_mapping, study_text
 
 Array = np.ndarray
 Row = dict[str, Any]
-BASE = {"first": 10_000, "second": 40_000, "final": 90_000, "third": 200_000}
+BASE = {"first": 10_000, "second": 40_000, "final": 90_000, "third": 300_000}
 EVERY = 4
 """Samples of the simulation of which one is recorded: 250 Hz."""
 CLASSES = (

@@ -53,8 +53,8 @@ class Search:
     known: dict[str, Reading] = field(default_factory=dict)
 
     def without(self, reading: Reading, step: Step) -> Reading | None:
-        """Leave out one change of a reading; None if the others cannot be written alone."""
-        fewer = self.start.again([one for one in reading.steps if one is not step])
+        """Leave out what one change changes; None if the others cannot be written alone."""
+        fewer = self.start.again([one for one in reading.steps if one.subject != step.subject])
         return None if fewer is None else self.known.setdefault(fewer.key, fewer)
 
     @property
@@ -97,18 +97,21 @@ class Search:
             beam = gaining[:1] if gaining[0].error < LIMIT.GOOD_ENOUGH else gaining
 
     def settled(self, reading: Reading) -> Reading:
-        """Search each change again beside all the others, and one more, until none gains.
+        """Search each number again beside all other changes, and one more change, until none gains.
 
-        A number that was fitted while another error was still there has taken up a part of it, and
-        so may a change of another kind.
+        A number that was fitted while another error was still there has taken up a part of it.
         """
+        given = self.start.score(self.N)
         for _ in range(LIMIT.SETTLING):
             reading = self.needed(reading)
-            fewer = [self.without(reading, step) for step in reading.steps]
+            fewer = [self.without(reading, step) for step in reading.steps if step.numbers]
             bases = [base for base in (reading, *fewer) if base is not None]
-            around = [one for base in bases for one in self.further(base)]
-            around = [one for one in around if len(one.steps) <= LIMIT.MOST_CHANGES]
-            given = self.start.score(self.N)
+            around = [
+                one
+                for base in bases
+                for one in self.further(base)
+                if len(one.steps) == len(one.subjects) <= LIMIT.MOST_CHANGES
+            ]
             self.readings |= {one.key: one for one in around if one.score(self.N) < given}
             before, reading = reading, best_of([reading, *around], self.N)
             if reading is before:
