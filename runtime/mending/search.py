@@ -4,6 +4,9 @@ From each reading one goes on by the causes that explain its rows better (`runti
 patterns of reversed torques, another direction of gravity, and delays. A step need not be decisive
 while the error is large: a second error hides a part of what the first correction gains, and a
 wrong one may gain more. Where the error is small, only named causes are tried.
+
+Then each number of the best reading is searched again beside all other changes, since it was fitted
+while another error was still there.
 """
 
 from __future__ import annotations
@@ -43,6 +46,8 @@ class Search:
         Number of independent rows of a joint, the largest of all readings.
     tried : dict of str to (list of Reading, tuple of Cause)
         What `further` made of a reading, by its key.
+    known : dict of str to Reading
+        Readings with fewer changes than another one, by their key.
     """
 
     start: Reading
