@@ -233,7 +233,8 @@ def _ordered(record: Lines, key: str, order: list[int], place: Place) -> bool:
         if columns.get(other):
             columns[other] = [columns[other][k] for k in order]
     settings = [(record["units"], key), (record["scale"], key)]
-    settings.append((record, "counts_per_revolution" if key == "q" else "torque_constant"))
+    whole = ("counts_per_revolution",) if key == "q" else ("torque_constant", "delay")
+    settings += [(record, name) for name in whole]
     for section, name in settings:
         if isinstance(given := section[name], list) and len(given) == place.n:
             section[name] = [given[k] for k in order]
@@ -261,15 +262,19 @@ def _at_side(record: Lines, cause: Cause, place: Place) -> bool:
 
 
 def _at_rate(record: Lines, cause: Cause, place: Place) -> bool:
-    """Write another unit of time, or another sampling rate in place of the time column."""
+    """Write another unit of time, or another sampling rate in place of the time column.
+
+    A delay is a number of samples, and lasts as much shorter as the rate is higher.
+    """
     unit = next((u for f, u in BEFORE_S.items() if np.isclose(f, cause.rate)), "")
     if place.timed and unit and record["units"]["t"] == "s":
         record["units"]["t"] = unit
-        return True
-    if record["resample"] is not None:
+    elif record["resample"] is not None:
         return False
-    record["rate"] = float(f"{cause.rate * (record['rate'] or place.rate):.10g}")
-    record["columns"]["t"] = None
+    else:
+        record["rate"] = float(f"{cause.rate * (record['rate'] or place.rate):.10g}")
+        record["columns"]["t"] = None
+    record["delay"] = _short(np.asarray(record["delay"], dtype=float) / cause.rate)
     return True
 
 
@@ -303,13 +308,18 @@ def _coupled(study: Lines, cause: Cause, place: Place) -> bool:
 _EDITS: dict[str, Callable[[Lines, Cause, Place], bool]] = {"side": _at_side, "rate": _at_rate}
 
 
-def delayed(study: Lines, delay: Array) -> Lines:
-    """Write the delay of the torques of each joint, s, in all records of a study."""
+def delayed(study: Lines, by: Array) -> Lines:
+    """Add to the delay of the torques of each joint, s, in all records of a study."""
     study = deepcopy(study)
-    values = [float(x) for x in delay]
     for record in records_in(study):
-        record["delay"] = values[0] if len({*values}) == 1 else values
+        record["delay"] = _short(np.asarray(record["delay"], dtype=float) + by)
     return study
+
+
+def _short(seconds: Array) -> float | list[float]:
+    """Write delays, s, without the last digits of a sum: one number if all joints have the same."""
+    values = [float(x) for x in np.atleast_1d(np.round(seconds, 12) + 0.0)]
+    return values[0] if len({*values}) == 1 else values
 
 
 def differences(before: Any, after: Any, path: tuple[str | int, ...] = ()) -> Iterator[Lines]:

@@ -48,6 +48,7 @@ def along(g: Array, n: int, before: Array) -> Cause:
         kind="gravity",
         says=f"gravity is turned by {angle:.1f} degrees: [{entry}] m/s^2 in frame 0",
         remedy=f"set gravity: [{entry}], or turn frame 0",
+        subject="the direction of gravity",
         constants=dict(zip(GRAVITY, map(float, g), strict=True)),
     )
 

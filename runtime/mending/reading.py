@@ -69,16 +69,24 @@ class Step:
         Sentence on what was wrong.
     cause : Cause or None
     delay : ndarray, shape (n,), s, or None
+    named : bool
+        Whether the change was decisive where it was made.
     """
 
     says: str
     cause: Cause | None = None
     delay: Array | None = None
+    named: bool = False
 
     @property
     def kind(self) -> str:
         """Family of the cause, or delay."""
         return "delay" if self.cause is None else self.cause.kind
+
+    @property
+    def subject(self) -> str:
+        """What it changes: the same for all amounts of one number."""
+        return "delay" if self.cause is None else self.cause.subject or self.cause.says
 
     @property
     def numbers(self) -> int:
@@ -173,8 +181,6 @@ class Reading:
     drives : Drives or None
     steps : tuple of Step
         The changes, in their order.
-    named : bool
-        Whether every change was a named cause: decisive where it was made.
     """
 
     data: Data
@@ -189,7 +195,6 @@ class Reading:
     units: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     drives: Drives | None = None
     steps: tuple[Step, ...] = ()
-    named: bool = True
 
     @classmethod
     def given(cls, data: Data, study: Lines) -> Reading:
@@ -210,6 +215,16 @@ class Reading:
     def key(self) -> str:
         """Text that is the same for readings with the same lines of the study."""
         return dumps(plain(self.study), sort_keys=True)
+
+    @property
+    def subjects(self) -> frozenset[str]:
+        """What the changes change, whatever their amounts."""
+        return frozenset(step.subject for step in self.steps)
+
+    @property
+    def named(self) -> bool:
+        """Whether every change was a named cause: decisive where it was made."""
+        return all(step.named for step in self.steps)
 
     # --- changes ---
 
@@ -263,8 +278,7 @@ class Reading:
             sides=sides,
             units=units,
             drives=drives,
-            steps=(*self.steps, Step(cause.says, cause)),
-            named=self.named and named,
+            steps=(*self.steps, Step(cause.says, cause, named=named)),
         )
 
     def late(self, delay: Array, says: str, *, named: bool = False) -> Reading:
@@ -272,10 +286,9 @@ class Reading:
         own = np.round(delay, 4)
         return replace(
             self,
-            study=delayed(self.study, own),
+            study=delayed(self.study, own - self.delay),
             delay=own,
-            steps=(*self.steps, Step(says, delay=own)),
-            named=self.named and named,
+            steps=(*self.steps, Step(says, delay=own, named=named)),
         )
 
     def short(self, delay: Array) -> bool:
@@ -290,9 +303,9 @@ class Reading:
             if reading is None:
                 return None
             if step.delay is not None:
-                reading = reading.late(step.delay, step.says)
+                reading = reading.late(step.delay, step.says, named=step.named)
             elif step.cause is not None:
-                reading = reading.changed(step.cause)
+                reading = reading.changed(step.cause, named=step.named)
         return reading
 
     def _zeros(self, cause: Cause) -> Cause | None:

@@ -29,7 +29,7 @@ from runtime.ground.progress import at
 from runtime.ground.settings import structure, to_mapping
 from runtime.mending.edits import Columns, Lines, Place, columns_in, differences
 from runtime.mending.reading import Data, Reading, record_of, set_aside
-from runtime.mending.search import Found, further, search
+from runtime.mending.search import BY_VALUES, Search
 from runtime.plausible.case import Case
 from runtime.plausible.friction import friction
 from runtime.plausible.jumps import cut_torques, jumps
@@ -40,8 +40,6 @@ from runtime.reading.publishers import Sent, of_one_publisher
 LIMIT = limits(__package__)
 
 Array = np.ndarray
-BY_VALUES = ("unit", "side")
-"""Kinds of causes that the values of the robot file alone may show: they fit no number."""
 
 
 @dataclass(frozen=True)
@@ -222,11 +220,10 @@ def repair(
     if start.baseline is None:
         raise InputError("the rows of the study cannot be fitted; identify says why")
     began = process_time()
-    found = search(start, lambda: process_time() - began)
-    best = _without_needless(found.best, start, found.N)
-    if best.key not in found.hidden:
-        found.hidden[best.key] = further(best)[1]
-    same = found.hidden[best.key]
+    found = Search(start, lambda: process_time() - began)
+    found.from_start()
+    best = found.settled(found.best)
+    same = found.hidden(best)
     best, others = _simplest(best, start, found)
     at("repair: the rows that were set aside")
     kept, reason = _judged(best, start)
@@ -244,7 +241,7 @@ def repair(
             tuple(records),
             hidden=hidden,
             candidates=tuple(_candidate(one, start) for one in listed),
-            readings=found.expanded,
+            readings=len(found.tried),
         )
     return Repair(
         True,
@@ -256,7 +253,7 @@ def repair(
         tuple(record_of(best, one) for one in records),
         equivalent=tuple(_candidate(one, start) for one in others),
         hidden=hidden,
-        readings=found.expanded,
+        readings=len(found.tried),
     )
 
 
@@ -318,24 +315,6 @@ def data_of(case: Case, problem: Problem, study: Lines, columns: Columns, rate: 
     return Data(case, samples, seen, aside, unseen, place)
 
 
-def _without_needless(best: Reading, start: Reading, N: float) -> Reading:
-    """Leave out each change without which the rows of the search are explained nearly as well.
-
-    A change must gain what names a cause (DECISIVE), and more than nearness to the values of the
-    robot file, unless it is a unit or a side.
-    """
-    least = LIMIT.DECISIVE - LIMIT.CHANGE_PRICE
-    for step in best.steps:
-        others = [one for one in best.steps if one is not step]
-        fewer = start.again(others)
-        if fewer is None:
-            continue
-        by_values = fewer.error < LIMIT.LEAST_FALL * best.error and step.kind not in BY_VALUES
-        if by_values or fewer.score(N) <= best.score(N) + least:
-            return _without_needless(replace(fewer, named=best.named), start, N)
-    return best
-
-
 def _weight(reading: Reading, start: Reading) -> tuple[int, int]:
     """Count the values that differ from the study as given, and those of the robot among them."""
     count = of_robot = 0
@@ -352,7 +331,7 @@ def _weight(reading: Reading, start: Reading) -> tuple[int, int]:
     return count, of_robot
 
 
-def _simplest(best: Reading, start: Reading, found: Found) -> tuple[Reading, list[Reading]]:
+def _simplest(best: Reading, start: Reading, found: Search) -> tuple[Reading, list[Reading]]:
     """Of the readings that this record cannot tell from the best, choose the simplest.
 
     Return it, and the others that are as simple as the best one.
@@ -362,13 +341,15 @@ def _simplest(best: Reading, start: Reading, found: Found) -> tuple[Reading, lis
     weight = _weight(best, start)
     N = found.N
     level = best.score(N) - best.price(N)
-    alike = {best.key: best}
-    for cause in found.hidden[best.key]:
-        one = best.changed(cause)
-        if one is not None:
-            alike[one.key] = replace(one, named=best.named)
-    for one in found.readings.values():
-        if one.steps and one.score(N) - one.price(N) < level + LIMIT.SAME:
+    hidden = [best.changed(cause, named=True) for cause in found.hidden(best)]
+    others = [
+        one
+        for one in sorted(found.readings.values(), key=lambda one: one.score(N))
+        if one.steps and one.score(N) - one.price(N) < level + LIMIT.SAME
+    ]
+    alike: dict[str, Reading] = {}
+    for one in (best, *hidden, *others):  # other amounts of the same numbers are no other reading
+        if one is not None and all(one.subjects != x.subjects for x in alike.values()):
             alike.setdefault(one.key, one)
     simple = [one for one in alike.values() if _weight(one, start)[0] <= weight[0] and one.steps]
     chosen = min(simple, key=lambda one: (_weight(one, start), one is not best))
