@@ -90,7 +90,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 453dfd1c2b358ced8f1ba7eb198d6db113653059d63545be30f8a336334f9b03
+sha256 of all but these lines: 41a4135e8a58328bc5bcecc859494b61997d7ccc8fd198fa30fe5455bd670b27
 """
 
 import numpy as np
@@ -385,10 +385,10 @@ class _Symbols:
         if len(shape) == 3:
             first = [{k[1:]: x for k, x in table.items() if k[0] == i} for i in range(shape[0])]
             return [self.gathered(entries, shape[1:], like) for entries in first]
-        matrix = self.package.SX(*(*shape, 1, 1)[:2])
-        for place, x in table.items():
-            matrix[place or 0] = x
-        return matrix
+        places = [(*np.atleast_1d(place), 0, 0)[:2] for place in table]
+        rows, columns = [[int(place[k]) for place in places] for k in range(2)]
+        entries = self.package.densify(self.package.vertcat(*table.values()))
+        return self.package.SX.triplet(rows, columns, entries, *(*shape, 1, 1)[:2])
 
     combined = _Arrays.combined
 

@@ -68,7 +68,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: c0c7aa624e04bac31b8350957063bd1a5885c10cc82bd53668f2d3964df11a6f
+sha256 of all but these lines: 7992120d664f5dd3d0ba85d77a6579594ae8b54320dde94893a5a2c14617fea9
 """
 
 import numpy as np
@@ -331,10 +331,10 @@ class _Symbols:
         if len(shape) == 3:
             first = [{k[1:]: x for k, x in table.items() if k[0] == i} for i in range(shape[0])]
             return [self.gathered(entries, shape[1:], like) for entries in first]
-        matrix = self.package.SX(*(*shape, 1, 1)[:2])
-        for place, x in table.items():
-            matrix[place or 0] = x
-        return matrix
+        places = [(*np.atleast_1d(place), 0, 0)[:2] for place in table]
+        rows, columns = [[int(place[k]) for place in places] for k in range(2)]
+        entries = self.package.densify(self.package.vertcat(*table.values()))
+        return self.package.SX.triplet(rows, columns, entries, *(*shape, 1, 1)[:2])
 
     def solve(self, A, b):
         """A = L diag(d) L', L unit lower triangular; A symmetric positive definite."""

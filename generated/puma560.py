@@ -81,7 +81,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 8707869c2d0ef2fc3b0f537182b61cd85e7b368ede2c85a9e784e2aa7089512c
+sha256 of all but these lines: 0e647030b7d7052c5005527308068246281caf422fb8816cb29f460e8a605fa9
 """
 
 import numpy as np
@@ -375,10 +375,10 @@ class _Symbols:
         if len(shape) == 3:
             first = [{k[1:]: x for k, x in table.items() if k[0] == i} for i in range(shape[0])]
             return [self.gathered(entries, shape[1:], like) for entries in first]
-        matrix = self.package.SX(*(*shape, 1, 1)[:2])
-        for place, x in table.items():
-            matrix[place or 0] = x
-        return matrix
+        places = [(*np.atleast_1d(place), 0, 0)[:2] for place in table]
+        rows, columns = [[int(place[k]) for place in places] for k in range(2)]
+        entries = self.package.densify(self.package.vertcat(*table.values()))
+        return self.package.SX.triplet(rows, columns, entries, *(*shape, 1, 1)[:2])
 
     def solve(self, A, b):
         """A = L diag(d) L', L unit lower triangular; A symmetric positive definite."""

@@ -79,7 +79,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 75711ad6e8e95aff68f3b567450866c44eaadb07466998c68a3c7df56e8ba3ed
+sha256 of all but these lines: 881029e07ce9776eead6d3fb2a65e940713e0f6340b7551ee93e59f55e3d8fd0
 """
 
 import numpy as np
@@ -366,10 +366,10 @@ class _Symbols:
         if len(shape) == 3:
             first = [{k[1:]: x for k, x in table.items() if k[0] == i} for i in range(shape[0])]
             return [self.gathered(entries, shape[1:], like) for entries in first]
-        matrix = self.package.SX(*(*shape, 1, 1)[:2])
-        for place, x in table.items():
-            matrix[place or 0] = x
-        return matrix
+        places = [(*np.atleast_1d(place), 0, 0)[:2] for place in table]
+        rows, columns = [[int(place[k]) for place in places] for k in range(2)]
+        entries = self.package.densify(self.package.vertcat(*table.values()))
+        return self.package.SX.triplet(rows, columns, entries, *(*shape, 1, 1)[:2])
 
     def solve(self, A, b):
         """A = L diag(d) L', L unit lower triangular; A symmetric positive definite."""

@@ -81,7 +81,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 0fe2e5d16203fd24026d96cbabec7d0e35622c22d6fa631f1d8438f83b8aaeba
+sha256 of all but these lines: 69ab46ff2199bf4b4fbdc926d1b25a2ab53863188b2fad12f4be1d4cd670c230
 """
 
 import numpy as np
@@ -369,10 +369,10 @@ class _Symbols:
         if len(shape) == 3:
             first = [{k[1:]: x for k, x in table.items() if k[0] == i} for i in range(shape[0])]
             return [self.gathered(entries, shape[1:], like) for entries in first]
-        matrix = self.package.SX(*(*shape, 1, 1)[:2])
-        for place, x in table.items():
-            matrix[place or 0] = x
-        return matrix
+        places = [(*np.atleast_1d(place), 0, 0)[:2] for place in table]
+        rows, columns = [[int(place[k]) for place in places] for k in range(2)]
+        entries = self.package.densify(self.package.vertcat(*table.values()))
+        return self.package.SX.triplet(rows, columns, entries, *(*shape, 1, 1)[:2])
 
     def solve(self, A, b):
         """A = L diag(d) L', L unit lower triangular; A symmetric positive definite."""

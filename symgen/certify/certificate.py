@@ -46,7 +46,7 @@ from symgen.derive.loops import close
 from symgen.description.expression import Call, Expression, Number, quarter_turns
 from symgen.description.robot import REVOLUTE, Frame, Robot
 from symgen.description.values import WITHIN
-from symgen.regroup.finite_field import rref
+from symgen.regroup.finite_field import rank as rank_modulo
 from symgen.regroup.regrouping import EXACT, Regrouping
 from symgen.regroup.states import closed_draw, sample, states_for
 
@@ -418,12 +418,9 @@ def degree(regrouping: Regrouping) -> int:
             + max(map(constant, (f.b, f.d, f.r0)))
         )
 
-    path = max(
-        (sum(frame(robot.frame(i)) for i in robot.path(f.j)) for f in robot.frames), default=0
-    )
-    coefficients = max(
-        (constant(c) for b in regrouping.base for c in b.combination.values()), default=0
-    )
+    of_frame = {f.j: frame(f) for f in robot.frames}
+    path = max((sum(of_frame[i] for i in robot.path(j)) for j in of_frame), default=0)
+    coefficients = max(map(constant, regrouping.coefficients), default=0)
     return 3 * path + 3 + 2 * max(map(constant, rows_of(robot)), default=0) + coefficients
 
 
@@ -443,20 +440,20 @@ def _modulo(
             draw: Draw = closed_draw(robot, seed, 1, count=FEW_STATES, p=p, at_numbers=True)
             fixed = closed_draw(robot, seed, states, p=p)
             few = np.moveaxis(sample(draw, names), 0, 1)
-            rank = len(rref(sample(fixed, regrouping.own)[0], p, reduced=False)[0])
+            rank = rank_modulo(sample(fixed, regrouping.own)[0], p)
         except ArithmeticError:
             return None, list(names) if regrouping.method == EXACT else []
     else:
         draw = Draw(robot, seed, states_for(robot, names), p=p)
         W = sampler(draw, names)
-        rank = len(rref(W[:, own], p, reduced=False)[0])
+        rank = rank_modulo(W[:, own], p)
         few = W.reshape(len(robot.rows), -1, len(names))[:, :FEW_STATES]
-    predicted = np.zeros_like(few)
+    predicted, column = np.zeros_like(few), {name: k for k, name in enumerate(names)}
+    residues = {c: draw.residues(draw.constant(c)) for c in regrouping.coefficients}
     for k, b in enumerate(regrouping.base):
-        for name, coefficient in b.combination.items():
-            residue = draw.residues(draw.constant(coefficient))
-            column = names.index(name)
-            predicted[..., column] = (predicted[..., column] + few[..., own[k]] * residue) % p
+        for name, c in b.combination.items():
+            x = predicted[..., column[name]]
+            predicted[..., column[name]] = (x + few[..., own[k]] * residues[c]) % p
     wrong = np.flatnonzero((predicted != few).any(axis=(0, 1)) & ~is_assumed(robot))
     return rank, [names[c] for c in wrong]
 

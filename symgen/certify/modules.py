@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
@@ -94,6 +95,7 @@ def certified_files(
         files = generate_files(
             robot, targets=targets, command=command, regrouping=regrouping, options=options
         )
+    gc.collect()  # graphs are cycles: of large robots, hundreds of megabytes
     return _certified(regrouping, files, options)
 
 

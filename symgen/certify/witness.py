@@ -475,11 +475,9 @@ def base_values(regrouping: Regrouping, chi: Array, constants: Mapping[str, floa
     the regrouping formulas.
     """
     value = dict(zip(regrouping.robot.parameters, chi, strict=True))
+    factor = {c: c.value(constants) for c in regrouping.coefficients}
     return np.array(
-        [
-            sum(c.value(constants) * value[name] for name, c in b.combination.items())
-            for b in regrouping.base
-        ]
+        [sum(factor[c] * value[name] for name, c in b.combination.items()) for b in regrouping.base]
     )
 
 

@@ -193,7 +193,8 @@ class Draw:
 
     def spread(self, value: Scalar) -> Array:
         """Repeat a value modulo p for all geometries and states: an array of shape `self.shape`."""
-        return np.broadcast_to(self.residues(value), self.shape)
+        x = self.residues(value)
+        return x if x.shape == self.shape else np.broadcast_to(x, self.shape)
 
     def _fp(self, x: Array) -> Fp:
         return Fp(x, self.p)

@@ -323,7 +323,7 @@ def reachable(
 class Domain(Protocol):
     """A number system in which graph nodes are evaluated: floats, integers modulo a prime p, ...
 
-    Its values have the operations +, * and unary minus.
+    Its values have the operations +, -, * and unary minus.
     """
 
     def symbol(self, symbol: Symbol) -> Any:
@@ -357,13 +357,11 @@ def value_of(node: Node, domain: Domain, values: Mapping[int, Any] | Sequence[An
             return domain.symbol(node.value)
         case "const":
             return domain.number(node.value)
-    x = [_signed(operand, values) for operand in node.operands]
-    match node.op:
-        case "add":
-            return x[0] + x[1]
-        case "mul":
-            return x[0] * x[1]
-    return domain.function(node, x)
+    if node.op in (ADD, MUL):  # of which only the second term of a sum has a sign
+        a, b = node.operands
+        x, y = values[a.node.index], values[b.node.index]
+        return x * y if node.op == MUL else x + y if b.sign > 0 else x - y
+    return domain.function(node, [_signed(operand, values) for operand in node.operands])
 
 
 def _signed(s: Scalar, values: Mapping[int, Any] | Sequence[Any]) -> Any:

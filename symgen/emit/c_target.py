@@ -233,7 +233,7 @@ def in_parts(
     A result belongs to the part of the last step that it depends on. Each part loads the inputs
     that it uses. Return the parts, and the number of values that must be stored for later parts.
     """
-    chunks = [list(steps[k : k + longest]) for k in range(0, len(steps), longest)]
+    chunks = [list(steps[k : k + longest]) for k in range(0, max(len(steps), 1), longest)]
     place = {lines[0].split()[2]: p for p, chunk in enumerate(chunks) for _, lines in chunk}
     for title, lines in results:
         last = max((place.get(word, 0) for word in words(lines)), default=0)
@@ -281,7 +281,8 @@ FLAGS = (
     "-std=c99 -O2 -ftree-vectorize -fno-math-errno -fno-trapping-math -ffp-contract=off "
     "-shared -fPIC"
 )
-LONGEST, OF_PART = 1000, 400  # steps of a body; a longer one is cut into parts and compiled once
+LONGEST, OF_PART = 1000, 100
+"""Steps and results of a body; a longer one is cut into parts of so many steps, compiled once."""
 RESULTS = (
     *("joints", "rows", "parameters", "energies", "wrench", "standard parameters"),
     *("frames", "pose"),
@@ -519,7 +520,7 @@ def _kernel(spec: ModuleSpec, states: CStates, f: Function, names: Namespace) ->
         for title, lines in [("Inputs", [*inputs, *recalled]), *steps, *results]
         for line in lines
     )
-    if len(steps) > LONGEST:
+    if len(steps) + len(results) > LONGEST:
         parts, kept = in_parts([*inputs, *recalled], steps, results, OF_PART)
         sections = ()
     read = text.trigonometry_inputs | text.main_inputs

@@ -48,8 +48,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
     read = {name for b in regrouping.base for name in b.combination}
     rates = {e for row in closure.row.values() for e in row.values()}
     passive = [e for j in robot.passive for e in (closure.offset[j], *closure.row[j].values())]
-    coefficients = [c for b in regrouping.base for c in b.combination.values()]
-    coefficients += [ratio for _, ratio, _ in sign_conditions(regrouping)]
+    coefficients = {*regrouping.coefficients, *(r for _, r, _ in sign_conditions(regrouping))}
     taken = {name: {*b.constants} for name, b in blocks.items()} | {
         "base_parameters": _symbols(coefficients),
         "moving": _symbols(rates),

@@ -10,32 +10,66 @@ import numpy as np
 from symgen.derive.exact import Array, power
 
 
-def rref(M: Array, p: int, *, reduced: bool = True) -> tuple[list[int], Array]:
+def rref(M: Array, p: int) -> tuple[list[int], Array]:
     """Compute the reduced row echelon form of M modulo a prime p.
 
+    Return the pivot columns, leftmost first, and the rows with pivots, shape (rank, columns). The
+    relations between the columns give them: a column has a pivot unless it is the last one of a
+    relation, and the entries of such a column are the coefficients of that relation. So the time
+    is that of `echelon`, and of the few relations.
+    """
+    K = _relations(M, p)[:, ::-1]  # the last column of a relation first
+    last, K = echelon(K, p)
+    for k in reversed(range(len(last))):
+        K[:k] = (K[:k] + (p - K[:k, last[k], None]) * K[k]) % p
+    dependent = M.shape[1] - 1 - np.array(last, dtype=int)
+    pivots = np.setdiff1d(np.arange(M.shape[1]), dependent)
+    R = np.zeros((len(pivots), M.shape[1]), dtype=np.int64)
+    R[np.arange(len(pivots)), pivots] = 1
+    R[:, dependent] = -K[:, ::-1][:, pivots].T % p
+    return pivots.tolist(), R
+
+
+def rank(M: Array, p: int) -> int:
+    """Compute the rank of M modulo a prime p."""
+    return len(echelon(M[:, ::-1], p)[0])
+
+
+def _relations(M: Array, p: int) -> Array:
+    """Return K, shape (columns - rank, columns), with M K' = 0 modulo a prime p."""
+    pivots, U = echelon(M[:, ::-1], p)
+    free = np.setdiff1d(np.arange(M.shape[1]), pivots)
+    K = np.zeros((len(free), M.shape[1]), dtype=np.int64)
+    K[np.arange(len(free)), free] = 1
+    for c, row in zip(reversed(pivots), U[::-1], strict=True):
+        entries = c + 1 + np.flatnonzero(row[c + 1 :])
+        K[:, c] = -(K[:, entries] * row[entries] % p).sum(axis=1) % p
+    return K[:, ::-1]
+
+
+def echelon(M: Array, p: int) -> tuple[list[int], Array]:
+    """Compute a row echelon form of M modulo a prime p, whose pivots are 1.
+
     Return the pivot columns, leftmost first, and the rows with pivots, shape (rank, columns). Rows
-    with few nonzero entries are used first, and only the columns of these entries are changed; this
-    is fast if the branches of a tree share few columns. Without `reduced`, the rows of earlier
-    pivots are not changed, which is enough for the rank.
+    with few nonzero entries are used first, and only the columns of these entries are changed. In a
+    tree the last links come first where the columns run from the tips to the base: each pivot row
+    then has the columns of one link, and the time grows with the number of nonzero entries.
     """
     M = M[np.argsort(np.count_nonzero(M, axis=1), kind="stable")] % p
     left = np.ones(len(M), dtype=bool)
     pivots: list[int] = []
     order: list[int] = []
     for c in range(M.shape[1]):
-        column = M[:, c]
-        rows = np.flatnonzero(column) if reduced else np.flatnonzero(left & (column != 0))
-        free = rows[left[rows]]
-        if free.size == 0:
+        rows = np.flatnonzero(left & (M[:, c] != 0))
+        if rows.size == 0:
             continue
-        r = int(free[0])
+        r, touched = int(rows[0]), rows[1:]
         left[r] = False
         pivots.append(c)
         order.append(r)
         entries = c + np.flatnonzero(M[r, c:])
         pivot = M[r, entries] * pow(int(M[r, c]), -1, p) % p
         M[r, entries] = pivot
-        touched = rows[rows != r]
         if 2 * entries.size > M.shape[1] - c:
             pivot, entries = M[r, c:], np.arange(c, M.shape[1])
         place = np.ix_(touched, entries) if entries.size < M.shape[1] - c else np.s_[touched, c:]

@@ -171,6 +171,11 @@ class Regrouping:
         return tuple(b.own for b in self.base)
 
     @property
+    def coefficients(self) -> set[Expression]:
+        """Different coefficients of the formulas: few, as a length comes back in every link."""
+        return {c for b in self.base for c in b.combination.values()}
+
+    @property
     def constants(self) -> Mapping[str, float]:
         """Constants of the robot whose values may change without a new derivation.
 
@@ -343,14 +348,18 @@ def _assemble(
             for standard, value in transfer.combination[dependent].items():
                 into[standard] = into.get(standard, ZERO) + beta * value
     order = {name: k for k, name in enumerate(robot.parameters)}
+    every = {c for terms in combination.values() for c in terms.values()}
+    simple = {c: simplified(with_known_cosines(c)) for c in every}
+    zero = {c for c in {*simple.values()} if _vanishes(c, draw)}
     parameters: list[BaseParameter] = []
     used: set[str] = set()
     for own in sorted(combination, key=order.__getitem__):
-        terms = {name: simplified(with_known_cosines(c)) for name, c in combination[own].items()}
         terms = {
-            name: c
-            for name, c in sorted(terms.items(), key=lambda nc: (nc[0] != own, order[nc[0]]))
-            if not _vanishes(c, draw)
+            name: simple[c]
+            for name, c in sorted(
+                combination[own].items(), key=lambda nc: (nc[0] != own, order[nc[0]])
+            )
+            if simple[c] not in zero
         }
         used |= set(terms)
         parameters.append(BaseParameter(own if terms == {own: ONE} else own + "R", own, terms))

@@ -101,8 +101,9 @@ class Transfer:
         for target, c in image.items():
             self.steps.append((source, target, c))
             into = self.combination[target]
+            product = {value: c * value for value in {*amount.values()}}
             for name, value in amount.items():
-                total = into.get(name, ZERO) + c * value
+                total = into.get(name, ZERO) + product[value]
                 into[name] = total
                 if not total:
                     del into[name]
