@@ -9,8 +9,8 @@ standard deviations,
 s_k is the corrected standard deviation. It is multiplied by the root of a factor c if residuals
 stay correlated for longer than a block (`runtime.core.residuals.unseen_by_blocks`). A parameter
 differs if |d| exceeds DIFFERS. This limit is a convention, not a statistical test
-(benchmarks/truth.md). Differences up to LIMIT.RELEVANT_DIFFERENCE of the value do not change the
-verdict.
+(benchmarks/truth.md). Differences up to 10 % of the value (RELEVANT_DIFFERENCE in limits.toml) do
+not change the verdict.
 
 Records differ if the robot changed (load, temperature, wear), if one record has an error, or if the
 model lacks an effect that appears in the motion of only some records.
@@ -105,7 +105,7 @@ class Homogeneity(Result, Part, keys="records parameters agree disagreements unt
     def records_differ(self) -> bool:
         """Whether a parameter differs between records by more than 10 % of its value.
 
-        The limit is LIMIT.RELEVANT_DIFFERENCE.
+        The limit is RELEVANT_DIFFERENCE in limits.toml.
         """
         return any(d.difference > LIMIT.RELEVANT_DIFFERENCE for d in self.disagreements)
 

@@ -558,8 +558,8 @@ def estimate_of(
 ) -> Estimate:
     """Estimate the parameters of given rows Y = W X + rho by the method of `settings`.
 
-    The default method is ols. Without `corrected`, `sigma_corrected` is nan: on a long record it
-    takes most of the time.
+    The default method is ols. Without `corrected`, `sigma_corrected` is nan: on a long record, its
+    computation takes most of the time.
     """
     settings = settings or EstimateSettings()
     return estimate_by(
@@ -737,8 +737,8 @@ def compare(
     Raises
     ------
     InputError
-        No candidate; one without validation records, or with other validation records than the
-        first; no candidate that can be identified.
+        There is no candidate; a candidate has no validation records, or others than the first; or
+        no candidate can be identified.
 
     Examples
     --------
@@ -976,8 +976,8 @@ def repair(
 ) -> Repair:
     """Search the lines of a study that are wrong, several at once, and write the mended study.
 
-    They are searched on some blocks of the records, and judged on the others and on the validation
-    records. All changes are kept, or none.
+    The lines are searched on some blocks of the records, and judged on the other blocks and on the
+    validation records. All changes are kept, or none.
 
     Parameters
     ----------

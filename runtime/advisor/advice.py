@@ -93,10 +93,10 @@ class Limit:
     ----------
     percent : float, %
     delta : float, rad or m
-        inf if no step reaches it; nan if even the finest step exceeds it, or if no parameter is
-        judged.
+        inf if no step reaches the limit; nan if even the finest step exceeds the limit, or if no
+        parameter is judged.
     parameter : str
-        The first parameter that reaches it; "" if there is none.
+        The first parameter that reaches the limit; "" if there is none.
     sampled : Sampled or None
         CESTAC runs at that step; None without runs.
     error, half_width : float, %
@@ -114,8 +114,8 @@ class Limit:
     def agrees(self) -> bool:
         """Whether CESTAC runs at the coarsest step confirm the predicted change of the parameter.
 
-        The difference may be the Student interval plus 30 % of %e, which is 15 % in Delta. True
-        without runs.
+        A difference up to the Student interval plus 30 % of %e (15 % in Delta) is allowed. Without
+        runs, the result is True.
         """
         return (
             self.sampled is None
@@ -175,7 +175,7 @@ class ReaderAdvice:
         All together first, then one at a time.
     notes : tuple of str
     steps : ndarray, shape (len(asked), b), %
-        Change at the requested steps of all encoders; nan if the records do not show it.
+        Change at the requested steps of all encoders; nan if the records do not show this change.
     """
 
     reader: str
@@ -200,9 +200,9 @@ class Advice(Result, Part):
     asked : tuple of float, rad or m
         Requested steps, of all encoders.
     steps : ndarray, shape (len(asked), b), %
-        Change predicted at the requested steps by the chapter's rounding law. Under law phase, it
-        is the change with real encoders, read as the study reads them; nan if the records do not
-        show it.
+        Change predicted at the requested steps by the chapter's rounding law. Under the law phase,
+        the change is that of real encoders, read as the study reads them; nan if the records do not
+        show this change.
     torque_sigma : ndarray, shape (b,)
         Standard deviation of the parameters for white torque noise of the motors of standard
         deviation 1 N m (N).
@@ -275,7 +275,7 @@ class Advice(Result, Part):
     def unit(self) -> str:
         """Unit of the encoder steps: "rad", "m", or "rad or m" for encoders of both kinds.
 
-        It is that of the first advice, usually on all encoders together.
+        The unit is that of the first advice, usually on all encoders together.
         """
         return self.encoders[0].unit
 

@@ -2,7 +2,7 @@
 
 Columns of sign(s), s = G qd, have no derivative. Let s be known up to a normal error of standard
 deviation sigma (filters add many raw errors, so it is normal whatever their law), u = s/sigma, phi
-and erf of the normal law, He_n Hermite's polynomials:
+the normal density, erf the error function, and He_n Hermite's polynomials:
 
     E sign(s + sigma z) = erf(u/sqrt 2)
         c_n = E[sign(s + sigma z) He_n(z)] = 2 phi(u) He_(n-1)(-u)
@@ -55,7 +55,8 @@ class Switched:
     slope : c_1/sigma at the kept instants, shape (K,); it replaces the derivative.
     variance : sum of Var f after decimation over the rows used of each joint, shape (n,).
 
-    All values are for G_j = 1.
+    Here f is the column, c_1 its first Hermite coefficient (see above), and all values are for s =
+    qd_j.
     """
 
     sigma: float
@@ -66,9 +67,9 @@ class Switched:
     def between(self, other: Switched, sigma: float) -> Switched:
         """Interpolate the effect of velocity errors, given for two standard deviations of errors.
 
-        The interpolated quantities are shift, slope*sigma and variance/sigma. This is exact if the
-        speed rests (slope as 1/sigma, variance as sigma) or passes zero quickly (slope constant,
-        variance as sigma^2).
+        The interpolated quantities are shift, slope*sigma and variance/sigma. The interpolation is
+        exact if the speed rests (slope proportional to 1/sigma, variance to sigma) or passes zero
+        quickly (slope constant, variance proportional to sigma^2).
         """
         share = (sigma - self.sigma) / (other.sigma - self.sigma)
         here = (self.shift, self.slope * self.sigma, self.variance / self.sigma)

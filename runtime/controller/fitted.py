@@ -455,7 +455,7 @@ def torque_of(record: Record, kd: Array, delay: float, saturation: Array) -> Arr
 def _apart(fit: Estimate, name: str) -> bool:
     """Whether the gain `name` can be distinguished from every other parameter of the fit.
 
-    Its correlations with the others must be below LIMIT.KD_ALIKE.
+    Its correlations with the other parameters must be small (below KD_ALIKE in limits.toml).
     """
     k = fit.names.index(name)
     scale = np.sqrt(np.diag(fit.covariance))

@@ -237,9 +237,9 @@ def key_blocks(keys: Sequence[Key], runs: int, levels: int, common: bool) -> lis
     """Group the runs of a study of encoder resolution into tasks for worker processes.
 
     A task holds successive runs of one level, or of all levels if these share their random numbers.
-    It has at most LIMIT.TASK_RUNS runs, or one run of every level if there are more levels than
-    that. A study with few runs has smaller tasks, so that every worker gets some. The tasks do not
-    depend on the number of workers.
+    The number of runs in a task is limited (TASK_RUNS in limits.toml); a task of all levels has at
+    least one run of each. A study with few runs has smaller tasks, so that every worker gets some.
+    The tasks do not depend on the number of workers.
     """
     size = max(1, min(LIMIT.TASK_RUNS, runs // 4) // (levels if common else 1))
 

@@ -108,8 +108,8 @@ class LevelResult:
     residual_verdict : str
         Verdict of `increase` alone.
     decided_by : mapping of float, %
-        Errors that decided the verdict, by name, largest first; where no parameter decides, that
-        of the residual, rho.
+        Errors that decided the verdict, by name, largest first; where no parameter decides, the
+        error of the residual, rho.
     runs_needed : int
         Number of runs that makes the intervals of the deciding parameters narrower than 1 % of
     X_LS.
@@ -172,8 +172,8 @@ class Cestac(Result, Part):
     def deciding(self) -> tuple[str, ...]:
         """Names of the parameters that decide the verdict: those with a small %sigma, eq. (11).
 
-        Their %sigma is at most LIMIT.DECIDING, and study.cestac.columns names them or is
-        "essential" or "all".
+        Their %sigma is at most 10 % (DECIDING in limits.toml), and study.cestac.columns names them
+        or is "essential" or "all".
         """
         return deciding_names(self.reference)
 
@@ -278,8 +278,8 @@ class Cestac(Result, Part):
     def error_table(self) -> Table:
         """Return the table of errors %e, eq. (21), and %sigma, eq. (20), at every rounding step.
 
-        It has one line per parameter; `*` marks parameters that do not decide the verdict, "-"
-        parameters whose 95 % interval contains zero.
+        The table has one line per parameter; `*` marks parameters that do not decide the verdict,
+        "-" parameters whose 95 % interval contains zero.
         """
         reference = self.reference
         own = reference.relative_deviation
@@ -304,7 +304,7 @@ class Cestac(Result, Part):
     def residual_table(self) -> Table:
         """Return the table of residual errors and verdicts, with one column per rounding step.
 
-        It has both forms of %e(rho), the increase of the residual norm, and the verdicts.
+        The table has both forms of %e(rho), the increase of the residual norm, and the verdicts.
         """
         levels = self.levels
         rows = [
@@ -475,7 +475,9 @@ def names_judged(settings: CestacSettings) -> dict[str, tuple[str, ...]]:
 
 
 def deciding_names(reference: Estimate) -> tuple[str, ...]:
-    """Find the parameters that decide the verdict: %sigma, eq. (11), is at most LIMIT.DECIDING."""
+    """Find the parameters that decide the verdict: %sigma, eq. (11), is at most 10 % (DECIDING of
+    the limits).
+    """
     asked = reference.provenance.get(JUDGED, reference.names)
     return tuple(
         name
@@ -548,7 +550,7 @@ def level_result(
 
 
 def runs_needed(spread: float) -> int:
-    """Find how many runs give means with confidence intervals of +-1 % (LIMIT.NEGLIGIBLE).
+    """Find how many runs give means with confidence intervals of +-1 % (NEGLIGIBLE in limits.toml).
 
     spread : 100 sigma / |X_LS|.
     """

@@ -129,7 +129,7 @@ class System:
     def band_rows(self, X: Array) -> Iterator[Iterator[Array]]:
         """Yield the weighted rows [W Y] band by band, for each kind of band (`Observation.bands`).
 
-        Shape (rows, b + 1) each; the load is that of the parameters X.
+        Each band has the shape (rows, b + 1); the bands of load use the torques W X.
         """
         return self.observation.band_rows(
             self.names, 1 / np.array(self.scales), X, self.row_covariance
