@@ -264,7 +264,7 @@ def entry(function: Callable[P, R]) -> Callable[P, R]:
 def require_study(study: Study | None) -> Study:
     """Check that the argument is a Study; None becomes Study(), the default settings.
 
-    InputError for anything else.
+    Raise InputError for anything else.
     """
     study = Study() if study is None else study
     require_kind(
@@ -276,7 +276,7 @@ def require_study(study: Study | None) -> Study:
 def list_records(records: Records) -> tuple[Record, ...]:
     """Return one record or several records as a tuple.
 
-    InputError for anything else.
+    Raise InputError for anything else.
     """
     if isinstance(records, Record):
         return (records,)
@@ -296,7 +296,7 @@ def with_records(problem: Problem) -> Problem:
 def complete_study(study: Study) -> Study:
     """Check that method and reader of a study exist; complete the settings of the reader.
 
-    SettingsError if the method or the reader is unknown, or for a setting of another reader.
+    Raise SettingsError if the method or the reader is unknown, or for a setting of another reader.
     """
     _named(METHODS, study.estimate.method, ("estimate", "method"))
     reader, signals = reader_of(study.signals), study.signals
@@ -313,7 +313,7 @@ def complete_study(study: Study) -> Study:
 
 
 def reader_of(signals: Signals) -> Reader:
-    """Return the reader that signals.reader names; SettingsError if it is unknown."""
+    """Return the reader that signals.reader names; raise SettingsError if it is unknown."""
     return _named(READERS, signals.reader, ("signals", "reader"))
 
 

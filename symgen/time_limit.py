@@ -1,6 +1,6 @@
 """Limit the processor time of a derivation.
 
-So for any robot file, a command ends with a result or with one sentence.
+The limit ensures that a command ends with a result or with one sentence for any robot file.
 """
 
 from __future__ import annotations

@@ -207,7 +207,7 @@ class Advice(Result, Part):
         Standard deviation of the parameters for white torque noise of the motors of standard
         deviation 1 N m (N).
     real : tuple of ReaderAdvice
-        Real encoders read as positions, and as counts; empty if they were not asked for.
+        Real encoders read as positions, and as counts; empty if they were not requested.
     assumptions : tuple of str
     settings, provenance : mapping
     """
@@ -704,8 +704,8 @@ def deciding_columns(reference: Estimate) -> list[int]:
 def limits_of(delta: Array, change: Array, reference: Estimate) -> tuple[Limit, ...]:
     """Find the coarsest encoder steps that change parameters of small %sigma by up to 1 % and 5 %.
 
-    nan if the finest step is already too coarse or no parameter is judged; inf if every step is
-    fine enough.
+    A limit is nan if the finest step is already too coarse or no parameter is judged; inf if every
+    step is fine enough.
     """
     names, limits = deciding_names(reference), []
     e = {name: np.abs(change[:, reference.names.index(name)]) for name in names}
@@ -726,8 +726,8 @@ def limits_of(delta: Array, change: Array, reference: Estimate) -> tuple[Limit, 
 def crossing(delta: Array, e: Array, percent: float) -> float:
     """Find the smallest encoder step at which the change e of a parameter, %, reaches `percent`.
 
-    Between the points of the curve, lines are straight on logarithmic axes. nan if no point reaches
-    `percent`, or if the first point is already above.
+    Between the points of the curve, lines are straight on logarithmic axes. The result is nan if no
+    point reaches `percent`, or if the first point is already above.
     """
     above = np.flatnonzero(e >= percent)
     if not len(above) or (above[0] == 0 and e[0] > percent):

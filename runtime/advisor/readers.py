@@ -2,10 +2,11 @@
 
 The change of the estimate is computed along steps of law phase, for both readers
 (`runtime.advisor.coarse_encoders`). White noise does not describe a sawtooth that is locked to the
-motion, still less what a reader of counts leaves of it. So no first-order law is used: each point
-of the curve is a mean over phases of the encoder (a quadrature). Limits are the steps at which the
-curve crosses 1 % and 5 %. At the steps on either side, the number of phases is doubled until the
-limit is certain (CURVE_SHARPNESS in limits.toml). Runs of random phase confirm the limits.
+motion, and still less the error that a reader of counts leaves. So no first-order law is used: each
+point of the curve is a mean over phases of the encoder (a quadrature). Limits are the steps at
+which the curve crosses 1 % and 5 %. At the steps on either side, the number of phases is doubled
+until the limit is certain (CURVE_SHARPNESS in limits.toml). Runs of random phase confirm the
+limits.
 """
 
 from __future__ import annotations
@@ -225,7 +226,7 @@ def read_locked_steps(steps: ReadSteps) -> None:
 
 
 def read_vague_steps(steps: ReadSteps) -> None:
-    """Double the phases at the steps beside the limits, until the limits are certain.
+    """Double the phases at the steps next to the limits, until the limits are certain.
 
     If a curve ends below the last limit, coarser steps are then read.
     """

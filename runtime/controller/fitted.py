@@ -116,7 +116,7 @@ def law_of_controller(problem: Problem) -> Problem:
 
 
 class FittedLaw(Part):
-    """Part that tells what was fitted of the control law, ahead of the values of the parameters."""
+    """Part on the fitted values of the control law, printed before the values of the parameters."""
 
     name = "law_of_controller"
     title = "Law of the controller"
@@ -184,9 +184,10 @@ class UnsignedModel:
 
 
 def doubt_of_gains(result: Identification) -> Doubt | None:
-    """Return a warning if the records fit much better with other velocity gains than the given.
+    """Return a warning if the records fit much better with other velocity gains than the given
+    ones.
 
-    None if there is no such doubt.
+    The result is None if there is no such doubt.
     """
     sentence = gain_doubt(result.problem, result.estimate.relative_error)
     return Doubt("gain_doubt", "Law of the controller", sentence) if sentence else None

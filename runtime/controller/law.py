@@ -99,7 +99,8 @@ def late(t: Array, x: Array, delay: float) -> Array:
 def torque_law(controller: Controller | None, n: int, limits: Mapping[str, Any]) -> TorqueLaw:
     """Make the control law that gives the torques of n joints from the controller settings.
 
-    SettingsError for gains that need more than the recorded signals, such as that of an integral.
+    Raise SettingsError for gains that need more than the recorded signals, such as that of an
+    integral.
 
     limits : limits of the robot file.
     """

@@ -5,8 +5,8 @@ rows of poses that were recorded already, if there are any. The search finds
 
     max log det M,  M = W0'W0 + W'W        C = M^-1, the predicted covariance
 
-by exchange: each pose in turn is replaced by the one of CANDIDATES random poses that enlarges the
-determinant most, until no pose does. The result is the best of several random starts.
+by exchange: each pose in turn is replaced by that of CANDIDATES random poses which enlarges the
+determinant most, until no exchange enlarges it. The result is the best of several random starts.
 
 References: Fedorov (1972), Theory of Optimal Experiments; Atkinson, Donev and Tobias (2007).
 """
@@ -197,7 +197,9 @@ def _sum(A: Array, M: Array, chosen: Array) -> Array:
 
 
 def _exchanged(A: Array, M: Array, chosen: Array) -> Array:
-    """Exchange poses while this raises det M of the information matrix M; return pose numbers."""
+    """Exchange poses as long as an exchange raises det M of the information matrix M; return pose
+    numbers.
+    """
     chosen, before = chosen.copy(), np.empty(0)
     while not np.array_equal(chosen, before):
         before = chosen.copy()

@@ -205,10 +205,12 @@ def _with_values(
     values: Mapping[str, float],
     essential: Sequence[str],
 ) -> tuple[ExcitationSettings, tuple[str, ...]]:
-    """Leave out the parameters whose unit has no value in the robot file, as friction in most URDFs.
+    """Leave out parameters for whose unit the robot file has no value, such as friction in most
+    URDFs.
 
     A criterion compares parameters by their size. Returns settings that name the other parameters,
-    and the names left out: none if the user names parameters, or if no parameter has a value.
+    and the names left out. No name is left out if the user names parameters, or if no parameter has
+    a value.
     """
     if settings.columns not in ("essential", "all"):
         return settings, ()

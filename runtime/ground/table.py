@@ -1,7 +1,7 @@
 """A table of texts, printed as aligned text, in a notebook as HTML, or on the page of a report.
 
 The parameters of an Estimate are also written in LaTeX, like Table 2 of the chapter (package
-booktabs). No name, unit or label is interpreted as LaTeX: a text without one of the known forms
+booktabs). No name, unit or label is interpreted as LaTeX: a text that has none of the known forms
 below is escaped, character by character.
 """
 

@@ -39,7 +39,7 @@ STEP = 1e-30  # of complex derivatives
 class Place:
     """A place on the link of a load, with its pose T, shape (4, 4), in the frame of the link.
 
-    `name` is that of the robot file, and `words` says which place it is.
+    `name` is the name in the robot file, and `words` says in words which place it is.
     """
 
     name: str
@@ -56,7 +56,8 @@ class Body:
     place : Place
         The place whose frame is used.
     value, sigma : ndarray, shape (10,)
-        The NUMBERS, and their standard deviations; nan for numbers that no torque determines.
+        Mass, centre and inertia in the order of `NUMBERS`, and their standard deviations; nan for a
+        number that no torque determines.
     """
 
     place: Place
@@ -98,15 +99,16 @@ class Body:
 def place_on(
     mounts: Mapping[str, tuple[int, Any]], link: int, frame: int, at: str | None, T: Array
 ) -> Place:
-    """Choose the place for a load on `link`: `at`, or tool0, flange or the last one on the link.
+    """Choose the place for a load on `link`: `at` or, without `at`, tool0, flange or the last named
+    place on the link.
 
     Parameters
     ----------
     mounts : mapping
         Link and pose of each named place of the robot.
     frame : int
-        Number of the frame of the estimated parameters, which is the place if it is not that of the
-        link, or if the link has no named place.
+        Number of the frame of the estimated parameters, which is the place if it is not the frame
+        of the link, or if the link has no named place.
     at : str or None
         Name that the user gave.
     T : ndarray, shape (4, 4)
@@ -169,7 +171,8 @@ def body_at(
 
 
 def _body(pose: Array, chi: Array) -> Array:
-    """Compute mass, centre and tensor about it, shape (10,), in the frame in which `pose` is given.
+    """Compute mass, centre and the inertia tensor about the centre, shape (10,), in the frame in
+    which `pose` is given.
 
     chi may be complex.
     """

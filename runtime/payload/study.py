@@ -1,6 +1,6 @@
 """Analysis of a load: its inertial parameters, and the torque constants of the drives.
 
-`runtime.payload.load`, `runtime.payload.gains`.
+The computations are in `runtime.payload.load` and `runtime.payload.gains`.
 """
 
 from __future__ import annotations

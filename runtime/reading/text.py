@@ -4,7 +4,7 @@ Columns are separated by commas, semicolons, tabs or blanks. There is one header
 `#` starts a comment. Decimals have a point, or a comma if the settings say so. The text is UTF-8, or
 UTF-16 if it starts with the bytes ff fe or fe ff.
 
-The text of `ros2 topic echo --csv` is told by its first line (`runtime.reading.echoed`).
+The text of `ros2 topic echo --csv` is recognised by its first line (`runtime.reading.echoed`).
 
 NumPy parses a file whose fields are all numbers. Other files are read field by field: a column with
 other texts raises an error only if it is used, with the first line of such a text.
@@ -108,7 +108,7 @@ def _lines(path: Path) -> Lines:
 
 
 def _encoding(path: Path) -> str:
-    """Return the encoding of a text file: UTF-16 if it starts so, else UTF-8.
+    """Return the encoding of a text file: UTF-16 if its first bytes say so, else UTF-8.
 
     Raise InputError for a file whose first bytes are those of another kind of file.
     """

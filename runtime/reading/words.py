@@ -133,9 +133,10 @@ READ = {"t": time_unit, "q": position_unit, "tau": torque_unit, "qd": speed_unit
 
 @cache
 def stated_unit(name: str, quantity: str, written: bool = False) -> str:
-    """Find the unit of a quantity that a name states, in brackets or as a word; "" if none.
+    """Find the unit of a quantity that a name states, in brackets or as a word; "" if there is
+    none.
 
-    written : whether to return the text of the unit as it is in the name.
+    written : whether to return the unit as it is written in the name.
     """
     read = READ.get(quantity)
     if read is None:

@@ -36,8 +36,8 @@ def identify_each(
 ) -> bool:
     """Identify the parameters from each record of a study alone, and print a line for each record.
 
-    A record that cannot be used has its reason in its line, and the others go on. Results that
-    exist are kept.
+    If a record cannot be used, its line gives the reason, and the other records are still
+    identified. Existing results are kept.
 
     options : as for `runtime.identify`.
 
@@ -68,7 +68,7 @@ def identify_each(
 def jobs_of(study: Study) -> list[Job]:
     """List the records of a study, each with its name as a folder and a study of its own.
 
-    InputError if two records have the same name.
+    Raise InputError if two records have the same name.
     """
     from dataclasses import replace
 
@@ -128,9 +128,10 @@ def identified(
 
 
 def hash_of(study: Study, model: GeneratedModel, folder: Path, options: Mapping[str, Any]) -> str:
-    """Return the SHA-256 of all that decides the results of a study of one record in `folder`.
+    """Return the SHA-256 of all data that determine the results of a study of one record in
+    `folder`.
 
-    A file that cannot be read counts as empty: reading the record tells it.
+    A file that cannot be read counts as empty, because reading the record will report the error.
     """
     from runtime.ground.errors import InputError
     from runtime.reading.files import is_file, sha256_of
@@ -147,7 +148,7 @@ def hash_of(study: Study, model: GeneratedModel, folder: Path, options: Mapping[
 
 
 def result_of(folder: Path, hashed: str) -> dict[str, Any] | None:
-    """Return the results in a folder if they are those of `hashed`, else None."""
+    """Return the results in a folder if their hash is `hashed`, else None."""
     try:
         found = json.loads((folder / ESTIMATE).read_text(encoding="utf-8"))
         return dict(found) if found["provenance"]["asked"] == hashed else None
@@ -156,7 +157,7 @@ def result_of(folder: Path, hashed: str) -> dict[str, Any] | None:
 
 
 def told(name: str, found: Mapping[str, Any]) -> tuple[str, bool]:
-    """Write the line of a record from its results, and return whether they can be used."""
+    """Write the line of a record from its results, and return whether the results can be used."""
     used = [one for one in found["sets"] if one["name"] == found["model_columns"]]
     error = [*used, found][0]["relative_error"]
     answer = found["checklist"]

@@ -59,7 +59,7 @@ WENT = {
 
 
 class Verb(TyperCommand):
-    """A command, which refuses an empty -o: it would write into the folder where one stands."""
+    """A command that refuses an empty -o, which would mean the current folder."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:
         for option, value in pairwise([*args, "-"]):
@@ -157,7 +157,7 @@ def main() -> None:
 
 
 def _open_streams() -> None:
-    """Make sure that the file descriptors 0 to 2 are open, if need be on os.devnull.
+    """Make sure that the file descriptors 0 to 2 are open, by os.devnull if needed.
 
     Otherwise a file that the program opens could get the number of a closed stream, and receive the
     text that a library prints.

@@ -1,6 +1,6 @@
 """The command `symgen schema`: print the JSON Schema of robot files, study files or results.
 
-Editors use the schema of robot files, programs that read results use the other schemas.
+Editors use the schema of robot files; programs that read results use the other schemas.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a command tells on its error stream: lines for people, or JSON lines for programs.
+"""Messages of a command on its error stream: lines for people, or JSON lines for programs.
 
 SYMGEN_LINES=json symgen cestac arm.urdf study.yaml 2> lines.jsonl
 
@@ -29,7 +29,7 @@ def as_json() -> bool:
 
 
 def tell(line: str, **data: Any) -> None:
-    """Print a line for people, or the data that it says as one line of JSON."""
+    """Print a line for people, or its data as one line of JSON."""
     typer.echo(json.dumps(data) if as_json() else line, err=True)
 
 
@@ -44,7 +44,9 @@ def error_data(error: Exception) -> dict[str, Any]:
 
 
 def counter() -> Callable[[int, int], None]:
-    """Return a function that tells the numbers of finished steps and of all steps, ten times a s."""
+    """Return a function that prints the number of finished steps and of all steps, at most ten
+    times a second.
+    """
     last = 0.0
 
     def count(done: int, total: int) -> None:

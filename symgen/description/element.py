@@ -256,8 +256,8 @@ class Element:
 
     @property
     def scalars(self) -> dict[str, LawScalar]:
-        """Constants on which the law depends nonlinearly, by name: those of the robot file, or
-        defaults.
+        """Constants on which the law depends nonlinearly, by name, from the robot file or by
+        default.
         """
         kind = KINDS.get(self.kind)
         return {name: _scalar(name, x) for name, x in (kind.fit if kind else {}).items()} | {
@@ -302,10 +302,10 @@ class Element:
         return sorted(name.removeprefix(CHANNEL) for name in names if name.startswith(CHANNEL))
 
     def law(self, j: int) -> Expression:
-        """Return the torque law of the element for frame j as an expression: the torque along s = G
-        q if the parameter is 1.
+        """Return the torque law of the element for frame j as an expression: the torque along the
+        coordinate s = G q for the parameter value 1.
 
-        It is zero if the law is an energy.
+        The law is zero if the user gives an energy.
         """
         return self._of_key(self.torque or KINDS[self.kind].torque, j)
 
@@ -316,9 +316,9 @@ class Element:
     def laws(self, j: int) -> tuple[Expression, dict[int, Expression]]:
         """Return the element's torque along the coordinate s = G q, and torques at single joints.
 
-        They are those for frame j and the parameter value 1. With the torque x along s and the
-        energy U, Gamma = G' x + dU/dq_i. The torque x includes the derivative of U with respect to
-        s. The second result maps each joint i that U names to dU/dq_i.
+        The torques are those for frame j and the parameter value 1. With the torque x along s and
+        the energy U, Gamma = G' x + dU/dq_i. The torque x includes the derivative of U with respect
+        to s. The second result maps each joint i that U names to dU/dq_i.
         """
         law, U = self.law(j), self.potential(j)
         joints = sorted(int(match[2]) for n in U.symbols if (match := STATE.match(n)) and match[2])
@@ -329,7 +329,7 @@ class Element:
         """Whether the element has a special law: not inertia, viscous or Coulomb friction, offset
         or spring.
 
-        This includes every law that the user writes, and every law with nonlinear constants.
+        Every law that the user writes, and every law with nonlinear constants, is special.
         """
         return (
             bool(self.torque or self.energy or self.scalars)

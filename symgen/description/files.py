@@ -70,7 +70,7 @@ def load_robot(
         an AngleWarning names the largest change, if it exceeds 1e-9 rad.
     base : str, optional
         `moving`: frame 0 is a body whose motion is measured; `free`: the wrench on this body is
-        measured too; `fixed`: it stands. Default: that of the file.
+        measured too; `fixed`: frame 0 stands still. Default: the base of the file.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def load_robot(
 
 
 def robot_of(robot: str | Path | Robot) -> Robot:
-    """Return a robot as it is, or that of a packaged name or a file.
+    """Return a Robot as it is, or load a packaged robot by name, or a robot file.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def robot_of(robot: str | Path | Robot) -> Robot:
 
 
 def on_base(robot: Robot, base: str | None) -> Robot:
-    """Return the robot with a fixed, moving or free base; None leaves that of the file."""
+    """Return the robot with a fixed, moving or free base; None keeps the base of the file."""
     if base is None:
         return robot
     if not isinstance(base, str) or base not in BASES:
@@ -254,8 +254,8 @@ def _beside(path: Path) -> Callable[[str, int], bytes]:
 def loops_beside(path: Path) -> Any:
     """Return the LoopsText of the file with the loops of a URDF or MJCF, or None if there is none.
 
-    It is NAME.loops.yaml in the same folder, or loop_closures.yaml there; of a file in a folder
-    `urdf`, also in the folder that holds it, or in `config` there.
+    The file is NAME.loops.yaml or loop_closures.yaml in the same folder. For a robot file in a
+    folder `urdf`, it may also be in the parent folder, or in the folder `config` of that folder.
     """
     from symgen.description.loops_file import EXPORTED, LoopsText  # numpy
 

@@ -3,8 +3,9 @@
 A text is read as plain data with line numbers and then converted to a checked Robot. A written text
 is read as the same Robot. Only mappings, lists and scalars of the core schema are read. Tags,
 anchors and aliases, merge keys, repeated keys, second documents and non-finite numbers are refused,
-so that a file means what it shows. Whatever the bytes are, the only exception that `parse_robot`
-raises is DescriptionError, with file and line; its message names the wrong field.
+so that a reader of the file sees everything that it means. Whatever the bytes are, the only
+exception that `parse_robot` raises is DescriptionError, with file and line; its message names the
+wrong field.
 """
 
 from __future__ import annotations
@@ -442,7 +443,7 @@ def tables_of(robot: Robot) -> dict[str, Any]:
 
 
 def data_of(robot: Robot) -> dict[str, Any]:
-    """Return the data of a robot file that describes `robot`, of which `described` makes it again."""
+    """Return the data of a robot file from which `described` makes `robot` again."""
     data: dict[str, Any] = document(write_yaml(robot).encode(), {})
     return data
 

@@ -15,7 +15,7 @@ class Target(NamedTuple):
     Attributes
     ----------
     file : str
-        Name of the file; {} stands for the name of the robot. Where each function has a file of its
+        Name of the file; {} stands for the name of the robot. If each function has a file of its
         own, a second {} stands for the function.
     language : str
         Language of the file, or the arrays for which it is written.

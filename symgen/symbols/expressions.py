@@ -82,7 +82,7 @@ def total(terms: Iterable[Tree]) -> Tree:
 
 
 def expression(e: Expression) -> Tree:
-    """Convert a constant expression, or one linear in joint positions, to a SymPy expression.
+    """Convert an expression that is constant, or linear in joint positions, to a SymPy expression.
 
     The order of its terms is the order of its printed text.
     """

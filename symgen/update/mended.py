@@ -25,10 +25,10 @@ def mended(
     """Repair a study (`runtime.repair`); return the repair, and the text of the mended study.
 
     described : the robot, as its file describes it.
-    records : those of the study.
-    folder : that of the mended study, to which the names of its files are relative.
+    records : records of the study.
+    folder : folder of the mended study, to which the names of its files are relative.
 
-    The text is "" if nothing changes. InputError if records or study cannot be repaired.
+    The text is "" if nothing changes. Raise InputError if records or study cannot be repaired.
     """
     import runtime
     from runtime.compose import records_of

@@ -5,12 +5,12 @@ axes in which the file states the tensor, the numbers are
 
     mass M,    centre MS / M in the link frame,    I = R' (J - M (c'c 1 - c c')) R about the centre
 
-A URDF uses the axes of its <inertial>, which stay, and <dynamics> of a joint; it has no attribute
-for motor inertia, offsets and springs. An MJCF has fullinertia in axes of the body, or diaginertia
-with the orientation of its principal axes. A body whose inertia comes from its geoms gets an
-<inertial>; inertiafromgeom="true" becomes "auto", so that other bodies stay as they are. A class of
-defaults, which holds for many joints, is not changed: a joint that differs gets an attribute of its
-own.
+A URDF uses the axes of its <inertial>, which stay, and <dynamics> of a joint; a URDF has no
+attribute for motor inertia, offsets and springs. An MJCF has fullinertia in axes of the body, or
+diaginertia with the orientation of its principal axes. A body whose inertia comes from its geoms
+gets an <inertial>; inertiafromgeom="true" becomes "auto", so that other bodies stay as they are. A
+class of defaults, which holds for many joints, is not changed: a joint that differs gets an
+attribute of its own.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Attributes:
         For each child element of <inertial> ("" is <inertial> itself): its attributes, and the
         index in NUMBERS of each number in them.
     dynamics : str
-        The child element of a joint that holds its parameters; "" if the joint itself does.
+        The child element of a joint that contains its parameters; "" if the joint itself has them.
     joint : mapping
         The attribute of each family of joint parameters, such as damping for FV.
     """
@@ -128,8 +128,8 @@ class LinkPlace:
     axes : ndarray, shape (3, 3)
         Orientation of the axes of the tensor in the link, as in the file or as compiled by MuJoCo.
     stated : ndarray, shape (10,), or None
-        NUMBERS as a URDF states them; None for an MJCF, whose numbers are compiled, unless the link
-        has no mass: its ten parameters do not contain its centre.
+        NUMBERS as a URDF states them; None for an MJCF, whose numbers are compiled. A link without
+        mass has them even in an MJCF, because its ten parameters do not contain its centre.
     """
 
     attributes: Attributes
@@ -282,7 +282,9 @@ class Places:
         return None if without else self.attributes.joint.get(family)
 
     def heed_inertials(self, edits: XmlEdits) -> None:
-        """Set inertiafromgeom to "auto" in the file, so that MuJoCo uses an inserted <inertial>."""
+        """Set inertiafromgeom to "auto" in the file, so that MuJoCo uses the <inertial> that was
+        inserted.
+        """
         own = (e for body in self.links.values() for e in body.own("inertial"))
         ignored = next(own, None)
         if self.from_geoms and ignored is not None:
@@ -414,7 +416,7 @@ class RobotText:
     file : str
         Name of the file.
     tree : Tree
-        Links and joints that are used: all of the file, or a chain of it.
+        Links and joints that are used: the whole file, or a chain in it.
     table : Table
         Khalil frames of `tree`.
     robot : Robot
@@ -430,7 +432,9 @@ class RobotText:
     places: Places
 
     def on(self, base: str) -> RobotText:
-        """Return the text as that of a robot with this base, whose link 0 may have parameters."""
+        """Return the same text for a robot whose base is `base`, so that link 0 has parameters if
+        the base is free.
+        """
         return replace(self, robot=on_base(self.robot, base))
 
     @property

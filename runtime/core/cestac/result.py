@@ -17,8 +17,8 @@ each form:
 As printed, (22) grows to hundreds of per cent where Table 3 says about ten; the increase relative
 to ||Y|| has the printed order of magnitude.
 
-The verdict is "practically unbiased" if the %e (21) of all parameters asked for are below 1 %,
-"biased" if one of them is above 5 %, and "doubtful" between. Parameters whose own %sigma (11) is
+The verdict is "practically unbiased" if the %e (21) of all requested parameters are below 1 %,
+"biased" if one of these is above 5 %, and "doubtful" between. Parameters whose own %sigma (11) is
 large do not decide; the result names the parameters that did. Section 4.1.4 of the chapter calls
 the residual (22) the best single indicator, because it covers the whole model: `residual_verdict`
 applies the same two limits to its increase. The residual hardly sees a parameter on which the
@@ -195,7 +195,7 @@ class Cestac(Result, Part):
     def enough(self) -> Level | None:
         """Coarsest encoder step such that this step and all finer ones leave the estimate unbiased.
 
-        None if the finest step is not practically unbiased.
+        The value is None if the finest step is not practically unbiased.
         """
         finest_first = sorted(self.encoder_steps, key=lambda r: r.level.delta)
         fine = list(takewhile(lambda r: r.verdict == "unbiased", finest_first))

@@ -44,7 +44,7 @@ from runtime.ground.limits import LIMIT
 def block_covariance(blocks: Iterable[Array], X: Array, T: Array) -> Array:
     """Compute the jackknife covariance of X over blocks of time, shape (b, b).
 
-    nan for fewer than two blocks, and for a parameter that only one block determines.
+    Entries are nan for fewer than two blocks, and for a parameter that only one block determines.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def corrected_deviations(
     friction.
 
     The deviations come from the jackknife over blocks of time; over one kind of bands where that
-    deviation is clearly larger. nan where only one block determines a parameter.
+    deviation is clearly larger. A deviation is nan if only one block determines the parameter.
 
     Parameters
     ----------

@@ -143,7 +143,7 @@ def ordinary(
 
     X = argmin ||Y - W X||,    C = sigma_rho^2 (W'W)^-1,    sigma_rho^2 = ||Y - W X||^2 / (r - b)
 
-    SettingsError if `settings` names a column that the observation lacks.
+    Raise SettingsError if `settings` names a column that the observation lacks.
     """
     names = observation.names if settings.columns == "all" else tuple(settings.columns)
     if unknown := [name for name in names if name not in observation.names]:

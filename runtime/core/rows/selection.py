@@ -1,6 +1,6 @@
 """Choice of the rows of Y = W X + rho that are used, by time, decimation, speed and known state.
 
-The choice is made once, on the measured record, and shared by every run of a study, so that noise
+The choice is made once, on the measured record, and every run of a study uses it, so that noise
 never decides whether a row is used.
 """
 
@@ -49,7 +49,7 @@ Chosen on simulated records (docs/theory/counts.md).
 class Selection:
     """Time window of a record, and the decimated rows in it that are used.
 
-    It is the same in every run of a study.
+    The selection is the same in every run of a study.
 
     samples : the window, in raw samples.
     kept : shape (K,), kept instants, from the start of the window.
@@ -84,7 +84,7 @@ def window_of(
 ) -> tuple[int, int]:
     """Find the samples [start, stop) with t0 <= t <= t1, s; None leaves an end open.
 
-    margin : samples left out at each end of the record, a tenth of it at most.
+    margin : samples left out at each end of the record, at most a tenth of the record.
     """
     t0, t1 = window
     start = 0 if t0 is None else int(np.searchsorted(t, t0, side="left"))
@@ -106,7 +106,7 @@ EXCERPT = 2**16
 def excerpt(record: Record, rows: Rows) -> slice:
     """Return the slice of the first samples in the time window, from which "auto" settings follow.
 
-    It has EXCERPT samples at most.
+    The slice has EXCERPT samples at most.
     """
     start, stop = window_of(record.t, rows.window, record.name)
     return slice(start, min(stop, start + EXCERPT))
@@ -116,7 +116,7 @@ def instants_of(record: Record, signals: Signals, rows: Rows) -> tuple[slice, in
     """Choose the time window of a record, and the samples in it that decimation keeps.
 
     Returns the raw samples of the window, the factor of the decimation, the samples of the window
-    that it keeps, shape (K,), and the number of these whose rows are left out at each end.
+    that it keeps, shape (K,), and the number of kept samples whose rows are left out at each end.
 
     The regressor near an end of the record is that of a low-pass which starts there. Decimation
     spreads this error over 27 instants (benchmarks/truth.md, Ends of records), so that rows.trim:
