@@ -305,7 +305,7 @@ def complete_study(study: Study) -> Study:
         if f.name not in known and getattr(signals, f.name) != f.default:
             users = [name for name, one in READERS.items() if f.name in one.own_settings]
             raise SettingsError(
-                f"given, but reader is {signals.reader}; set reader: {' or '.join(users)}, or "
+                f"the reader {signals.reader} does not use this key; set reader: {' or '.join(users)}, or "
                 "remove this key",
                 path=("signals", f.name),
             )
@@ -919,7 +919,7 @@ def excite(
     map: Callable[..., Iterable[Any]] = map,
     progress: Callable[[int, int], None] | None = None,
 ) -> Excitation:
-    """Search an exciting motion within the robot's limits, with the best criterion of the study.
+    """Search for an exciting motion within the robot's limits, with the best criterion of the study.
 
     The best motion over all starts of the search is returned. Without records, the values of the
     robot file serve as parameters.
@@ -944,7 +944,7 @@ def excite(
 def static_poses(
     model: GeneratedModel, records: Records = (), study: Study | None = None
 ) -> StaticPoses:
-    """Search static poses that, with recorded poses, determine the gravity parameters best.
+    """Search for static poses that, with recorded poses, determine the gravity parameters best.
 
     study.excitation.poses is the number of new poses, default 20. All poses respect the limits of
     q.
@@ -974,7 +974,7 @@ def repair(
     further: Sequence[Record] | None = None,
     folder: str | Path | None = None,
 ) -> Repair:
-    """Search the lines of a study that are wrong, several at once, and write the mended study.
+    """Search for the lines of a study that are wrong, several at once, and write the mended study.
 
     The lines are searched on some blocks of the records, and judged on the other blocks and on the
     validation records. All changes are kept, or none.

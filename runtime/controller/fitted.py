@@ -327,7 +327,7 @@ def _best(
     delay: float,
     cuts: bool,
 ) -> tuple[Array, float, float]:
-    """Search kd and delay from several kd; return those of the smallest misfit, and the misfit."""
+    """Search for kd and delay from several kd; return those of the smallest misfit, and the misfit."""
     ends = [_search_kd(torques, gains, late_too, kd, delay, cuts) for kd in starts]
     return min(ends, key=lambda end: end[2])
 
@@ -340,7 +340,7 @@ def _search_kd(
     delay: float,
     cuts: bool,
 ) -> tuple[Array, float, float]:
-    """Search velocity gains kd and delay by Gauss-Newton iterations from given kd and delay.
+    """Search for velocity gains kd and delay by Gauss-Newton iterations from given kd and delay.
 
     Returns kd, the delay and their misfit, which is nan if the drives do not cut.
 

@@ -120,7 +120,7 @@ def on_links(problem: Problem) -> dict[str, Any]:
     torques = any(record.tau.any() for record in problem.records)
     if problem.records and not torques and not any(map(_acts, problem.records)):
         raise InputError(
-            "all torques and all wrenches are zero, so that no row tells a parameter; give the "
+            "all torques and all wrenches are zero, so that no row determines a parameter; give the "
             "joint torques (record.columns.tau), or the wrench of the world"
         )
     changed: dict[str, Any] = {

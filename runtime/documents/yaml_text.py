@@ -58,12 +58,12 @@ def yaml_values(text: str, *, file: str) -> tuple[Any, dict[Path, int]]:
     except MarkedYAMLError as e:
         mark = e.problem_mark or e.context_mark
         raise SettingsError(
-            f"not YAML: {e.problem or e.context}",
+            f"the text is not YAML: {e.problem or e.context}",
             file=file,
             line=None if mark is None else mark.line + 1,
         ) from None
     except Exception as e:  # the scanner raises IndexError, AttributeError and others too
-        raise SettingsError(f"not YAML: {first_line(e)}", file=file) from None
+        raise SettingsError(f"the text is not YAML: {first_line(e)}", file=file) from None
 
 
 def yaml_text(mapping: Mapping[str, Any], comments: Mapping[Path, str] | None = None) -> str:

@@ -15,7 +15,7 @@ of their parameter, so that parameters are compared by their relative error.
 W is the observation matrix of the identification: the motion, sampled at the controller rate,
 passes through the filters and the decimation of the study. A parameter smaller than a hundredth of
 the largest parameter of its unit counts as if it had the size of this hundredth.
-`runtime.excitation.search` searches the motion.
+`runtime.excitation.search` searches for the motion.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Search static poses that determine the gravity parameters best, within the limits of the joints.
+"""Search for static poses that determine the gravity parameters best, within the limits of the joints.
 
 W holds the rows of the poses, divided by the standard deviations s_j of the torques; W0 holds the
 rows of poses that were recorded already, if there are any. The search finds
@@ -93,7 +93,7 @@ class StaticPoses(Result, keys="poses condition sigma compared s taken_in"):
 
 
 def static_poses(problem: Problem) -> StaticPoses:
-    """Search the static poses that determine the gravity parameters best, within the limits of q.
+    """Search for the static poses that determine the gravity parameters best, within the limits of q.
 
     study.excitation.poses is the number of poses, default 20.
 

@@ -1,4 +1,4 @@
-"""Search an exciting motion from random starts, and predict the precision of the best motion.
+"""Search for an exciting motion from random starts, and predict the precision of the best motion.
 
     excitation = excite(model, record, study)         # section `excitation` of the study
     excitation.verdict, excitation.relative_sigma     # predicted %sigma of every parameter
@@ -50,7 +50,7 @@ def excite(
     map: Callable[..., Iterable[Any]] = map,
     progress: Callable[[int, int], None] | None = None,
 ) -> Excitation:
-    """Search the motion of best criterion within the limits at every sample of the controller.
+    """Search for the motion of best criterion within the limits at every sample of the controller.
 
     The search runs from all starts of study.excitation.
 

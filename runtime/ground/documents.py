@@ -163,7 +163,7 @@ def from_text(kind: type[T], text: str, schema: str, file: str) -> T:
     try:
         data = json.loads(text, parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as e:
-        raise InputError(f"not JSON: {e}", file=file) from e
+        raise InputError(f"the text is not JSON: {e}", file=file) from e
     given = data.get("schema") if isinstance(data, dict) else None
     if not isinstance(given, str) or given.partition("/")[0] != schema.partition("/")[0]:
         raise InputError(

@@ -53,7 +53,7 @@ def along(g: Array, n: int, before: Array) -> Cause:
 
 
 def tilted(reading: Reading) -> Cause | None:
-    """Search the direction of gravity that explains the rows of the search best.
+    """Search for the direction of gravity that explains the rows of the search best.
 
     Return None if the best direction is that of the reading, or if the rows do not determine it.
     """

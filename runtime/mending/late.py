@@ -25,7 +25,7 @@ Array = np.ndarray
 
 
 def late_torques(reading: Reading) -> tuple[Array, str] | None:
-    """Search the delays of the torques, s, shape (n,); None if no joint is late beyond doubt.
+    """Search for the delays of the torques, s, shape (n,); None if no joint is late beyond doubt.
 
     Return the delays with a sentence.
     """

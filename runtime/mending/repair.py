@@ -203,7 +203,7 @@ def repair(
     variants: Any,
     folder: str | Path | None = None,
 ) -> Repair:
-    """Search the lines of a study that are wrong, and write the study in which they are right.
+    """Search for the lines of a study that are wrong, and write the study in which they are right.
 
     Parameters
     ----------
@@ -229,7 +229,9 @@ def repair(
     data = data_of(case, problem, lines, columns, records[0].rate)
     start = Reading.given(data, lines)
     if start.baseline is None:
-        raise InputError("the rows of the study cannot be fitted; identify says why")
+        raise InputError(
+            "the rows of the study cannot be fitted; `symgen identify` gives the reason"
+        )
     began = process_time()
     found = search(start, lambda: process_time() - began)
     best = _without_needless(found.best, start, found.N)

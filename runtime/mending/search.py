@@ -52,7 +52,7 @@ class Found:
 
 
 def search(start: Reading, spent: Callable[[], float]) -> Found:
-    """Search the readings that explain the rows of the search better than the study as given.
+    """Search for the readings that explain the rows of the search better than the study as given.
 
     spent : function that returns the processor time so far, s.
     """

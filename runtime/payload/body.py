@@ -123,7 +123,7 @@ def place_on(
     if at is not None and at not in names:
         listed = ", ".join(names[:20]) or "none"
         raise SettingsError(
-            f"{at!r} is no link of the robot file on link {link}; those are {listed}",
+            f"{at!r} is no named place on link {link}; the robot file has the places {listed}",
             path=("payload", "at"),
         )
     if at is None and (frame != link or not names):

@@ -545,7 +545,7 @@ def _of_numbers(baseline: Baseline, robot: Robot) -> list[Trial]:
 
 
 def _search_number(baseline: Baseline, row: Row, change: Change, first: float) -> Trial | None:
-    """Search the size xi of one possible error, such as a torque factor, that fits the record best.
+    """Search for the size xi of one possible error, such as a torque factor, that fits the record best.
 
     Return None if no size improves the fit enough. A few sizes are tried with the joint weights of
     the study, then a bounded search uses the weights of each trial. Each unknown number of the

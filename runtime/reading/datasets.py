@@ -194,7 +194,7 @@ def fetch(name: str, file: str, *, cache: Path | None = None) -> Path:
 
 
 def _local(name: str, file: str, cache: Path | None) -> tuple[Path | None, list[str]]:
-    """Search a file of a dataset on this machine; return its path or None, and failed attempts."""
+    """Search for a file of a dataset on this machine; return its path or None, and failed attempts."""
     expected = _digest(name, file)
     tried: list[str] = []
     data = os.environ.get("SYMGEN_DATA")

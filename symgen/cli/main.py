@@ -31,7 +31,7 @@ PANELS = {
         "apply": "Write identified values into your own URDF or MJCF.",
         "report": "Identify a robot from a record and judge the result on one page.",
         "compare": "Find which of several studies predicts best.",
-        "excite": "Search a motion that excites the parameters within the limits.",
+        "excite": "Search for a motion that excites the parameters within the limits.",
         "simulate": "Simulate the closed loop of a study file and write its record.",
     },
     "Encoder": {

@@ -316,8 +316,8 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
     for record in records[1:]:
         if Path(record).suffix.lower() in (".yaml", ".yml") or not is_measured(Path(record)):
             raise InputError(
-                "not a measured file; every RECORD after the first must be one, with the same columns, "
-                "units and side (joint or motor) as the first",
+                "this is no measured file; every RECORD after the first must be a measured file with "
+                "the same columns, units and side (joint or motor) as the first",
                 file=record,
             )
         like = study.record[-1]

@@ -36,7 +36,7 @@ def show(
         str | None,
         typer.Option(
             help="A model in symbols: pose, jacobian, inertia_matrix, inverse_dynamics, gravity, "
-            "... (a wrong name lists them)."
+            "...; a wrong name prints the list."
         ),
     ] = None,
     frame: Annotated[

@@ -176,7 +176,7 @@ def _close(table: Table, cut: Cut) -> None:
     if table.tree.floats and not _below(table, j) & _below(table, twin):
         raise DescriptionError(
             f"loop {cut.loop.name!a:.60} closes on the free base, which is read only for loops inside "
-            "one of its limbs; hold the base: symgen convert --lock, with the name of its joint and =0",
+            "one of its limbs; hold the base by symgen convert --lock JOINT=0, with the name of its joint",
             line=cut.loop.line or None,
         )
     start = {number[name]: round(x, START_DIGITS) + 0.0 for name, x in positions.items()}

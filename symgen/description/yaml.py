@@ -149,7 +149,7 @@ def document(content: bytes, lines: dict[Path, int]) -> Any:
         )
         advice = next((f"; {text}" for part, text in _YAML_ADVICE.items() if part in problem), "")
         raise DescriptionError(
-            f"not YAML: {problem}{advice}", line=mark.line + 1 if mark else None
+            f"the text is not YAML: {problem}{advice}", line=mark.line + 1 if mark else None
         ) from error
     except RecursionError as error:
         raise DescriptionError(
@@ -157,7 +157,7 @@ def document(content: bytes, lines: dict[Path, int]) -> Any:
         ) from error
     except Exception as error:  # on malformed text the scanner raises IndexError and others too
         first = (str(error) or type(error).__name__).splitlines()[0]
-        raise DescriptionError(f"not YAML: {first}") from error
+        raise DescriptionError(f"the text is not YAML: {first}") from error
 
 
 def _value(node: Node, path: Path, lines: dict[Path, int], resolver: Any) -> Any:

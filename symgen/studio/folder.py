@@ -216,7 +216,7 @@ class WorkFolder:
         Raise InputError if there is no earlier record.
         """
         if not self.record_before:
-            raise InputError("there is no record before; reload the page")
+            raise InputError("there is no earlier record; reload the page")
         earlier = self.kept("record")[-1]
         self._keep_record()
         for path in earlier.iterdir():

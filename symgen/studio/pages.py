@@ -291,7 +291,7 @@ class Pages:
             return
         value = await self.server.view(views.preview, str(part), {"topic": None, "joints": ()})
         if "error" in value:
-            raise InputError(f"{part.name[:80]}: {value['error']}; the record before stays")
+            raise InputError(f"{part.name[:80]}: {value['error']}; the earlier record stays in use")
 
     async def _earlier_record(self, form: dict[str, str]) -> str:
         self.folder.exchange_record()

@@ -408,7 +408,7 @@ def findings(robot_file: str, study_file: str) -> dict[str, Any]:
 
 @answered
 def repair(robot_file: str, study_file: str) -> dict[str, Any]:
-    """Search the errors of the study, and write the mended study over it; list the changes.
+    """Search for the errors of the study, and write the mended study over it; list the changes.
 
     The list contains the earlier text of the study, so that it can be restored. If the study or the
     robot has been changed meanwhile, nothing is written.

@@ -1,4 +1,4 @@
-"""Search the errors of a study with the model of a robot, and write the mended study as text."""
+"""Search for the errors of a study with the model of a robot, and write the mended study as text."""
 
 from __future__ import annotations
 
@@ -46,8 +46,9 @@ def mended(
     ):
         if not (same(read.q, meant.q) and same(read.tau, meant.tau)):
             raise InputError(
-                "the changes found are not those that the study would make; nothing is written; "
-                "make them by hand: " + "; ".join(change.line for change in repair.changes)
+                "the mended study would not have the effect of the changes that were found, so that "
+                "nothing is written; make these changes by hand: "
+                + "; ".join(change.line for change in repair.changes)
             )
     return repair, study_text(repair.study, folder, defaults=False, comments=repair.comments)
 

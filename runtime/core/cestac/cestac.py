@@ -126,8 +126,8 @@ def cestac(
     name = study.signals.reader
     if settings.delta and not problem.reader.reads_rounded:
         raise SettingsError(
-            f"steps, but signals.reader: {name} does not say how it reads rounded positions; set "
-            "another reader, or delta: []",
+            f"signals.reader: {name} cannot read rounded positions; set another reader, or "
+            "delta: []",
             path=("cestac", "delta"),
         )
     if problem.reader.encoder is not None and settings.delta and settings.rounding != "phase":
